@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 #include <sched.h>
 #include <stdlib.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <fstream>
 
 #include "common/base/safe_text.h"
@@ -23,16 +23,6 @@ std::string processor() {
     if (line.starts_with("model name"))
       if (const auto at = line.find(": "); at != std::string::npos) return plain_text(line.substr(at + 2));
   return "a processor that does not tell its name";
-}
-
-double seconds_of(const timeval& t) {
-  return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-}
-
-// User and system time of this process.
-double cpu_seconds() {
-  rusage usage{};
-  return ::getrusage(RUSAGE_SELF, &usage) == 0 ? seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime) : 0;
 }
 
 }  // namespace
@@ -80,7 +70,7 @@ Others::Times Others::taken() {
     if (i != kIdle && i != kWaiting) times.busy += ticks / tick;
   }
   if (!file || name != "cpu") return {};
-  times.own = cpu_seconds();
+  times.own = static_cast<double>(std::clock()) / CLOCKS_PER_SEC;  // user and system time of this process
   return times;
 }
 

@@ -151,36 +151,28 @@ int run(const CompareFlags& flags) {
 }
 
 void add_options(CLI::App& compare, CompareFlags& flags) {
-  compare.add_option("scenes", flags.scenes, "one scene, or a set")->required()->type_name("SCENE...");
-  compare.add_option("--integrators", flags.integrators, "those that race; default: the scene's")
+  add_option(compare, "scenes", flags.scenes, "SCENE...", "one scene, or a set")->required();
+  add_option(compare, "--integrators", flags.integrators, "A,B", "those that race; default: the scene's")
       ->delimiter(',')
-      ->allow_extra_args(false)
-      ->type_name("A,B");
-  compare.add_option("--time", flags.time, "that each entrant has for each seed, after loading")
-      ->required()
-      ->type_name("SECONDS");
-  compare.add_option("--clock", flags.clock, "wall, or cpu: CPU seconds over threads, for a busy machine")
-      ->check(CLI::IsMember({"wall", "cpu"}))
-      ->type_name("wall|cpu");
-  compare.add_option("--spp", flags.spp, "stop at so many samples if that comes first")->type_name("N");
-  compare.add_option("--seeds", flags.seeds, "renders of each entrant (default 5)")->type_name("K");
-  compare.add_option("--seed", flags.first_seed, "the first of them (default 0)")->type_name("N");
-  compare.add_option("--threads", flags.threads, "and cores, for everybody; default: all")->type_name("N");
-  compare.add_option("--size", flags.size, "size of the image instead of the scene's")->type_name("WxH");
-  compare
-      .add_option("--reference", flags.reference,
-                  "the right picture, or two independent ones; default: the other seeds' pictures")
+      ->allow_extra_args(false);
+  add_option(compare, "--time", flags.time, "SECONDS", "that each entrant has for each seed, after loading")
+      ->required();
+  add_option(compare, "--clock", flags.clock, "wall|cpu",
+             "wall, or cpu: CPU seconds over threads, for a busy machine")
+      ->check(CLI::IsMember({"wall", "cpu"}));
+  add_option(compare, "--spp", flags.spp, "N", "stop at so many samples if that comes first");
+  add_option(compare, "--seeds", flags.seeds, "K", "renders of each entrant (default 5)");
+  add_option(compare, "--seed", flags.first_seed, "N", "the first of them (default 0)");
+  add_option(compare, "--threads", flags.threads, "N", "and cores, for everybody; default: all");
+  add_option(compare, "--size", flags.size, "WxH", "size of the image instead of the scene's");
+  add_option(compare, "--reference", flags.reference, "REF.exr[,REF2.exr]",
+             "the right picture, or two independent ones; default: the other seeds' pictures")
       ->delimiter(',')
-      ->allow_extra_args(false)
-      ->type_name("REF.exr[,REF2.exr]");
-  compare
-      .add_option("--references", flags.references,
-                  "of a set: a folder with NAME.exr, or NAME.0.exr and NAME.1.exr")
-      ->type_name("DIR");
+      ->allow_extra_args(false);
+  add_option(compare, "--references", flags.references, "DIR",
+             "of a set: a folder with NAME.exr, or NAME.0.exr and NAME.1.exr");
   add_defines(compare, flags.defines);
-  compare.add_option("--report", flags.report, "the folder for page, plots and tables")
-      ->required()
-      ->type_name("DIR");
+  add_option(compare, "--report", flags.report, "DIR", "the folder for page, plots and tables")->required();
   compare.add_flag("--strict", flags.strict, "warnings of the scene are errors");
   compare.add_flag("--quiet", flags.quiet, "only warnings, errors and the figures");
 }

@@ -191,8 +191,8 @@ void add_convert(CLI::App& app, Action& action) {
       "the scene has for them, unless they are there; a name that leads out of the folder becomes one in it. "
       "OUT has the same digest then, if no file had to be renamed; it is printed",
       run);
-  convert->add_option("in", flags->in, "the scene")->required()->type_name("IN");
-  convert->add_option("out", flags->out, "the XML file to write")->required()->type_name("OUT");
+  add_option(*convert, "in", flags->in, "IN", "the scene")->required();
+  add_option(*convert, "out", flags->out, "OUT", "the XML file to write")->required();
   add_defines(*convert, flags->defines);
   convert->add_flag("--strict", flags->strict, "warnings are errors");
   convert->add_flag("--quiet", flags->quiet, "only the digest, warnings and errors");

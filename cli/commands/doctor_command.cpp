@@ -9,6 +9,7 @@
 #include "cli/doctor/findings.h"
 #include "cli/farm/farm_api.h"
 #include "cli/output/console.h"
+#include "cli/output/job_options.h"
 #include "cli/output/reply_fields.h"
 #include "common/base/safe_text.h"
 
@@ -77,11 +78,10 @@ void add_doctor(CLI::App& app, Action& action) {
       app, action, "doctor",
       "checks this machine, and whether a farm can be used from it; exit code 1 if not", run_doctor);
   flags->farm.add_to(*doctor);
-  doctor->add_option("--farm", flags->farm.url, "the same as --to")->type_name("URL")->excludes("--to");
-  doctor->add_option("--cache", flags->cache, "the cache of a worker; default: that of this user's workers")
-      ->type_name("DIR");
-  doctor->add_option("--data", flags->data, "the data folder of a coordinator, to check it, too")
-      ->type_name("DIR");
+  add_option(*doctor, "--farm", flags->farm.url, "URL", "the same as --to")->excludes("--to");
+  add_option(*doctor, "--cache", flags->cache, "DIR",
+             "the cache of a worker; default: that of this user's workers");
+  add_option(*doctor, "--data", flags->data, "DIR", "the data folder of a coordinator, to check it, too");
 }
 
 }  // namespace ls::cli

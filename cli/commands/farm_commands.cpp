@@ -179,10 +179,8 @@ std::pair<CLI::App*, FarmFlags*> add(CLI::App& app, Action& action, const char* 
   CLI::App* command = app.add_subcommand(name, help);
   flags->farm.add_to(*command);
   if (of_a_job) {
-    command->add_option("id", flags->id, "the job's id, as `submit` and `jobs` print it")
-        ->required()
-        ->type_name("ID");
-    command->add_option("--frame", flags->frame, "of a sequence: this frame alone")->type_name("N");
+    add_option(*command, "id", flags->id, "ID", "the job's id, as `submit` and `jobs` print it")->required();
+    add_option(*command, "--frame", flags->frame, "N", "of a sequence: this frame alone");
   }
   command->callback([flags, run, &action] {
     action = [flags, run] {
@@ -206,34 +204,27 @@ void add_farm_commands(CLI::App& app, Action& action) {
   add(app, action, "cancel", "end a job for good", cancel, true);
   const auto [extend_command, extending] =
       add(app, action, "extend", "more samples or less error for a job, done or not", extend, true);
-  extend_command->add_option("--spp", extending->spp, "the new total per pixel")->type_name("TOTAL");
-  extend_command
-      ->add_option("--target-error", extending->target_error,
-                   "of a job that has one: go on until the image's relMSE is below this")
-      ->type_name("E");
+  add_option(*extend_command, "--spp", extending->spp, "TOTAL", "the new total per pixel");
+  add_option(*extend_command, "--target-error", extending->target_error, "E",
+             "of a job that has one: go on until the image's relMSE is below this");
   const auto [fetch_command, fetching] =
       add(app, action, "fetch", "the image of a job, finished or as it is", fetch, true);
-  fetch_command
-      ->add_option("-o,--output", fetching->out,
-                   "the image, .exr or .png; of a sequence every frame's, out_####.exr say")
-      ->type_name("OUT.exr");
-  fetch_command
-      ->add_option("--report", fetching->report, "its report, too; with # in its name, every frame's")
-      ->type_name("REPORT.json");
-  fetch_command
-      ->add_option("--html", fetching->html,
-                   "its report as a page; of a sequence every frame's, with # in the name")
-      ->type_name("REPORT.html");
+  add_option(*fetch_command, "-o,--output", fetching->out, "OUT.exr",
+             "the image, .exr or .png; of a sequence every frame's, out_####.exr say");
+  add_option(*fetch_command, "--report", fetching->report, "REPORT.json",
+             "its report, too; with # in its name, every frame's");
+  add_option(*fetch_command, "--html", fetching->html, "REPORT.html",
+             "its report as a page; of a sequence every frame's, with # in the name");
   const auto [focus_command, looking] =
       add(app, action, "focus", "which part of a job's image gets the next samples first", focus, true);
-  focus_command->add_option("--region", looking->region, "the tiles of these pixels go before all others")
-      ->type_name("X0,Y0,X1,Y1");
+  add_option(*focus_command, "--region", looking->region, "X0,Y0,X1,Y1",
+             "the tiles of these pixels go before all others");
   focus_command->add_flag("--none", looking->none, "all tiles are treated alike again");
   const auto [video_command, filming] =
       add(app, action, "video", "a video of the finished frames of a sequence", video, true);
-  video_command->add_option("-o,--output", filming->out, "the video")->required()->type_name("OUT.mp4");
-  video_command->add_option("--fps", filming->fps, "pictures per second; without it 24")->type_name("N");
-  video_command->add_option("--exposure", filming->exposure, "in stops; without it 0")->type_name("STOPS");
+  add_option(*video_command, "-o,--output", filming->out, "OUT.mp4", "the video")->required();
+  add_option(*video_command, "--fps", filming->fps, "N", "pictures per second; without it 24");
+  add_option(*video_command, "--exposure", filming->exposure, "STOPS", "in stops; without it 0");
   video_command->add_flag("--denoised", filming->denoised, "of the denoised images");
   add(app, action, "workers", "the workers of a farm", workers);
 }
@@ -248,12 +239,11 @@ void add_tokens(CLI::App& app, Action& action) {
                    "what it may do: submit (own jobs), read, join (a worker's) or admin")
       ->required()
       ->check(CLI::IsMember({"submit", "read", "join", "admin"}));
-  adder->add_option("--user", adding->user, "whose it is: owner of the jobs handed in with it")
-      ->type_name("NAME");
+  add_option(*adder, "--user", adding->user, "NAME", "whose it is: owner of the jobs handed in with it");
   add(*token, action, "list", "the tokens, without their secrets", list_tokens);
   const auto [revoke, revoking] =
       add(*token, action, "revoke", "makes a token worthless, at once", revoke_token);
-  revoke->add_option("id", revoking->id, "its id, as `list` prints it")->required()->type_name("ID");
+  add_option(*revoke, "id", revoking->id, "ID", "its id, as `list` prints it")->required();
 }
 
 }  // namespace ls::cli

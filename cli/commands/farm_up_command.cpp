@@ -194,63 +194,52 @@ void describe(CLI::App& app, FarmUpFlags& f) {
                  "what runs the workers: slurm, docker, kubernetes, or ssh for a list of machines")
       ->required()
       ->check(CLI::IsMember({"slurm", "ssh", "docker", "kubernetes"}));
-  app.add_option("--coordinator", f.coordinator,
-                 "HOST:PORT where workers reach the coordinator; with kubernetes its manifests say it")
-      ->type_name("HOST:PORT");
-  app.add_option(
-         "--join-token", f.join_token,
-         "file with the farm's join token; with slurm the workers' machines read it under this path, with "
-         "kubernetes a Secret has it")
-      ->type_name("FILE");
-  app.add_option("--workers", f.workers, "the most workers at once; default: 1")->type_name("N");
-  app.add_option("--threads", f.threads, "of each worker; default: 1")->type_name("N");
-  app.add_option("--finish-in", f.finish_in,
-                 "as many workers as finish the queued work in this time; default: 600")
-      ->type_name("SECONDS");
-  app.add_option("--idle", f.idle, "drain a worker that has had no work for this time; default: 60")
-      ->type_name("SECONDS");
-  app.add_option("--drain", f.drain, "end a worker that has not drained after this time; default: 120")
-      ->type_name("SECONDS");
-  app.add_option("--budget", f.budget, "the most to spend, over all runs with the same report")
-      ->type_name("COREHOURS");
-  app.add_option("--job-budget", f.job_budget, "the most to render of each job, by whichever workers")
-      ->type_name("COREHOURS");
-  app.add_option("--user-budget", f.user_budgets,
-                 "the most to render for each user, or with USER= for one; may be repeated")
-      ->type_name("[USER=]COREHOURS")
+  add_option(app, "--coordinator", f.coordinator, "HOST:PORT",
+             "HOST:PORT where workers reach the coordinator; with kubernetes its manifests say it");
+  add_option(app, "--join-token", f.join_token, "FILE",
+             "file with the farm's join token; with slurm the workers' machines read it under this path, "
+             "with kubernetes a Secret has it");
+  add_option(app, "--workers", f.workers, "N", "the most workers at once; default: 1");
+  add_option(app, "--threads", f.threads, "N", "of each worker; default: 1");
+  add_option(app, "--finish-in", f.finish_in, "SECONDS",
+             "as many workers as finish the queued work in this time; default: 600");
+  add_option(app, "--idle", f.idle, "SECONDS",
+             "drain a worker that has had no work for this time; default: 60");
+  add_option(app, "--drain", f.drain, "SECONDS",
+             "end a worker that has not drained after this time; default: 120");
+  add_option(app, "--budget", f.budget, "COREHOURS", "the most to spend, over all runs with the same report");
+  add_option(app, "--job-budget", f.job_budget, "COREHOURS",
+             "the most to render of each job, by whichever workers");
+  add_option(app, "--user-budget", f.user_budgets, "[USER=]COREHOURS",
+             "the most to render for each user, or with USER= for one; may be repeated")
       ->allow_extra_args(false);
-  app.add_option("--report", f.report, "what was spent; default: lightshaft-NAME.json")
-      ->type_name("REPORT.json");
-  app.add_option("--name", f.name, "tells several farm-ups apart; default: farm")->type_name("NAME");
+  add_option(app, "--report", f.report, "REPORT.json", "what was spent; default: lightshaft-NAME.json");
+  add_option(app, "--name", f.name, "NAME", "tells several farm-ups apart; default: farm");
   app.add_flag("--until-done", f.until_done, "end when no job is queued or running");
-  app.add_option("--poll", f.poll, "time between two looks; default: 5")->type_name("SECONDS");
-  app.add_option("--logs", f.logs, "folder for the workers' logs; default: this one")->type_name("DIR");
-  app.add_option("--worker", f.worker, "lightshaft-worker on the workers' machines; default: the path here")
-      ->type_name("PROGRAM");
-  app.add_option("--worker-option", f.worker_options,
-                 "one more word of the worker's command; may be repeated")
-      ->type_name("WORD")
+  add_option(app, "--poll", f.poll, "SECONDS", "time between two looks; default: 5");
+  add_option(app, "--logs", f.logs, "DIR", "folder for the workers' logs; default: this one");
+  add_option(app, "--worker", f.worker, "PROGRAM",
+             "lightshaft-worker on the workers' machines; default: the path here");
+  add_option(app, "--worker-option", f.worker_options, "WORD",
+             "one more word of the worker's command; may be repeated")
       ->allow_extra_args(false);
-  app.add_option("--minutes", f.minutes, "slurm, kubernetes: time limit of a worker; default: 60")
-      ->type_name("N");
-  app.add_option("--sbatch", f.sbatch, "slurm: one more option of sbatch, --sbatch=--partition=low say")
-      ->type_name("OPTION")
+  add_option(app, "--minutes", f.minutes, "N", "slurm, kubernetes: time limit of a worker; default: 60");
+  add_option(app, "--sbatch", f.sbatch, "OPTION",
+             "slurm: one more option of sbatch, --sbatch=--partition=low say")
       ->allow_extra_args(false);
-  app.add_option("--image", f.image, "docker: image of the workers; default: lightshaft-worker:local")
-      ->type_name("IMAGE");
-  app.add_option("--docker", f.docker, "docker: one more option of docker run, --docker=--network=host say")
-      ->type_name("OPTION")
+  add_option(app, "--image", f.image, "IMAGE",
+             "docker: image of the workers; default: lightshaft-worker:local");
+  add_option(app, "--docker", f.docker, "OPTION",
+             "docker: one more option of docker run, --docker=--network=host say")
       ->allow_extra_args(false);
-  app.add_option("--like", f.like,
-                 "kubernetes: what has the template of a worker's pod; default: deployment/worker")
-      ->type_name("KIND/NAME");
-  app.add_option("--kubectl", f.kubectl,
-                 "kubernetes: one more option of kubectl, --kubectl=--namespace=lightshaft say")
-      ->type_name("OPTION")
+  add_option(app, "--like", f.like, "KIND/NAME",
+             "kubernetes: what has the template of a worker's pod; default: deployment/worker");
+  add_option(app, "--kubectl", f.kubectl, "OPTION",
+             "kubernetes: one more option of kubectl, --kubectl=--namespace=lightshaft say")
       ->allow_extra_args(false);
-  app.add_option("--machines", f.machines, "ssh: the machines, one a line")->type_name("FILE");
-  app.add_option("--ssh-config", f.ssh_config, "ssh: configuration file to use instead of the usual one")
-      ->type_name("FILE");
+  add_option(app, "--machines", f.machines, "FILE", "ssh: the machines, one a line");
+  add_option(app, "--ssh-config", f.ssh_config, "FILE",
+             "ssh: configuration file to use instead of the usual one");
 }
 
 }  // namespace

@@ -335,11 +335,9 @@ int run(const InspectFlags& flags) {
 void add_inspect(CLI::App& app, Action& action) {
   const auto [inspect, flags] = add_command<InspectFlags>(
       app, action, "inspect", "read and check a scene without rendering; say what it needs", run);
-  inspect->add_option("scene", flags->scene, "Mitsuba XML, .pbrt, .gltf or .glb")
-      ->required()
-      ->type_name("SCENE");
+  add_option(*inspect, "scene", flags->scene, "SCENE", "Mitsuba XML, .pbrt, .gltf or .glb")->required();
   add_defines(*inspect, flags->defines);
-  inspect->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
+  add_option(*inspect, "--frame", flags->frame, "N", "of a sequence: this frame");
   inspect->add_flag("--strict", flags->strict, "warnings are errors");
   inspect->add_flag("--variants", flags->variants,
                     "renders a small image with every instantiation that covers the scene: their bits must "

@@ -149,17 +149,14 @@ int run(const MergeFlags& flags) {
 void add_merge(CLI::App& app, Action& action) {
   const auto [merge, flags] = add_command<MergeFlags>(
       app, action, "merge", "fold partial images into the final one, exactly as the coordinator does", run);
-  merge->add_option("partials", flags->partials, "partial images, or folders of them")
-      ->required()
-      ->type_name("PARTIAL.exr...");
-  merge->add_option("-o,--output", flags->out, "the image, .exr or .png")->required()->type_name("OUT.exr");
-  merge->add_option("--report", flags->report, "write digest and error as JSON")->type_name("REPORT.json");
-  merge
-      ->add_option("--scene", flags->scene,
-                   "what they were rendered from: gives mattes the names of things, which partials lack")
-      ->type_name("SCENE");
+  add_option(*merge, "partials", flags->partials, "PARTIAL.exr...", "partial images, or folders of them")
+      ->required();
+  add_option(*merge, "-o,--output", flags->out, "OUT.exr", "the image, .exr or .png")->required();
+  add_option(*merge, "--report", flags->report, "REPORT.json", "write digest and error as JSON");
+  add_option(*merge, "--scene", flags->scene, "SCENE",
+             "what they were rendered from: gives mattes the names of things, which partials lack");
   add_defines(*merge, flags->defines);
-  merge->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
+  add_option(*merge, "--frame", flags->frame, "N", "of a sequence: this frame");
   merge->add_flag("--float", flags->float_output, "32-bit pixels instead of half");
 }
 

@@ -146,31 +146,23 @@ int run(const RenderFlags& flags) {
 void add_render(CLI::App& app, Action& action) {
   const auto [render, flags] =
       add_command<RenderFlags>(app, action, "render", "render a scene on this machine", run);
-  render->add_option("scene", flags->scene, "Mitsuba XML, .pbrt, .gltf or .glb")
-      ->required()
-      ->type_name("SCENE");
-  render
-      ->add_option("-o,--output", flags->out,
-                   "the image: .exr with all layers, or .png; default: the scene's name, with .exr, in this "
-                   "folder. Of a sequence: with # for the frame's number, out_####.exr say")
-      ->type_name("OUT.exr");
+  add_option(*render, "scene", flags->scene, "SCENE", "Mitsuba XML, .pbrt, .gltf or .glb")->required();
+  add_option(*render, "-o,--output", flags->out, "OUT.exr",
+             "the image: .exr with all layers, or .png; default: the scene's name, with .exr, in this "
+             "folder. Of a sequence: with # for the frame's number, out_####.exr say");
   flags->job.add_to(*render);
-  render->add_option("--threads", flags->threads, "default: all")->type_name("N");
-  render->add_option("--pixel", flags->pixel, "with --sample: print the value of one sample of this pixel")
-      ->type_name("X,Y");
-  render->add_option("--sample", flags->sample, "its number, from 0")->type_name("N");
-  render
-      ->add_option("--reference", flags->reference,
-                   "the right image, of another seed: the report has the true error, too")
-      ->type_name("REF.exr");
-  render->add_option("--report", flags->report, "write what it cost and how large the error is, as JSON")
-      ->type_name("REPORT.json");
-  render->add_option("--html", flags->html, "the same as a page, with image, curves and maps in it")
-      ->type_name("REPORT.html");
-  render
-      ->add_option("--partial-dir", flags->partial_dir,
-                   "keep every unit's partial image: `lightshaft merge` folds them")
-      ->type_name("DIR");
+  add_option(*render, "--threads", flags->threads, "N", "default: all");
+  add_option(*render, "--pixel", flags->pixel, "X,Y",
+             "with --sample: print the value of one sample of this pixel");
+  add_option(*render, "--sample", flags->sample, "N", "its number, from 0");
+  add_option(*render, "--reference", flags->reference, "REF.exr",
+             "the right image, of another seed: the report has the true error, too");
+  add_option(*render, "--report", flags->report, "REPORT.json",
+             "write what it cost and how large the error is, as JSON");
+  add_option(*render, "--html", flags->html, "REPORT.html",
+             "the same as a page, with image, curves and maps in it");
+  add_option(*render, "--partial-dir", flags->partial_dir, "DIR",
+             "keep every unit's partial image: `lightshaft merge` folds them");
   render->add_flag("--isolate", flags->isolate, "render in a child process, which may crash");
   auto* quiet = render->add_flag("--quiet", flags->quiet, "only warnings and errors");
   render

@@ -105,46 +105,31 @@ int run(const SubmitFlags& flags) {
 void add_submit(CLI::App& app, Action& action) {
   const auto [submit, flags] = add_command<SubmitFlags>(
       app, action, "submit", "send a scene and its files to a farm; prints the job's id", run);
-  submit
-      ->add_option("scene", flags->scene,
-                   "Mitsuba XML, .pbrt, .gltf or .glb, or a .zip, .tar or .tar.gz with one and all its files")
-      ->required()
-      ->type_name("SCENE");
+  add_option(*submit, "scene", flags->scene, "SCENE",
+             "Mitsuba XML, .pbrt, .gltf or .glb, or a .zip, .tar or .tar.gz with one and all its files")
+      ->required();
   flags->farm.add_to(*submit);
   flags->job.add_to(*submit);
-  submit->add_option("--priority", flags->job.priority, "higher goes first; default 0")->type_name("N");
-  submit->add_option("--tags", flags->job.tags, "only workers with all of these")
+  add_option(*submit, "--priority", flags->job.priority, "N", "higher goes first; default 0");
+  add_option(*submit, "--tags", flags->job.tags, "A,B", "only workers with all of these")
       ->delimiter(',')
-      ->allow_extra_args(false)
-      ->type_name("A,B");
-  submit->add_option("--max-workers", flags->job.max_workers, "at most so many workers at once")
-      ->type_name("N");
-  submit->add_option("--max-units", flags->job.max_units, "at most so many units lent to workers at once")
-      ->type_name("N");
-  submit->add_option("--memory", flags->job.memory, "only workers with so much memory, 8G say")
-      ->type_name("BYTES");
-  submit
-      ->add_option("--numeric-class", flags->job.numeric_class,
-                   "only workers of this class, by the beginning of its digits or of its platform in "
-                   "`lightshaft workers`")
-      ->type_name("CLASS");
-  submit
-      ->add_option("--reference", flags->reference,
-                   "the right image: every checkpoint is compared with it. Of another seed than the job's")
-      ->type_name("REF.exr");
+      ->allow_extra_args(false);
+  add_option(*submit, "--max-workers", flags->job.max_workers, "N", "at most so many workers at once");
+  add_option(*submit, "--max-units", flags->job.max_units, "N",
+             "at most so many units lent to workers at once");
+  add_option(*submit, "--memory", flags->job.memory, "BYTES", "only workers with so much memory, 8G say");
+  add_option(*submit, "--numeric-class", flags->job.numeric_class, "CLASS",
+             "only workers of this class, by the beginning of its digits or of its platform in `lightshaft "
+             "workers`");
+  add_option(*submit, "--reference", flags->reference, "REF.exr",
+             "the right image: every checkpoint is compared with it. Of another seed than the job's");
   submit->add_flag("--wait", flags->wait, "until the job is done");
-  submit
-      ->add_option("-o,--output", flags->out,
-                   "wait, then fetch the image, .exr or .png; of a sequence every frame's, out_####.exr say")
-      ->type_name("OUT.exr");
-  submit
-      ->add_option("--report", flags->report,
-                   "wait, then fetch the report; with # in its name, every frame's")
-      ->type_name("REPORT.json");
-  submit
-      ->add_option("--html", flags->html,
-                   "wait, then fetch the report as a page; of a sequence every frame's, with # in the name")
-      ->type_name("REPORT.html");
+  add_option(*submit, "-o,--output", flags->out, "OUT.exr",
+             "wait, then fetch the image, .exr or .png; of a sequence every frame's, out_####.exr say");
+  add_option(*submit, "--report", flags->report, "REPORT.json",
+             "wait, then fetch the report; with # in its name, every frame's");
+  add_option(*submit, "--html", flags->html, "REPORT.html",
+             "wait, then fetch the report as a page; of a sequence every frame's, with # in the name");
   submit->add_flag("--quiet", flags->quiet, "only the id, warnings and errors");
 }
 

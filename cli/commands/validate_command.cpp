@@ -6,6 +6,7 @@
 #include "cli/commands/commands.h"
 #include "cli/local/local_scene.h"
 #include "cli/output/console.h"
+#include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
 #include "common/base/safe_text.h"
 #include "validation/nori_test_run.h"
@@ -106,18 +107,13 @@ void add_validate(CLI::App& app, Action& action) {
       "check the renderer against known answers: stiff and extreme cases, or the tests of a Nori file "
       "(ttest, chi2test); exit code 0 if all pass, 1 if not",
       run);
-  validate->add_option("file", flags->file, "Nori XML with a <test>; without: the table of cases")
-      ->type_name("FILE");
-  validate
-      ->add_option("--case", flags->only,
-                   "only the cases whose names begin so or match the glob; of FILE: with this in their name")
-      ->type_name("NAME");
+  add_option(*validate, "file", flags->file, "FILE", "Nori XML with a <test>; without: the table of cases");
+  add_option(*validate, "--case", flags->only, "NAME",
+             "only the cases whose names begin so or match the glob; of FILE: with this in their name");
   validate->add_flag("--quick", flags->quick, "bands of 1 % for .3 %, without the longest cases");
-  validate->add_option("--json", flags->json, "the table as JSON, too")->type_name("OUT");
-  validate->add_option("--seed", flags->seed, "default 0")->type_name("N");
-  validate->add_option("--threads", flags->threads, "default all")
-      ->check(CLI::Range(1, 1024))
-      ->type_name("N");
+  add_option(*validate, "--json", flags->json, "OUT", "the table as JSON, too");
+  add_option(*validate, "--seed", flags->seed, "N", "default 0");
+  add_option(*validate, "--threads", flags->threads, "N", "default all")->check(CLI::Range(1, 1024));
   validate->add_flag("--strict", flags->strict, "warnings are errors");
 }
 

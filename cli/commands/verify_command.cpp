@@ -299,16 +299,13 @@ void add_verify(CLI::App& app, Action& action) {
   const auto [verify, flags] = add_command<VerifyFlags>(
       app, action, "verify",
       "render random tiles of a finished image again and compare them with the digests sealed in it", run);
-  verify->add_option("image", flags->image, "a finished EXR")->required()->type_name("OUT.exr");
-  verify->add_option("--scene", flags->scene, "the scene it was rendered from")
-      ->required()
-      ->type_name("SCENE");
-  verify->add_option("--tiles", flags->tiles, fmt::format("how many (default {})", kDefaultTiles))
-      ->type_name("K");
-  verify->add_option("--seed", flags->seed, "chooses the tiles; default: anew each time")->type_name("N");
+  add_option(*verify, "image", flags->image, "OUT.exr", "a finished EXR")->required();
+  add_option(*verify, "--scene", flags->scene, "SCENE", "the scene it was rendered from")->required();
+  add_option(*verify, "--tiles", flags->tiles, "K", fmt::format("how many (default {})", kDefaultTiles));
+  add_option(*verify, "--seed", flags->seed, "N", "chooses the tiles; default: anew each time");
   add_defines(*verify, flags->defines);
-  verify->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
-  verify->add_option("--threads", flags->threads, "default: all")->type_name("N")->check(CLI::Range(1, 1024));
+  add_option(*verify, "--frame", flags->frame, "N", "of a sequence: this frame");
+  add_option(*verify, "--threads", flags->threads, "N", "default: all")->check(CLI::Range(1, 1024));
   verify->add_flag("--json", flags->json, "as JSON");
 }
 

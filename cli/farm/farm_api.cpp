@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "cli/farm/http_client.h"
+#include "cli/output/job_options.h"
 #include "cli/output/reply_fields.h"
 #include "common/base/safe_text.h"
 #include "common/base/secret.h"
@@ -108,11 +109,10 @@ Rejected problem_of(const HttpResponse& response) {
 }
 
 void FarmOptions::add_to(CLI::App& app) {
-  app.add_option("--to", url, "the coordinator's address; also LIGHTSHAFT_URL")->type_name("URL");
-  app.add_option("--token-file", token_file, "file with the token; also LIGHTSHAFT_TOKEN, the token itself")
-      ->type_name("FILE");
-  app.add_option("--ca", ca, "certificates to trust instead of the system's; also LIGHTSHAFT_CA")
-      ->type_name("FILE");
+  add_option(app, "--to", url, "URL", "the coordinator's address; also LIGHTSHAFT_URL");
+  add_option(app, "--token-file", token_file, "FILE",
+             "file with the token; also LIGHTSHAFT_TOKEN, the token itself");
+  add_option(app, "--ca", ca, "FILE", "certificates to trust instead of the system's; also LIGHTSHAFT_CA");
   app.add_flag("--json", json, "answer as JSON");
 }
 

@@ -61,23 +61,15 @@ Result<std::uint64_t> InstructionCounter::read() const {
   return count;
 }
 
-namespace {
-
-Result<std::uint64_t> read(const Result<InstructionCounter>& counter) {
-  if (!counter) return tl::unexpected(counter.error());
-  return counter->read();
-}
-
-}  // namespace
-
 VariantBitsList measure_variants(const std::vector<std::string>& names, double paths,
                                  const Result<InstructionCounter>& counter,
                                  const std::function<Digest(const std::string&)>& render) {
+  const auto count = [&] { return counter.and_then([](const InstructionCounter& c) { return c.read(); }); };
   VariantBitsList out;
   for (const std::string& name : names) {
-    const auto before = read(counter);
+    const auto before = count();
     VariantBits v{name, render(name), std::nullopt};
-    const auto after = read(counter);
+    const auto after = count();
     if (before && after && *after > *before)
       v.instructions = static_cast<double>(*after - *before) / paths;
     else if (out.uncounted.empty())

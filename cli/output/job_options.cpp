@@ -104,35 +104,27 @@ Result<std::map<std::string, std::string>> parse_defines(const std::vector<std::
 }
 
 void add_defines(CLI::App& app, std::vector<std::string>& defines) {
-  app.add_option("-D,--define", defines, "sets the scene's $name")
-      ->allow_extra_args(false)
-      ->type_name("name=value");
+  add_option(app, "-D,--define", defines, "name=value", "sets the scene's $name")->allow_extra_args(false);
 }
 
 void JobOptions::add_to(CLI::App& app) {
-  app.add_option("--spp", spp, "samples per pixel; default: the scene's")->type_name("N");
-  app.add_option("--target-error", target_error, "stop when the image's relMSE is below this")
-      ->type_name("E");
-  app.add_option("--target-layer", target_layer,
-                 "whose relMSE --target-error means: raw, the image as rendered (default), or denoised, its "
-                 "denoised layers, which --denoise adds")
-      ->type_name("LAYER");
-  app.add_option("--time", time, "stop after this many seconds, counted from the first ray")
-      ->type_name("SECONDS");
-  app.add_option("--seed", seed, "default 0")->type_name("N");
-  app.add_option(
-         "--frames", frames,
-         "a sequence, 1-10 or 1-10x2 say: a run of # in the names of files is the frame's number, and "
-         "$frame is it, too")
-      ->type_name("A-B");
-  app.add_option("--size", size, "size of the image instead of the scene's")->type_name("WxH");
-  app.add_option("--integrator", integrator,
-                 "volpath, volpath_distant_mis, path or whitted instead of the scene's")
-      ->type_name("NAME");
-  app.add_option("--aov", aov, "further layers of the image: " + known_aovs() + " (docs/reference/aovs.md)")
+  add_option(app, "--spp", spp, "N", "samples per pixel; default: the scene's");
+  add_option(app, "--target-error", target_error, "E", "stop when the image's relMSE is below this");
+  add_option(app, "--target-layer", target_layer, "LAYER",
+             "whose relMSE --target-error means: raw, the image as rendered (default), or denoised, its "
+             "denoised layers, which --denoise adds");
+  add_option(app, "--time", time, "SECONDS", "stop after this many seconds, counted from the first ray");
+  add_option(app, "--seed", seed, "N", "default 0");
+  add_option(app, "--frames", frames, "A-B",
+             "a sequence, 1-10 or 1-10x2 say: a run of # in the names of files is the frame's number, and "
+             "$frame is it, too");
+  add_option(app, "--size", size, "WxH", "size of the image instead of the scene's");
+  add_option(app, "--integrator", integrator, "NAME",
+             "volpath, volpath_distant_mis, path or whitted instead of the scene's");
+  add_option(app, "--aov", aov, "NAME,...",
+             "further layers of the image: " + known_aovs() + " (docs/reference/aovs.md)")
       ->delimiter(',')
-      ->allow_extra_args(false)
-      ->type_name("NAME,...");
+      ->allow_extra_args(false);
   add_defines(app, defines);
   app.add_flag("--float", float_output, "32-bit pixels in the image instead of half");
   app.add_flag("--denoise", denoise,

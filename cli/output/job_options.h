@@ -1,4 +1,5 @@
-// Options shared by `render` and `submit`: the request for a job.
+// Options of commands: how they are added and parsed, and those that `render` and `submit` share, the request
+// for a job.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -11,6 +12,13 @@
 #include "common/job/settings.h"
 
 namespace ls::cli {
+
+// Adds an option whose value the help shows as `type`.
+template <class T>
+CLI::Option* add_option(CLI::App& app, const std::string& name, T& value, const std::string& type,
+                        const std::string& help) {
+  return app.add_option(name, value, help)->type_name(type);
+}
 
 // Numbers are kept as text until parse(), which makes the error messages.
 struct JobOptions {
