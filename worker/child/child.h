@@ -7,6 +7,7 @@
 // which unit was at fault (SIGKILL: the system was out of memory), all running units are reported as failed.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,6 +21,8 @@ namespace ls::worker {
 inline constexpr int kMostChildThreads = 256;
 
 struct ChildOptions {
+  // The child's program. The default is this same program, even if its file was replaced after the start.
+  std::filesystem::path executable = "/proc/self/exe";
   std::vector<std::string> arguments;  // arguments with which the child calls serve(): see worker/main.cpp
   // Number of units rendered at the same time: the caller's number of threads
   int slots = 1;

@@ -63,13 +63,10 @@ Result<std::shared_ptr<Process>> Process::spawn(const ChildOptions& options) {
 }
 
 Result<void> Process::start(const ChildOptions& options, const std::list<Descriptor>& theirs) {
-  // This same program, even if its file was replaced after the start. The process list should show the name
-  // behind the link.
-  const std::string self = "/proc/self/exe";
-  std::error_code no_link;
-  const std::filesystem::path behind = std::filesystem::read_symlink(self, no_link);
-  Program program{.path = self,
-                  .arguments = {no_link ? self : behind.string()},
+  std::error_code no_link;  // the process list should show the name behind /proc/self/exe
+  const std::filesystem::path behind = std::filesystem::read_symlink(options.executable, no_link);
+  Program program{.path = options.executable.string(),
+                  .arguments = {no_link ? options.executable.string() : behind.string()},
                   .files = {kDevNull, STDOUT_FILENO, STDERR_FILENO},
                   .inherits = may_see};
   program.arguments.insert(program.arguments.end(), options.arguments.begin(), options.arguments.end());
