@@ -42,11 +42,14 @@ Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const 
 bool Camera::usable() const {
   // Before their directions are normalised, the rays of perspective and orthographic cameras depend linearly
   // on the positions on the film and on the lens, so testing a few extreme positions suffices. The rays of a
-  // spherical camera all start at one point.
+  // spherical camera all start at one point. An aperture map only makes the lens smaller, by place, so the
+  // whole lens is tested.
+  Camera whole = *this;
+  whole.textures_ = nullptr;
   for (const double fx : {0., 1.})
     for (const double fy : {0., 1.})
       for (const V2& lens : {V2(0, 0), V2(0, 1), V2(1, 0), V2(1, 1)}) {
-        const CameraRay r = ray(fx / per_pixel_x_, fy / per_pixel_y_, lens);
+        const CameraRay r = whole.ray(fx / per_pixel_x_, fy / per_pixel_y_, lens);
         const float length = dot(r.d, r.d);
         if (!is_finite(r.o) || !(length > .99f && length < 1.01f) || std::isnan(r.t_max)) return false;
       }

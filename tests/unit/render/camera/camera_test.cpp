@@ -249,6 +249,17 @@ TEST(ApertureMap, MultipliesTheRadiusWherePixelsAre) {
   }
 }
 
+TEST(ApertureMap, DoesNotHideALensThatIsTooLarge) {
+  // The checkerboard repeats, so at the four corners of the frame itself the aperture is closed
+  test::SceneBuilder builder = with_aperture_map(0, 1);
+  builder.scene.sensor.aperture_radius = 1e39;  // infinite in single precision
+
+  const auto world = build_world(builder.scene, test::settings_of(builder.scene), builder.files, 1);
+
+  ASSERT_FALSE(world);
+  EXPECT_NE(world.error().message.find("aperture_radius"), std::string::npos) << world.error().message;
+}
+
 TEST(ApertureMap, OfOneAndOfNothingChangeNoBit) {
   const auto render = [](const test::SceneBuilder& builder) {
     return render_tile(*test::world_of(builder), {0, 0, 16, 8}, {0, 4}, nullptr, nullptr).sums;
