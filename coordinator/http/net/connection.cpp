@@ -115,10 +115,8 @@ net::awaitable<bool> Connection::serve_match(Parser& parser, const Match& match,
     co_await stream_events(request, response);
     co_return false;
   }
-  if (!charge_answer(response.in_memory())) {
+  if (!charge_answer(response.in_memory()))
     response = problem(503, "too much is being sent to others that read slowly; try again");
-    response.headers.emplace_back("Retry-After", "2");
-  }
   const bool unread = request.has_body && !parser.is_done();
   const bool kept = co_await answer(request, response, parser.keep_alive() && !unread);
   charge_answer(0);
@@ -360,17 +358,19 @@ net::awaitable<bool> Connection::write_paced(std::string_view head, std::span<co
 }
 
 net::awaitable<bool> Connection::write_file(std::string_view head, const FileBody& file) {
-  const auto began = SteadyClock::now();
+  auto began = SteadyClock::now();
   std::uint64_t sent = 0;
   std::vector<std::byte> slice(kWriteSlice);
   for (std::uint64_t offset = 0; offset < file.size;) {
-    disarm();  // time spent on the disk does not count; only writing to the client does
+    disarm();
+    const auto paused = SteadyClock::now();
     auto work = [&slice, &file, offset] {
       return read_slice(file, offset,
                         std::span(slice).first(std::min<std::uint64_t>(slice.size(), file.size - offset)));
     };
     const std::size_t n = co_await run_on(shared_.slow, shared_.io, std::move(work));
     if (n == 0) co_return false;
+    began += SteadyClock::now() - paused;  // time spent on the disk does not count against the client
     if (!co_await write_paced(offset == 0 ? head : std::string_view(), std::span(slice).first(n), began,
                               sent))
       co_return false;

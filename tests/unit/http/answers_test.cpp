@@ -89,7 +89,12 @@ TEST_F(ServerTest, AnswersInMemoryAreBoundedAndLaterOnesAreToldToComeAgain) {
       "GET /api/v1/jobs/" + coordinator::submit(*coordinator).value + "/log HTTP/1.1\r\nHost: x\r\n" + kAuth;
   auto readers = slow_readers(server->port(), 2, get_log + "\r\n");
 
-  EXPECT_EQ(ask(get_log + "\r\n"), 503);
+  RawClient client(server->port());
+  client.send(get_log + "\r\n");
+  const std::string refused = client.response();
+  EXPECT_EQ(RawClient::status(refused), 503);
+  EXPECT_NE(refused.find("Retry-After"), std::string::npos) << refused;
+  EXPECT_EQ(refused.find("Retry-After"), refused.rfind("Retry-After")) << refused;
   EXPECT_EQ(ask(kGet), 200);
   readers.clear();
   EXPECT_TRUE(eventually([&] { return ask(get_log + "Connection: close\r\n\r\n") == 200; }));
