@@ -359,7 +359,7 @@ Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const Blob
   if (!bytes) return tl::unexpected(bytes.error());
   if (*bytes > limits.max_bytes)
     return invalid(fmt::format("the reference has {} bytes; at most {} are read", *bytes, limits.max_bytes));
-  const auto exr = blobs.read(digest, 0, *bytes);
+  const auto exr = blobs.read_whole(digest, *bytes);
   if (!exr) return tl::unexpected(exr.error());
   return read_reference(*exr, "the reference", size, limits);
 }

@@ -44,8 +44,20 @@ class BlobStore {
                        : fail(Errc::not_found, std::string("there is no blob ").append(digest.hex()));
   }
   virtual Result<std::uint64_t> size(const Digest& digest) const = 0;
+  // Returns up to `length` bytes from `offset` on, and at most limits::kMaxBlobRead; fewer at the blob's end.
   virtual Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
                                               std::uint64_t length) const = 0;
+  // Returns the first `bytes` bytes of the blob by as many calls of read() as they take; fewer if it ends.
+  Result<std::vector<std::byte>> read_whole(const Digest& digest, std::uint64_t bytes) const {
+    auto whole = read(digest, 0, bytes);
+    while (whole && whole->size() < bytes) {
+      const auto piece = read(digest, whole->size(), bytes - whole->size());
+      if (!piece) return piece;
+      if (piece->empty()) break;
+      whole->insert(whole->end(), piece->begin(), piece->end());
+    }
+    return whole;
+  }
   virtual Result<void> put(const Digest& digest, std::span<const std::byte> bytes) = 0;
   // Receives a blob piece by piece, in order; finish() verifies the digest. If the Upload is destroyed before
   // finish(), its bytes are dropped, unless it came from resume_upload().

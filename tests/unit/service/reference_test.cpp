@@ -6,6 +6,8 @@
 #include <thread>
 
 #include "common/image/exr/exr_file.h"
+#include "coordinator/admission/admission.h"
+#include "coordinator/store/blobs/memory_blobs.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -50,6 +52,25 @@ std::vector<std::optional<ReferenceError>> rendered(const std::filesystem::path&
   EXPECT_EQ(told["true_relmse"], truths(*coordinator, job).back()->relmse);
   EXPECT_EQ(told["reference"]["noise_relmse"], nullptr);
   return truths(*coordinator, job);
+}
+
+// One read of a store returns a limited number of bytes, as of a reference of more than 256 MiB.
+TEST(ServiceReference, IsReadWholeFromAStoreThatReturnsPieces) {
+  struct Pieces : MemoryBlobs {
+    Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
+                                        std::uint64_t length) const override {
+      return MemoryBlobs::read(digest, offset, std::min<std::uint64_t>(length, 100));
+    }
+  } blobs;
+  const auto exr = grey_exr({40, 24}, .5F);
+  ASSERT_GT(exr.size(), 100u);
+  JobSpec spec;
+  spec.reference = sha256(std::span<const std::byte>(exr));
+  ASSERT_TRUE(blobs.put(*spec.reference, exr));
+
+  const auto reference = load_reference(spec, {40, 24}, blobs);
+
+  EXPECT_TRUE(reference) << reference.error().message;
 }
 
 TEST(ServiceReference, GivesTheTrueErrorAtEveryCheckpointWhateverTheOrder) {
