@@ -66,6 +66,7 @@ class S3Server:
         self.uploads = {}  # id -> (key, {number: part}) of unfinished uploads in parts
         # number of ends of uploads in parts that are carried out but answered with an error
         self.forget_ends = 0
+        self.refuse_ends = 0  # number of ends of uploads in parts that are refused
         self.lock = threading.Lock()
         owner = self
 
@@ -161,6 +162,9 @@ class Request(http.server.BaseHTTPRequestHandler):
             return self.answer(200, f"<InitiateMultipartUploadResult><UploadId>{upload}</UploadId></InitiateMultipartUploadResult>".encode())
         if query["uploadId"] not in state.uploads:
             return self.refuse(404, "NoSuchUpload")
+        if state.refuse_ends:
+            state.refuse_ends -= 1
+            return self.refuse(403, "AccessDenied")
         parts = state.uploads[query["uploadId"]][1]
         named = re.findall(r"<PartNumber>(\d+)</PartNumber><ETag>([^<]+)</ETag>", body.decode())
         if [(int(n), tag) for n, tag in named] != [(n, self.etag(part)) for n, part in sorted(parts.items())]:

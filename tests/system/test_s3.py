@@ -212,6 +212,28 @@ def test_an_end_whose_answer_was_lost_is_known_by_what_the_store_has(s3, farm_of
     assert of_large(s3, "POST") == 3
 
 
+def test_an_end_that_is_refused_is_no_success_even_if_the_object_of_before_has_the_same_size(s3, farm_of_parts):
+    data = os.urandom(LARGE)
+    digest = put(farm_of_parts, data)
+    key = f"scenes/{digest[:2]}/{digest}"
+    s3.objects[key] = data[:-1] + bytes([data[-1] ^ 1])
+    farm_of_parts.coordinator.kill()
+    shutil.rmtree(farm_of_parts.data / "blobs")
+    farm_of_parts.start_coordinator()
+    token = (farm_of_parts.data / "join-token").read_text().strip()
+    farm_rpc.fetch_blob(farm_rpc.channel_of(farm_of_parts.grpc), token, digest)
+    assert missing(farm_of_parts, digest), "the damage has been found"
+
+    s3.refuse_ends = 1
+    with pytest.raises(Exception, match="AccessDenied"):
+        put(farm_of_parts, data)
+    assert missing(farm_of_parts, digest)
+
+    put(farm_of_parts, data)
+    assert s3.objects[key] == data
+    assert not missing(farm_of_parts, digest)
+
+
 def test_parts_of_a_file_that_could_not_be_sent_do_not_stay_in_the_store(s3, farm_of_parts):
     data = os.urandom(LARGE)
     s3.refuse = [None, None, None] + [503] * 6  # HEAD, the beginning, one part; then the second part, as often as it is tried
@@ -219,7 +241,8 @@ def test_parts_of_a_file_that_could_not_be_sent_do_not_stay_in_the_store(s3, far
         put(farm_of_parts, data)
 
     assert (s3.uploads, s3.objects) == ({}, {})
-    assert put(farm_of_parts, data)
+    digest = put(farm_of_parts, data)
+    assert not missing(farm_of_parts, digest)
 
 
 def test_so_many_copies_as_there_is_room_for_stay_on_this_machine(s3, tmp_path):

@@ -129,7 +129,7 @@ Result<std::vector<Digest>> S3Blobs::missing(std::span<const Digest> digests) co
 
 Result<void> S3Blobs::prove(const Digest& digest, bool again) const {
   if (local_->has(digest))
-    if (auto proven = local_->prove(digest, again); proven || local_->has(digest)) return proven;
+    if (auto proven = local_->prove(digest, again); !proven && local_->has(digest)) return proven;
   const auto there = find(digest);
   if (!there) return tl::unexpected(there.error());
   return *there ? Result<void>() : fail(Errc::not_found, fmt::format("there is no blob {}", digest.hex()));

@@ -57,8 +57,9 @@ class S3Blobs final : public BlobStore {
   Result<bool> find(const Digest& digest) const override;
   Result<std::vector<Digest>> missing(std::span<const Digest> digests) const override;
   Result<void> answers() const override { return link_.answers(); }
-  // Verifies the local copy; a damaged copy is moved aside. Without an intact copy it only checks that the S3
-  // store has the blob, since the bytes are verified when they are fetched.
+  // Verifies the local copy, if there is one; a damaged copy is moved aside. Then checks that the S3 store
+  // has the blob: a local file that could not be sent does not count. Bytes in the S3 store are verified when
+  // they are fetched.
   Result<void> prove(const Digest& digest, bool again = false) const override;
   Result<std::uint64_t> size(const Digest& digest) const override;
   Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,

@@ -327,9 +327,10 @@ Result<void> S3Link::send_parts(const std::string& key, const std::string& uploa
   // The store begins its answer before it has joined the parts, so an answer with status 200 may contain an
   // error.
   if (answer->status / 100 == 2 && xml_element(answer->text, "Code").empty()) return {};
-  // If the answer to an earlier attempt was lost, the upload may be complete, and the store no longer accepts
-  // its id: then the object exists.
-  if (const auto there = look_at(key); there && there->bytes == bytes) return {};
+  // If the answer to an earlier attempt was lost, the upload may be complete, and the store no longer knows
+  // its id: then the object exists. After any other error an object may be one from before this upload.
+  if (xml_element(answer->text, "Code") == "NoSuchUpload")
+    if (const auto there = look_at(key); there && there->bytes == bytes) return {};
   return tl::unexpected(error_of(end, *answer));
 }
 
