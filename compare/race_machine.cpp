@@ -29,7 +29,7 @@ double seconds_of(const timeval& t) {
   return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
 }
 
-// User and system time of this process.
+// Returns the user and system CPU time of this process, in seconds; 0 if it is unknown.
 double cpu_seconds() {
   rusage usage{};
   return ::getrusage(RUSAGE_SELF, &usage) == 0 ? seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime) : 0;
@@ -64,8 +64,8 @@ double load_average() {
   return ::getloadavg(&load, 1) == 1 ? load : -1;
 }
 
-// Reads the times of all cores together from the first line of /proc/stat, "cpu user nice system idle iowait
-// irq softirq steal ...", in ticks (proc(5)).
+// Reads the times since boot, summed over all cores. The first line of /proc/stat has them in clock ticks:
+// "cpu user nice system idle iowait irq softirq steal ..." (proc(5)).
 Others::Times Others::taken() {
   constexpr int kFields = 8, kIdle = 3, kWaiting = 4;
   std::ifstream file("/proc/stat");
