@@ -19,8 +19,9 @@ namespace {
 
 using namespace ls::cli;
 
-// Sets the log level of coordinator and worker, by LIGHTSHAFT_LOG. By default they log nothing: commands
-// report everything relevant themselves.
+// Sets the log level of the coordinator and the worker in this process from the environment variable
+// LIGHTSHAFT_LOG. Without the variable they log nothing, since commands report everything relevant
+// themselves.
 void set_log_level() {
   const char* level = std::getenv("LIGHTSHAFT_LOG");
   const std::string_view wanted = level ? level : "off";

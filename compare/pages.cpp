@@ -1,4 +1,5 @@
-// The results as CSV tables, as Markdown and as an HTML page.
+// Writes the results of a comparison of integrators (races on one or more scenes) as CSV tables, as Markdown
+// and as an HTML page.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -26,7 +27,8 @@ th, td { text-align: left; padding: .25rem .8rem .25rem 0; border-bottom: 1px so
 .plots svg { width: 100%; height: auto; }
 )";
 
-// Escapes Markdown markup in a cell or a line.
+// Returns the text for a cell or a line of Markdown: characters that are markup are escaped, and a line break
+// becomes a space.
 std::string plain(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -67,7 +69,7 @@ std::string paragraph(const std::string& text, const char* kind = "") {
   return fmt::format("<p{}>{}</p>\n", kind, escape_html(text));
 }
 
-// Quotes a field of a table by RFC 4180.
+// Returns a text as a field of a CSV table, in quotes where RFC 4180 requires them.
 std::string field(const std::string& text) {
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string quoted = "\"";
@@ -77,7 +79,8 @@ std::string field(const std::string& text) {
 
 std::string field(double value) { return std::isfinite(value) ? fmt::format("{:.6g}", value) : ""; }
 
-// Returns an estimate as three fields, value and interval; they are empty for nullopt.
+// Returns an estimate as three fields of a CSV table: the value, and the lower and the upper end of its
+// interval. All three are empty for nullopt.
 std::string fields(const std::optional<Estimate>& e) {
   return e ? fmt::format("{},{},{}", field(e->value), field(e->lo), field(e->hi)) : ",,";
 }

@@ -1,4 +1,5 @@
-// Stores the images of a race until they are judged, reads reference images, and computes errors.
+// Stores the images of a race (integrators that render one scene at equal cost, race.h), reads reference
+// images, and computes the errors of images.
 #pragma once
 
 #include <filesystem>
@@ -12,10 +13,10 @@
 
 namespace ls::race {
 
-using Pixels = std::vector<float>;  // R, G, B interleaved, row by row from the top; all finite
+using Pixels = std::vector<float>;  // an image: R, G, B interleaved, row by row from the top; all finite
 
-// A folder for the images of one race, which is removed with the object. The images are on disk because they
-// are many, and are read only once, at the end.
+// A temporary folder for the images of one race; the destructor removes it. The images stay on disk until the
+// end of the race, since they may be too many for memory.
 class Scratch {
  public:
   static Result<Scratch> make();
@@ -37,38 +38,41 @@ Result<Pixels> kept(const std::filesystem::path& file, FrameSize size);
 // that are NaN or infinite; the message names the file.
 Result<Pixels> read_picture(const std::filesystem::path& exr, FrameSize size);
 
-// The reference for a race: either two independent images of the right answer, each with its own noise, or a
-// single image that is taken as exact (then `second` is empty).
+// The reference of a race, which stands for the true image: either two independent images, each with its own
+// noise, or a single image that is taken as exact (then `second` is empty).
 struct Reference {
   Pixels first, second;
 };
 
 // A reference image given by the user.
 struct ReferenceFile {
-  std::string name;  // without folders
+  std::string name;  // file name, without folders
   ls::Reference picture;
 };
-// Reads an image like read_picture(), with the error layers and the seed that the file has.
+// Reads an image with the checks of read_picture(). The result also has the layers of standard errors and the
+// seed, if the file has them.
 Result<ReferenceFile> read_reference(const std::filesystem::path& exr, FrameSize size);
 
-// Makes the reference of a race from one file, or from two that are independent of each other. A single file
-// with a layer of standard errors s counts as two images: ref + s and ref - s are the means of the two halves
-// of its samples, though it is unknown which is which (common/image/reference/reference.h).
+// Makes the reference of a race from one file, or from two files whose images are independent. A single file
+// without a layer of standard errors is taken as exact. With such a layer s, its image ref counts as two
+// images, ref + s and ref - s: these are the means of the two halves of its samples, in unknown order
+// (common/image/reference/reference.h).
 Reference combine(const std::vector<ReferenceFile>& files);
 std::string describe(const std::vector<ReferenceFile>& files);
 
 struct Wrong {
   double mse = 0, relmse = 0;
 };
-// Returns the errors of an image x against the reference images a and b. `mse` is the mean over pixels and
-// channels of (x - a)(x - b); `relmse` is the mean of the same divided by r^2 + 0.01, where r = (a + b) / 2.
-// If a and b are unbiased and independent of x and of each other, E[(x - a)(x - b)] = E[(x - truth)^2]: the
-// references' own noise cancels. The result may be negative where that noise is larger than the error of x.
-// With a single reference b = a, and its noise counts as error of the image.
+// Returns the errors of an image x against the two images a and b of the reference. `mse` is the mean of (x -
+// a)(x - b) over pixels and channels. `relmse` is the mean of (x - a)(x - b) / (r^2 + 0.01), with r the mean
+// of a and b. If a and b are unbiased and independent of x and of each other, the expectation of (x - a)(x -
+// b) is (x - truth)^2: the noise of a and b cancels. A result may be negative if that noise is larger than
+// the error of x. If the reference is a single image, b = a, and its noise counts as error of x.
 Wrong wrong(std::span<const float> pixels, const Reference& reference);
 
-// Returns the relMSE of the mean of the two references a and b, estimated from their difference: the mean of
-// ((a - b) / 2)^2 / (r^2 + 0.01), where r = (a + b) / 2. It is 0 for a single reference.
+// Returns the relMSE of r, the mean of the two images a and b of the reference. It is estimated from their
+// difference, as the mean of ((a - b) / 2)^2 / (r^2 + 0.01) over pixels and channels. It is 0 if the
+// reference is a single image.
 double noise_of(const Reference& reference);
 
 }  // namespace ls::race

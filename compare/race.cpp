@@ -9,8 +9,9 @@
 namespace ls::race {
 namespace {
 
-// The part of a race with one seed: runs its lanes (a lane is one entrant with one seed) to the end, and
-// records the entrants that failed in `failures`.
+// The part of a race that has one seed. run() lets all entrants (integrators) render with this seed, in
+// turns, to the end. It adds a lane (the run of an entrant with a seed) for each entrant that finishes, and a
+// failure for each that fails.
 class Heat {
  public:
   Heat(std::size_t seed, Lanes& out) : seed_(seed), out_(out) {}
@@ -58,7 +59,7 @@ class Heat {
   std::vector<Running> running_;
 };
 
-// The weighted mean of images.
+// Computes the weighted mean of images.
 class Sum {
  public:
   void add(const Pixels& pixels, double weight) {
@@ -77,8 +78,9 @@ class Sum {
   double weights_ = 0;
 };
 
-// Returns the entrant whose final images have the smallest sum of estimated relMSE. Considers only entrants
-// that render everything that the scene has and that have an image for every seed. nullopt: there is none.
+// Returns the entrant whose final images have the smallest estimated relMSE, summed over the seeds. Only
+// entrants that render all features of the scene and have an image for every seed are considered. nullopt:
+// there is none.
 std::optional<std::size_t> best_of(const Race& race, const Lanes& lanes, std::size_t seeds) {
   std::optional<std::size_t> best;
   double least = std::numeric_limits<double>::infinity();

@@ -1,5 +1,6 @@
-// A race on one scene. An entrant is an integrator that takes part. It runs once per seed; each such run is a
-// lane. Lanes run in turns, then their images are judged.
+// A race compares integrators at equal cost on one scene. An entrant is an integrator that takes part. It
+// renders the scene once per seed; each of these runs is a lane. The lanes of one seed run in turns
+// (racer.h). At the end the errors of all images are measured.
 #pragma once
 
 #include <functional>
@@ -15,12 +16,12 @@ namespace ls::race {
 
 struct Entrant {
   std::string name;
-  // True if it renders everything that the scene has, so that its images can serve as references.
+  // True if the integrator renders all features of the scene, so that its images can serve as references
   bool whole = false;
 };
 
 struct Lane {
-  std::size_t entrant = 0, seed = 0;  // indices
+  std::size_t entrant = 0, seed = 0;  // index of the entrant, and of the seed, from 0
   std::vector<Checkpoint> checkpoints;
   std::vector<std::filesystem::path> halves;
   std::vector<std::string> notes;
@@ -31,28 +32,30 @@ struct Failure {
 };
 struct Lanes {
   std::vector<Lane> lanes;        // ordered by seed, then by entrant
-  std::vector<Failure> failures;  // an entrant that failed has no lanes
+  std::vector<Failure> failures;  // the entrants that failed; they have no lanes
 };
 
-// Creates the racer of an entrant for one seed (both are indices), with the scene loaded.
+// Creates the racer that renders one lane: an entrant with a seed (both are indices). The scene is already
+// loaded when it returns.
 using MakeRacer = std::function<Result<std::unique_ptr<Racer>>(std::size_t entrant, std::size_t seed)>;
 // Called before each turn of a lane; `used` is the time that the lane has used so far, in seconds on the
 // race's clock.
 using Progress = std::function<void(std::size_t seed, std::size_t entrant, double used)>;
 
-// Runs the seeds one after the other. For one seed the entrants run in turns (schedule.h), beginning with
-// another entrant for each seed. Returns an error only because of `stop`; an error of a racer only removes
-// its entrant from the race.
+// Runs all lanes. The seeds run one after the other. The entrants of one seed run in turns (next_turn() in
+// racer.h), and each seed begins with another entrant. Returns an error only if `stop` was set. If a racer
+// fails, its entrant leaves the race and all its lanes are removed; the others go on.
 Result<Lanes> run_lanes(std::size_t entrants, std::size_t seeds, const MakeRacer& make,
                         const std::atomic<bool>& stop, const Progress& progress);
 
 struct JudgedPoint {
   double spp = 0;
   Cost cost;
-  double seconds = 0;  // on the race's clock
+  double seconds = 0;  // the cost so far, in seconds on the race's clock
   bool last = false;
   std::optional<ImageError> estimate;
-  double mse = 0, relmse = 0;  // errors against the reference; 0 or less: hidden by the reference's noise
+  // Errors against the reference; not positive: the noise of the reference hides the error
+  double mse = 0, relmse = 0;
 };
 struct JudgedLane {
   std::size_t entrant = 0, seed = 0;
@@ -65,19 +68,19 @@ struct Race {
   std::vector<JudgedLane> lanes;
   std::vector<Failure> failures;
   std::string reference;       // the reference used, in words
-  double reference_noise = 0;  // relMSE of the mean of two references
+  double reference_noise = 0;  // relMSE of the mean of the two reference images; 0 if there is only one
   std::vector<std::string> notes;
 };
 
-// Checks that judge() can work without a reference. invalid_argument: no entrant renders everything that
-// the scene has, or there are not enough seeds.
+// Checks that judge() can work without a reference from the user. invalid_argument: no entrant renders all
+// features of the scene, or there are fewer than two seeds.
 Result<void> judges_itself(const Race& race, std::size_t seeds);
 
-// Measures the errors of all images against `reference`. Without a reference, it makes one for each seed s
-// from the final images that the best entrant rendered with all other seeds: one image from the means of
-// their halves A (even samples), another from those of their halves B (odd samples). These two are
-// independent of the images of seed s and of each other. invalid_argument: there is no such entrant, or only
-// one seed.
+// Measures the errors of all images against `reference`. Without it, each seed s gets its own reference. This
+// is made from final images of one entrant: of those that render all features of the scene, the one with the
+// smallest estimated error. Its images of all seeds but s give the two images of the reference: the mean of
+// their halves A (even samples), and the mean of their halves B (odd samples). These two are independent of
+// the images of seed s and of each other. invalid_argument: there is no such entrant, or only one seed.
 Result<void> judge(Race& race, const Lanes& lanes, std::size_t seeds,
                    const std::optional<Reference>& reference);
 

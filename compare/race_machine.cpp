@@ -54,8 +54,8 @@ double load_average() {
   return ::getloadavg(&load, 1) == 1 ? load : -1;
 }
 
-// Reads the times of all cores together from the first line of /proc/stat, "cpu user nice system idle iowait
-// irq softirq steal ...", in ticks (proc(5)).
+// Reads the times since boot, summed over all cores. The first line of /proc/stat has them in clock ticks:
+// "cpu user nice system idle iowait irq softirq steal ..." (proc(5)).
 Others::Times Others::taken() {
   constexpr int kFields = 8, kIdle = 3, kWaiting = 4;
   std::ifstream file("/proc/stat");

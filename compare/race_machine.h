@@ -1,4 +1,5 @@
-// The machine that a race runs on, and the cores that it may use.
+// Describes the machine that a race runs on, restricts the race to some of its cores, and measures how busy
+// other processes keep it.
 #pragma once
 
 #include "common/base/error.h"
@@ -12,18 +13,20 @@ Result<void> use_cores(int count);
 
 // Returns the machine's processor and the number of cores used, such as "AMD EPYC 7B13, 2 of 8 cores".
 std::string machine_words(int cores);
-double load_average();  // the kernel's one-minute average; negative: unknown
+double load_average();  // the kernel's load average over one minute; negative: unknown
 
-// Measures the load of other processes since its construction.
+// Measures how much CPU time other processes use from the construction of this object on.
 class Others {
  public:
   Others() : start_(taken()) {}
-  // Returns the share, 0 to 1, of all cores' time that other processes have used. Negative: unknown.
+  // Returns the share, 0 to 1, of the time of all cores that other processes have used. Negative: unknown.
   double share() const;
 
  private:
   struct Times {
-    double total = 0, busy = 0, own = 0;  // seconds; total 0: unknown
+    // Seconds, summed over all cores: all time since boot (0: unknown), the busy part of it, and the CPU time
+    // of this process
+    double total = 0, busy = 0, own = 0;
   };
   static Times taken();
   Times start_;

@@ -14,12 +14,13 @@
 namespace ls::race {
 namespace {
 
-// A round that was cut to the time left is not rendered if it would add less than 1 / kLeastShare of the
-// existing samples.
+// A round that does not fit into the remaining time is shortened. It is left out if it would then add less
+// than 1 / kLeastShare of the samples rendered so far.
 constexpr std::uint64_t kLeastShare = 16;
 
-// Wall seconds after which a turn ends, unless the round ends earlier: long enough that waiting for the last
-// tile is a small part of the turn, and short enough that changes of the machine's speed affect all racers.
+// A turn ends after this many wall seconds, unless the round ends earlier. At the end of a turn threads wait
+// for the last tile: the turn is long enough to make this wait a small part of it. It is short enough that
+// changes of the machine's speed affect all racers.
 constexpr double kTurnSeconds = 1;
 
 // Runs `work` on `threads` threads at once; returns their total CPU seconds.
@@ -99,8 +100,9 @@ class RenderRacer final : public Racer {
     return entry_.folder / fmt::format("{}.{}", entry_.name, what);
   }
 
-  // Renders and folds the next tile of the round. Returns true if the round has no more tiles, or if
-  // rendering was stopped. nullopt: an error, which is in trouble_.
+  // Renders the next tile of the round and folds it (adds it to the image). Returns true if the turn ends
+  // here: no other tile of the round is left, rendering was stopped, or another thread had an error. nullopt:
+  // this tile had an error, which is in trouble_.
   std::optional<bool> one_tile(const std::atomic<bool>& stop) {
     TileIndex tile;
     {
@@ -114,7 +116,7 @@ class RenderRacer final : public Racer {
     auto rendered = render::render_tile(*entry_.world, partial.header.tile, *range_, &stop, nullptr);
     if (rendered.stopped) return true;
     partial.sums = std::move(rendered.sums);
-    const Digest digest;  // zero: no result is sent, so the chain of digests is not needed
+    const Digest digest;  // zero: the film chains the digests of results, which a race does not need
     const std::lock_guard lock(mutex_);
     const auto folded = film_.fold(tile, round_, partial, digest);
     if (!folded) {
@@ -126,8 +128,8 @@ class RenderRacer final : public Racer {
     return tile + 1 == entry_.grid.count();
   }
 
-  // Adds the partial (the pixel sums of one tile) to the frame's sums of each half of the samples. The film
-  // does not provide these.
+  // Adds the partial (the pixel sums of one tile) to sums_, the sums of the frame for each half of the
+  // samples. The film does not provide these.
   void add(const Partial& partial) {
     const PixelRect& rect = partial.header.tile;
     const auto pixels = static_cast<std::size_t>(rect.pixels());
@@ -161,7 +163,7 @@ class RenderRacer final : public Racer {
   }
 
   // Returns the mean image of the halves [from, to) of the samples: [0, 1) is half A, [1, 2) is half B, and
-  // [0, 2) is both. `samples` is the number of these samples per pixel.
+  // [0, 2) is both. `samples` is the number of samples per pixel in these halves.
   Pixels means(std::size_t from, std::size_t to, std::uint64_t samples) const {
     Pixels out(values());
     for (std::size_t i = 0; i < out.size(); ++i) {
@@ -176,16 +178,16 @@ class RenderRacer final : public Racer {
   const Conditions conditions_;
   const SystemClock clock_;
 
-  // guards the data shared by the threads of a turn: film_, sums_, health_, next_tile_, trouble_
+  // Guards the data shared by the threads of a turn: film_, sums_, health_, next_tile_, trouble_
   std::mutex mutex_;
   Film film_;
-  std::vector<double> sums_;  // of half A, then of half B; R, G, B interleaved
+  std::vector<double> sums_;  // pixel sums of half A, then of half B; R, G, B interleaved
   Health health_;
   TileIndex next_tile_ = 0;
   std::optional<Error> trouble_;
 
   RoundIndex round_ = 0;
-  std::optional<SampleRange> range_;  // of the current round; nullopt: the race is over
+  std::optional<SampleRange> range_;  // the samples of the current round; nullopt: the racer has finished
   double seconds_per_sample_ = 0;
   Cost cost_;
   std::vector<Checkpoint> points_;

@@ -1,4 +1,4 @@
-// The content that the HTML page and the Markdown page share.
+// Makes the parts that the HTML page and the Markdown page of a comparison share.
 #include "compare/results.h"
 
 #include <fmt/format.h>

@@ -28,7 +28,7 @@ std::vector<const JudgedLane*> lanes_of(const Race& race, std::size_t entrant) {
   return out;
 }
 
-// Returns one value per lane (the run of an entrant with one seed), from its last point.
+// Returns value(p) for the last point p of each lane (the run of an entrant with one seed).
 template <class Value>
 std::vector<double> at_end(const std::vector<const JudgedLane*>& lanes, const Value& value) {
   std::vector<double> out;
@@ -38,8 +38,8 @@ std::vector<double> at_end(const std::vector<const JudgedLane*>& lanes, const Va
 
 double efficiency(const JudgedPoint& p) { return 1 / (p.relmse * p.seconds); }
 
-// Returns points at doubling sample counts: from the last point back, each with at most half the samples of
-// the one after it.
+// Returns points of the lane at doubling sample counts, beginning with its last point: each further point has
+// at most half the samples of the point returned before it.
 std::vector<TimeError> doublings(const JudgedLane& lane) {
   std::vector<TimeError> out;
   double next = std::numeric_limits<double>::infinity();
@@ -134,7 +134,8 @@ std::vector<Row> rows_of(const Race& race) {
 
 std::vector<CurveAt> curve_of(const Race& race, std::size_t entrant) {
   const auto lanes = lanes_of(race, entrant);
-  // Key for the final points of all seeds, which belong together although their sample counts differ
+  // This key stands for the end of a run: the final points of all seeds form one group, although their sample
+  // counts differ.
   const double end = std::numeric_limits<double>::infinity();
   std::map<double, std::vector<const JudgedPoint*>> groups;
   for (const JudgedLane* lane : lanes)

@@ -15,7 +15,8 @@
 namespace ls::race {
 
 struct Estimate {
-  double value = 0, lo = 0, hi = 0;  // 95 % interval; unbounded for a single value
+  // A mean and its 95 % interval [lo, hi]; unbounded if it is the mean of a single value
+  double value = 0, lo = 0, hi = 0;
 };
 
 // Returns the geometric mean of positive values; the interval of a single value is (0, infinity). nullopt:
@@ -33,22 +34,23 @@ std::optional<Estimate> mean(std::span<const double> values);
 struct TimeError {
   double seconds = 0, error = 0;
 };
-// Returns the exponent s of error ~ seconds^-s, fitted by least squares through the logarithms of the points;
-// it is 1 for independent samples. nullopt: fewer than three points have positive time and error, or all of
-// them have the same time.
+// Returns the exponent s of error ~ seconds^-s, fitted by least squares through the logarithms of the points.
+// For squared errors s is 1 if the samples are independent. nullopt: fewer than three points have positive
+// time and error, or all of them have the same time.
 std::optional<double> log_slope(std::span<const TimeError> points);
 
 struct Row {
   std::size_t entrant = 0;
   std::size_t seeds = 0;
-  double spp = 0, seconds = 0;         // geometric means at the end
-  std::optional<Estimate> relmse;      // at the end
-  std::optional<Estimate> efficiency;  // 1 / (relMSE x seconds) at the end
+  double spp = 0, seconds = 0;     // samples per pixel and seconds at the end of the race (geometric means)
+  std::optional<Estimate> relmse;  // final error against the reference
+  std::optional<Estimate> efficiency;  // final 1 / (relMSE x seconds)
   std::optional<Estimate> slope;       // s of relMSE ~ seconds^-s, fitted to points at doubling sample counts
   // The first entrant's efficiency divided by this one's, as geometric mean over the seeds. nullopt for the
-  // first entrant.
+  // first entrant itself, and if an efficiency is unknown
   std::optional<Estimate> ratio;
-  double spread = 1;  // largest final relMSE of a seed over the smallest: large if few pixels dominate
+  // Largest final relMSE of the seeds divided by the smallest; large if few pixels dominate
+  double spread = 1;
 };
 // Returns one row per entrant that finished, in the order of the entrants.
 std::vector<Row> rows_of(const Race& race);
@@ -57,9 +59,9 @@ struct CurveAt {
   double spp = 0, seconds = 0;
   Estimate relmse;
 };
-// Returns the curve of an entrant: geometric means over the seeds at each sample count that the runs of the
-// different seeds share, and at the ends of the runs. Sample counts that fewer than half of the seeds
-// reached, and errors below the reference's noise, are omitted.
+// Returns the error of an entrant over time, as geometric means over the seeds: one point for each sample
+// count that at least half of the seeds have reached, and one for the ends of the runs. A point is omitted if
+// the error of any of its seeds is hidden by the noise of the reference.
 std::vector<CurveAt> curve_of(const Race& race, std::size_t entrant);
 
 }  // namespace ls::race

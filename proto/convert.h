@@ -1,7 +1,8 @@
-// Converts the messages of farm.proto (the protocol between coordinator and workers) to and from the plain
-// values of common/protocol. A value within the limits, with texts in UTF-8, survives the round trip
-// unchanged. A received message is converted to a value, or rejected with invalid_argument and the name of
-// the invalid field, so the code that uses the values need not check lengths, rectangles or lists again.
+// Converts the messages of farm.proto (the protocol between coordinator and workers) to and from the structs
+// of common/protocol/messages.h. A struct whose values are within their limits and whose texts are UTF-8
+// survives the round trip unchanged. A received message is converted, or rejected with invalid_argument and
+// the name of the invalid field, so the code that uses the structs need not check lengths, rectangles or
+// lists again.
 //
 // Names, tags and reasons longer than their limit are cut when sent; ids, tokens and lists are never cut.
 #pragma once
@@ -25,8 +26,8 @@ pb::ToWorker to_wire(const ToWorker& message);
 // between two characters.
 std::string sendable(const std::string& text, std::size_t limit);
 
-// True if this version supports the kind of the message. A newer peer may send others, which the caller
-// should ignore.
+// True if this version of the program knows messages of this kind. A peer of a newer version may send other
+// kinds; the caller should ignore them.
 bool known(const pb::FromWorker& message);
 bool known(const pb::ToWorker& message);
 

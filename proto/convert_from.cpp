@@ -1,4 +1,5 @@
-// Converts received messages to plain values. Every field is checked, because senders are not trusted.
+// Converts received protobuf messages to the structs of common/protocol/messages.h. Every field is checked,
+// because senders are not trusted.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -32,8 +33,8 @@ Result<std::string> id_from(const std::string& text, const char* field) {
   return text;
 }
 
-// Returns the text, which must have at most `limit` bytes. Control characters are replaced by spaces, so that
-// a worker cannot forge log lines or control a terminal.
+// Returns the text, which must have at most `limit` bytes. Control characters except line breaks are replaced
+// by spaces, so that a worker cannot control the terminal on which the text is shown.
 Result<std::string> text_from(const std::string& text, std::size_t limit, const char* field) {
   if (text.size() > limit)
     return wrong(field, fmt::format("has {} bytes; at most {} are allowed", text.size(), limit));
@@ -68,7 +69,8 @@ Result<SampleRange> range_from(std::uint64_t s0, std::uint64_t s1, const char* f
 
 // ---- values ----
 
-// Returns the entries of a list, which must be at most `limit`, converted by `entry_from`.
+// Returns the entries of the list `in`, each converted by `entry_from`. Returns an error if the list has more
+// than `limit` entries or one of them is invalid.
 template <class List, class From>
 auto list_from(const List& in, std::size_t limit, const char* field, const From& entry_from)
     -> Result<std::vector<typename decltype(entry_from(*in.begin()))::value_type>> {
@@ -168,9 +170,9 @@ Result<Health> health_from(const pb::UnitResult& in) {
     return Health{};
   auto health = parse_health(in.health().empty() ? "{}" : in.health());
   if (!health) return wrong("result.health", health.error().message);
-  // If a sender does not know a cause, only the counts nonfinite, negative and majorant_violations include
-  // it. The part of a count that is not in `health` is added to the cause unnamed, negative or
-  // majorant_violation.
+  // A newer worker may count a cause that this version does not know. Then its counts nonfinite, negative and
+  // majorant_violations are larger than the counts of the causes in `health`. Each excess is added to one
+  // cause: unnamed for nonfinite, negative, or majorant_violation.
   const auto rest = [](std::uint64_t stated, std::uint64_t named) {
     return stated > named ? stated - named : 0;
   };

@@ -1,4 +1,4 @@
-// Converts plain values to messages.
+// Converts the structs of common/protocol/messages.h to protobuf messages.
 #include <algorithm>
 #include <utility>
 
@@ -8,8 +8,8 @@
 namespace ls::wire {
 namespace {
 
-// Returns the number of bytes of the UTF-8 character at `i` (RFC 3629: shortest forms, no surrogates, up to
-// U+10FFFF); 0 if there is no such character at `i`.
+// Returns the number of bytes of the UTF-8 character that begins at `i` (RFC 3629: shortest forms, no
+// surrogates, up to U+10FFFF); 0 if the bytes from `i` on are no such character.
 std::size_t character_length(const std::string& text, std::size_t i) {
   const auto byte = [&](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0U; };
   const unsigned first = byte(i);

@@ -20,12 +20,13 @@ using render::V2;
 using render::V3;
 
 constexpr std::uint64_t kSamplesPerCell = 5000;
-// The density is integrated over each cell by the midpoint rule. The grid is refined until a step changes the
-// integral by at most kConverged times the larger of the integral and kNegligible. With 1e6 samples, such
-// errors add 1e6 * kConverged^2 = 0.01 to the statistic.
+// The density is integrated over each cell by the midpoint rule, on a grid of n x n points. n is doubled
+// until that changes the integral by at most kConverged times the larger of the integral and kNegligible.
+// With 1e6 samples, such errors add 1e6 * kConverged^2 = 0.01 to the statistic.
 constexpr double kConverged = 1e-4, kNegligible = 1e-6;
 constexpr int kFirstGrid = 8, kLastGrid = 512;
-// A density whose integral exceeds 1 by more than this is an error; the integration is far more accurate.
+// If the integral of a density over all directions exceeds 1 by more than this, the density is wrong: the
+// error of the numerical integration is far smaller.
 constexpr double kExcess = 1e-3;
 
 struct Surface {
@@ -56,8 +57,9 @@ V3 direction(double cosine, double phi) {
           static_cast<float>(cosine)};
 }
 
-// Cells of equal solid angle over the sphere: `rows` rows in the cosine, and twice as many columns in phi.
-// One more cell is for samples that are absorbed or scattered by a delta lobe.
+// The cells of a chi-square test of a BSDF's sampling. They divide the sphere of directions into parts of
+// equal solid angle: `rows` rows in the cosine, and twice as many columns in phi. One more cell is for
+// samples that are absorbed or scattered by a delta lobe.
 class BinTable {
  public:
   BinTable(const render::BsdfTable& bsdfs, BsdfIndex index, int rows, const V3& wo)
@@ -154,14 +156,15 @@ class Runner {
  private:
   bool asked_for(const std::string& name) const { return name.find(options_.only) != std::string::npos; }
 
-  // Tests a scene's mean: with one name its luminance, with three names its channels.
+  // Tests the mean of a scene by t-tests, and adds a case for each of `names`: one name means the luminance,
+  // three names mean the channels.
   Result<void> t_test(const Scene& scene, const std::vector<std::string>& names, const double* expected) {
     const std::uint64_t seed = options_.seed + number_++;
     bool any = false;
     for (const std::string& name : names) any = any || asked_for(name);
     if (!any) return {};
-    // The error of the mean is estimated from pixels, so their errors must be independent: pixels share no
-    // paths.
+    // Switches path reuse off: pixels would share parts of paths, so their errors would depend on each other.
+    // The standard error of a mean is computed from the errors of the pixels as if they were independent.
     Scene alone = scene;
     alone.integrator.path_reuse = -1;
     const auto m = measure(alone, files_, test_.sample_count, seed, options_.threads);
@@ -212,7 +215,7 @@ class Runner {
   const render::AssetFiles& files_;
   const ValidateOptions& options_;
   double level_ = 0;
-  std::uint64_t number_ = 0;  // number of the case, which determines its seed
+  std::uint64_t number_ = 0;  // number of tests so far; each test adds it to its seed
   std::vector<ValidateCase> cases_;
 };
 
@@ -225,10 +228,11 @@ Scene albedo_scene(const Scene& bsdf, double degrees) {
   scene.integrator = {};
   scene.integrator.name = "path";
   scene.integrator.max_depth = 2;
-  // A very narrow view that hits the rectangle, [-1, 1]^2 in z = 0, in its middle.
+  // A very narrow view of the middle of the rectangle [-1, 1]^2 in z = 0, `degrees` off its normal.
   const double a = degrees * std::numbers::pi / 180, s = std::sin(a), c = std::cos(a), away = 1;
   scene.sensor = {};
-  // Columns: left, up, forward, position; forward points to the origin.
+  // The columns of the matrix, which is stored by rows, are the camera's axes left, up and forward, and its
+  // position. The camera points to the origin.
   scene.sensor.to_world.m = {0, c, -s, s * away, 1, 0, 0, 0, 0, -s, -c, c * away, 0, 0, 0, 1};
   scene.sensor.fov = 1e-3;
   scene.film.size = {1, 1};
@@ -251,7 +255,7 @@ Result<ValidateCase> chi2_case(const NoriTest& test, std::size_t bsdf, const ren
                 fmt::format("bsdf {} has delta lobes alone, so it has no density that a chi2test could test",
                             bsdf + 1));
   render::RandomStream stream(render::combine(seed, 0x6368693274657374));
-  // Draws a direction with a density proportional to the cosine, as in Nori.
+  // Draws the outgoing direction with a density proportional to its cosine, as in Nori.
   const double u = stream.uniform(), phi = 2 * std::numbers::pi * stream.uniform();
   const BinTable table(surface->bsdfs, surface->index, test.resolution, direction(std::sqrt(1 - u), phi));
   const std::uint64_t samples =

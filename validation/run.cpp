@@ -18,14 +18,14 @@ namespace {
 using cli::Measured;
 using cli::ValidateCase;
 
-// Number of paths of a case's first run, which determines how many paths the case needs.
+// Number of paths of the pilot run, which is not judged: it determines how many paths the case needs.
 constexpr std::uint64_t kPilotPaths = 1 << 13;
-// The number of paths is planned so that kSpare standard errors remain between the interval and the band's
-// end. In about one run of seven this margin is too small, by chance or because the first run underestimated
-// the variance. Then the case is repeated with kAgain to kMostAgain times as many paths, as the newer
-// estimate demands.
+// The number of paths is planned so that the end of the confidence interval stays kSpare standard errors away
+// from the end of the band. In about one attempt of seven this margin is too small, by chance or because the
+// previous run underestimated the variance. Then the case is repeated with kAgain to kMostAgain times as many
+// paths, depending on the newer estimate.
 constexpr double kSpare = 1.5, kAgain = 2, kMostAgain = 16;
-// The degrees of freedom of the standard error that are assumed when the number of paths is planned.
+// The degrees of freedom that the standard error is assumed to have when the number of paths is planned.
 constexpr double kPlannedFreedom = 1e3;
 // Two one-sided tests, each at the level kWrongPass / kAttempts, decide whether the figure lies in the band.
 // They pass if a two-sided confidence interval of this level lies inside the band.
@@ -66,7 +66,7 @@ class Runner {
   std::vector<ValidateCase> take() { return std::move(lines_); }
 
  private:
-  // A measured mean with its expected value and errors, in each channel.
+  // A measured mean with its expected value, the standard error and its degrees of freedom, in each channel.
   struct Sight {
     Channels expected, got, error, freedom;
     render::Health health;
@@ -97,7 +97,8 @@ class Runner {
 
   Result<Sight> difference(const Same& same, std::uint64_t paths, std::uint64_t seed) const {
     // A simulated broken renderer (RunOptions::gain) has the same error in both scenes, so a case that
-    // compares two scenes passes. Their mean is not known in advance; 1 stands for it.
+    // compares two scenes passes in spite of it. The mean of the scenes is not known without rendering; here
+    // it is taken to be 1.
     const auto a = options_.gain ? broken(grey(1)) : look(same.scene, paths, seed),
                b = options_.gain ? a : look(same.other, paths, ~seed);
     if (!a) return tl::unexpected(a.error());
@@ -112,7 +113,7 @@ class Runner {
       s.got[k] = a->mean[k];
       s.expected[k] = b->mean[k];
       s.error[k] = std::sqrt(va + vb);
-      // Welch-Satterthwaite.
+      // The degrees of freedom of the difference, by the formula of Welch and Satterthwaite.
       const double spread = va * va / a->freedom[k] + vb * vb / b->freedom[k];
       s.freedom[k] = spread > 0 ? (va + vb) * (va + vb) / spread : a->freedom[k];
     }
@@ -120,8 +121,8 @@ class Runner {
   }
 
   // Returns the figures of a simulated broken renderer, whose values are `gain` times the right ones. Its
-  // standard error is `gain` times the one that growth() plans for a correct renderer: kSpare standard errors
-  // remain between the interval and the band's end.
+  // standard error is `gain` times that of a correct renderer with the planned number of paths (growth()):
+  // the end of the confidence interval is then kSpare standard errors away from the end of the band.
   Result<Measured> broken(const Channels& expected) const {
     Measured m;
     m.paths = kPilotPaths;
@@ -137,18 +138,18 @@ class Runner {
   }
 
   double band() const { return case_->options.band * (options_.quick ? kQuickWidening : 1); }
-  // Returns the part of an interval's half width that does not depend on the number of paths: rounding, and
-  // the uncertainty of the answer.
+  // Returns the part of the half width of a confidence interval that does not depend on the number of paths:
+  // float32 rounding, and the uncertainty of the answer.
   double unknown(double expected) const { return (kRounding + case_->options.slack) * std::abs(expected); }
 
-  // Returns the factor on the number of paths that makes the interval fit into the band with kSpare standard
-  // errors to spare; 0: no number of paths would suffice.
+  // Returns the factor by which the number of paths must grow to make the confidence interval fit into the
+  // band with kSpare standard errors to spare; 0: no number of paths would suffice.
   double growth(const Sight& s) const {
     double worst = 0;
     for (std::size_t k = 0; k < lines_of(*case_); ++k) {
       const std::size_t c = channel(k);
       const double room = band() * std::abs(s.expected[c]) - unknown(s.expected[c]);
-      if (!(room > 0)) return 0;  // no number of paths would suffice
+      if (!(room > 0)) return 0;
       const double ratio = s.error[c] * (kSpare + cli::student_quantile(kBandLevel, kPlannedFreedom)) / room;
       worst = std::max(worst, ratio * ratio);
     }

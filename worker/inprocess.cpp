@@ -23,9 +23,9 @@ tl::unexpected<UnitFailure> failed(const Error& error) {
       UnitFailure{.scene_at_fault = error.code == Errc::invalid_argument, .reason = error.message});
 }
 
-// Checks that the scene's needs (the features and files that rendering it takes), as this worker derives
-// them, equal those in the job's brief. The coordinator serves the files that the brief lists, so coordinator
-// and worker must derive the needs by the same rules.
+// A scene's needs are the features and files that rendering it takes. Worker and coordinator both derive them
+// from the scene, and the coordinator serves only the files that it found. So this function checks that the
+// needs that this worker derives equal those in the job's brief, which the coordinator has derived.
 tl::expected<void, UnitFailure> check_needs(const Scene& scene, const JobBrief& brief) {
   if (brief.needs.empty()) return {};
   const std::string own =
@@ -91,7 +91,8 @@ class InProcessBackend final : public LocalBackend {
   }
 
   void forget(const JobId& job) override {
-    std::vector<std::shared_ptr<const render::World>> last;  // destroyed after the mutex is unlocked
+    // The removed worlds. Declared before the lock, so that they are freed after the mutex is unlocked.
+    std::vector<std::shared_ptr<const render::World>> last;
     const std::lock_guard lock(mutex_);
     std::erase_if(worlds_, [&](auto& entry) {
       const bool gone = entry.first.job == job;

@@ -11,9 +11,11 @@ std::string host_name();
 int usable_cpus();  // number of CPUs on which this process may run
 // Returns the memory of the machine, or the limit of this process's control group if that is lower.
 std::uint64_t usable_memory_bytes();
-// Returns the cache's default folder, in XDG_CACHE_HOME or ~/.cache or else in the system's temporary folder.
+// Returns the default folder of the cache: in $XDG_CACHE_HOME if that is set, else in ~/.cache, else in the
+// system's temporary folder.
 std::filesystem::path default_cache();
-// The number of open files that a worker requests from the system: each blob in use is one.
+// The limit of open files that a worker requests from the system. It is large because each blob in use is an
+// open file.
 inline constexpr std::uint64_t kWantedFiles = 65536;
 void raise_file_limit();  // raises the limit of open files to kWantedFiles, or as far as this user is allowed
 

@@ -92,8 +92,8 @@ int run_worker(const worker::Options& options, const sigset_t& signals) {
                                 return link->fetch_blob(wanted, sink);
                               });
   if (!cache) return failed(cache.error());
-  // The child starts after the cache is open: its sandbox lets it read the cache's folder, which must exist
-  // by then.
+  // The child is started after BlobCache::open() has created the cache's folder: the child's sandbox permits
+  // reading that folder, and a sandbox can permit only folders that exist.
   worker::ChildOptions child_options{.arguments = child_arguments(options),
                                      .slots = options.threads,
                                      .hang_limit = from_seconds(options.hang_seconds),

@@ -153,7 +153,8 @@ std::variant<Options, int> parse_options(int argc, char** argv) {
 std::vector<std::string> child_arguments(const Options& o) {
   std::vector<std::string> arguments = {"--render-child", "--threads", std::to_string(o.threads),
                                         "--memory-limit", std::to_string(o.memory_limit)};
-  // The child needs the cache's folder, because its sandbox allows reading there.
+  // The child must know the cache's folder, where the files of jobs are, so that its sandbox can permit
+  // reading there.
   if (!o.cache.empty()) arguments.insert(arguments.end(), {"--cache", o.cache.string()});
   if (o.log_format == LogFormat::json) arguments.insert(arguments.end(), {"--log-format", "json"});
   if (o.fake) arguments.push_back("--fake");

@@ -15,18 +15,18 @@
 namespace ls::worker {
 
 struct Options {
-  std::vector<std::string> coordinators;  // addresses HOST:PORT
+  std::vector<std::string> coordinators;  // the address HOST:PORT of each coordinator
   int threads = 1;
   std::filesystem::path cache;
   std::uint64_t cache_limit = 0;   // upper limit for the bytes of the cache; 0: no limit
   std::uint64_t memory_limit = 0;  // upper limit for the render child's memory in bytes; 0: no limit
-  double hang_seconds = 300;
-  double build_seconds = 1800;
-  double idle_seconds = 0;  // 0: no limit
+  double hang_seconds = 300;       // longest time for one sample
+  double build_seconds = 1800;     // longest time to build a scene
+  double idle_seconds = 0;         // time without work after which the worker ends; 0: no limit
   std::string name;
   std::vector<std::string> tags;
   std::string join_token;
-  std::optional<LinkTls> tls;  // nullopt: no encryption
+  std::optional<LinkTls> tls;  // certificates; nullopt: no encryption
   bool fake = false;
   FakeOptions fake_options;
   std::string fake_fault_text;

@@ -16,8 +16,8 @@ namespace ls::cli {
 
 using Action = std::function<int()>;
 
-// Adds a command with options in `Flags`, which `run` executes. Returns the command and its flags, which live
-// as long as `app`.
+// Adds the command `name`. Its action calls `run` with a Flags object. Returns the command and this object,
+// into which the options are to be parsed; both live as long as `app`.
 template <class Flags>
 std::pair<CLI::App*, Flags*> add_command(CLI::App& app, Action& action, const std::string& name,
                                          const std::string& help, int (*run)(const Flags& flags)) {
@@ -31,9 +31,9 @@ void add_render(CLI::App& app, Action& action);
 void add_inspect(CLI::App& app, Action& action);
 void add_convert(CLI::App& app, Action& action);
 void add_submit(CLI::App& app, Action& action);
-// Adds jobs, show, watch, pause, resume, cancel, extend, fetch, focus, video and workers.
+// Adds the commands jobs, show, watch, pause, resume, cancel, extend, fetch, focus, video and workers.
 void add_farm_commands(CLI::App& app, Action& action);
-void add_farm_up(CLI::App& app, Action& action);  // the command farm up
+void add_farm_up(CLI::App& app, Action& action);
 void add_tokens(CLI::App& app, Action& action);
 void add_merge(CLI::App& app, Action& action);
 void add_validate(CLI::App& app, Action& action);
@@ -41,7 +41,7 @@ void add_verify(CLI::App& app, Action& action);
 void add_compare(CLI::App& app, Action& action);
 void add_doctor(CLI::App& app, Action& action);
 
-// Returns "lightshaft 0.2.0, build ..."
+// Returns the version and the build, such as "lightshaft 0.2.0, build ...".
 inline std::string version_text() {
   return fmt::format("lightshaft {}, build {}", LIGHTSHAFT_VERSION, render::kBuildId);
 }

@@ -1,4 +1,4 @@
-// lightshaft compare: renders scenes with several of our integrators and compares how fast their errors fall.
+// lightshaft compare: renders scenes with several integrators and compares how fast their errors fall.
 #include <fmt/format.h>
 
 #include <atomic>
@@ -120,7 +120,8 @@ void warn_if_busy(const CompareOptions& options) {
 }
 
 int run(const CompareFlags& flags) {
-  std::atomic<bool> stop{false};  // declared first, so that it outlives the thread that sets it
+  // Declared before `interrupt`, so that it outlives the thread of `interrupt`, which sets it.
+  std::atomic<bool> stop{false};
   Interrupt interrupt;
   auto options = options_of(flags);
   if (!options) return print_error(options.error());

@@ -49,11 +49,12 @@ class SceneRace {
     std::string name;
     JobSpec spec;
     std::optional<LocalWorld>
-        world;  // the scene ready to trace with the first seed; nullopt: not kept, or used up
+        world;  // the scene ready to trace, built for the first seed; nullopt: not kept, or already used
   };
 
-  // Builds the world (the scene ready to trace) for every integrator of the race, so that errors are found
-  // before hours of rendering. Keeps only the first world: all of them together would take too much memory.
+  // Builds the world (the scene ready to trace) for each integrator that will be compared, so that errors are
+  // found before hours of rendering. Keeps only the first world: all of them together would take too much
+  // memory.
   tl::expected<void, Rejected> line_up() {
     std::vector<std::string> wanted = options_.integrators;
     if (wanted.empty()) wanted.emplace_back();
@@ -97,8 +98,9 @@ class SceneRace {
     return std::optional(race::combine(read));
   }
 
-  // Rejects a reference that was rendered from this scene with one of the race's seeds. It would have the
-  // same noise as the race's image with that seed, whose error would then seem much smaller than it is.
+  // Rejects a reference image that was rendered from this scene with one of the seeds that the race uses. Its
+  // noise would be the same as that of the race's image with that seed, and the image's error would seem much
+  // smaller than it is.
   Result<void> refuse_own_noise(const race::ReferenceFile& file) const {
     for (const Digest& scene : scenes_)
       for (std::size_t i = 0; i < options_.seeds; ++i)
@@ -129,8 +131,8 @@ class SceneRace {
   const LocalScene& scene_;
   race::Race race_;
   std::vector<Ours> ours_;
-  // Digests of the scene, one per integrator, because each integrator leaves out what it cannot see. An image
-  // file has the digest of the scene that it shows.
+  // Digests of the scene, one per integrator, because the scene is reduced to what the integrator can see.
+  // They are compared with the digest in a reference file, which identifies the scene that it shows.
   std::vector<Digest> scenes_;
   std::filesystem::path folder_;
 };

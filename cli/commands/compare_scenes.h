@@ -1,4 +1,5 @@
-// Options of `lightshaft compare`, and the races that it runs.
+// Options of `lightshaft compare`, and the races that it runs. A race renders one scene with several
+// integrators at equal cost, with several seeds, and compares the errors.
 #pragma once
 
 #include <map>
@@ -13,12 +14,12 @@ namespace ls::cli {
 
 struct CompareOptions {
   std::vector<std::string> scenes;
-  std::vector<std::string> integrators;  // empty: the integrator that the scene names
-  race::Conditions conditions;           // without the size of the image
-  std::optional<FrameSize> size;         // nullopt: the size that the scene gives
+  std::vector<std::string> integrators;  // their names; empty: only the one that the scene names
+  race::Conditions conditions;           // time, clock, samples and threads; the image size is set later
+  std::optional<FrameSize> size;         // size of the image; nullopt: the size in the scene
   std::size_t seeds = 5;
   std::uint64_t first_seed = 0;
-  std::vector<std::filesystem::path> reference;  // one or two images, for a single scene
+  std::vector<std::filesystem::path> reference;  // one or two reference images, for a single scene
   std::filesystem::path references;  // a folder with reference images for several scenes; empty: none
   std::map<std::string, std::string> defines;
   std::filesystem::path report;
@@ -26,7 +27,7 @@ struct CompareOptions {
 };
 
 // Returns the names of the scenes in tables and files: the name of the scene file without extension, or its
-// folder's name if the file is called "scene". A number is appended to a name that occurs twice.
+// folder's name if the file is called "scene". If a name occurs again, a number is appended to it.
 std::vector<std::string> scene_names(const std::vector<std::string>& files);
 
 // Returns the reference images in `folder` for the scene called `name`: NAME.0.exr and NAME.1.exr, or

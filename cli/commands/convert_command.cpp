@@ -27,7 +27,7 @@ struct ConvertFlags {
 namespace fs = std::filesystem;
 
 struct FileCopy {
-  std::string name_before;  // the name in the original scene
+  std::string name_before;  // the file's name in the original scene
   std::filesystem::path from, to;
   Digest digest;
   bool renamed = false;
@@ -40,8 +40,8 @@ struct Converted {
   std::vector<FileCopy> copies;  // files to copy beside the XML file
 };
 
-// Knows the assets of a scene that was read before. With it, the scene's new text is read without opening any
-// file.
+// Finds assets by name in a scene that was read before. The converted text is read with this source, which
+// opens no file.
 class KnownAssets final : public AssetSource {
  public:
   explicit KnownAssets(const Scene& scene) {
@@ -70,8 +70,8 @@ bool leads_out(const std::string& name) {
   return name.starts_with('/') || name == ".." || name.starts_with("../");
 }
 
-// Renames the assets whose names lead out of the scene's folder (absolute paths, or by ".."), so that their
-// copies lie in the new folder. The new names are unique.
+// Renames each asset whose name leads out of the scene's folder (an absolute path, or a path that begins with
+// ".."), so that its copy lies in the new folder. The new name is the file name without folders, made unique.
 void rename_those_outside(Scene& scene) {
   std::set<std::string> taken;
   for (const Asset& a : scene.assets)
@@ -87,8 +87,9 @@ void rename_those_outside(Scene& scene) {
   }
 }
 
-// Returns the files that must be copied for the converted scene; files that exist already are left out. If
-// `all` is false, only files that the reader made from numbers in the scene's text are copied.
+// Returns the files to copy into `folder` for `written`, the scene with its new names. A file that already
+// exists there with the same content is left out. If `all` is false, only files that the reader made from
+// numbers in the scene's text are copied. already_exists: another file has the name of a copy.
 Result<std::vector<FileCopy>> copies_for(const LocalScene& scene, const Scene& written,
                                          const fs::path& folder, bool all) {
   std::vector<FileCopy> copies;
@@ -120,8 +121,8 @@ Result<std::vector<FileCopy>> copies_for(const LocalScene& scene, const Scene& w
 // folder of the original scene, these are only files that the reader made from numbers in the scene's text.
 // Otherwise they are all files that the scene needs, with the same relative names; a file whose name is
 // absolute or leaves the folder by ".." goes directly into the folder of `out`. The new text is read again
-// and compared with the scene. internal: they differ; already_exists: the folder has another file under a
-// name that the scene needs.
+// and compared with the scene. internal: it describes another scene; already_exists: the folder has another
+// file under a name that the scene needs.
 Result<Converted> convert_scene(const LocalScene& scene, const fs::path& out) {
   Scene written = scene.scene;
   Converted converted;

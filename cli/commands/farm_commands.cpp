@@ -1,5 +1,5 @@
-// The commands that ask a farm or change it. `lightshaft token add | list | revoke` manages the tokens that
-// give access to the farm; only its administrator may use it.
+// The commands that query or change a farm (its jobs, workers and tokens). `lightshaft token add | list |
+// revoke` manages the tokens that give access to the farm; only its administrator may use it.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -30,7 +30,7 @@ struct FarmFlags {
   std::string id, frame, spp, target_error, out, report, html, region, fps, exposure, role, user;
   bool quiet = false, none = false, denoised = false;
 };
-constexpr std::chrono::milliseconds kVideoPause(500);  // between two checks whether the video is ready
+constexpr std::chrono::milliseconds kVideoPause(500);  // pause between checks whether a video is ready
 using Run = int (*)(FarmApi& api, const FarmFlags& flags);
 
 int show_answer(const FarmApi::Answer<json>& answer, const FarmFlags& flags,
@@ -73,7 +73,7 @@ int extend(FarmApi& api, const FarmFlags& flags) {
   return change(api, flags, {{"spp", *spp}});
 }
 
-// Parses "X0,Y0,X1,Y1".
+// Parses a rectangle "X0,Y0,X1,Y1" in pixels; returns a JSON array of the four numbers.
 Result<json> parse_region(const std::string& text) {
   json rect = json::parse('[' + text + ']', nullptr, false);
   const bool pixels =
@@ -143,7 +143,8 @@ int fetch(FarmApi& api, const FarmFlags& flags) {
   return fetch_results(api, flags.id, {flags.out, flags.report, flags.html, flags.farm.json, false});
 }
 
-// With --frame, replaces the id of a sequence in `flags` by the id of one frame, which is a separate job.
+// With --frame, replaces the id of a sequence (a job with several frames) in `flags` by the id of that frame,
+// which is a job of its own.
 Result<void> choose_frame(FarmFlags& flags) {
   if (flags.frame.empty()) return {};
   const auto frame = parse_frame(flags.frame);
@@ -172,7 +173,8 @@ int revoke_token(FarmApi& api, const FarmFlags& flags) {
   return done ? kOk : print_rejected(done.error());
 }
 
-// Adds a command that `run` executes with a connection to the farm.
+// Adds a command. Its action connects to the farm and calls `run`. If `of_a_job`, the command takes the id of
+// a job, and --frame.
 std::pair<CLI::App*, FarmFlags*> add(CLI::App& app, Action& action, const char* name, const char* help,
                                      Run run, bool of_a_job = false) {
   auto flags = std::make_shared<FarmFlags>();

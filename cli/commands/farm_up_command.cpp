@@ -1,4 +1,5 @@
-// `lightshaft farm up --on ENGINE`: starts and stops workers as a farm's jobs need them.
+// `lightshaft farm up --on ENGINE`: starts and stops workers as a farm's jobs need them. ENGINE (Slurm, ssh,
+// Docker or Kubernetes) runs the workers.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,7 +22,8 @@ namespace fs = std::filesystem;
 
 constexpr double kMostSeconds = 1e7, kMostHours = 1e9;
 
-// Numbers are kept as text until they are parsed, so that error messages can name the option.
+// Values of the options. Numbers are kept as text here; parse_options() converts them, and its error messages
+// name the option.
 struct FarmUpFlags {
   FarmOptions farm;
   std::string engine, name = "farm", coordinator, join_token, worker, machines, ssh_config, logs = ".",
@@ -32,7 +34,7 @@ struct FarmUpFlags {
   bool until_done = false;
 };
 
-// Checks the farm-up's name (--name), which becomes part of the names of jobs, workers and files.
+// Checks the value of --name, which becomes part of the names of workers, Slurm jobs and files.
 Result<void> check_name(const std::string& name) {
   const bool plain = !name.empty() && name.size() <= 40 && std::all_of(name.begin(), name.end(), [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';

@@ -1,5 +1,5 @@
-// lightshaft inspect: the parts of the renderer that a scene uses, those that it does not use and why, and
-// the cost in bytes and instructions. It is printed as JSON, or as text for users.
+// lightshaft inspect: lists the parts of the renderer that a scene uses, those that it does not use and why,
+// and the cost in bytes and instructions. It is printed as JSON, or as text for users.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -54,7 +54,8 @@ tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> small_
 }
 
 // Renders a small image with every variant of the integrator that has the scene's features. (A variant is
-// compiled for a subset of the features that scenes can have.) Returns digests of the pixel sums.
+// compiled for a subset of the features that scenes can have.) Returns, for each variant, the digest of its
+// pixel sums and its instructions per path.
 tl::expected<VariantBitsList, coordinator::Rejected> render_variants(const LocalScene& scene,
                                                                      const LocalWorld& whole) {
   const auto world = small_world(scene, whole);
@@ -70,7 +71,8 @@ tl::expected<VariantBitsList, coordinator::Rejected> render_variants(const Local
                           });
 }
 
-// Returns the work counters of rendering a small image.
+// Renders a small image, and returns how often each kind of work was done, such as shadow rays or image
+// lookups. invalid_argument: this build does not count work.
 tl::expected<ordered_json, coordinator::Rejected> count_work([[maybe_unused]] const LocalScene& scene,
                                                              [[maybe_unused]] const LocalWorld& whole) {
 #ifdef LIGHTSHAFT_COUNT
@@ -104,7 +106,7 @@ std::string times(std::uint64_t count, const std::string& what) {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-// Returns a list with a title; empty if there are no rows.
+// Returns the rows as a list with a title; an empty text if there are no rows.
 std::string titled(const std::string& title, const Rows& rows) {
   return rows.empty() ? "" : "\n" + title + "\n" + aligned(rows, "  ") + "\n";
 }
@@ -187,7 +189,7 @@ std::string files(const ordered_json& j) {
                 staying);
 }
 
-// Draws a bar of up to 24 marks; the bar for `largest` has all 24.
+// Draws a bar as long as `bytes` is large: 24 marks for `largest`, and at least one mark unless `bytes` is 0.
 std::string bar(std::uint64_t bytes, std::uint64_t largest) {
   if (bytes == 0 || largest == 0) return "";
   const auto marks =

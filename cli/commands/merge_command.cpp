@@ -120,7 +120,7 @@ int run(const MergeFlags& flags) {
   if (!merged) return print_error(merged.error());
   Provenance provenance;
   provenance.scene = merged->scene;
-  // Partials contain the digest of the settings, not the settings.
+  // The settings themselves are unknown: partials contain only their digest.
   provenance.settings_json = nlohmann::json{{"sha256", merged->settings.hex()}}.dump();
   provenance.build = LIGHTSHAFT_VERSION;
   provenance.numeric_class = merged->numeric_class;

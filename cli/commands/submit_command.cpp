@@ -64,7 +64,7 @@ int wait_and_fetch(const std::string& id, const SubmitFlags& flags) {
   return fetch_results(*api, id, {flags.out, flags.report, flags.html, false, true});
 }
 
-// Uploads the reference before the job that refers to it.
+// Uploads the reference image, and stores its digest in `spec`. Must be called before the job is submitted.
 FarmApi::Answer<void> send_reference(const SubmitFlags& flags, JobSpec& spec) {
   if (spec.frames && spec.frames->count() > 1)
     return coordinator::rejected(

@@ -25,8 +25,8 @@ struct ValidateFlags {
   bool strict = false, quick = false;
 };
 
-// Records the renderer and the options with which the figures were made, so that nobody mixes the figures of
-// two renderers.
+// Adds the build, the numeric class (machines of one class render the same bits), the seed and --case, so
+// that nobody mixes results of different builds or options.
 void add_origin(nlohmann::ordered_json& json, const ValidateFlags& flags) {
   json["build"] = render::kBuildId;
   json["numeric_class"] = render::numeric_class().hex();
@@ -48,7 +48,7 @@ int report(const std::vector<ValidateCase>& lines, nlohmann::ordered_json json, 
 }
 
 // Returns the table as JSON, with its significance level and the cases that --quick has left out. The docs
-// page is generated from it, and a check uses it to find missing cases.
+// page is generated from it, and a check finds missing cases in it.
 nlohmann::ordered_json table_with_rows(const cases::Table& table, const std::vector<ValidateCase>& lines,
                                        bool quick) {
   nlohmann::ordered_json json = table_json(lines);

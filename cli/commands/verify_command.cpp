@@ -72,7 +72,7 @@ struct VerifiedTile {
   // True if verification was interrupted before the tile was rendered: its result is unknown.
   bool stopped = false;
   TileError error;      // error of the tile, estimated from its samples
-  std::string problem;  // empty: the digest and all layers match
+  std::string problem;  // what is wrong with the tile; empty: its digest and all layers match
 
   bool wrong() const { return !problem.empty(); }
 };
@@ -148,7 +148,9 @@ std::vector<std::string> wrong_headers(const SealedImage& image, const Cryptomat
       if (t.spp == 0) missing += static_cast<std::uint64_t>(t.rect.pixels());
     }
     expected.merge(error_strings(sums, missing));
-    expected.erase("lightshaft:verdict");  // also depends on the convergence curve, which is unknown here
+    // The verdict cannot be checked: it also depends on the convergence curve of the job, which is unknown
+    // here.
+    expected.erase("lightshaft:verdict");
   }
   std::vector<std::string> wrong;
   for (const auto& [name, value] : expected) {
@@ -249,7 +251,8 @@ Result<Numbers> numbers_of(const VerifyFlags& flags) {
 }
 
 int run(const VerifyFlags& flags) {
-  std::atomic<bool> stop{false};  // declared first, so that it outlives the thread that sets it
+  // Declared before `interrupt`, so that it outlives the thread of `interrupt`, which sets it.
+  std::atomic<bool> stop{false};
   Interrupt interrupt;
   interrupt.on_signal([&] { stop = true; });
   const auto numbers = numbers_of(flags);

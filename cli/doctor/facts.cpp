@@ -35,7 +35,7 @@ std::optional<worker::child::Sandboxed> probe_sandbox() {
 }
 
 bool processor_fits([[maybe_unused]] const std::string& target) {
-  // The program runs, so the processor supports every target that is not tested here.
+  // Any other target counts as supported, because this program, which was compiled for it, runs.
 #ifdef __x86_64__
   if (target == "x86-64-v3") return __builtin_cpu_supports("x86-64-v3") != 0;
 #endif
@@ -45,7 +45,8 @@ bool processor_fits([[maybe_unused]] const std::string& target) {
 double cpu_quota() {
   double quota = 0, period = 0;
   std::ifstream group("/sys/fs/cgroup/cpu.max");
-  return group >> quota >> period && period > 0 ? quota / period : 0;  // "max 100000" means no limit
+  // Without a limit the file has "max" in place of the quota, and reading a number fails.
+  return group >> quota >> period && period > 0 ? quota / period : 0;
 }
 
 bool may_run(const fs::path& program) { return ::access(program.c_str(), X_OK) == 0; }
@@ -62,8 +63,8 @@ fs::path in_path(const std::string& program) {
   return {};
 }
 
-// Observes a folder. A folder that does not exist is judged by the nearest existing one above it, where it
-// would be created.
+// Observes a folder. If it does not exist, observes the nearest existing folder above it, in which it would
+// be created.
 FolderFacts observe_folder(const std::string& name, const fs::path& path) {
   FolderFacts facts{name, path, false, 0};
   std::error_code error;

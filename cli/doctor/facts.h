@@ -14,14 +14,14 @@
 namespace ls::cli {
 
 struct FolderFacts {
-  std::string name;  // purpose of the folder: "cache"
+  std::string name;  // purpose of the folder, such as "cache"
   std::filesystem::path path;
   bool usable = false;  // true if a writable folder exists there or can be created
   std::uint64_t free_bytes = 0;
 };
 
 struct MachineFacts {
-  std::string processor_target;  // processor for which the program was compiled: "x86-64-v3"
+  std::string processor_target;  // processor for which the program was compiled, such as "x86-64-v3"
   bool processor_fits = false;
   // Numeric class of `lightshaft render` on this machine, in hexadecimal: machines of one class render the
   // same bits.
@@ -41,8 +41,8 @@ struct MachineFacts {
 
 MachineFacts observe_machine(const std::filesystem::path& cache, const std::filesystem::path& data);
 
-// Entering the sandbox is tried in a separate process, since a process cannot leave it again. That process is
-// this program with this flag; its exit code is the result.
+// With this flag, the program only enters the sandbox and ends; its exit code has a bit for each restriction
+// that took effect. observe_machine() runs it as a child process, since a process cannot leave the sandbox.
 inline constexpr const char* kSandboxProbeFlag = "--sandbox-probe";
 int run_sandbox_probe();
 
@@ -54,9 +54,11 @@ struct WorkerFacts {
 struct FarmFacts {
   std::string url;  // address without user and password
   bool has_token = false;
-  std::string trouble;            // why there was no answer; empty: there was an answer
-  bool is_coordinator = false;    // true if a coordinator answered
-  std::string not_ready, remark;  // from /readyz: why the coordinator cannot take jobs; another remark
+  std::string trouble;          // why there was no answer; empty: there was an answer
+  bool is_coordinator = false;  // true if a coordinator answered
+  // From the answer to GET /readyz. `not_ready`: why the coordinator cannot take jobs; empty: it can.
+  // `remark`: what else it reports; empty: nothing.
+  std::string not_ready, remark;
   // In seconds since 1970: this machine's clock before and after the request, and the coordinator's clock,
   // from the header Date of its answer.
   double asked_at = 0, answered_at = 0;

@@ -13,8 +13,8 @@ enum class Status { ok, warning, problem };
 std::string to_string(Status status);
 
 struct Finding {
-  std::string name;     // name of the check: "memory"
-  std::string subject;  // which object a repeated check concerns: an address, a folder
+  std::string name;     // name of the check, such as "memory"
+  std::string subject;  // the address or folder checked, if one check is made for several
   Status status = Status::ok;
   std::string what;
   std::string advice;  // what the user should do; empty: nothing

@@ -26,7 +26,7 @@ constexpr std::size_t kDigestsPerQuestion = 10'000;
 // smaller file is sent as a whole, and again if necessary; this saves the request that asks how many bytes
 // have arrived.
 constexpr std::uintmax_t kSentInParts = 1u << 20;
-constexpr int kBarrenAttempts = 8;  // give up after this many consecutive attempts without progress
+constexpr int kBarrenAttempts = 8;  // an upload fails after more consecutive attempts without progress
 
 std::string environment(const char* name) {
   const char* value = std::getenv(name);
@@ -165,7 +165,8 @@ FarmApi::Answer<void> FarmApi::download(const std::string& path, const std::file
 FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const JobSpec& spec,
                                               const Digest& text,
                                               const std::function<void(const std::string&)>& on_progress) {
-  // The files that the job needs, by digest. Null stands for the scene's text, which is in memory.
+  // The files that the job needs, by their digests in hexadecimal. Null stands for the scene's text, which is
+  // in memory.
   std::map<std::string, const LocalFile*> by_digest{{text.hex(), nullptr}};
   for (const auto& [name, file] : scene.files)
     if (is_needed(scene, spec, file)) by_digest.emplace(file.digest.hex(), &file);
@@ -193,7 +194,8 @@ FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const Job
   return {};
 }
 
-// Sending the same file again is safe, because blobs are identified by digest.
+// After a broken connection the file, or its missing part, is sent again. That is safe, because the
+// coordinator identifies files by digest, so that a second copy changes nothing.
 FarmApi::Answer<HttpResponse> FarmApi::send_file(const std::string& path, const std::filesystem::path& file) {
   std::error_code error;
   if (std::filesystem::file_size(file, error) < kSentInParts || error)

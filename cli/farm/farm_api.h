@@ -69,7 +69,7 @@ class FarmApi {
   HttpClient client_;
 };
 
-std::string job_path(const std::string& id);  // returns "/api/v1/jobs/ID", escaped
+std::string job_path(const std::string& id);  // "/api/v1/jobs/ID" with the id percent-encoded
 
 // Converts a response with an error status to an error, including its diagnostics.
 coordinator::Rejected problem_of(const HttpResponse& response);
@@ -81,7 +81,7 @@ std::optional<std::string> bundle_type(const std::string& file);
 
 // Returns the spec as query parameters, such as "?spp=8&define=a%3D1", or an empty text. Options that the
 // user did not give are left out, because the archive may set them. `with_priority`: true if the user gave
-// the priority, which its value does not show.
+// a priority; `spec` alone does not show that, since it always has one.
 std::string spec_query(const JobSpec& spec, bool with_priority);
 
 }  // namespace ls::cli

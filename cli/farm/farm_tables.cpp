@@ -36,8 +36,8 @@ std::string percent(const json& object, const char* key) {
   return value ? fmt::format("{:.0f} %", 100 * *value) : "-";
 }
 
-// A sequence with at most this many frames is listed completely. In a longer one, frames that are done or
-// queued are left out.
+// A sequence (a job with several frames) is listed completely if it has at most this many frames. In a longer
+// list, frames that are done or queued are left out.
 constexpr std::size_t kMostFrames = 100;
 
 std::string frames_done(const json& frames) {
@@ -59,8 +59,8 @@ std::string frames_table(const json& frames) {
   return rows.size() == 1 ? "" : "\n" + aligned(rows);
 }
 
-// Describes the samples done and requested. For a job that ends by target error or time only, `spp` is a
-// limit that the user did not set.
+// Describes the samples done and requested. If the user gave a target error or a time but no number of
+// samples, `spp` is only an upper limit.
 std::string samples(const json& job) {
   const std::string done = number(job, "spp_done", "{:.6g}"), limit = number(job, "spp", "{:.0f}");
   const auto asked = job.find("spp_asked");

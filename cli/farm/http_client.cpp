@@ -16,11 +16,11 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr long kConnectSeconds = 15;
-constexpr long kStallSeconds = 60;  // longest time without a byte of an answer
+constexpr long kStallSeconds = 60;  // a transfer that moves no byte for this long fails
 constexpr long kRedirects = 3;
 constexpr double kRemoteSeconds = 120;
 constexpr int kFirstPauseMilliseconds = 250, kLongestPauseMilliseconds = 4000;
-constexpr long kWorkSeconds = 3600;  // kStallSeconds for requests that take the server long to process
+constexpr long kWorkSeconds = 3600;  // replaces kStallSeconds if the server must work long before it answers
 
 struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }
@@ -188,7 +188,7 @@ Result<HttpResponse> HttpClient::State::perform(const std::string& path, const H
     set_common(urls[current] + path, headers);
     code = curl_easy_perform(curl);
     if (code != CURLE_COULDNT_CONNECT || urls.size() == 1) break;
-    current = (current + 1) % urls.size();  // nothing was sent yet, so the next address is tried
+    current = (current + 1) % urls.size();  // without a connection nothing was sent: try the next address
   }
   long status = 0;
   curl_easy_getinfo(curl, CURLINFO_RESPONSE_CODE, &status);
@@ -266,7 +266,7 @@ Result<HttpResponse> HttpClient::post_file(const std::string& path, const fs::pa
   state_->stall_seconds = kWorkSeconds;
   auto response = state_->send(path, file, content_type);
   state_->stall_seconds = kStallSeconds;
-  curl_easy_reset(state_->curl);  // removes the method if send() failed before the request
+  curl_easy_reset(state_->curl);  // removes CUSTOMREQUEST if send() failed before perform()
   return response;
 }
 

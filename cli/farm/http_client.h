@@ -17,8 +17,8 @@ namespace ls::cli {
 struct HttpResponse {
   int status = 0;
   std::string body;
-  std::optional<std::uint64_t> upload_offset;  // value of the header Upload-Offset
-  std::optional<std::int64_t> date;            // value of the header Date, in seconds since 1970
+  std::optional<std::uint64_t> upload_offset;  // header Upload-Offset: bytes of the file that the server has
+  std::optional<std::int64_t> date;            // header Date, in seconds since 1970
 };
 
 class HttpClient {
@@ -46,8 +46,8 @@ class HttpClient {
   // connection breaks.
   Result<HttpResponse> upload(const std::string& path, const std::filesystem::path& file,
                               std::optional<std::uint64_t> offset = std::nullopt);
-  // Sends a file by POST. The coordinator may take up to an hour to answer, because it unpacks the archive
-  // first.
+  // Sends an archive (a scene with its files) by POST. The coordinator may take up to an hour to answer,
+  // because it first unpacks the archive.
   Result<HttpResponse> post_file(const std::string& path, const std::filesystem::path& file,
                                  std::string_view content_type);
   // Writes the body of a 2xx answer to `file`: through a temporary file beside it, or directly if it is a

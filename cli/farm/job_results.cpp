@@ -34,10 +34,11 @@ std::optional<std::uint32_t> frame_number(const json& frame) {
 
 struct Plan {
   std::vector<Download> downloads;
-  std::vector<std::uint32_t> empty;  // frames that have no results
+  std::vector<std::uint32_t> empty;  // numbers of the frames that have no results
 };
 
-// Returns the path and parameters of the image within `job`. The PNG of a denoised job is the denoised image.
+// Returns the part of the image's URL that follows the path of the job: "/image.exr" or "/image.png", the
+// latter with a query for the denoised image if the job requests denoising.
 std::string image_of(const json& job, const Results& wanted) {
   if (image_format(wanted.image) != ImageFormat::png) return "/image.exr";
   return flag_field(job, "denoise") ? "/image.png?layer=denoised" : "/image.png";
@@ -112,7 +113,8 @@ ProgressFigures progress_of(const json& job) {
     f.samples_per_second = f.spp_done * size->first * size->second / elapsed;
   if (const json* frames = object_field(job, "frames")) {
     const int total = int_field(*frames, "total", 0);
-    // spp_done is the mean over the frames, and the rate is that of all frames together
+    // spp_done is the mean over the frames, so the rate computed above is that of one frame. The rate of all
+    // frames together is shown.
     f.samples_per_second *= total;
     f.frames = fmt::format("{} of {} frames", int_field(*frames, "done", 0), total);
   }

@@ -21,8 +21,8 @@ ProgressFigures progress_of(const nlohmann::json& job);
 // Prints how a job ended. If it is done, prints the error of its image (with `quiet` only if the error cannot
 // be trusted) and returns kOk; otherwise prints the reason and returns kFailed.
 int print_end(const nlohmann::json& job, bool quiet);
-// Prints the error of the denoised image of a job that is done; it is in the job's report only. Prints
-// nothing if no denoising was requested.
+// Prints the error of the denoised image of a job that is done. Only the job's report, which this function
+// downloads, contains that error. Prints nothing if no denoising was requested.
 void print_denoised(FarmApi& api, const nlohmann::json& job);
 
 struct Results {

@@ -22,8 +22,8 @@ namespace ls::cli {
 // without sockets or encoding.
 class LocalLink final : public worker::CoordinatorLink {
  public:
-  // `coordinator` must outlive the link. `on_result`, if given, is called with every result before the
-  // coordinator receives it.
+  // `coordinator` must outlive the link. `on_result`, if given, is called with every result just before the
+  // result goes to the coordinator.
   explicit LocalLink(coordinator::Coordinator& coordinator,
                      std::function<void(const UnitResult&)> on_result = {})
       : coordinator_(coordinator), on_result_(std::move(on_result)) {}
@@ -41,7 +41,7 @@ class LocalLink final : public worker::CoordinatorLink {
 };
 
 // Gives the worker agent in this process the blobs (scene and assets, identified by digest) of the
-// coordinator in this process as files. For an asset this is the user's file, where it is. The canonical
+// coordinator in this process as files. An asset is not copied: its file is the user's own. The canonical
 // scene, which the coordinator has in memory, becomes a memory file, which leaves nothing on disk.
 class LocalBlobFiles final : public worker::BlobFiles {
  public:

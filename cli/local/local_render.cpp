@@ -101,7 +101,7 @@ std::string forecast_text(const json& report, bool doubtful) {
   return line;
 }
 
-// Prints numeric health problems to stderr; usually nothing.
+// Prints the numeric problems of the render (such as invalid samples) to stderr, if there are any.
 void print_report_health(const json& j) {
   print_health(j);
   if (const auto cut = number(j, "clamped_values"); cut > 0)

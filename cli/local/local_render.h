@@ -23,7 +23,7 @@ struct LocalRenderOptions {
 // Renders the scene, and writes the output files; returns the exit code.
 int render_locally(const LocalScene& scene, const LocalRenderOptions& options);
 
-// What only this process can measure.
+// What only this process knows about the render; the coordinator's report lacks it.
 struct LocalFacts {
   double load_seconds = 0;
   std::uint64_t peak_rss_bytes = 0;
@@ -32,7 +32,8 @@ struct LocalFacts {
   // Instructions of the whole process; an error: why they were not counted
   Result<std::uint64_t> instructions = 0;
 };
-// Returns the coordinator's report with these facts.
+// Returns `report`, the coordinator's report in JSON, with `facts` added and the scene's path reduced to its
+// file name.
 Result<nlohmann::json> local_report(const std::string& report, const LocalFacts& facts);
 
 // Returns one line with the main results of the report.

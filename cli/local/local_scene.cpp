@@ -61,7 +61,7 @@ class RecordedFolder final : public AssetSource {
  private:
   FolderAssets folder_;
   std::map<std::string, LocalFile> files_;
-  std::string texts_;  // the included texts; the reader limits their size
+  std::string texts_;  // all included texts, joined; the scene reader limits their size
 };
 
 // Returns the names of the parameters ($name) in a text. Each name extends to the first character that cannot

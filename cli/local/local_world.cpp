@@ -10,7 +10,8 @@ namespace {
 
 using BuiltWorld = tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected>;
 
-// Builds the world of `description`, which is the scene in another form, with the files of `scene`.
+// Builds the world (the scene prepared for tracing) from `description`: the scene as a worker receives it, or
+// as it was read. `scene` provides the files, and the name for error messages.
 BuiltWorld build(const LocalScene& scene, const Scene& description, const RenderSettings& settings,
                  int threads) {
   render::AssetFiles files;

@@ -12,7 +12,7 @@
 namespace ls::cli {
 
 struct LocalWorld {
-  coordinator::StoredJob job;  // settings, samples and warnings, as for a job
+  coordinator::StoredJob job;  // settings, samples and warnings that a job would have
   std::shared_ptr<const render::World> world;
   scene::Needs needs;
   std::uint64_t scene_bytes = 0;  // size of the canonical scene that is sent to workers

@@ -13,7 +13,7 @@ namespace ls::cli {
 
 enum ExitCode : int { kOk = 0, kFailed = 1, kUsage = 2 };
 
-// Each of these prints the error and returns the exit code with which the command should end.
+// usage_error() and print_error() print the error and return the exit code with which the command should end.
 int usage_error(const std::string& text);  // returns kUsage
 int print_error(const Error& error);       // returns kUsage if the input is at fault, otherwise kFailed
 // Prints why a scene or job was rejected, with its diagnostics if any. Returns kUsage if the input is at

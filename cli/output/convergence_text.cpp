@@ -23,7 +23,7 @@ Verdict verdict(const json& object, const char* kind_key, const char* words_key)
   return out;
 }
 
-// Returns the errors against a reference image, each preceded by a comma and a space.
+// Returns the errors of the job's image against a reference image, each preceded by a comma and a space.
 std::string reference_errors_text(const json& job) {
   const json* reference = object_field(job, "reference");
   if (!reference) return "";
@@ -38,7 +38,7 @@ std::string reference_errors_text(const json& job) {
 
 constexpr std::size_t kMostCauses = 64;  // largest number of causes shown from a farm's answer
 
-// Returns the causes of a job whose numbers are not clean.
+// Returns the causes of the job's numeric problems, such as invalid samples; an empty list if none are known.
 const json& causes_of(const json& job) {
   static const json kNone = json::array();
   const json* health = object_field(job, "health");

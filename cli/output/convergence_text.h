@@ -21,7 +21,7 @@ Verdict verdict_of(const nlohmann::json& job);            // from the answer to 
 Verdict verdict_of_report(const nlohmann::json& report);  // from the answer to GET /jobs/ID/report
 
 // Returns the error that `job` has under `key`, as "0.0123 (0.0118 to 0.0129)", "0.0123 (don't trust yet)",
-// or "-" if it is unknown. `interval` is the key of its interval.
+// or "-" if it is unknown. `interval` is the key of its 95 % interval in `job`.
 std::string estimate_text(const nlohmann::json& job, const char* key, const char* interval);
 // Returns the remaining time that `times` has under `key`, as "4:12 (3:06 to 5:30)", "at least 4:12" (for a
 // doubtful job with a target), or "-" if it is unknown. `times` is `job` itself or an object in it.

@@ -7,7 +7,8 @@
 
 namespace ls::cli {
 
-// An Interrupt must be created before any other thread, so that all threads inherit the blocked signals.
+// Its constructor blocks the signals. An Interrupt must be created before any other thread, because a thread
+// inherits blocked signals only when it starts.
 class Interrupt {
  public:
   Interrupt();
@@ -15,7 +16,7 @@ class Interrupt {
   Interrupt(const Interrupt&) = delete;
   Interrupt& operator=(const Interrupt&) = delete;
 
-  // Calls `stop` once, on a separate thread, at the first signal. Call once.
+  // Calls `stop` once, on a separate thread, at the first signal. on_signal() may be called only once.
   void on_signal(std::function<void()> stop);
 
  private:

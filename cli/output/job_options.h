@@ -20,7 +20,8 @@ CLI::Option* add_option(CLI::App& app, const std::string& name, T& value, const 
   return app.add_option(name, value, help)->type_name(type);
 }
 
-// Numbers are kept as text until parse(), which makes the error messages.
+// Values of the options. Numbers are kept as text here; parse() converts them, and its error messages name
+// the option.
 struct JobOptions {
   std::string spp, target_error, target_layer, time, seed, size, integrator, priority, frames;
   std::string max_workers, max_units, memory, numeric_class;
@@ -39,9 +40,9 @@ void add_defines(CLI::App& app, std::vector<std::string>& defines);  // adds -D 
 // Parses a whole number, as in "--spp 64". `what` is the option's name, for the message.
 Result<std::uint64_t> parse_whole(const std::string& what, const std::string& text, std::uint64_t least,
                                   std::uint64_t most);
-// Parses the value of --frame.
+// Parses the value of --frame, the number of a frame.
 Result<std::uint32_t> parse_frame(const std::string& text);
-// parses, for example, "8G"; the units are powers of 1024
+// Parses a number of bytes, such as "8G"; the units are powers of 1024.
 Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& text);
 Result<double> parse_positive(const std::string& what, const std::string& text, double most);
 Result<FrameSize> parse_size(const std::string& text);             // parses, for example, "640x360"
@@ -58,7 +59,8 @@ Result<void> take(const std::string& text, T& field, const Parse& parse) {
   field = std::move(*value);
   return {};
 }
-// The parsers parse_whole() and parse_positive() for take().
+// whole() and positive() return a function for the parameter `parse` of take(), which calls parse_whole() or
+// parse_positive().
 inline auto whole(const char* what, std::uint64_t least, std::uint64_t most) {
   return [=](const std::string& text) { return parse_whole(what, text, least, most); };
 }

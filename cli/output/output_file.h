@@ -28,8 +28,9 @@ Result<void> check_folder(const std::string& option, const std::filesystem::path
 // Checks the name of an output file that is written once per frame. invalid_argument: there are several
 // frames, and the name has no # to distinguish their files.
 Result<void> check_numbered(const std::string& option, const std::string& name, const FrameRange& frames);
-// Checks, before a job begins, that an output file, or one per frame, can be written. The name of an image
-// ("-o") must be that of an image format. A report may be a single file for all frames.
+// Checks, before a job begins, that the output file `name`, or one such file per frame, can be written. If
+// `option` is "-o", the file is an image, and image_format() must accept its name. If there are several
+// frames, the name must have a # for their numbers; only "--report" may name a single file for all frames.
 Result<void> check_outputs(const std::string& option, const std::string& name,
                            const std::optional<FrameRange>& frames);
 Result<void> write_output(const std::filesystem::path& file, std::span<const std::byte> bytes);
@@ -48,9 +49,9 @@ class PartialDir {
   static Result<PartialDir> open(std::filesystem::path folder);
 
   Result<void> keep(const UnitResult& result);
-  // Removes stored rounds that are not part of the image: when a tile reaches the target error, some of its
-  // later rounds may have been rendered already. `folded` is the number of rounds of each tile that are part
-  // of the image.
+  // Removes the files of rounds that are not part of the image. There may be such files, because later rounds
+  // of a tile may already have been rendered when the tile reaches the target error. `folded` is the number
+  // of rounds of each tile that are part of the image.
   Result<void> drop_unfolded(std::span<const RoundIndex> folded);
 
   std::filesystem::path path(TileIndex tile, RoundIndex round) const;

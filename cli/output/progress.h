@@ -9,7 +9,7 @@
 namespace ls::cli {
 
 struct ProgressFigures {
-  std::string state;    // "running", ...
+  std::string state;    // state of the job, such as "running"
   double progress = 0;  // from 0 to 1
   double spp_done = 0;  // samples per pixel, mean over pixels
   double samples_per_second = 0;
@@ -22,8 +22,8 @@ struct ProgressFigures {
   std::optional<double> target_error = {};   // requested target, in relMSE
   std::optional<double> eta_with_more = {};  // remaining time with `more_workers` additional workers
   int more_workers = 8;
-  bool doubtful = false;         // the error is not reliable yet, nor is the time to a target
-  bool target_denoised = false;  // target_error means the denoised layers
+  bool doubtful = false;         // neither the error nor the time left to a target error is reliable yet
+  bool target_denoised = false;  // target_error is for the error of the denoised layers
   // Upper end of the interval that the most recent check gave for the relMSE of the denoised layers
   std::optional<double> denoised_at_most = {};
 };
@@ -32,7 +32,7 @@ struct ProgressFigures {
 // `columns`, whole parts are omitted, in this order: the rate, the effect of more workers, the error's
 // interval, the bar, the forecast's interval, the target. In the line of a doubtful job, "don't trust yet"
 // replaces the intervals and, if there is a target, "at least 4:12 left" replaces the remaining time; these
-// two texts are never omitted. If the target means the denoised layers, the line has ", denoised at most
+// two texts are never omitted. If the target is for the denoised layers, the line has ", denoised at most
 // 0.0012, target 0.001". `columns` 0: any length.
 std::string progress_line(const ProgressFigures& figures, int columns, bool with_bar = true);
 

@@ -1,4 +1,4 @@
-// Reads fields of a farm's answers, which may be missing or of the wrong type.
+// Reads fields of the JSON in a farm's answers. A field may be missing or have the wrong type.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -15,7 +15,7 @@ inline std::string text_field(const nlohmann::json& object, const char* key,
   return found != object.end() && found->is_string() ? found->get<std::string>() : otherwise;
 }
 
-// Returns false if the field is missing or of another type.
+// Returns true if the field is true; false also if it is missing or of another type.
 inline bool flag_field(const nlohmann::json& object, const char* key) {
   const auto found = object.find(key);
   return found != object.end() && *found == nlohmann::json(true);
@@ -31,7 +31,7 @@ inline int int_field(const nlohmann::json& object, const char* key, int otherwis
   return found != object.end() && found->is_number_integer() ? found->get<int>() : otherwise;
 }
 
-// reads a field like [1.5, 2]
+// Returns the two numbers of a field such as [1.5, 2]; nullopt if it is missing or of another form.
 inline std::optional<std::pair<double, double>> pair_field(const nlohmann::json& object, const char* key) {
   const auto found = object.find(key);
   if (found == object.end() || !found->is_array() || found->size() != 2 || !(*found)[0].is_number() ||
@@ -40,20 +40,20 @@ inline std::optional<std::pair<double, double>> pair_field(const nlohmann::json&
   return std::pair((*found)[0].get<double>(), (*found)[1].get<double>());
 }
 
-// Returns the field, or null if it is missing or no object.
+// Returns the field, or null if it is missing or not an object.
 inline const nlohmann::json* object_field(const nlohmann::json& object, const char* key) {
   const auto found = object.find(key);
   return found != object.end() && found->is_object() ? &*found : nullptr;
 }
 
-// Returns the field, or an empty list if it is missing or no list.
+// Returns the field, or an empty list if it is missing or not a list.
 inline const nlohmann::json& list_field(const nlohmann::json& object, const char* key) {
   static const nlohmann::json none = nlohmann::json::array();
   const auto found = object.find(key);
   return found != object.end() && found->is_array() ? *found : none;
 }
 
-// Returns the elements of a list that are objects.
+// Returns those elements of the list under `key` that are objects.
 inline std::vector<nlohmann::json> objects_field(const nlohmann::json& object, const char* key) {
   std::vector<nlohmann::json> objects;
   for (const auto& element : list_field(object, key))
@@ -61,7 +61,7 @@ inline std::vector<nlohmann::json> objects_field(const nlohmann::json& object, c
   return objects;
 }
 
-// Returns the elements of a list that are strings.
+// Returns those elements of the list under `key` that are strings.
 inline std::vector<std::string> texts_field(const nlohmann::json& object, const char* key) {
   std::vector<std::string> texts;
   for (const auto& element : list_field(object, key))
@@ -69,7 +69,8 @@ inline std::vector<std::string> texts_field(const nlohmann::json& object, const 
   return texts;
 }
 
-// Returns JSON with this indentation; -1: in one line. Invalid UTF-8 is replaced.
+// Returns the value as JSON text, indented by `indent` spaces per level; -1: on one line. Invalid UTF-8 is
+// replaced.
 template <class Json>
 std::string dump(const Json& value, int indent = 2) {
   return value.dump(indent, ' ', false, Json::error_handler_t::replace);

@@ -117,7 +117,8 @@ Result<LongCommand> LongCommand::start(const Words& words, const std::string& in
   if (in.read < 0) return fail(Errc::resource_exhausted, "no pipe to run a program with");
   int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
   if (file < 0) return bad_argument(fmt::format("{}: {}", log, std::strerror(errno)));
-  // Writing does not block: a pipe holds 64 KiB without a reader, far more than a command with its token.
+  // The input is written before the program runs. A pipe holds 64 KiB without a reader, far more than the
+  // command line and token of a worker. If the input were longer, the write would fail instead of blocking.
   ::fcntl(in.write, F_SETFL, O_NONBLOCK);
   const bool sent = ::write(in.write, input.data(), input.size()) == static_cast<ssize_t>(input.size());
   const Result<pid_t> pid =

@@ -19,7 +19,7 @@ struct CommandOutput {
 };
 
 // Runs a program to its end. unavailable: it did not end within `most_seconds`, and was killed;
-// resource_exhausted: it printed too much, and was killed; not_found: there is no such program.
+// resource_exhausted: it printed more than 64 MiB, and was killed; not_found: there is no such program.
 Result<CommandOutput> run_command(const Words& words, const std::string& input, double most_seconds);
 
 // Returns the parts of a command's output between the characters `separator`: its lines, or a line's fields.

@@ -77,7 +77,7 @@ void Spending::observe(std::span<const JobCost> jobs, std::span<const WorkerCost
     Worker& worker = it->second;
     worker.engine = cost.engine;
     if (is_new && !begun_) worker.before = cost.core_seconds;
-    // A worker that has rendered less than before was restarted.
+    // A worker that reports less than before was restarted. What its earlier process has cost is kept.
     if (cost.core_seconds < worker.now) worker.earlier += worker.now - std::exchange(worker.before, 0);
     worker.now = cost.core_seconds;
   }

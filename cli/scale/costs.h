@@ -1,5 +1,6 @@
-// What `lightshaft farm up` costs, in core seconds. The sums are kept in a file, so that the next run under
-// the same name continues them. Pure state machines: they read no clock and send no requests.
+// What `lightshaft farm up` costs, in core seconds. The sums are kept in a file, so that the next run with
+// the same --name continues them. The classes are pure state machines: they read no clock and send no
+// requests.
 #pragma once
 
 #include <limits>
@@ -37,13 +38,13 @@ class Ledger {
   int started_ = 0;
 };
 
-inline constexpr double kCoreHour = 3600;  // core seconds
+inline constexpr double kCoreHour = 3600;  // in core seconds
 
 // Upper limits in core seconds; nullopt: no limit.
 struct Budgets {
-  std::optional<double> job;            // for each job
-  std::optional<double> user;           // for each user that `users` does not name
-  std::map<std::string, double> users;  // for the users named; "": the administrator
+  std::optional<double> job;            // budget of each job
+  std::optional<double> user;           // budget of each user that is not in `users`
+  std::map<std::string, double> users;  // budgets by user name; "": the administrator
 };
 
 struct JobCost {
@@ -68,25 +69,25 @@ class Spending {
   double of_job(const std::string& id) const;
   double of_user(const std::string& owner) const;
   // Returns the core seconds that remain in the budget of a job or of a user: infinity without a budget; 0 or
-  // less if it is used up.
+  // less if the budget is used up.
   double left_of_job(const std::string& id) const;
   double left_of_user(const std::string& owner) const;
 
   nlohmann::json report() const;  // core hours by job, by user and by engine
   nlohmann::json to_json() const;
-  // Continues the sums of an earlier run, from its to_json(). invalid_argument: `json` has no such sums.
+  // Continues the sums of an earlier run, from its to_json(). invalid_argument: `json` does not contain sums.
   Result<void> go_on_from(const nlohmann::json& json);
 
  private:
   struct Job {
     std::string name, owner;
-    double before = 0;  // core seconds at the first report, which are not counted
+    double before = 0;  // core seconds before the first observe(), which are not counted
     double now = 0;
   };
   struct Worker {
     std::string engine;
     double earlier = 0;          // core seconds of earlier processes with the same id
-    double before = 0, now = 0;  // as in Job, for the process that runs now
+    double before = 0, now = 0;  // as in Job, but only of the process that runs now
   };
   Budgets budgets_;
   bool begun_ = false;

@@ -12,8 +12,8 @@ namespace {
 
 using State = EngineWorker::State;
 
-constexpr double kDockerLimit = 60;      // seconds allowed for one command of Docker
-constexpr double kDockerRunLimit = 600;  // the same for a command that may have to fetch the image first
+constexpr double kDockerLimit = 60;      // seconds allowed for a command of Docker except `docker run`
+constexpr double kDockerRunLimit = 600;  // seconds allowed for `docker run`, which may fetch the image first
 
 // The container's command waits at a named pipe for the farm's token. The pipe is in the container's /tmp,
 // which is in memory. So the token is in no argument, in no file, and not in the environment that `docker
@@ -117,9 +117,9 @@ class Docker final : public Engine {
     return std::move(output->out);
   }
 
-  // Runs a command of Docker on several containers. Containers that have ended since they were listed are no
-  // error. The call must not be repeated: the other containers have received their signal, and a second
-  // SIGTERM ends a worker at once.
+  // Runs a command of Docker on several containers. It is no error if some of them have ended since they were
+  // listed. The command must not be repeated because of them: the other containers have received their
+  // signal, and a second SIGTERM ends a worker at once.
   Result<void> for_all(Words words, const std::vector<std::string>& ids) const {
     if (ids.empty()) return {};
     for (const std::string& id : ids) words.push_back(container(id));

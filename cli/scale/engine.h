@@ -24,7 +24,7 @@ struct EngineWorker {
     running,
     stuck,  // the engine will not start it, or not soon
   };
-  std::string id;  // the engine's id; unique among the workers that it lists
+  std::string id;  // the engine's id of the worker; unique among the workers that the engine lists
   State state = State::waiting;
   double seconds = 0;  // time since its last start
   int cores = 1;       // cores that the engine has reserved for it
@@ -34,7 +34,7 @@ class Engine {
  public:
   explicit Engine(std::string version) : version_(std::move(version)) {}
   virtual ~Engine() = default;
-  const std::string& version() const { return version_; }  // such as "slurm-wlm 22.05.8"
+  const std::string& version() const { return version_; }  // of the engine, such as "slurm-wlm 22.05.8"
   // Returns the workers that this farm-up started, now or in an earlier run under the same name. An error
   // means that they are unknown, not that there are none.
   virtual Result<std::vector<EngineWorker>> list() = 0;
@@ -54,7 +54,7 @@ struct WorkerCommand {
   std::string coordinator;  // address HOST:PORT under which these machines reach the coordinator
   std::string token_file;   // file that contains the join token
   int threads = 1;
-  std::vector<std::string> options;  // more options of the worker, one word each
+  std::vector<std::string> options;  // more command line options of the worker, one word each
 };
 
 // Returns the name under which the coordinator shows the worker.
@@ -63,7 +63,8 @@ inline std::string worker_name(const std::string& farm, const std::string& id) {
 // Returns a new id of a worker in a container: eight random hexadecimal digits.
 inline std::string new_worker_id() { return fmt::format("{:08x}", std::random_device{}()); }
 
-// Returns the ids of the workers that run (`running`), or that do not run; nullopt: of all.
+// Returns the ids of the workers that run (`running` is true) or that do not run (false); nullopt: the ids of
+// all workers.
 inline std::vector<std::string> ids_of(std::span<const EngineWorker> workers,
                                        std::optional<bool> running = std::nullopt) {
   std::vector<std::string> ids;

@@ -50,9 +50,9 @@ Result<std::vector<std::string>> read_machines(const std::filesystem::path& file
 // Docker: workers are containers. `docker run` starts them, `docker ps` lists them, and signals drain and end
 // them.
 struct DockerOptions {
-  WorkerCommand worker;  // `program` is the path in the image
+  WorkerCommand worker;  // `program` is a path in the container image
   std::string join_token;
-  std::string image;             // name of the image, which deploy/images.sh builds
+  std::string image;             // name of the container image, which deploy/images.sh builds
   int drain_seconds = 120;       // how long Docker lets a worker drain if another command stops its container
   std::string logs = ".";        // folder for the logs of workers that have ended
   std::vector<std::string> run;  // more options of `docker run`, one word each
@@ -75,7 +75,7 @@ struct KubernetesOptions {
   int minutes = 60;         // time limit, after which Kubernetes ends the pod, with that grace period
   std::string logs = ".";   // folder for the logs of workers that have ended
   std::vector<std::string> kubectl;         // more options of kubectl, one word each
-  std::vector<std::string> worker_options;  // more options of the worker
+  std::vector<std::string> worker_options;  // more command line options of the worker
 };
 
 // failed_precondition: kubectl does not reach a cluster, or the cluster has no such Deployment.
@@ -87,8 +87,8 @@ Result<std::unique_ptr<Engine>> open_kubernetes(KubernetesOptions options);
 Result<nlohmann::json> pod_like(const nlohmann::json& deployment, const KubernetesOptions& options,
                                 const std::string& id);
 
-// Reads the output of `kubectl get pods -o json`; `unix_time` is now. invalid_argument: it is not a list of
-// pods that were made by pod_like().
+// Reads the output of `kubectl get pods -o json`; `unix_time` is now, in seconds since 1970.
+// invalid_argument: it is not a list of pods that were made by pod_like().
 Result<EngineList> parse_pods(const nlohmann::json& list, double unix_time);
 
 }  // namespace ls::cli

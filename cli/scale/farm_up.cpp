@@ -156,8 +156,8 @@ class FarmUp {
   }
 
  private:
-  // Reads the demand. While the coordinator does not answer, the number of workers does not change. Returns
-  // an error only if it has never answered.
+  // Asks the coordinator for the demand (how much work waits). While the coordinator does not answer, the
+  // number of workers does not change. Returns an error only if the coordinator has never answered.
   FarmApi::Answer<void> look_at_jobs() {
     auto asked = ask_demand(api_, {options_.limits.farm, engine_.version()}, spending_);
     if (asked) {

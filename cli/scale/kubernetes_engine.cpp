@@ -53,7 +53,8 @@ std::optional<double> seconds_of_utc(const std::string& text) {
   return ((days * 24.0 + hour) * 60 + minute) * 60 + second;
 }
 
-// True if a container of the pod does not start for a reason that waiting longer will not remove.
+// True if a container of the pod does not start, and waiting longer will not help: its image or its
+// configuration is at fault.
 bool hopeless(const json& status) {
   static const std::set<std::string> reasons{"ImagePullBackOff",     "ErrImagePull",
                                              "InvalidImageName",     "CreateContainerConfigError",
@@ -104,7 +105,7 @@ class Kubernetes final : public Engine {
 
   Result<void> drain(std::span<const EngineWorker> workers) override { return remove(workers, {}); }
 
-  // Removes the pods without waiting for their node to confirm it, as a lost node never does.
+  // Removes the pods without waiting for their nodes to confirm it, because a lost node never confirms it.
   Result<void> kill(std::span<const EngineWorker> workers) override {
     return remove(workers, {"--grace-period=0", "--force"});
   }

@@ -104,14 +104,15 @@ int Scaler::wanted(const Demand& demand) const {
   if (demand.open_jobs == 0) return 0;
   const double threads = std::ceil(demand.queued_core_seconds / limits_.finish_in) - demand.other_threads;
   const double workers = std::ceil(threads / limits_.threads);
-  // If nobody else runs workers, an open job needs at least one: to measure the job's cost if that is
-  // unknown, and to finish the work that workers already hold (queued_core_seconds leaves it out).
+  // If only this command runs workers, open jobs need at least one, even if no cost is predicted. The cost
+  // may be unknown until a worker has measured it, and queued_core_seconds leaves out the work that workers
+  // hold.
   const double least = demand.other_threads > 0 ? 0 : 1;
   return static_cast<int>(std::clamp(workers, least, static_cast<double>(limits_.most_workers)));
 }
 
-// Returns how many more workers the budget allows. It must pay every worker, existing or new, for
-// kWorthStarting seconds and for the time to end.
+// Returns how many more workers the budget allows. What is left of the budget must pay every worker, existing
+// or new, for kWorthStarting seconds and for the time that it takes to end.
 int Scaler::affordable(std::span<const EngineWorker> workers, double spent) const {
   if (!limits_.budget_core_seconds) return limits_.most_workers;
   const double each = kWorthStarting + seconds_to_end();
@@ -121,8 +122,8 @@ int Scaler::affordable(std::span<const EngineWorker> workers, double spent) cons
                   static_cast<int>(std::min<double>(limits_.most_workers, left / (limits_.threads * each))));
 }
 
-// Returns the most seconds that a worker still costs if the next check ends it: the interval until that
-// check, the time to drain, and another interval until its end is noticed.
+// Returns for how many seconds, at most, a worker still costs if the next check asks it to drain: the
+// interval until that check, the time to drain, and another interval until its end is noticed.
 double Scaler::seconds_to_end() const { return limits_.drain_seconds + 2 * limits_.poll_seconds; }
 
 void Scaler::drain(const EngineWorker& worker, ScaleActions& out, TimePoint now) {

@@ -19,8 +19,8 @@ namespace ls::cli {
 struct Demand {
   int open_jobs = 0;    // queued or running, with something left of their budgets
   int unpaid_jobs = 0;  // queued or running, but nothing is left of their budgets
-  // Predicted cost of the work that no worker holds, up to what the budgets pay for. 0 also if no cost was
-  // measured yet.
+  // Predicted cost of the work that no worker holds, as far as the budgets pay for it. The cost also counts
+  // as 0 while no cost of the job has been measured.
   double queued_core_seconds = 0;
   bool more_helps = true;        // false: by the coordinator's forecast, more workers would save no time
   int other_threads = 0;         // threads of connected workers that this command did not start
@@ -52,8 +52,8 @@ class Scaler {
   // `spent`: core seconds that our workers have cost so far. `workers`: all workers that the engine lists.
   ScaleActions decide(const Demand& demand, std::span<const EngineWorker> workers, double spent,
                       TimePoint now);
-  // Returns the actions for the end of the command: it starts no worker, drains all, and kills those that
-  // take too long to end.
+  // Returns the actions while the command is ending: start no worker, drain all, and kill those that have not
+  // ended after drain_seconds.
   ScaleActions end(std::span<const EngineWorker> workers, TimePoint now);
   // Must be called if the engine could not start workers. The next attempt waits, longer with each failure.
   void start_failed(TimePoint now);

@@ -13,7 +13,7 @@ namespace {
 
 using State = EngineWorker::State;
 
-constexpr double kTimeLimit = 60;          // seconds allowed for one command of Slurm
+constexpr double kTimeLimit = 60;          // seconds allowed for one command of Slurm, such as squeue
 constexpr std::size_t kMostInACall = 500;  // largest number of jobs in one call of scancel
 
 // The job's script. The worker's command line is passed as arguments, so that no shell parses it. `exec`

@@ -108,7 +108,7 @@ class Ssh final : public Engine {
 
   SshOptions options_;
   const SystemClock clock_;
-  std::map<std::string, Running> running_;  // key: machine
+  std::map<std::string, Running> running_;  // the running worker of each machine, by machine
   std::size_t next_ = 0;
   int count_ = 0;
 };

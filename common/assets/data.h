@@ -26,7 +26,7 @@ inline constexpr std::uint64_t kMaxGridValues = std::uint64_t{1} << 31;
 
 // A mesh attribute with one or three numbers per vertex or triangle.
 struct MeshAttribute {
-  std::string name;  // "vertex_..." or "face_..."
+  std::string name;  // begins with "vertex_" or "face_"
   std::uint32_t components = 1;
   bool bytes = false;         // true: the values are 0 to 255, as in the file
   std::vector<float> values;  // `components` values per vertex or triangle, adjacent in memory
@@ -38,7 +38,7 @@ struct MeshAttribute {
 struct MeshData {
   std::vector<float> positions, normals, uvs;
   std::vector<std::uint32_t> indices;
-  bool face_normals = false;  // true if the file requests flat triangles
+  bool face_normals = false;  // true if the file requests flat shading
   // Number of triangles without area or with a non-finite vertex; `indices` does not contain them.
   std::uint64_t dropped_triangles = 0;
   std::vector<MeshAttribute> attributes;     // the requested attributes
@@ -59,8 +59,8 @@ struct ImageData {
   bool operator==(const ImageData&) const = default;
 };
 
-// A dense grid: x fastest, then y, then z; the channels of a node are adjacent. All values are finite and not
-// negative.
+// A dense grid of nx * ny * nz nodes. In `values`, x varies fastest, then y, then z; the channels of a node
+// are adjacent. All values are finite and not negative.
 struct GridData {
   std::uint32_t nx = 0, ny = 0, nz = 0, channels = 0;
   std::vector<float> values;

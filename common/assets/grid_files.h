@@ -1,8 +1,8 @@
 // Grids of voxels in two file formats, both little endian.
 //
-// Mitsuba's .vol, version 3: "VOL", byte 3, int32 type, int32 nx ny nz, int32 channels, six float32 (minimum
-// and maximum corner), then the values, x fastest. Types: 1 float32, 2 float16, 3 uint8 (0 to 255 mean 0 to
-// 1).
+// Mitsuba's .vol, version 3: "VOL", a byte of value 3, int32 type, int32 nx ny nz, int32 channels, six
+// float32 (minimum and maximum corner), then the values, x fastest. Types: 1 float32, 2 float16, 3 uint8 (0
+// to 255 mean 0 to 1).
 //
 // Raw .bin: int32 nx, ny, nz; float32 minimum x, y, z and maximum x, y, z of the box in the world; nx ny nz
 // float32 values. Either x or z varies fastest (some converters call the latter "x-major"). The values are at

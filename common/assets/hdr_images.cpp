@@ -1,4 +1,4 @@
-// Decoders of images with floating-point values that need no library.
+// Decoders, written without a library, of images with floating-point values: Radiance .hdr and .pfm.
 #include <fmt/format.h>
 
 #include <array>
@@ -20,7 +20,8 @@ struct HdrSize {
   std::uint32_t width = 0, height = 0;
 };
 
-// Parses "-Y height +X width", which means rows from the top. Programs do not write other orientations.
+// Parses "-Y height +X width", which means rows from the top; nullopt for any other orientation, since no
+// common program writes one.
 std::optional<HdrSize> resolution(std::string_view line) {
   const auto count = [](std::string_view w) -> std::uint32_t {
     const auto n = parse_number<std::uint32_t>(w);
@@ -91,8 +92,9 @@ Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> f
   if (std::uint64_t{size->width} * size->height > max_pixels)
     return too_many_pixels(name, size->width, size->height, max_pixels);
   ByteReader r(file.subspan(file.size() - text.size()));
-  // A run packs at most 127 values of a plane into two bytes, so a pixel of four planes takes more than 1/16
-  // byte. A file that is too short for the claimed size is rejected before memory is allocated.
+  // A run packs at most 127 values of a plane into two bytes. So a pixel, which has a value in each of the
+  // four planes, takes at least 4 * 2 / 127 bytes, which is more than 1/16 byte. A file that is too short for
+  // the claimed size is rejected before memory is allocated.
   if (std::uint64_t{size->width} * size->height / 16 > r.left() || r.left() < std::uint64_t{size->height} * 4)
     return broken("it is too short for its size");
   ImageData image{size->width, size->height, 3, {}, {}, false};
@@ -110,7 +112,7 @@ Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> f
 
 namespace {
 
-constexpr std::size_t kMaxWord = 40;  // longest number in a header
+constexpr std::size_t kMaxWord = 40;  // longest number in a header, in characters
 
 // Removes the next word and the one blank after it from the front of `text`, and returns the word.
 std::string_view next_field(std::string_view& text) {

@@ -10,7 +10,7 @@ namespace ls {
 namespace {
 
 struct Failure {
-  jpeg_error_mgr base;  // first member, so that the library's pointer to it points to this struct
+  jpeg_error_mgr base;  // first member, so the library's pointer to it also points to the whole Failure
   std::jmp_buf escape;
   char message[JMSG_LENGTH_MAX];
 };
@@ -76,8 +76,9 @@ Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> 
   if (pixels == 0 || image.width > kMaxImageSide || image.height > kMaxImageSide || pixels > kMaxImagePixels)
     return broken("its size is not believable");
   if (pixels > max_pixels) return too_many_pixels(name, image.width, image.height, max_pixels);
-  // A block of 8 x 8 values takes at least two bits, and chroma may have a lower resolution, so this limit of
-  // one bit per 512 pixels is lenient.
+  // Rejects a header that claims more pixels than the file can hold. A block of 8 x 8 values takes at least
+  // two bits, and a colour channel may have up to 4 x 4 times fewer values than the image has pixels. So the
+  // lenient limit is one bit per 32 * 16 = 512 pixels.
   if (pixels / 64 / 64 > file.size()) return broken("it is too short for its size");
   image.u8.resize(pixels * image.channels);
   if (!read_rows(d, image.u8.data(), std::size_t{image.width} * image.channels))

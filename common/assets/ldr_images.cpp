@@ -18,7 +18,7 @@ Result<void> check_size(const BrokenImage& broken, std::int64_t width, std::int6
                          max_pixels);
 }
 
-// The fields of the two headers that are used, in the order of the file.
+// The fields that are used of BMP's two headers (file header and image header), in the order of the file.
 struct BmpHeader {
   std::uint32_t pixels_at = 0;
   // A positive height means rows from the bottom up, a negative one rows from the top down.
@@ -93,7 +93,8 @@ class QoiDecoder {
   }
 
  private:
-  // Returns false if the data end.
+  // Decodes one step that begins with the byte `head`: one pixel or a run. Returns false if the data end too
+  // early.
   bool step(std::uint8_t head) {
     if (head >= 0xfe) return read_codes(head == 0xff ? 4 : 3);
     const int low = head & 63;
@@ -111,7 +112,7 @@ class QoiDecoder {
         return more.has_value();
       }
       default:
-        run_ = low;  // `low` further pixels are equal to the current one
+        run_ = low;  // the current pixel is repeated `low` more times
         return true;
     }
   }
@@ -167,7 +168,7 @@ enum Kind : std::uint8_t { kMapped = 1, kColour = 2, kGrey = 3 };
 
 struct TgaHeader {
   std::uint8_t kind = 0;
-  bool packed = false;  // run-length coded
+  bool packed = false;  // true if the pixels are run-length coded
   std::uint32_t map_first = 0, map_count = 0, map_bits = 0;
   std::uint32_t width = 0, height = 0, bits = 0;
   bool has_alpha = false, from_right = false, from_top = false;
@@ -219,8 +220,8 @@ class PixelBytes {
   PixelBytes(std::span<const std::byte> data, std::size_t size, bool packed)
       : data_(data), size_(size), packed_(packed) {}
 
-  // Returns false if the data are certainly too short for `pixels`: a run-length packet has at least 1 + size
-  // bytes and at most 128 pixels.
+  // Returns false if the data are certainly too short for this many pixels. A run-length packet has at least
+  // 1 + size_ bytes (a header byte and one pixel) and represents at most 128 pixels.
   bool may_suffice(std::uint64_t pixels) const {
     return data_.size() >= (packed_ ? (pixels + 127) / 128 * (1 + size_) : pixels * size_);
   }
@@ -244,7 +245,7 @@ class PixelBytes {
   std::span<const std::byte> data_;
   std::size_t size_;
   bool packed_, repeats_ = false;
-  int left_ = 0;  // pixels of the current packet
+  int left_ = 0;  // number of pixels of the current packet that next() has not returned yet
 };
 
 std::vector<Rgba> read_map(std::span<const std::byte> bytes, std::size_t entry) {

@@ -42,7 +42,8 @@ inline bool is_drawable(const MeshData& m, std::uint32_t a, std::uint32_t b, std
       if (!std::isfinite(p[i][k])) return false;
     }
   double area2 = 0;
-  // In double, products of differences of floats cannot underflow.
+  // The components of the cross product are computed in double. In float the products of differences could
+  // underflow, and a tiny triangle would seem to have no area.
   for (int k = 0; k < 3; ++k) {
     const int u = (k + 1) % 3, v = (k + 2) % 3;
     const double n = (p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) - (p[1][v] - p[0][v]) * (p[2][u] - p[0][u]);
@@ -64,8 +65,8 @@ inline void add_polygon(MeshData& m, std::span<const std::uint32_t> corners) {
 }
 
 struct PlyAttribute {
-  std::string name;                     // without "vertex_" or "face_"
-  std::vector<std::size_t> properties;  // indices of its properties: one or three
+  std::string name;                     // name of the attribute, without the prefix "vertex_" or "face_"
+  std::vector<std::size_t> properties;  // one or three indices of PLY properties, one per component
 };
 
 // Groups the properties of a PLY element into attributes, by the rules of Mitsuba 3.9. `names` are the names

@@ -57,8 +57,8 @@ class ObjReader {
     return complain(fmt::format("unknown statement '{}'", key.substr(0, 40)));
   }
 
-  // Parses N numbers, of which the first `needed` are required; ignores the rest of the line (w, vertex
-  // colours).
+  // Parses N numbers, of which the first `needed` are required. The rest of the line, such as w or a vertex
+  // colour, is ignored.
   template <std::size_t N>
   bool numbers(std::string_view line, std::vector<std::array<float, N>>& into, std::size_t needed) {
     std::array<float, N> a{};
@@ -67,8 +67,8 @@ class ObjReader {
       if (w.empty() && i >= needed) break;
       if (!w.empty() && w[0] == '+') w.remove_prefix(1);
       const auto [end, ec] = std::from_chars(w.data(), w.data() + w.size(), a[i]);
-      // A number that is too small becomes 0 or denormal, one that is too large infinite. add_polygon()
-      // leaves out triangles with an infinite vertex position.
+      // A number that is too small for float becomes 0 or denormal; one that is too large becomes infinite.
+      // add_polygon() leaves out triangles with an infinite vertex position.
       if (ec == std::errc::result_out_of_range)
         a[i] = static_cast<float>(std::strtod(std::string(w.substr(0, 64)).c_str(), nullptr));
       else if (ec != std::errc{} || end != w.data() + w.size())

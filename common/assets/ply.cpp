@@ -24,7 +24,7 @@ enum class Coding { ascii, little_endian, big_endian };
 struct Type {
   std::string_view name;
   std::size_t bytes;
-  double largest;  // of an integer type; 0 for floating point
+  double largest;  // largest value of an integer type; 0 for a floating-point type
   std::optional<double> (*take)(ByteReader&, bool big_endian);
 };
 template <class T>
@@ -52,7 +52,7 @@ bool is_byte(const Type& t) { return t.largest == 255; }
 struct Property {
   std::string_view name;
   const Type* type = nullptr;
-  const Type* count = nullptr;  // type of the length of a list; null for a property that is no list
+  const Type* count = nullptr;  // type of a list's length; null if the property is not a list
 };
 struct Element {
   std::string_view name;
@@ -171,8 +171,8 @@ class PlyReader {
       if (!ok) return false;
     }
     if (mesh_.indices.empty() && mesh_.dropped_triangles == 0) return complain("has no faces");
-    // A file may have several elements of one name. If only one of two elements 'face' has the attribute, the
-    // attribute has too few values, which is an error.
+    // A file may have several elements of the same name. If an attribute does not have a value for every
+    // vertex or triangle, for example because only one of two elements 'face' has it, the file is rejected.
     for (const MeshAttribute& a : mesh_.attributes)
       if (a.values.size() !=
           a.components * (a.name.starts_with("face_") ? mesh_.triangle_count() : mesh_.vertex_count()))
@@ -192,7 +192,8 @@ class PlyReader {
     const char* const last = rest_.data() + rest_.size();
     const auto [end, ec] = std::from_chars(rest_.data() + a, last, v);
     if (ec == std::errc::invalid_argument) return std::nullopt;
-    if (ec == std::errc::result_out_of_range) v = 0;  // outside the range of double
+    // a number too large or too small for double is read as 0
+    if (ec == std::errc::result_out_of_range) v = 0;
     if (end != last && kBlanks.find(*end) == kBlanks.npos) return std::nullopt;
     rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
     return v;
@@ -295,9 +296,9 @@ class PlyReader {
     return true;
   }
 
-  // The place of a property's values: a component of one of the requested attributes.
+  // Where the values of a PLY property are stored: one component of a requested attribute.
   struct Place {
-    int attribute = -1;  // index in mesh_.attributes; -1: none
+    int attribute = -1;  // index in mesh_.attributes; -1: the property belongs to no requested attribute
     std::size_t component = 0;
   };
   std::vector<Place> attribute_places(const Element& e, std::string_view prefix) {
@@ -340,8 +341,8 @@ class PlyReader {
     const double x = v / t.largest;
     return x <= .04045 ? x / 12.92 : std::pow((x + .055) / 1.055, 2.4);
   }
-  // Copies the attributes of the last face, so that each of its triangles has them; removes them if the face
-  // has no triangles.
+  // Copies the attributes of the last face, so that each triangle of this face has them. Removes them if the
+  // face has no triangles.
   void share_among_triangles(const std::vector<Place>& places, std::size_t triangles) {
     for (const Place& p : places) {
       if (p.attribute < 0 || p.component > 0) continue;

@@ -24,8 +24,8 @@ std::optional<PlyAttribute> colour(std::span<const std::string_view> names) {
   return std::nullopt;
 }
 
-// Consecutive properties with the same prefix. Their last characters are the beginning of one of the
-// sequences in kKinds.
+// Consecutive properties with the same prefix, such as foo_x foo_y. Their last characters are the first
+// characters of `kind`, which is one of the sequences in kKinds.
 struct Run {
   std::string_view prefix;
   std::string_view kind;
@@ -61,7 +61,7 @@ std::vector<PlyAttribute> ply_attributes(std::span<const std::string_view> names
       run = {prefix, *kind, {i}};
     } else if (run.properties.size() < 4 && run.kind[run.properties.size()] == name.back()) {
       run.properties.push_back(i);
-    } else {  // the property does not continue the sequence, so this prefix has no attribute
+    } else {  // the property does not continue the run, so its prefix becomes no attribute
       done.insert(prefix);
       run = {};
     }

@@ -10,8 +10,8 @@ namespace ls {
 
 namespace {
 
-// The source of libpng's callbacks. Callbacks must not throw. Errors return by longjmp, which calls no
-// destructors, so only plain data may be on the stack.
+// What the callbacks of libpng use: the bytes still to be read, and the message of an error. Callbacks must
+// not throw. Errors return by longjmp, which calls no destructors, so only plain data may be on the stack.
 struct Source {
   const std::byte* data;
   std::size_t left;
@@ -80,8 +80,8 @@ Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> f
   PngShape shape;
   if (!read_header(p, shape)) return broken(source.message);
   const std::uint64_t pixels = std::uint64_t{shape.width} * shape.height;
-  // Deflate packs at most 1032 bytes into one. One bit of a palette image expands to four bytes, a factor of
-  // 32. A header that claims more pixels than the file can contain is rejected.
+  // A header that claims more pixels than the file can contain is rejected. Deflate packs at most 1032 bytes
+  // into one, and one bit of a palette image is at most expanded to four bytes, which is a factor of 32.
   if (pixels == 0 || pixels > kMaxImagePixels ||
       shape.row_bytes * std::uint64_t{shape.height} / 1032 / 32 > file.size())
     return broken("its size is not believable");

@@ -1,5 +1,6 @@
 // Reads Mitsuba's `serialized` meshes. Their format is described in the documentation of Mitsuba's
-// `serialized` shape. In version 3 meshes have no names, and the table at the end has 32-bit offsets.
+// `serialized` shape. Meshes of version 4 have names, and the table of offsets at the end of the file has
+// 64-bit numbers. In version 3 there are no names, and the offsets have 32 bits.
 #include <fmt/format.h>
 #include <zlib.h>
 
@@ -25,7 +26,7 @@ enum Flags : std::uint32_t {
   kDouble = 0x2000  // if absent: single precision
 };
 
-// A zlib stream that is unpacked on demand, so that memory is only needed for data that exist, not for the
+// A zlib stream that is unpacked as it is read. So memory is needed only for data that exist, not for the
 // size that the file claims.
 class Inflater {
  public:
@@ -89,7 +90,7 @@ class SerializedReader {
     return false;
   }
 
-  // Returns the compressed bytes of mesh number `index`; sets version_.
+  // Returns the part of the file that begins with the compressed bytes of mesh number `index`. Sets version_.
   std::optional<std::span<const std::byte>> find(int index) {
     if (!header(file_)) return std::nullopt;
     if (index == 0) return file_.subspan(4);
@@ -163,8 +164,8 @@ class SerializedReader {
     return false;
   }
 
-  // True if the packed bytes can contain the vertices and triangles that the header announces: zlib packs at
-  // most 1032 bytes into one. If not, the file is rejected before memory is allocated.
+  // Returns true if the packed bytes are enough for the vertices and triangles that the header announces:
+  // zlib packs at most 1032 bytes into one. Otherwise the file is rejected before memory is allocated.
   bool plausible(std::uint32_t flags, std::uint64_t vertices, std::uint64_t triangles) {
     const std::uint64_t per_vertex =
         3 + (flags & kHasNormals ? 3 : 0) + (flags & kHasUvs ? 2 : 0) + (flags & kHasColours ? 3 : 0);

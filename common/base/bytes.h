@@ -41,7 +41,7 @@ class ByteReader {
     std::memcpy(&v, raw, sizeof v);
     return v;
   }
-  // Reads a zero-terminated text of at most `longest` characters.
+  // Reads a zero-terminated text of at most `longest` characters. The text is returned without the zero.
   std::optional<std::string_view> name(std::size_t longest) {
     const std::string_view rest = as_text(data_.subspan(position_));
     const std::size_t length = rest.substr(0, longest + 1).find('\0');

@@ -19,14 +19,15 @@
 namespace ls {
 
 std::string to_hex(std::span<const std::uint8_t> bytes);  // returns lower-case hexadecimal digits
-// Reads exactly `bytes` from lower-case digits; returns false if the text is anything else.
+// Fills `bytes` from `text`, which must have exactly two lower-case hexadecimal digits per byte. Returns
+// false if it is anything else.
 bool read_hex(std::string_view text, std::span<std::uint8_t> bytes);
 
 struct Digest {
   std::array<std::uint8_t, 32> bytes{};
 
   std::string hex() const { return to_hex(bytes); }
-  // Returns nullopt unless `hex` is exactly 64 digits
+  // Returns nullopt unless `hex` is exactly 64 lower-case digits.
   static std::optional<Digest> parse(std::string_view hex);
   auto operator<=>(const Digest&) const = default;
 };

@@ -25,8 +25,8 @@ struct FrameRange {
   bool operator==(const FrameRange&) const = default;
 };
 
-// Parses a range of frames. invalid_argument: `text` is not such a range; the message quotes it, with the
-// correct syntax and any limit exceeded.
+// Parses a range of frames. Returns invalid_argument if `text` is not a valid range. The message quotes the
+// text and contains the correct syntax and any limit that is exceeded.
 Result<FrameRange> parse_frames(std::string_view text);
 std::string to_string(const FrameRange& range);
 

@@ -15,7 +15,8 @@ class Guarded {
   template <class... Args>
   explicit Guarded(Args&&... args) : value_(std::forward<Args>(args)...) {}
 
-  // Holds the mutex until it is destroyed, except between unlock() and lock().
+  // Gives access to the value. It holds the mutex from its construction to its destruction, except between
+  // unlock() and lock().
   class Lock {
    public:
     T& operator*() const {

@@ -34,8 +34,8 @@ std::string one_line(std::string_view text) {
   return line;
 }
 
-// Splits "a=1 b=two words c=3" into keys and values: a word without '=' belongs to the value before it. If a
-// key occurs twice, its first value is kept.
+// Adds the pairs in `keys`, such as "a=1 b=two words c=3", to `line`. A word without '=' belongs to the value
+// before it. If a key occurs twice, its first value is kept.
 void add_keys(nlohmann::ordered_json& line, std::string_view keys) {
   std::string key, value;
   const auto flush = [&] {
@@ -97,8 +97,8 @@ std::string log_line(LogFormat format, std::string_view keys, std::string_view t
   nlohmann::ordered_json line;
   line["text"] = text;
   add_keys(line, keys);
-  // With `replace`, dump() gives valid JSON whatever bytes a name contains. The opening brace is removed,
-  // since kJsonPattern already contains it.
+  // With error_handler_t::replace, dump() gives valid JSON whatever bytes a name contains. The opening brace
+  // is removed, since kJsonPattern already writes one.
   return line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).substr(1);
 }
 

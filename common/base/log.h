@@ -1,6 +1,6 @@
-// Logs one line per event, with keys and a text: log_info("job=j-12 tile=4 worker=w-3", "unit accepted").
-// info = a state changed, warn = something was retried, error = a person must act. An error is either logged
-// or returned, never both.
+// Logs one line per event, with keys (pairs KEY=VALUE) and a text: log_info("job=j-12 tile=4 worker=w-3",
+// "unit accepted"). Levels: info = a state changed, warn = something was retried, error = a person must act.
+// An error is either logged or returned, never both.
 #pragma once
 
 #include <optional>
@@ -10,8 +10,8 @@
 namespace ls {
 
 enum class LogLevel { debug, info, warn, error, off };
-// text: "TIME LEVEL KEYS TEXT". json: one object per line, with "time" (UTC), "level", "text" and the keys;
-// all values are strings.
+// The form of a logged line. text: "TIME LEVEL KEYS TEXT". json: one object per line, with "time" (UTC),
+// "level", "text" and the keys; all values are strings.
 enum class LogFormat { text, json };
 
 void log_level(LogLevel level);

@@ -36,8 +36,8 @@ bool is_shown(std::uint32_t code) {
   const auto within = [code](std::uint32_t first, std::uint32_t last) {
     return code >= first && code <= last;
   };
-  // Excluded are control characters, line and paragraph separators with the directional embeddings and
-  // overrides, and the directional isolates.
+  // Not shown are control characters, line and paragraph separators, directional embeddings and overrides
+  // (all in 0x2028 to 0x202E), and directional isolates.
   return !within(0, 0x1F) && !within(0x7F, 0x9F) && !within(0x2028, 0x202E) && !within(0x2066, 0x2069);
 }
 
@@ -65,7 +65,7 @@ std::string plain_text(std::string_view text) {
 
 std::string shell_word(std::string_view text) {
   if (!text.empty() && std::all_of(text.begin(), text.end(), needs_no_quotes)) return std::string(text);
-  // True if there are characters that are unsafe for a terminal
+  // true if `text` has characters that are unsafe for a terminal
   const bool escapes = plain_text(text) != text;
   std::string word = escapes ? "$'" : "'";
   for (const char c : text) {

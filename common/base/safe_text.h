@@ -17,9 +17,10 @@ std::string plain_text(std::string_view text);
 // ($'...', as bash, zsh and ksh read them), so the word can be shown on a terminal and in a log line.
 std::string shell_word(std::string_view text);
 
-// "a b" -> "a%20b": codes all but the unreserved characters of URLs.
+// Encodes all but the unreserved characters of URLs: "a b" -> "a%20b".
 std::string percent_encode(std::string_view text);
-// "a%20b" -> "a b" (RFC 3986, section 2.1); nullopt if a '%' is not followed by two hexadecimal digits.
+// Decodes a text of percent_encode() or of a URL: "a%20b" -> "a b" (RFC 3986, section 2.1). nullopt: a '%' is
+// not followed by two hexadecimal digits.
 std::optional<std::string> percent_decode(std::string_view text);
 
 }  // namespace ls

@@ -18,7 +18,8 @@
 namespace ls {
 
 bool equal_secret(std::string_view a, std::string_view b) {
-  // The digests of the two are compared: they have equal length, and an attacker cannot predict them.
+  // Compares the SHA-256 digests of the secrets: they have equal length, and an attacker cannot predict them,
+  // so the time of the comparison reveals nothing about the secrets.
   return equal_secret(sha256(a), sha256(b));
 }
 

@@ -1,4 +1,4 @@
-// Reading and comparing secrets.
+// Reads, writes and compares secrets, and signs texts with them.
 #pragma once
 
 #include <sys/types.h>
@@ -12,7 +12,8 @@
 
 namespace ls {
 
-// True if the two are equal. The run time reveals neither where they differ nor the secret's length.
+// Returns true if the two are equal. The run time reveals neither the place of a difference nor the length of
+// the secret.
 bool equal_secret(std::string_view a, std::string_view b);
 bool equal_secret(const Digest& a, const Digest& b);
 
@@ -29,8 +30,8 @@ Result<std::string> read_secret(const std::filesystem::path& file);
 inline constexpr std::size_t kPemBytes = 1u << 20;
 Result<std::string> read_pem(const std::filesystem::path& file);
 
-// Replaces the file in one step: after a crash there is either the old file, or the new one with the
-// permissions `mode`.
+// Replaces the file in one step: after a crash there is either the old file or the complete new one. The new
+// file has the permissions `mode`.
 Result<void> write_private(const std::filesystem::path& file, std::string_view text, mode_t mode = 0600);
 
 }  // namespace ls

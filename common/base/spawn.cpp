@@ -16,17 +16,19 @@ extern char** environ;
 namespace ls {
 namespace {
 
-// Duplicates of the files to be inherited, with higher numbers than the program will use. So dup2() of one
-// file to its final number cannot overwrite another file that is still to be moved.
+// Duplicates of the files that the program will inherit. Their numbers are higher than all numbers that the
+// program will use, so that dup2() of one file to its final number cannot overwrite another file that is
+// still to be moved.
 class HighFiles {
  public:
   ~HighFiles() {
     for (const int fd : fds_) ::close(fd);
   }
-  // Returns an error number, 0 for success.
+  // Duplicates `fd` to a number of at least `lowest`. Returns an error number, 0 for success.
   int add(int fd, int lowest) {
     const int high = ::fcntl(fd, F_DUPFD_CLOEXEC, lowest);
-    if (high < 0) return errno == EINVAL ? EMFILE : errno;  // EINVAL: `lowest` exceeds the descriptor limit
+    // EINVAL: `lowest` is above the process's limit for descriptors
+    if (high < 0) return errno == EINVAL ? EMFILE : errno;
     fds_.push_back(high);
     return 0;
   }

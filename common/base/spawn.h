@@ -1,4 +1,4 @@
-// Starts other programs with an explicit list of what they inherit.
+// Starts other programs. The caller lists the files and the environment variables that they inherit.
 #pragma once
 
 #include <sys/types.h>
@@ -18,12 +18,14 @@ inline constexpr int kDevNull = -1;
 
 struct Program {
   std::string path;                    // looked up in PATH if it has no slash
-  std::vector<std::string> arguments;  // argv: begins with the program's name
-  // files[i] becomes descriptor i of the program; kDevNull: /dev/null. No other descriptor is inherited.
+  std::vector<std::string> arguments;  // all of argv, beginning with the program's name
+  // files[i] becomes the program's descriptor i; the value kDevNull stands for /dev/null. No other descriptor
+  // is inherited.
   std::vector<int> files = {0, 1, 2};
   // Returns true if the program inherits the environment variable, given as NAME=VALUE.
   std::function<bool(std::string_view)> inherits;
-  // True: the program gets a process group of its own, and so none of the terminal's signals, such as Ctrl-C.
+  // True: the program gets a process group of its own, so it does not receive the signals of the terminal,
+  // such as Ctrl-C.
   bool own_group = false;
 };
 
@@ -34,12 +36,12 @@ Result<pid_t> spawn(Program program);
 // Waits until the process ends, and returns its wait status as waitpid() gives it.
 int wait_for_end(pid_t pid);
 
-// As wait_for_end(), but returns at once; nullopt if the process still runs.
+// Like wait_for_end(), but returns at once: nullopt if the process still runs.
 std::optional<int> poll_end(pid_t pid);
 
-// Helper programs are installed beside this one. They use third-party libraries that may crash, hang or take
-// too much memory: reading OpenVDB files, denoising. They share memory with this program through one file,
-// which they inherit as this descriptor.
+// Helper programs are installed beside this one. They read OpenVDB files or denoise images, with third-party
+// libraries that may crash, hang or take too much memory. A helper shares memory with this program through
+// one file, which it inherits as this descriptor.
 inline constexpr int kHelperFd = 3;
 
 // Returns the path of a program in the folder of the running executable.
@@ -55,10 +57,10 @@ class Descriptor {
   const int fd;
 };
 
-// Runs a helper program, waits for its end, and returns its wait status, as waitpid() gives it. It
-// inherits only two files: `shared` as kHelperFd, and standard error. Of the environment it inherits only
-// the variables that the loader, the allocator and the sanitizers read, so that it gets no secrets.
-// internal: it could not be started.
+// Runs a helper program, waits for its end, and returns its wait status, as waitpid() gives it. The helper
+// inherits only two files: `shared` as kHelperFd, and standard error. Of the environment it inherits only the
+// variables that the loader, the allocator and the sanitizers read, so that it gets no secrets. internal: the
+// program could not be started.
 Result<int> run_helper(const std::filesystem::path& program, std::vector<std::string> arguments, int shared);
 
 }  // namespace ls

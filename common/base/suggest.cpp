@@ -20,7 +20,8 @@ std::string folded(std::string_view name) {
   return out;
 }
 
-// Returns the optimal string alignment distance.
+// Returns the optimal string alignment distance: the smallest number of insertions, deletions, substitutions
+// and swaps of neighbouring letters that change one text into the other.
 std::size_t distance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;
@@ -49,7 +50,8 @@ std::optional<std::string> nearest_name(std::string_view given, std::span<const 
     const std::string other = folded(candidate);
     const std::size_t shorter = std::min(name.size(), other.size()),
                       longer = std::max(name.size(), other.size());
-    if ((longer - shorter) * 3 > longer) continue;  // the distance is at least the difference of the lengths
+    // the distance is at least the difference of the lengths, so this name is too far away
+    if ((longer - shorter) * 3 > longer) continue;
     if (work += shorter * longer; work > kMaxNameWork) break;
     const std::size_t d = distance(name, other);
     if (d * 3 > longer || (best && d >= best_distance)) continue;

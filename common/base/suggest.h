@@ -9,7 +9,8 @@
 
 namespace ls {
 
-// Limit of the work for one suggestion, in cells of edit-distance tables.
+// Limit of the work for one suggestion: the total number of cells of the edit-distance tables that are
+// filled.
 inline constexpr std::size_t kMaxNameWork = 4'000'000;
 
 // Returns the name in `known` that is nearest to `given` by edit distance; a swap of neighbouring letters

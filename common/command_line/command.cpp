@@ -21,7 +21,8 @@ std::vector<std::string> split(const std::string& text, char separator) {
   return parts;
 }
 
-// CLI11 joins an option's type name and the names of its checks with colons: "TEXT:{read,admin}".
+// Sets an option's value name and choices from CLI11's type text, in which CLI11 joins the type name and the
+// names of the checks by colons: "TEXT:{read,admin}".
 void read_type(const std::string& type, CommandOption& option) {
   const std::size_t colon = type.find(':');
   option.value = type.substr(0, colon);

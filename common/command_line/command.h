@@ -12,10 +12,11 @@ class App;
 namespace ls {
 
 struct CommandOption {
-  std::vector<std::string> names;  // for example "-o", "--output"; empty: an argument without a name
-  // Placeholder of its value, such as "FILE" or "N"; empty: it takes no value
+  // all its names, such as "-o", "--output"; empty: a positional argument without a name
+  std::vector<std::string> names;
+  // Name of its value in the help, such as "FILE" or "N"; empty: the option takes no value
   std::string value;
-  std::vector<std::string> choices;  // the allowed values; empty: any
+  std::vector<std::string> choices;  // the allowed values; empty: any value is allowed
   std::string help;
   std::string default_value;  // empty: there is no default, or the help contains it
   bool required = false, repeated = false;

@@ -8,7 +8,8 @@
 namespace ls {
 namespace {
 
-// Calls `visit` for the program and all of its commands. `path` is, for example, "lightshaft token add".
+// Calls `visit` for the program and for each of its commands, at any depth. `path` is the program's name and
+// the names of the commands down to this one, such as "lightshaft token add".
 using Visit = std::function<void(const std::string& path, const Command& command)>;
 void walk(const std::string& path, const Command& command, const Visit& visit) {
   visit(path, command);
@@ -21,7 +22,7 @@ std::string in_quotes(const std::string& text) {
   return out + "'";
 }
 
-// Returns the name of a shell function for this path.
+// Returns the name of the shell function that completes the command with this path.
 std::string function_of(const std::string& path) {
   std::string name = "_";
   for (const char c : path) name += c == ' ' || c == '-' ? '_' : c;
@@ -108,7 +109,8 @@ std::string with_backslashes(const std::string& text, std::string_view before) {
   return out;
 }
 
-// Escapes brackets and colons, which separate the parts of a specification for zsh's _arguments.
+// Escapes the characters that separate the parts of a specification for zsh's _arguments: brackets, colons
+// and the backslash.
 std::string zsh_text(const std::string& text) { return with_backslashes(text, "[]:\\"); }
 
 std::string zsh_value(const CommandOption& option) {
@@ -156,8 +158,9 @@ std::string zsh_completion(const Command& program) {
   std::string script = fmt::format("#compdef {0}\n# written by `{0} completion zsh`\n", program.name);
   walk(program.name, program,
        [&](const std::string& path, const Command& command) { script += zsh_function(path, command); });
-  // zsh may autoload this file as the body of the function, which must then call the function that it
-  // defines. If the file is sourced, it registers the function.
+  // There are two ways in which zsh reads this file. If zsh autoloads it, the whole file is the body of the
+  // function, so it must call the function that it has just defined. If it is sourced, it registers the
+  // function for completion.
   return script +
          fmt::format("if [[ $funcstack[1] == {0} ]]; then\n  {0} \"$@\"\nelse\n  compdef {0} {1}\nfi\n",
                      function_of(program.name), program.name);

@@ -16,7 +16,8 @@ constexpr double kInterval = 1.96;  // half the width of a 95 % interval, in sta
 // An interval is given only if at least this many pixels carry the noise, measured as (sum n^2)^2 / sum n^4
 // (denoised_image.h).
 constexpr double kFewestPixels = 4;
-// E (a - b)^4 / Var^2, where a and b are independent Gaussian variables of variance Var.
+// The fourth moment E (a - b)^4 divided by Var^2, where a and b are independent Gaussian variables of
+// variance Var.
 constexpr double kFourthMoment = 12;
 
 struct Noisy {
@@ -24,8 +25,9 @@ struct Noisy {
   std::vector<bool> counts;
 };
 
-// The indices in TileAovs::sums of the three planes of one half (A or B) of a guide, an AOV for the denoiser.
-// The planes are sorted by name there: B, G, R or X, Y, Z.
+// For one half (A or B of the samples) of a guide (an AOV for the denoiser): the indices in TileAovs::sums of
+// its three planes, in the order R, G, B or X, Y, Z. TileAovs::sums itself has planes sorted by name: B, G, R
+// or X, Y, Z.
 struct GuidePlanes {
   std::array<std::size_t, 3> plane{};
 };

@@ -57,16 +57,16 @@ namespace ls {
 struct DenoisedError {
   double mse = 0, rmse = 0, rmse_lo = 0, rmse_hi = 0;
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;
-  bool rmse_interval = false, relmse_interval = false;  // false: the interval is not known
-  // The largest relMSE within the interval; nullopt: there is no interval. If noise made the estimate
-  // negative, the noise is larger than the error, and the interval is moved up so that its centre is 0.
+  bool rmse_interval = false, relmse_interval = false;  // false: the interval is unknown
+  // Returns the upper end of the interval of relMSE; nullopt: there is no interval. A negative estimate means
+  // that its noise is larger than the error. In this case the interval is moved up so that its centre is 0.
   std::optional<double> relmse_at_most() const {
     return relmse_interval ? std::optional(relmse_hi - std::min(0.0, relmse)) : std::nullopt;
   }
 };
 
-// Half means and their denoised images: R, G, B of each pixel, row by row. `counts` has one element per
-// pixel: false if the pixel has no samples.
+// The mean images of the two halves, and the denoised images of these means: R, G, B of each pixel, row by
+// row. `counts` has one element per pixel: false if the pixel has no samples.
 struct DenoisedHalves {
   std::vector<float> a, b, denoised_a, denoised_b;
   std::vector<bool> counts;
@@ -79,8 +79,8 @@ struct DenoisedImage {
   DenoisedError error;
   std::string by;  // name of the denoiser, from Denoiser::name()
 };
-// Denoises a film that has the AOVs aovs_of(AovKind::guide). The film may be unfinished. Returns the errors
-// of Denoiser::denoise().
+// Denoises a film, which may be unfinished. It must have all AOVs of AovKind::guide. Returns the errors of
+// Denoiser::denoise().
 Result<DenoisedImage> denoised_image(const Film& film, const Denoiser& denoiser);
 
 }  // namespace ls

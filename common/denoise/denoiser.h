@@ -28,23 +28,25 @@ struct NoisyImage {
 
 class Denoiser {
  public:
-  // Finds the library and reads its version. `library` is its file; if it is empty, the library is searched
-  // for as described above. `least_seconds` is the time limit of denoise() for small images; it grows with
-  // the number of pixels. failed_precondition: the library cannot be used on this machine; the message says
-  // why, and how to install it. resource_exhausted: the library hung, or there was not enough memory.
+  // Finds the library and reads its version. `library` is the path of the library; if it is empty, the
+  // library is searched for as described above. `threads` is the number of threads for denoising. `program`
+  // is the path of lightshaft-denoise. `least_seconds` is the time limit of denoise() for small images; the
+  // limit grows with the number of pixels. failed_precondition: the library cannot be used on this machine;
+  // the message contains the reason and how to install it. resource_exhausted: the library hung, or there was
+  // not enough memory.
   static Result<Denoiser> find(int threads, const std::string& library = {},
                                const std::filesystem::path& program = program_beside_us("lightshaft-denoise"),
                                int least_seconds = 600);
 
   const std::string& name() const { return name_; }  // for example "Open Image Denoise 2.5.1"
 
-  // Returns the denoised colours, one for each image, all finite. All images have the size `size`.
+  // Returns the denoised colours of each image; all values are finite. `size` is the size of every image.
   // resource_exhausted: there was not enough memory, or the library hung; internal: the library failed.
   Result<std::vector<std::vector<float>>> denoise(FrameSize size, std::span<const NoisyImage> images) const;
 
  private:
-  // The time limit for denoising, in seconds: far more than it takes even on one busy core, where a megapixel
-  // needs a few seconds.
+  // Returns the time limit for denoising, in seconds: far more than denoising takes even on one busy core,
+  // where an image of 10^6 pixels needs a few seconds.
   int most_seconds(FrameSize size, std::size_t images) const;
 
   std::filesystem::path program_;

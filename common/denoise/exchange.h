@@ -1,6 +1,6 @@
-// The memory shared with lightshaft-denoise (common/denoise/program/main.cpp): a header, and from the offset
-// kPlanesAt on the images. Each image has three planes (colour, albedo, normal) of three floats per pixel,
-// row by row. The program overwrites each colour with the denoised one.
+// The memory shared with lightshaft-denoise (common/denoise/program/main.cpp): a Header at offset 0, and the
+// images from the offset kPlanesAt on. Each image has three planes (colour, albedo, normal) of three floats
+// per pixel, row by row. The program overwrites each colour plane with the denoised colours.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace ls::denoise {
 
-inline constexpr std::size_t kPlanesAt = 4096;  // offset of the images in bytes
+inline constexpr std::size_t kPlanesAt = 4096;  // offset of the first image, in bytes
 inline constexpr std::uint64_t kMagic = 0x6573'696f'6e73'6c;
 inline constexpr std::size_t kPlanesPerImage = 3;
 
@@ -16,7 +16,8 @@ enum class Outcome : std::int32_t { none, done, failed };
 
 struct Header {
   std::uint64_t magic;
-  std::int32_t width, height, images;  // 0 images: only the version of the library is requested
+  // size in pixels, and number of images; 0 images: only the version of the library is requested
+  std::int32_t width, height, images;
   Outcome outcome;
   std::int32_t version;  // version of the library, 20501 for 2.5.1; 0: it was not found
   char error[512];       // null-terminated

@@ -1,6 +1,6 @@
-// Sends one HTTP POST to an address that the operator named: a receiver of notifications, a collector of
-// traces. It follows no redirects, ignores proxies named in the environment and speaks only http and https,
-// so that the answering side cannot make this program send requests to other addresses.
+// Sends one HTTP POST to an address that the operator named: a receiver of notifications or a collector of
+// traces. It follows no redirects, ignores the proxies that the environment names, and speaks only http and
+// https, so that the answering side cannot make this program send requests to other addresses.
 #pragma once
 
 #include <cstddef>
@@ -18,9 +18,10 @@ struct HttpPost {
   std::string url;
   std::vector<std::pair<std::string, std::string>> headers;
   std::string body;
-  double seconds = 15;                // time limit until the answer has arrived
-  std::size_t most_answer_bytes = 0;  // the answer's body is cut to this length
-  std::string ca_file;                // certificates of the authorities to trust; empty: the system's
+  double seconds = 15;                // time limit of the whole request, in seconds
+  std::size_t most_answer_bytes = 0;  // the body of the answer is cut to this many bytes
+  // file of the certificates of the authorities to trust; empty: the system's certificates
+  std::string ca_file;
   // Called about once a second while the request runs; if it returns true, the request ends with an error.
   // May be empty.
   std::function<bool()> give_up = {};

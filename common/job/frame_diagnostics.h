@@ -1,5 +1,6 @@
-// Diagnostics of a scene that is read once per frame. A diagnostic of all frames is reported once; any other,
-// such as a file that is missing in some frames, is reported with the frames that have it.
+// Collects the errors and warnings (diagnostics) about the scene of a sequence, which is read once for each
+// frame. A diagnostic that occurs in all frames is reported once, without a frame. A diagnostic that occurs
+// in some frames, such as a missing file, is reported once with the first frame and the number of others.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +15,15 @@ namespace ls {
 
 class FrameDiagnostics {
  public:
-  // Adds the diagnostics found in a frame; there may be none.
+  // Adds the diagnostics `found` in frame number `frame`; to be called for every frame, also for one without
+  // diagnostics.
   void add(std::uint32_t frame, const std::vector<Diagnostic>& found);
-  // True if there are as many distinct diagnostics as will be shown, so that no further frames need to be
-  // read.
+  // True if kMost distinct diagnostics have been added. No more are shown, so the caller need not read more
+  // frames.
   bool full() const { return all_.size() >= kMost; }
   bool empty() const { return all_.empty(); }
-  // Returns the distinct diagnostics in order of appearance. If not all frames have a diagnostic, its text
-  // begins with "frame 5: " or "frame 5 and 3 more: ".
+  // Returns the distinct diagnostics in order of appearance. If a diagnostic did not occur in all frames, its
+  // text begins with "frame 5: " or "frame 5 and 3 more: ".
   std::vector<Diagnostic> take() const;
 
  private:

@@ -1,5 +1,6 @@
-// The health of a job for users and programs: for each cause a sentence, its first location, and the command
-// that renders this location again.
+// Describes the numeric health of a job (image/film/health.h) to users and programs. A note has, for each
+// cause of bad samples, a sentence, the first locations (pixel and sample), and a command that renders the
+// first location again.
 #pragma once
 
 #include <cstdint>
@@ -17,19 +18,22 @@ struct HealthNote {
   HealthCause cause{};
   std::uint64_t count = 0;
   std::vector<HealthLocation> first;
-  // For sequences: the first frame with this cause, to which `first` and `replay` refer.
+  // The first frame in which this cause occurred; `first` and `replay` belong to that frame. nullopt: the job
+  // is not a sequence of frames.
   std::optional<std::uint32_t> frame;
-  std::string replay;  // command that reproduces the first location; empty: there is no location
+  std::string replay;  // command that renders the first location again; empty: there is no location
   bool operator==(const HealthNote&) const = default;
 };
 
 // Returns a note for each cause in `health`. `command` is replay_command() of the job.
 std::vector<HealthNote> health_notes(const Health& health, const std::string& command);
-// Adds `more`, the notes of frame number `frame`, to `notes`, those of the frames before it.
+// Merges the notes of a further frame of a sequence into `notes`, which are the notes of the frames before
+// it. `more` are the notes of that frame, `frame` is its number.
 void add_notes(std::vector<HealthNote>& notes, std::span<const HealthNote> more, std::uint32_t frame);
 
-// Returns {"clean", "nonfinite", "negative", "majorant_violations", "causes": [{"cause", "effect": "rejected"
-// | "kept" | "input", "count", "text", "frame", "first": [{"pixel": [x, y], "sample"}], "replay"}]}.
+// Returns the JSON text {"clean", "nonfinite", "negative", "majorant_violations", "causes": [{"cause",
+// "effect": "rejected" | "kept" | "input", "count", "text", "frame", "first": [{"pixel": [x, y], "sample"}],
+// "replay"}]}.
 std::string health_json(const Health& totals, std::span<const HealthNote> notes);
 
 // Returns "lightshaft render SCENE" with all options that determine the value of a sample; each word is
@@ -37,7 +41,8 @@ std::string health_json(const Health& totals, std::span<const HealthNote> notes)
 // frames.
 std::string replay_command(const std::string& scene, const JobSpec& spec,
                            std::optional<std::uint32_t> frame = {});
-// Returns the command for one sample of the pixel (x, y). `command` is from the function above.
+// Returns the command that renders one sample of the pixel (x, y). `command` is the result of
+// replay_command() above for the job.
 std::string replay_command(const std::string& command, int x, int y, std::uint64_t sample);
 
 }  // namespace ls

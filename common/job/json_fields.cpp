@@ -12,7 +12,8 @@
 namespace ls::job {
 namespace {
 
-// True if the text has only letters, digits and "_-.:", which are safe for file names, labels and layers.
+// True if the text is short enough and has only letters, digits and "_-.:", which are safe in the names of
+// files, labels and layers.
 bool is_name(const std::string& s) {
   return !s.empty() && s.size() <= kMaxNameBytes && std::ranges::all_of(s, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
@@ -49,7 +50,8 @@ Result<Json> parse_object(std::string_view text, std::string_view what) {
   bool too_deep = false;
   const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
     too_deep |= depth > kMaxNesting;
-    // Deep values are not kept, since code that destroys or prints them is recursive.
+    // Once the text is too deep, values are discarded. Otherwise destroying or printing them, which is
+    // recursive, could overflow the stack.
     if (too_deep) return false;
     if (event == Json::parse_event_t::key && depth <= 2) {
       const auto& key = parsed.get_ref<const std::string&>();
@@ -106,7 +108,7 @@ std::optional<std::uint64_t> Fields::whole(const char* key, std::uint64_t least,
 std::optional<std::int64_t> Fields::integer(const char* key, std::int64_t least, std::int64_t most) {
   const Json* v = find(key);
   if (!v) return std::nullopt;
-  // A value above the signed range is rejected, because the conversion would make it negative.
+  // A number above INT64_MAX is rejected here, because get<std::int64_t>() would make it negative.
   const bool fits =
       v->is_number_integer() && !(v->is_number_unsigned() && v->get<std::uint64_t>() > INT64_MAX);
   if (fits && v->get<std::int64_t>() >= least && v->get<std::int64_t>() <= most)

@@ -29,7 +29,7 @@ class Fields {
  public:
   Fields(const Json& object, std::string_view what, std::vector<std::string> known);
 
-  const std::optional<Error>& error() const { return error_; }  // the first error
+  const std::optional<Error>& error() const { return error_; }  // the first error; nullopt: no error so far
 
   // Each of these returns nullopt if the key is absent or its value is wrong.
   std::optional<std::uint64_t> whole(const char* key, std::uint64_t least, std::uint64_t most);

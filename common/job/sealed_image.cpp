@@ -54,7 +54,7 @@ Result<void> read_tiles(SealedImage& image, const std::string& name) {
   const auto text = text_of(image.picture, "lightshaft:tiles", name);
   if (!text) return tl::unexpected(text.error());
   const std::size_t count = image.grid().count();
-  constexpr std::size_t kStep = 65;  // length of 64 digits and a space
+  constexpr std::size_t kStep = 65;  // length of a digest (64 hexadecimal digits) and a space
   if (text->size() + 1 != kStep * count)
     return bad(name, fmt::format("its header \"lightshaft:tiles\" does not name {} tiles", count));
   for (std::size_t i = 0; i < count; ++i) {
@@ -69,7 +69,8 @@ std::size_t index_of(FrameSize size, int x, int y) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(size.width) + static_cast<std::size_t>(x);
 }
 
-// Returns the bits of a value as stored in the file.
+// Returns the bits of value number `at`. Values of half layers are converted to float, which keeps them
+// distinct.
 std::uint32_t stored(const std::variant<ExrHalf, ExrFloat, ExrUint>& channel, std::size_t at) {
   return std::visit(
       overloaded{[&](const ExrHalf& c) { return std::bit_cast<std::uint32_t>(as_half(c.values[at])); },

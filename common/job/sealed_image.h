@@ -1,5 +1,6 @@
-// Reads a final EXR of this program with its provenance, so that it can be rendered again and compared. The
-// file is untrusted: sizes are limited, and headers and layers must have the form that final_exr() writes.
+// Reads a final EXR of this program together with its provenance (scene, settings, build), so that the image
+// can be rendered again and compared. The file is untrusted: sizes are limited, and headers and layers must
+// have the form that final_exr() writes.
 #pragma once
 
 #include <cstddef>
@@ -23,21 +24,25 @@ struct SealedImage {
   Digest scene, numeric_class;
   RenderSettings settings;
   std::string build;
-  std::vector<Digest> tiles;  // one per tile: Film::tile_digest
+  // One per tile: Film::tile_digest(), a digest of the results that were added to the tile.
+  std::vector<Digest> tiles;
 
   TileGrid grid() const { return {picture.size, settings.tile}; }
 };
 
-// Checks the headers and layers of the image. invalid_argument: one is missing or wrong; the message names
-// it.
+// Checks the headers and layers of `picture` and parses its provenance. invalid_argument: a header or layer
+// is missing or wrong; the message names it. `name` is the name of the file, for messages.
 Result<SealedImage> read_sealed_image(FinalPicture picture, const std::string& name);
 
 // Returns the number of samples per pixel of the tile, from the image's layer `spp`. invalid_argument: the
-// pixels of the tile have different numbers, or one that this program never renders.
+// pixels of the tile have different numbers of samples, or a number that this program never renders (odd, or
+// above kMaxSpp).
 Result<std::uint64_t> tile_samples(const SealedImage& image, TileIndex tile);
 
-// The first value of a tile, in the order of layers, that differs from the value that final_exr() would store
-// for the film. If the image lacks a whole layer, it is the first pixel of the tile in this layer.
+// The place of a difference: a pixel and a layer. first_difference() compares a tile of the image with the
+// values that final_exr() would store for `film`, layer by layer, and returns the first value that differs.
+// If the image lacks a layer, it returns the first pixel of the tile in that layer. nullopt: the tile is
+// equal.
 struct PixelDifference {
   int x = 0, y = 0;
   std::string layer;

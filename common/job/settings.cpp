@@ -52,8 +52,8 @@ void read_frames(Fields& fields, JobSpec& spec) {
     fields.wrong("defines", "gives $frame, which in a job with 'frames' is the number of the frame");
 }
 
-// Reads `target_layer` and `denoise`. If the target error is that of the denoised layers, `denoise` is true
-// even if it is left out.
+// Reads `target_layer` and `denoise`. If `target_layer` is "denoised", the image must be denoised, so
+// `denoise` is then true by default and must not be false.
 void read_denoise(Fields& fields, JobSpec& spec) {
   const auto layer = fields.name("target_layer");
   if (layer) {

@@ -1,6 +1,7 @@
-// The request for a job, in two parts. RenderSettings determines the pixels of a unit (one tile and range of
-// samples); JobSpec also has the settings of the job as a whole. `spp` is in JobSpec: if the number of
-// samples of a job is raised, its units must stay the same.
+// The request for a job, in two parts. RenderSettings determines the pixels of a unit (one tile and one range
+// of samples). JobSpec has the whole request, also the settings that do not affect the pixels of a unit.
+// `spp`, the number of samples per pixel, is in JobSpec only: if it is raised, the units that are already
+// rendered stay valid.
 #pragma once
 
 #include <cstdint>
@@ -25,46 +26,48 @@ struct RenderSettings {
   FrameSize size;
   int tile = 32;
   std::uint64_t seed = 0;
-  std::string integrator;        // as IntegratorSettings::name; never empty
+  std::string integrator;        // name of the integrator, as in IntegratorSettings::name; never empty
   int max_depth = -1;            // -1: unlimited; counts path segments, as in Mitsuba
   int rr_depth = 5;              // first depth at which Russian roulette may act
-  std::vector<std::string> aov;  // sorted names, as returned by names_of(AovSet); empty: colour only
+  std::vector<std::string> aov;  // sorted names of AOVs, as returned by names_of(AovSet); empty: colour only
   bool operator==(const RenderSettings&) const = default;
 };
 AovSet aovs_of(const RenderSettings& settings);
 
-// The layers that a target error applies to: the image as rendered, or its denoised layers
+// Which layers must reach the target error: the image as rendered, or its denoised layers.
 enum class TargetLayer { raw, denoised };
 std::string_view to_string(TargetLayer layer);
 std::optional<TargetLayer> parse_target_layer(std::string_view text);
 
-// The request, as in `spec` of the HTTP API and in the options of the command line. If a member has no value,
-// the scene's setting applies.
+// The whole request, as given in `spec` of the HTTP API or by the options of the command line. If a member
+// that the scene also sets has no value, the scene's value applies.
 struct JobSpec {
   std::optional<std::uint64_t> spp;
-  std::optional<double> target_error;  // relMSE
+  // The job ends when its estimated relMSE (mean squared error relative to the brightness) is at most this.
+  std::optional<double> target_error;
   TargetLayer target_layer = TargetLayer::raw;
   std::optional<double> time;  // seconds
   std::optional<std::uint64_t> seed;
   std::optional<FrameSize> size;
   std::optional<std::string> integrator;
   std::vector<std::string> aov;
-  std::map<std::string, std::string> defines;  // values of Mitsuba's $name parameters
+  std::map<std::string, std::string> defines;  // values of the $name parameters in Mitsuba scenes, by name
   int priority = 0;
   bool float_output = false;
   // True: the image also has denoised layers (common/denoise/denoised_image.h). The coordinator computes them
   // from the film, to which it adds the AOVs that the denoiser needs.
   bool denoise = false;
   std::vector<std::string> tags;
-  // The frames of a sequence, which has one film per frame; nullopt: a single image
+  // The frame numbers of a sequence. Each frame is an image of its own. nullopt: the job is a single image.
   std::optional<FrameRange> frames;
   std::optional<std::uint32_t> max_workers;  // maximum number of workers at the same time
   std::optional<std::uint32_t> max_units;    // maximum number of units assigned to workers at the same time
-  // Memory in bytes that a worker must have; a job always requires at least the size of its files
+  // Memory, in bytes, that a worker must have to get units of the job. It is at least the size of the job's
+  // files, even if this value is smaller.
   std::optional<std::uint64_t> memory;
-  // The numeric class that renders the job (machines of one class compute the same bits), as the first
-  // characters of its digest in hexadecimal, or of its platform (WorkerHello::platform). Only workers of this
-  // class get units of the job.
+  // The numeric class of the workers that may render the job; machines of one class compute the same bits.
+  // The text is the beginning of the class's digest in hexadecimal, or the beginning of its platform
+  // (WorkerHello::platform).
   std::optional<std::string> numeric_class;
   std::optional<Digest> reference;  // digest of the reference image, an EXR of the job's size
   bool operator==(const JobSpec&) const = default;

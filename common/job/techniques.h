@@ -1,8 +1,8 @@
-// Additional sampling techniques of the integrators. They sample light that is found too rarely by BSDFs and
-// phase functions, or by next-event estimation at vertices. A job's techniques depend on its scene and files:
-// each worker chooses them when it builds the world (the scene prepared for rendering), and reports them with
-// its results. A parameter of the scene's integrator switches each technique off
-// (docs/reference/scene-format.md, Integrators).
+// Additional sampling techniques of the integrators. They are for light that the basic techniques find too
+// rarely: sampling of BSDFs and phase functions, and next-event estimation at path vertices. A job's
+// techniques depend on its scene and files: each worker chooses them when it builds the world (the scene
+// prepared for rendering), and reports them with its results. A parameter of the scene's integrator switches
+// each technique off (docs/reference/scene-format.md, Integrators).
 #pragma once
 
 #include <cstdint>
@@ -13,29 +13,29 @@
 namespace ls {
 
 enum class Technique : std::uint8_t {
-  equiangular,      // points on segments of paths in media, sampled near lights that have a position
-  exponential,      // points on segments of paths in media, sampled by transmittance
-  camera_points,    // several points on the segments of camera rays in media
-  lamp_directions,  // a share of the directions is sampled close to lights without extent
-  lamp_flights,     // a share of the flights through media is sampled to end close to lights without extent
-  light_vertices,   // connections to points that a directional emitter lights
-  light_tree,       // one of many lights, chosen by a tree
-  path_reuse,       // subpaths from the second vertex on that several pixels share
-  shadow_roulette,  // Russian roulette for shadow rays through grids that could contribute little
-  sky_samples,      // a second direction from the first surface, sampled towards a constant environment
-  path_splitting,   // in scenes with grids: splitting and Russian roulette by possible contribution
-  sky_portals,      // sampling of directions towards the sky through openings
-  local_lights,     // one of few lights, chosen by probabilities learned for each place
+  equiangular,      // samples points on path segments in media, close to lights that have a position
+  exponential,      // samples points on path segments in media in proportion to the transmittance
+  camera_points,    // samples several points on the segments of camera rays in media
+  lamp_directions,  // samples a share of the directions close to lights without extent
+  lamp_flights,     // lets a share of the flights through media end close to lights without extent
+  light_vertices,   // connects paths to points that are lit by a directional emitter
+  light_tree,       // chooses one of many lights with a tree of lights
+  path_reuse,       // lets several pixels share the part of a path from its second vertex on
+  shadow_roulette,  // traces shadow rays through grids with Russian roulette if they can contribute little
+  sky_samples,      // samples a second direction at the first surface, towards a constant environment
+  path_splitting,   // in scenes with grids: splits or ends paths by what they can still contribute
+  sky_portals,      // samples directions towards the sky through openings
+  local_lights,     // chooses one of few lights by probabilities that are learned for each place
 };
 
 struct TechniqueRow {
   Technique technique;
-  std::string_view name;  // in reports
-  std::string_view what;  // for people
+  std::string_view name;  // name in reports
+  std::string_view what;  // what the technique does, in words for users
 };
 std::span<const TechniqueRow> techniques();  // all, in the order of the enumeration
 
-// The parameter of the integrator, and its value, that switch a technique off.
+// A technique is switched off by setting the integrator's parameter `parameter` to `value`.
 struct TechniqueSwitch {
   std::string_view parameter, value;
 };
@@ -44,7 +44,8 @@ TechniqueSwitch off_switch(Technique technique, std::string_view integrator);
 class TechniqueSet {
  public:
   constexpr TechniqueSet() = default;
-  // Unknown bits are dropped: they may come from a worker of another version.
+  // Returns the techniques whose bits are set. Bits of unknown techniques, which a worker of another version
+  // may send, are ignored.
   static TechniqueSet of_bits(std::uint32_t bits);
   void add(Technique t) { bits_ |= bit(t); }
   void add(TechniqueSet other) { bits_ |= other.bits_; }

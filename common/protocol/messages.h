@@ -1,6 +1,6 @@
 // Messages between coordinator and worker, as plain values. proto/farm.proto defines their form on the wire
-// and documents the exchange; proto/convert.h converts between the two. `lightshaft render` passes these
-// values inside one process.
+// and documents the exchange; proto/convert.h converts between the two. `lightshaft render` has coordinator
+// and worker in one process and passes these values directly.
 #pragma once
 
 #include <cstddef>
@@ -36,7 +36,8 @@ struct UnitKey {
 struct BlobRef {
   Digest digest;
   std::uint64_t bytes = 0;
-  std::string name;  // the scene's name for the file; for messages only, never a path
+  // Name of the file in the scene. Used in messages only, never as a path.
+  std::string name;
   bool operator==(const BlobRef&) const = default;
 };
 
@@ -48,8 +49,9 @@ struct JobBrief {
   RenderSettings settings;
   Digest settings_digest;
   std::vector<BlobRef> assets;  // assets that the scene uses
-  // The features that the scene needs of the renderer, according to the coordinator
-  // (common/scene/analysis/needs.h). The worker compares it with its own analysis. Empty: not sent.
+  // JSON text of the features that the scene needs of the renderer, as computed by the coordinator
+  // (common/scene/analysis/needs.h). The worker compares it with the text that it computes itself. Empty: not
+  // sent.
   std::string needs;
   bool operator==(const JobBrief&) const = default;
 };
@@ -62,8 +64,8 @@ struct LeaseUnit {
   bool operator==(const LeaseUnit&) const = default;
 };
 
-// Units (one round of one tile each) that the coordinator has assigned to one worker until a deadline. The
-// worker renders them in order and reports each result on its own.
+// A lease: units (one round of one tile each) that the coordinator has assigned to one worker until a
+// deadline. The worker renders them in order and reports each result as soon as it has it.
 struct Lease {
   LeaseId id;
   JobId job;
@@ -71,15 +73,17 @@ struct Lease {
   bool operator==(const Lease&) const = default;
 };
 
-// Seconds that a worker spent on a unit besides rendering it. `load` and `build` are the times until the
-// job's world (the scene prepared for rendering) was ready; only the first result of a world has them. `load`
-// is the time to fetch the job's files, `build` the wall-clock time in which one thread reads them and builds
-// the world.
+// Times, in seconds, that a worker spent on a unit besides rendering it. Before its first unit of a job, a
+// worker builds the job's world (the scene prepared for rendering). `load` is the time to fetch the job's
+// files, `build` the wall-clock time in which one thread reads them and builds the world. Both are set only
+// in the first result that is rendered with a world; in all others they are 0.
 struct UnitTimes {
   double load = 0, build = 0;
-  double transfer = 0;  // encoding the result and computing its digest
-  double idle = 0;      // idle time of its thread since the previous unit of the job
-  // Time its thread waited for a core while rendering: wall-clock seconds minus cpu_seconds
+  double transfer = 0;  // time to encode the result and compute its digest
+  // Time that the rendering thread was idle since its previous unit of the job.
+  double idle = 0;
+  // Time that the rendering thread waited for a CPU core: the wall-clock time of rendering minus
+  // UnitResult::cpu_seconds.
   double wait = 0;
   bool operator==(const UnitTimes&) const = default;
 };
@@ -92,23 +96,23 @@ struct UnitResult {
   double cpu_seconds = 0;      // CPU time of the thread that rendered the unit
   Health health;
   UnitTimes times;
-  TechniqueSet techniques;  // techniques that the integrator uses in this job's world; empty: unknown
-  // When the worker received the unit, by its clock, in nanoseconds since 1970. It is sent only if the lease
-  // has a trace; 0: not sent.
+  TechniqueSet techniques;  // sampling techniques that the integrator uses in this job; empty: unknown
+  // When the worker received the unit: nanoseconds since 1970 by the worker's clock. It is sent only if the
+  // lease is traced (AssignLease::trace); 0: not sent.
   std::uint64_t held_unix_ns = 0;
   bool operator==(const UnitResult&) const = default;
 };
 
-// A unit that could not be rendered. `scene_at_fault`: the world cannot be built from the scene, for example
-// because a grid is truncated. Otherwise rendering failed (crash, hang, memory). In both cases other workers
-// try the unit; the job fails after failures on several workers.
+// A unit that could not be rendered. `scene_at_fault`: true if the scene could not be prepared for rendering,
+// for example because the file of a grid is truncated; false if rendering failed (crash, hang, out of
+// memory). In both cases other workers try the unit. If it fails on several workers, the job fails.
 struct UnitFailure {
   UnitKey unit;
   LeaseId lease;
   bool scene_at_fault = false;
   std::string reason;                        // text for the user
-  std::optional<int> signal;                 // signal that ended the render child
-  std::optional<std::pair<int, int>> pixel;  // the pixel that was being rendered then
+  std::optional<int> signal;                 // signal that ended the render process; nullopt: none
+  std::optional<std::pair<int, int>> pixel;  // pixel (x, y) that was being rendered at the failure
   std::optional<std::uint64_t> sample;
   bool operator==(const UnitFailure&) const = default;
 };
@@ -124,14 +128,15 @@ struct WorkerHello {
   std::vector<std::string> tags;
   std::vector<Digest> blobs_held;
   std::string join_token;
-  // The id in an earlier Welcome; empty for a new worker. With it, a worker keeps its id when it connects
-  // again.
+  // The id that the worker got in an earlier Welcome, so that it keeps this id when it connects again; empty
+  // for a new worker.
   WorkerId previous_id;
   bool fake = false;     // true if the worker generates fake pixels instead of rendering
-  std::string platform;  // machine and build of its numeric class in words; may be empty
+  std::string platform;  // machine type and build that its numeric class stands for, as text; may be empty
   bool operator==(const WorkerHello&) const = default;
 };
-// Renews the deadlines of the given leases. The worker sends it about once a second while it has work.
+// This message renews the deadlines of the listed leases. The worker sends it about once a second while it
+// has work.
 struct WorkerProgress {
   struct Entry {
     LeaseId lease;
@@ -139,18 +144,19 @@ struct WorkerProgress {
     bool operator==(const Entry&) const = default;
   };
   std::vector<Entry> leases;
-  std::string activity;  // text for the dashboard: "loading bath.vdb", "rendering", "idle"
+  std::string activity;  // text for the dashboard, for example "loading bath.vdb", "rendering" or "idle"
   double cpu_seconds_total = 0;
   std::uint64_t rss_bytes = 0;
-  double load_seconds = 0;  // duration of the last build of a world
+  double load_seconds = 0;  // seconds that the last preparation of a scene for rendering took
   bool operator==(const WorkerProgress&) const = default;
 };
-// The worker wants no more leases. It still delivers finished units, and returns the others by LeaseReturned.
+// The worker wants no more leases. It still sends the results of finished units, and returns all other units
+// with a LeaseReturned message.
 struct WorkerDraining {
   bool operator==(const WorkerDraining&) const = default;
 };
-// Units of this lease that the worker has not rendered and will not render, because it drains
-// (WorkerDraining), or because the units were cancelled.
+// The worker returns units of a lease that it has not rendered and will not render, because it takes no more
+// work (WorkerDraining) or because they were cancelled.
 struct LeaseReturned {
   LeaseId lease;
   std::vector<UnitKey> unrendered;
@@ -162,8 +168,8 @@ using FromWorker =
 // Messages from coordinator to worker.
 struct Welcome {
   WorkerId worker;
-  // A number that grows with every registration of this worker. The coordinator closes the worker's
-  // connections with smaller numbers.
+  // The number of this registration. Each time the worker registers, it gets a larger number, and the
+  // coordinator closes the worker's connections that have smaller ones.
   std::uint64_t epoch = 0;
   bool operator==(const Welcome&) const = default;
 };
@@ -175,19 +181,19 @@ struct Refused {  // after this message the coordinator closes the connection
 struct AssignLease {
   Lease lease;
   std::optional<JobBrief> brief;  // sent with a job's first lease on this connection
-  // The span of the lease in the job's trace, the parent of the worker's spans. nullopt: the lease is not
-  // traced.
+  // The span (traced period of time) of the lease in the job's trace. The worker's own spans become its
+  // children. nullopt: the lease is not traced.
   std::optional<trace::SpanContext> trace = std::nullopt;
   bool operator==(const AssignLease&) const = default;
 };
-// The coordinator has stored the result durably, or rejected it with a reason. In both cases the worker
-// deletes its copy.
+// The coordinator has stored the result of the unit durably, or has rejected it for the reason `refused`. In
+// both cases the worker deletes its copy of the result.
 struct ResultAck {
   UnitKey unit;
   std::optional<Error> refused;
   bool operator==(const ResultAck&) const = default;
 };
-// The worker stops rendering the job's units immediately; results of the job are dropped.
+// The job was cancelled. The worker stops rendering its units immediately and discards its results.
 struct CancelJob {
   JobId job;
   bool operator==(const CancelJob&) const = default;

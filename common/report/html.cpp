@@ -36,7 +36,8 @@ std::string escape_html(std::string_view text) {
 }
 
 std::string base64(std::span<const std::byte> bytes) {
-  std::string out(4 * ((bytes.size() + 2) / 3) + 1, '\0');  // one more for the NUL that OpenSSL writes
+  // One more character than the result, for the NUL that OpenSSL writes at the end.
+  std::string out(4 * ((bytes.size() + 2) / 3) + 1, '\0');
   EVP_EncodeBlock(reinterpret_cast<unsigned char*>(out.data()),
                   reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<int>(bytes.size()));
   out.pop_back();

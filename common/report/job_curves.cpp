@@ -12,7 +12,8 @@
 namespace ls::report {
 namespace {
 
-constexpr std::size_t kMostRows = 256;  // at most this many rows in the table: the last checkpoints
+// Largest number of rows in the table. If there are more checkpoints, the table has the last ones.
+constexpr std::size_t kMostRows = 256;
 
 struct Clock {
   const char* key;
@@ -27,14 +28,16 @@ std::string range(const std::optional<std::pair<double, double>>& ci, std::strin
   return ci ? fmt::format("{} to {}", words(ci->first), words(ci->second)) : std::string();
 }
 
-// Returns the interval of the error at a checkpoint. The report judges only the last checkpoint: with `doubt`
-// its figures are not trusted, and then no checkpoint has an interval.
+// Returns the 95 % interval of the error at a checkpoint, to be shown. With `doubt`, the error estimate at
+// the last checkpoint is not trusted. The report does not judge earlier checkpoints, so in this case none of
+// them gets an interval either.
 std::optional<std::pair<double, double>> shown_interval(const Json& point, bool doubt) {
   return doubt ? std::nullopt : interval(point, "relmse_ci95");
 }
 
-// Returns the point at which the error will reach the requested target. For the curve over wall-clock time,
-// the remaining time is extrapolated from the pace so far.
+// Returns the time at which the error is predicted to reach the requested target. The report predicts the
+// remaining core seconds. For the curve over wall-clock time they are converted by the ratio of wall-clock
+// time to core seconds so far.
 std::optional<Ahead> ahead_of(const Json& report, const Json& last, const Clock& clock) {
   const Json& forecast = member(report, "forecast");
   const double more = number(forecast, "core_seconds"), now = number(last, clock.key);

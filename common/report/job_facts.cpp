@@ -52,7 +52,8 @@ std::string verdict(const Json& report) {
     const std::string words = text(report, "verdict");
     out += fmt::format("<p class=\"verdict\" role=\"note\">{}</p>",
                        escape_html(words.empty() ? phrase("estimateInDoubt") : words));
-  } else if (objects(report, "convergence").empty()) {  // otherwise the words are below the curves
+    // If the report has convergence curves, these words are printed below the curves instead.
+  } else if (objects(report, "convergence").empty()) {
     out += paragraph("note", verdict_words(report));
   }
   return out + paragraph("note", unreached(report)) + paragraph("note", one_seed(report)) +
@@ -103,7 +104,7 @@ std::string feature_list(const Json& report, bool used) {
                      used ? "" : " out", items);
 }
 
-// Lists the parts of the scene that affect no pixel. They were not stored or sent.
+// Lists the parts of the scene that were removed before storing and sending it, because they affect no pixel.
 std::string pruned(const Json& report) {
   std::string items;
   for (const Json& one : objects(member(report, "analysis"), "left_out")) {
@@ -124,14 +125,14 @@ std::string row(const char* name, const std::string& value, bool code = false) {
 
 std::string whole(double n) { return std::isfinite(n) ? fmt::format("{:.0f}", n) : std::string(); }
 
-// Returns the target error. If it is that of the denoised layers, a note says so.
+// Returns the target error as text. A note is added if the target applies to the denoised layers.
 std::string target_of(const Json& report) {
   const double target = number(report, "target_error");
   if (!(target > 0)) return "";
   return given(target) + (denoised_target(report) ? " of the denoised layers" : "");
 }
 
-// Lists the requested path limits and end conditions.
+// Lists what the job requested: limits of the path length, and conditions that end the job.
 std::string asked(const Json& report) {
   const double depth = number(report, "max_depth"), spp = number(report, "spp_asked");
   const std::string roulette = whole(number(report, "rr_depth"));

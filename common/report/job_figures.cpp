@@ -13,7 +13,7 @@ namespace ls::report {
 namespace {
 
 struct Part {
-  const char* name;  // also the key in the report
+  const char* name;  // name of this part of the time; also its key in the report
   const char* meaning;
 };
 constexpr std::array kParts{

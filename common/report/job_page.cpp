@@ -59,7 +59,7 @@ std::string picture(const std::vector<std::byte>& png, const std::string& alt) {
   return fmt::format("<img alt=\"{}\" src=\"{}\">", alt, data_url("image/png", png));
 }
 
-// Draws the colour scale of the maps, divided in equal factors.
+// Draws the colour scale of a map with its smallest and largest value as labels. The scale is logarithmic.
 std::string legend(const std::string& least, const std::string& most) {
   std::string out = R"(<svg class="ramp" viewBox="0 0 64 4" preserveAspectRatio="none" aria-hidden="true">)";
   for (int i = 0; i < 64; ++i) {

@@ -12,31 +12,34 @@
 
 namespace ls::report {
 
-// Fields of a report that another version of this program, or another program, may have written
-// (job_page.cpp). Each function returns the field's value, or a default if the field is missing.
+// Functions that read fields of a report. The report may come from another version of this program or from
+// another program. So each function returns the value of the field `key`, or a default if the field is
+// missing or has the wrong type.
 using Json = nlohmann::json;
 
 const Json& member(const Json& j, const char* key);  // null if missing
 double number(const Json& j, const char* key);       // NaN if missing
 std::string text(const Json& j, const char* key);    // empty if missing
 bool flag(const Json& j, const char* key, bool otherwise);
-std::optional<std::pair<double, double>> interval(const Json& j, const char* key);  // [lo, hi]
+// Returns the two numbers of a field [lo, hi]; nullopt if missing.
+std::optional<std::pair<double, double>> interval(const Json& j, const char* key);
 std::vector<Json> objects(const Json& j, const char* key);       // the elements of a list that are objects
 std::vector<std::string> texts(const Json& j, const char* key);  // the elements of a list that are strings
 
 // Convergence status (job_facts.cpp).
-bool doubtful(const Json& report);        // true if the error figures are not reliable yet
-std::string verdict(const Json& report);  // why they are not reliable, with further notes
-// A sentence for a report that is not doubtful; empty: no sentence
+bool doubtful(const Json& report);  // true if the error figures are not reliable yet
+// Returns the reason why the error figures are not reliable, and further notes on the result.
+std::string verdict(const Json& report);
+// Returns a sentence on the convergence, for a report with reliable error figures; empty: there is none.
 std::string verdict_words(const Json& report);
 std::string failure(const Json& report);
-bool denoised_target(const Json& report);  // true if the target error is that of the denoised layers
+bool denoised_target(const Json& report);  // true if the target error applies to the denoised layers
 
 // Error against time (job_curves.cpp).
 std::string curves(const Json& report);
-std::string outlook(const Json& report);  // a sentence on the cost of a smaller error; empty: unknown
+std::string outlook(const Json& report);  // how much more core time a smaller error needs; empty: unknown
 
-// Figures (job_figures.cpp).
+// Key numbers of the job, and where its time was spent (job_figures.cpp).
 std::string figures(const Json& report);
 std::string time_split(const Json& report);
 

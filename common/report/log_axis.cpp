@@ -10,12 +10,15 @@
 namespace ls::report {
 namespace {
 
-constexpr double kMargin = 0.06;  // margin on either side, as a share of the range
-constexpr double kShort = 2.2;    // decades: a shorter axis also has labels at 2 and 5
-constexpr double kFine = 4.5;     // decades: a shorter axis has lines at 2 to 9
+constexpr double kMargin = 0.06;  // margin at each end, as a fraction of the axis's range in decades
+// An axis shorter than this many decades also has labels at 2 and 5 times each power of ten.
+constexpr double kShort = 2.2;
+// An axis of at most this many decades also has lines at 2 to 9 times each power of ten.
+constexpr double kFine = 4.5;
 constexpr std::size_t kMostLabels = 8;
-constexpr std::size_t kFewTimes = 4;  // with fewer time labels than this, intermediate ones are added
-constexpr double kFarthest = 300;     // largest distance from 1 in decades: near the range of double
+constexpr std::size_t kFewTimes = 4;  // If fewer time labels than this fit, labels between them are added.
+// The ends of an axis are from 10^-300 to 10^300, so that they can be computed in double.
+constexpr double kFarthest = 300;
 constexpr double kMinute = 60, kHour = 3600, kDay = 86400;
 
 bool inside(const LogAxis& axis, double value) { return value >= axis.lo && value <= axis.hi; }
@@ -32,8 +35,8 @@ std::string time_label(double seconds) {
   return seconds < kDay ? fmt::format("{:g} h", seconds / kHour) : fmt::format("{:g} d", seconds / kDay);
 }
 
-// Returns the labelled times (1 s, 10 s, 1 min, ...) within the axis; `coarse`: without the intermediate
-// ones.
+// Returns the times within the axis that are usual as labels. `coarse`: in steps of about 10 only (1 s, 10 s,
+// 1 min, 10 min, ...); otherwise also times between them, such as 2 s and 5 s.
 std::vector<double> usual_times(const LogAxis& axis, bool coarse) {
   std::vector<double> all;
   const auto take = [&](double unit, std::initializer_list<double> steps) {
@@ -92,7 +95,8 @@ LogAxis log_axis(double lo, double hi, double from, double to) {
 }
 
 std::vector<Tick> ticks(const LogAxis& axis, AxisUnit unit) {
-  // log_axis() makes no axis with such ends.
+  // The loops that make the ticks need finite ends above 0. All axes from log_axis() have them; for any other
+  // axis there are no ticks.
   if (!(axis.lo > 0) || !(axis.hi < std::pow(10.0, kFarthest + 1))) return {};
   return unit == AxisUnit::seconds ? time_ticks(axis) : plain_ticks(axis);
 }

@@ -17,17 +17,19 @@ namespace {
 
 constexpr double kWidth = 520, kLeft = 60, kRight = 504, kTop = 14;
 constexpr double kPlotHeight = 290, kBelow = 50, kLegendLine = 22;
-// Half the width of the widest time label, which must fit into the drawing.
+// Half the width of the widest time label, in units of the drawing. The middle of a label keeps this distance
+// from the right edge of the drawing, so that they are not cut off.
 constexpr double kHalfLabel = 25;
-constexpr double kLetter = 7.4;         // mean width of a letter in the legend
-constexpr double kFarthestAhead = 100;  // a forecast is drawn if it is at most this multiple of the last x
+constexpr double kLetter = 7.4;  // mean width of a letter in the legend, in units of the drawing
+// A forecast is drawn only if its x is less than this multiple of the x of the last point.
+constexpr double kFarthestAhead = 100;
 
 using Out = std::back_insert_iterator<std::string>;
 
 bool drawable(const CurvePoint& p) { return std::isfinite(p.x) && std::isfinite(p.y) && p.x > 0 && p.y > 0; }
 bool has_band(const CurvePoint& p) { return std::isfinite(p.hi) && p.lo > 0 && p.hi >= p.lo; }
 
-// Returns the points to draw, in order of x.
+// Returns the points of a curve to draw, in order of x: at most kMostCurvePoints, evenly chosen from all.
 std::vector<CurvePoint> chosen(const Curve& curve) {
   std::vector<CurvePoint> all;
   std::copy_if(curve.points.begin(), curve.points.end(), std::back_inserter(all), drawable);
@@ -216,7 +218,8 @@ class Drawing {
     text_ += "</g>";
   }
 
-  // Draws a mark. Each curve has its own shape of marks, so that curves can be distinguished without colour.
+  // Draws a mark at (x, y) for a point of curve number `index`. There are four shapes, by the curve's index,
+  // so that up to four curves can be distinguished without colour.
   static std::string mark(std::size_t index, double x, double y) {
     switch (index % 4) {
       case 1:

@@ -11,30 +11,30 @@ namespace ls::report {
 
 struct CurvePoint {
   double x = 0, y = 0;    // points are drawn only if x and y are finite and above 0
-  double lo = 0, hi = 0;  // interval of y; both 0: there is none
+  double lo = 0, hi = 0;  // interval (lo, hi) of y; both 0: there is none
 };
 struct Curve {
   std::string name;  // for the legend, which is shown if there are several curves
   std::vector<CurvePoint> points;
   bool dashed = false;
 };
-inline constexpr std::size_t kMostCurves = 8;  // each has its own colour and mark
-// Largest number of points drawn per curve; longer curves are thinned evenly
+inline constexpr std::size_t kMostCurves = 8;  // Each curve has its own colour; further curves are not drawn.
+// Largest number of points drawn per curve. Of longer curves, evenly chosen points are drawn.
 inline constexpr std::size_t kMostCurvePoints = 512;
 
 // A forecast: the x at which the first curve will reach the target.
 struct Ahead {
-  double x = 0, x_lo = 0, x_hi = 0;  // x with its interval; x_lo = x_hi = 0: there is none
+  double x = 0, x_lo = 0, x_hi = 0;  // x, and its interval; x_lo = x_hi = 0: no interval
 };
 
 struct LogPlot {
   std::string id;                // letters, digits and -; must be unique in its page
   std::string title;             // title for screen readers
   std::string summary;           // description in one sentence
-  std::string x_title, y_title;  // x is in seconds
+  std::string x_title, y_title;  // titles of the axes; x is in seconds
   std::vector<Curve> curves;
   std::optional<double> target;  // horizontal line at this y
-  std::optional<Ahead> ahead;    // drawn only with a target
+  std::optional<Ahead> ahead;    // forecast; drawn only if there is a target
 };
 
 // Returns an SVG element for a page whose style includes plot_css(). If there are no points, the drawing has

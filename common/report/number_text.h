@@ -19,9 +19,11 @@ std::string given(double x);  // returns a number that a user has chosen, with i
 std::string duration(double seconds);
 std::string count(double n);           // returns "39,321,600"
 std::string sample_count(double spp);  // returns "1,024"; a mean below 100 has one decimal: "5.7"
-std::string threads_words(double n);   // returns "4"; a mean has one decimal: "3.5"
-std::string byte_size(double n);       // returns "34.7 MiB"
-// Returns "12 %" or "< 1 %" in plain text; 0 and 100 only for exactly nothing and everything.
+// Returns "4"; a number that is not whole (a mean) has one decimal: "3.5".
+std::string threads_words(double n);
+std::string byte_size(double n);  // returns "34.7 MiB"
+// Returns "12 %" or "< 1 %" in plain text; `part` is a fraction from 0 to 1. "0 %" is returned only for
+// exactly 0, and "100 %" only for 1.
 std::string percent(double part);
 std::string date_time(double unix_seconds);  // returns "2026-11-21 18:26 UTC"
 

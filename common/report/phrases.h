@@ -8,17 +8,17 @@
 namespace ls::report {
 
 struct Phrase {
-  std::string_view key;  // a name in JavaScript
+  std::string_view key;  // name of the phrase in C++ and JavaScript
   const char* text;
 };
 inline constexpr std::array kPhrases{
-    // Doubt about the error estimate
+    // Phrases on doubt about the error estimate:
     Phrase{"doubt", "don't trust yet"},
     Phrase{"estimateInDoubt", "This error estimate can't be trusted yet."},
     Phrase{"noIntervals", "No intervals are shown: the estimate can't be trusted yet."},
     Phrase{"noPointYet", "The first point appears when every tile has finished a round of samples."},
     Phrase{"independentSamples", "independent samples give −1"},
-    // References
+    // Phrases on errors against a reference image:
     Phrase{"againstReference", "against the reference"},
     Phrase{"belowNoise", "below the reference's noise"},
     Phrase{"oneSeed", "not to be trusted: one seed"},
@@ -26,7 +26,7 @@ inline constexpr std::array kPhrases{
            "The reference shares this job's seed: its noise is the same noise, and the true figures say "
            "nothing. "
            "Render it with another --seed."},
-    // Why a job ended, for each value of the field `stopped`
+    // Why a job ended (the report's field `stopped`), and headings for errors:
     Phrase{"stoppedSpp", "all its samples are in"},
     Phrase{"stoppedError", "the target error is reached"},
     Phrase{"stoppedErrorDenoised", "the target error of the denoised layers is reached"},
@@ -35,7 +35,7 @@ inline constexpr std::array kPhrases{
     Phrase{"stoppedUser", "someone stopped it"},
     Phrase{"failed", "The job failed"},
     Phrase{"unwell", "Something is wrong"},
-    // Where the time was spent, by the members of the field `time`
+    // Where the time was spent (the report's field `time`): the unit, and one phrase for each member.
     Phrase{"timeUnit", "Seconds of threads: of render their CPU time, of the others by the clock."},
     Phrase{"timeLoad", "getting the files that the scene names"},
     Phrase{"timeBuild", "reading them and building the world"},

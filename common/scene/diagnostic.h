@@ -8,7 +8,7 @@ namespace ls {
 
 struct SourcePlace {
   std::string file;
-  int line = 0, column = 0;  // counted from 1; 0: the file as a whole
+  int line = 0, column = 0;  // counted from 1; 0: the message is about the file as a whole
   bool operator==(const SourcePlace&) const = default;
 };
 
@@ -17,8 +17,9 @@ struct Diagnostic {
   Severity severity = Severity::error;
   SourcePlace place;
   std::string text;
-  std::string source_line;  // the line of the error, shown with a caret; empty if there is none
-  int length = 1;           // length of the underlined part, in characters
+  // The text of the line with the error, to be shown with a caret below; empty: none.
+  std::string source_line;
+  int length = 1;  // length of the underlined part, in characters
   bool operator==(const Diagnostic&) const = default;
 };
 

@@ -15,9 +15,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxNamesLookedAt = 4096;  // files of a folder examined for a suggestion
+constexpr std::size_t kMaxNamesLookedAt = 4096;  // maximum number of file names compared for a suggestion
 
-// Returns a suggestion like "; did you mean 'cloud.vol'?" from the files beside the missing one.
+// Returns a text such as "; did you mean 'cloud.vol'?", for an error about a missing file. The suggestion is
+// a file with a similar name in the same folder.
 std::string names_like(const fs::path& missing) {
   std::vector<std::string> names;
   std::error_code error;

@@ -13,7 +13,7 @@
 
 namespace ls {
 
-// A temporary folder, which is removed when the last user of its files releases it.
+// A temporary folder. It is removed from disk when the last shared pointer to it is destroyed.
 class KeptFolder {
  public:
   static Result<std::shared_ptr<const KeptFolder>> make();
@@ -36,8 +36,8 @@ class FolderAssets final : public AssetSource {
   // file, or cannot be read.
   Result<Asset> find(std::string_view name) override;
   Result<std::string> text(std::string_view name) override;
-  // Writes the file to a temporary folder. From then on find() returns it instead of any file of that name in
-  // the scene's own folder, which is not changed.
+  // Writes a file with these bytes to a temporary folder. From then on find(name) returns this file, even if
+  // the scene's own folder has a file of the same name. The scene's folder is not changed.
   Result<Asset> keep(std::string_view name, const std::string& bytes) override;
   bool keeps() const override { return true; }
 

@@ -15,7 +15,7 @@ void put(std::string& out, std::uint32_t x) {
 void put(std::string& out, float x) { put(out, std::bit_cast<std::uint32_t>(x)); }
 void put(std::string& out, int x) { put(out, static_cast<std::uint32_t>(x)); }
 
-// An attribute of a mesh's corners, such as normals, and the names of its components in the file.
+// The values of a vertex attribute, such as normals, and the names of its components in the PLY file.
 struct Part {
   const std::vector<float>& values;
   std::vector<std::string_view> names;
@@ -71,7 +71,7 @@ namespace {
 
 std::string bytes_of(const MadeGrid& grid) {
   std::string out("VOL\3", 4);
-  put(out, 1);  // float32
+  put(out, 1);  // the code of the value type float32 in Mitsuba's volume format
   for (const int n : grid.sides) put(out, n);
   put(out, grid.channels);
   for (const float x : {0.f, 0.f, 0.f, 1.f, 1.f, 1.f}) put(out, x);

@@ -1,4 +1,5 @@
-// Files that readers make from the numbers in a scene's text.
+// Asset files (meshes, volume grids, images) that readers of scene files make from data that is inside a
+// scene file.
 #pragma once
 
 #include <array>
@@ -10,28 +11,31 @@
 
 namespace ls::scene {
 
-// Triangles for a PLY file. All lists except positions and indices may be empty.
+// A triangle mesh that becomes a PLY file. All lists except positions and indices may be empty.
 struct MadeMesh {
-  std::vector<float> positions, normals, uvs;  // three, three, two numbers per corner (vertex)
-  std::vector<float> colours, opacities;       // the attributes "vertex_color", "vertex_opacity": three, one
-  std::vector<std::uint32_t> indices;          // three per triangle, all in range
+  std::vector<float> positions, normals, uvs;  // per corner (vertex): 3, 3 and 2 numbers
+  // The attributes "vertex_color" and "vertex_opacity": per corner 3 numbers and 1 number
+  std::vector<float> colours, opacities;
+  std::vector<std::uint32_t> indices;  // three corners per triangle, each less than corners()
   std::size_t corners() const { return positions.size() / 3; }
-  std::size_t bytes() const;  // size of the file
+  std::size_t bytes() const;  // upper bound of the PLY file's size in bytes
 };
 
 struct MadeGrid {
   std::array<int, 3> sides;
   int channels = 1;
-  std::vector<float> values;  // x fastest, channels within a voxel
+  // The channels of a voxel are adjacent. Of the voxels' coordinates x varies fastest, z slowest.
+  std::vector<float> values;
 };
 
-// Each makes a file, gives it to `assets` to keep, and returns its name, which contains a digest of its
-// bytes.
+// Each function makes a file, gives it to `assets` to keep, and returns the file's name, which contains a
+// digest of the file's bytes.
 Result<std::string> keep_made(AssetSource& assets, const MadeMesh& mesh);
 Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid);
-// Keeps a grid under this name.
+// Makes a file of the grid and keeps it under the given name.
 Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid, const std::string& name);
-// Keeps a file with these bytes; its name begins with `kind` ("image") and ends in `ending` (".png").
+// Keeps a file with these bytes; its name begins with `kind`, such as "image", and ends in `ending`, such as
+// ".png".
 Result<std::string> keep_made(AssetSource& assets, std::string_view kind, std::string_view ending,
                               const std::string& bytes);
 

@@ -22,18 +22,19 @@ class AssetSource {
   virtual ~AssetSource() = default;
   // Returns digest and size of the file that the scene calls `name`.
   virtual Result<Asset> find(std::string_view name) = 0;
-  // Returns the text of a scene file that another one includes; its size is limited.
+  // Returns the text of a scene file that another scene file includes. The size of the text is limited.
   virtual Result<std::string> text(std::string_view name) = 0;
   // Keeps a file that the reader has made from numbers in the scene's text; from then on find() returns it.
-  // If a source keeps no files, the sender of the scene must send this file, too, under the same name.
+  // If a source keeps no files, the program that uploads the scene must upload this file, too, under the same
+  // name.
   virtual Result<Asset> keep(std::string_view name, const std::string& bytes);
-  // Returns whether keep() stores files. If not, the sender must send made files, and readers need not
-  // compute them.
+  // True if keep() stores files. If false, the program that uploads the scene uploads the files that readers
+  // make, and this reader need not compute them.
   virtual bool keeps() const { return false; }
 };
 
 struct ReadOptions {
-  std::map<std::string, std::string> defines;  // values of $name; unused ones cause a warning
+  std::map<std::string, std::string> defines;  // values of parameters $name; unused ones cause warnings
   bool strict = false;                         // true: warnings are errors
   // The frame number, for sequences (jobs with several frames): it replaces each run of # in file names and
   // is the value of $frame.

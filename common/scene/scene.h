@@ -33,39 +33,42 @@ struct BitmapTexture {
   Wrap wrap = Wrap::repeat;
   bool raw = false;  // true: 8- and 16-bit values are not decoded from sRGB
   UvTransform to_uv;
-  // For a texture that is used as an opacity. If true, the value is the image's alpha channel if any pixel of
-  // the image has an alpha below 1/2, otherwise the image's colour.
+  // True for a texture that is used as an opacity. Its value is then the image's alpha channel if any pixel
+  // of the image has an alpha below 1/2, otherwise the image's colour.
   bool alpha = false;
-  // One channel: the value is that channel's number, without sRGB decoding; a missing alpha channel is 1.
+  // Which channels are looked up. `all`: the colour. A single channel: the texture is grey, and its value is
+  // the number stored in this channel, without sRGB decoding; if the image has no alpha channel, alpha is 1.
   Channel channel = Channel::all;
   bool operator==(const BitmapTexture&) const = default;
 };
 // A checkerboard: color0 where floor(2 u') + floor(2 v') is even, otherwise color1 (Mitsuba's
-// `checkerboard`). Here (u', v') is (u, v) transformed by to_uv, modulo 1. If it is read as a scalar
-// (roughness, opacity, weight of a blend, all parameters of `principled` except its colour) color0 and
-// color1 are swapped, as in Mitsuba 3.9.
+// `checkerboard`). Here (u', v') is (u, v) transformed by to_uv, modulo 1. If the checkerboard is read as a
+// scalar (roughness, opacity, weight of a blend, all parameters of `principled` except its colour), color0
+// and color1 are swapped, as in Mitsuba 3.9.
 struct CheckerboardTexture {
   TextureIndex color0, color1;
   UvTransform to_uv;
   bool operator==(const CheckerboardTexture&) const = default;
 };
 // The largest channel of another texture or, with `hue`, the colour of that texture divided by its largest
-// channel (white where that texture is black). The product of the variants with and without `hue` is the
-// texture itself. This is an extension, used to express Nori's `microfacet`.
+// channel (white where that texture is black). The largest channel times this hue is the other texture
+// itself. Mitsuba has no such texture; it is used to express Nori's `microfacet`.
 struct PeakTexture {
   TextureIndex texture;
   bool hue = false;
   bool operator==(const PeakTexture&) const = default;
 };
-// A mesh attribute of this name, "vertex_..." (interpolated) or "face_...": one number, or three. For PLY
-// files; rejected on other shapes (mesh_attributes.h).
+// Reads the mesh attribute `name`, which has one or three numbers for each vertex ("vertex_...",
+// interpolated) or for each face ("face_..."). Only meshes from PLY files have attributes: this texture is
+// rejected on all other shapes (schema/mesh_attributes.h).
 struct MeshAttributeTexture {
   std::string name;
   double scale = 1;
   bool operator==(const MeshAttributeTexture&) const = default;
 };
 // The product of two textures. With a threshold above 0 it is 1 where the product's luminance is at least the
-// threshold, else 0. This is an extension, used to express the factors and cut-outs of glTF.
+// threshold, otherwise 0. Mitsuba has no such texture; it is used to express the factors and alpha cut-offs
+// of glTF.
 struct ProductTexture {
   TextureIndex first, second;
   double threshold = 0;
@@ -76,9 +79,9 @@ using Texture = std::variant<ConstantTexture, BitmapTexture, CheckerboardTexture
 
 // Surfaces.
 enum class Microfacet { beckmann, ggx };
-// Rough surfaces with multiple_scattering set include light that is scattered several times between
-// microfacets, which the plain microfacet model leaves out (docs/design/multiple-scattering.md). Their
-// roughness must be one constant.
+// Several rough surfaces below have the option multiple_scattering. If it is true, they include light that is
+// scattered several times between microfacets, which the plain microfacet model leaves out
+// (docs/design/multiple-scattering.md). The roughness must then be a constant, the same along u and v.
 
 struct DiffuseBsdf {
   TextureIndex reflectance;
@@ -116,14 +119,15 @@ struct RoughDielectricBsdf {
   bool multiple_scattering = false;
   bool operator==(const RoughDielectricBsdf&) const = default;
 };
-// A thin sheet whose two sides are one surface: light passes without changing its direction
+// A thin sheet, such as a window pane, as one surface: light passes through it without changing its
+// direction.
 struct ThinDielectricBsdf {
   double int_ior = 1.5046, ext_ior = 1.000277;
   TextureIndex specular_reflectance, specular_transmittance;
   bool operator==(const ThinDielectricBsdf&) const = default;
 };
-// A thin sheet whose two rough sides are one surface. The lobe of transmitted light is that of the reflected
-// light, mirrored at the sheet.
+// A thin sheet with two rough sides, as one surface. The lobe of transmitted light is the lobe of reflected
+// light, mirrored at the plane of the sheet.
 struct RoughThinDielectricBsdf {
   Microfacet distribution = Microfacet::beckmann;
   TextureIndex alpha_u, alpha_v;
@@ -154,7 +158,7 @@ struct TwoSidedBsdf {
   BsdfIndex front, back;
   bool operator==(const TwoSidedBsdf&) const = default;
 };
-// Bsdfs that contain others nest at most scene::kMaxBsdfNesting deep.
+// Bsdfs that contain other bsdfs may be nested at most scene::kMaxBsdfNesting deep.
 struct MaskBsdf {  // the share 1 - opacity of the light passes straight through
   TextureIndex opacity;
   BsdfIndex bsdf;
@@ -165,11 +169,11 @@ struct BlendBsdf {  // the mixture (1 - weight) first + weight second
   BsdfIndex first, second;
   bool operator==(const BlendBsdf&) const = default;
 };
-// Options of normal and bump maps. flip_invalid_normals rotates a normal that faces away from the viewer by
-// half a turn about the surface's normal (Schuessler et al. 2017). use_shadowing_function darkens by the
-// shadowing of facets with the map's slope (Estevez, Lecocq, Stein 2019). With either, the BSDF is not
-// reciprocal.
-struct NormalMapBsdf {  // normal = 2 colour - 1 in the frame of u, v and the surface's normal
+// Normal and bump maps have two options; with either of them the BSDF is not reciprocal. With
+// flip_invalid_normals, a mapped normal that faces away from the viewer is rotated by half a turn about the
+// surface's normal (Schuessler et al. 2017). With use_shadowing_function, light is reduced by the shadowing
+// function of microfacets that are as steep as the mapped normal (Estevez, Lecocq, Stein 2019).
+struct NormalMapBsdf {  // (x, y, z) = 2 (r, g, b) - 1 is the normal in the frame (u, v, surface normal)
   TextureIndex normalmap;
   BsdfIndex bsdf;
   bool flip_invalid_normals = true, use_shadowing_function = true;
@@ -192,8 +196,8 @@ struct PrincipledBsdf {
   TextureIndex spec_tint, sheen, sheen_tint, flatness, clearcoat, clearcoat_gloss;
   bool operator==(const PrincipledBsdf&) const = default;
 };
-// A metal with GGX facets under a dielectric coat with GGX facets. eta and k are those of the metal against a
-// vacuum.
+// A metal with GGX facets under a dielectric coat with GGX facets. eta and k are the metal's index of
+// refraction relative to vacuum.
 struct CoatedConductorBsdf {
   double int_ior = 1.49, ext_ior = 1.000277;
   double coat_alpha = 0;
@@ -209,8 +213,8 @@ using Bsdf = std::variant<DiffuseBsdf, ConductorBsdf, RoughConductorBsdf, Dielec
 
 // Volumes and media.
 //
-// A constant value. As a density it fills the unit cube [0,1]^3 of its local space, transformed by to_world;
-// for any other purpose it fills all of space.
+// A volume with the same value everywhere. If it is a medium's density (sigma_t), it fills the unit cube
+// [0,1]^3 of its local space, transformed by to_world; for any other purpose it fills all of space.
 struct ConstVolume {
   Rgb value{1, 1, 1};
   Transform to_world;
@@ -218,20 +222,22 @@ struct ConstVolume {
 };
 enum class VolumeFilter { nearest, trilinear };
 enum class GridOrder { x_fastest, z_fastest };
-// A grid with values at cell centres. It fills the unit cube [0,1]^3 of its local space, transformed by
-// to_world. With use_grid_bbox the cube is first mapped to the file's own bounding box. VDB and NanoVDB grids
-// are placed by their own transform, raw `.bin` grids by their box with the outermost values on its faces
-// (see docs/reference/scene-format.md).
+// A grid of values from a file (docs/reference/scene-format.md). The values are at cell centres, except in
+// raw `.bin` files, whose outermost values are on the faces of the grid's box. The box is the unit cube
+// [0,1]^3 of the local space or, with use_grid_bbox and for `.bin` files, the bounding box given in the file;
+// to_world is applied to it. VDB and NanoVDB grids are placed by the transform in their file instead of a
+// box, and then by to_world.
 struct GridVolume {
   AssetIndex file;
   std::string grid_name;  // name of the grid in a VDB file; empty: the only grid, or "density"
   VolumeFilter filter = VolumeFilter::trilinear;
   Wrap wrap = Wrap::clamp;
   bool use_grid_bbox = false;
-  // true: the outermost values are on the faces of the box (Mitsuba 0.x); not for VDB
+  // True: the outermost values are on the faces of the box, as in Mitsuba 0.x. It has no effect on VDB
+  // and NanoVDB files.
   bool node_centred = false;
-  // true: the box ends at the inner faces of the outermost voxels, whose values only take part in the
-  // interpolation; only for a `.vol` with values at cell centres
+  // True: the outermost voxels are outside the box, which ends at their inner faces; their values are only
+  // used for interpolation. Only for a `.vol` file with values at cell centres.
   bool border = false;
   bool raw = true;
   Transform to_world;
@@ -258,26 +264,27 @@ struct HomogeneousMedium {
   PhaseIndex phase;
   Rgb emission{0, 0, 0};         // radiance per scene unit, independent of extinction
   Rgb source_radiance{0, 0, 0};  // radiance of an infinitely deep medium without scattering
-  int priority = 0;              // where media overlap, only those of the highest priority are in effect
+  int priority = 0;              // where media overlap, only the media of the highest priority exist
   bool operator==(const HomogeneousMedium&) const = default;
 };
-// At most one of emission, source_radiance and temperature is set. The extinction is sigma_t * scale * tint.
+// A medium whose properties vary in space. The extinction is sigma_t * scale * tint. At most one of emission,
+// source_radiance and temperature is set.
 struct HeterogeneousMedium {
   VolumeIndex sigma_t;
   VolumeIndex albedo;
   double scale = 1;
-  Rgb tint{1, 1, 1};  // must be grey if sigma_t is a grid of three differing channels
+  Rgb tint{1, 1, 1};  // must be grey if sigma_t is a coloured grid (three channels that differ)
   PhaseIndex phase;
   std::optional<VolumeIndex> emission;         // radiance per scene unit, independent of extinction
-  std::optional<VolumeIndex> source_radiance;  // emission per length is sigma_a times this
+  std::optional<VolumeIndex> source_radiance;  // emission per length is sigma_a times this radiance
   // Emission per length is sigma_a times the radiance of a black body at temperature_offset +
   // temperature_scale * value kelvin.
   std::optional<VolumeIndex> temperature;
-  double emission_scale = 1;  // factor on the emission
+  double emission_scale = 1;  // factor on the emission, whichever of the three volumes gives it
   double temperature_scale = 1, temperature_offset = 0;
   bool peak_one = false;  // true: the spectrum of a black body is divided by its largest value
-  std::optional<VolumeIndex> emission_weight;  // factor on the light of `temperature`
-  int priority = 0;  // where media overlap, only those of the highest priority are in effect
+  std::optional<VolumeIndex> emission_weight;  // factor on the black-body emission
+  int priority = 0;  // where media overlap, only the media of the highest priority exist
   bool operator==(const HeterogeneousMedium&) const = default;
 };
 using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
@@ -287,13 +294,13 @@ struct ConstantEmitter {  // the same radiance from all directions
   Rgb radiance{1, 1, 1};
   bool operator==(const ConstantEmitter&) const = default;
 };
-// Parallel light. `direction` is the direction in which the light travels, in world space; the irradiance is
-// that on a plane that faces the light.
+// Parallel light. `direction` is the direction in which the light travels, in world space. `irradiance` is
+// received by a plane perpendicular to it.
 struct DirectionalEmitter {
   Vec3 direction{0, 0, 1};
   Rgb irradiance{1, 1, 1};
-  // In degrees. If it is not 0, the light is a disk of this angular radius in the sky, of uniform radiance,
-  // with the same irradiance.
+  // In degrees. 0: the light is exactly parallel. Otherwise it comes from a disk of this angular radius in
+  // the sky, whose radiance is uniform and gives the same irradiance.
   double angular_radius = 0;
   bool operator==(const DirectionalEmitter&) const = default;
 };
@@ -306,9 +313,10 @@ struct SpotEmitter {  // a spot light at the origin of to_world, which emits alo
   Transform to_world;
   Rgb intensity{1, 1, 1};
   double cutoff_angle = 20;  // degrees from the axis; no light beyond this
-  // Full intensity within this angle; up to cutoff_angle the intensity falls linearly with the angle
+  // In degrees from the axis. Within this angle the intensity is full; from there to cutoff_angle it falls
+  // linearly with the angle to 0.
   double beam_width = 15;
-  std::optional<TextureIndex> texture;  // image by which the light is multiplied, projected as in Mitsuba
+  std::optional<TextureIndex> texture;  // factor on the intensity, projected along +z as by Mitsuba
   bool operator==(const SpotEmitter&) const = default;
 };
 // How an environment map's image covers the directions, in the map's own space.
@@ -353,48 +361,57 @@ struct GoniometricEmitter {
 using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter, EnvmapEmitter,
                              ProjectorEmitter, GoniometricEmitter>;
 
-// Integrator.
-inline constexpr int kUsualPathReuse = 16;  // pixels that share subpaths, if path_reuse 0 selects sharing
+// The integrator.
+//
+// The number of pixels that share subpaths if path_reuse is 0 and sharing lowers the error of the scene.
+inline constexpr int kUsualPathReuse = 16;
+// Many parameters of IntegratorSettings switch a sampling technique. "Chosen for the scene" means that an
+// analysis of the scene decides whether the technique is used.
 struct IntegratorSettings {
-  // Our name: "volpath", "volpath_distant_mis", "path" or "whitted".
+  // Lightshaft's name of the integrator: "volpath", "volpath_distant_mis", "path" or "whitted".
   std::string name = "volpath";
   int max_depth = -1;  // longest path in segments; -1: no limit; 1: emission only; 2: direct light
   int rr_depth = 5;
   bool hide_emitters = false;
-  // Distance and heuristic are used by "volpath_distant_mis" only
+  // `distance` and `heuristic` are for "volpath_distant_mis" only.
   DistanceSampling distance = DistanceSampling::mis;
   MisHeuristic heuristic = MisHeuristic::power;
   // For "volpath" only: number of points on a camera ray's segment through a medium at which next-event
   // estimation samples light. 0: chosen for the scene, possibly none; -1: none.
   int camera_points = 0;
-  bool phase_only = false;  // true: directions are not sampled towards point, spot or projector lights
+  // For "volpath" only. True: in scenes with media and point, spot or projector lights, no directions are
+  // sampled towards these lights, only from phase functions and BSDFs.
+  bool phase_only = false;
   // For "volpath" and "path" only: whether paths are connected to points that a directional emitter lights.
   // 0: chosen for the scene; -1: never; 1: always.
   int light_vertices = 0;
-  // For "volpath" only. Lamps are point, spot and projector lights. equiangular: whether points on path
-  // segments are sampled near lamps; if not, directions are not sampled towards lamps either. lamp_flights:
-  // whether a share of the free-flight distances is sampled near lamps. 0: chosen for the scene; -1: never.
+  // Both are for "volpath" only; a lamp is a point, spot or projector light. equiangular: whether next-event
+  // estimation also connects lamps to points on path segments through media, sampled more densely near the
+  // lamp; if not, directions are not sampled towards lamps either. lamp_flights: whether a share of the
+  // free-flight distances is sampled so that paths scatter near lamps. 0: chosen for the scene; -1: never.
   int equiangular = 0, lamp_flights = 0;
-  int light_tree = 0;  // 0: a tree chooses among many lights; -1: lights are chosen by their power alone
-  // For "volpath" and "path" only: the number of pixels that share the subpaths from the second vertex on. 0:
-  // kUsualPathReuse or none, chosen for the scene; -1 or 1: none.
+  // How next-event estimation chooses one of many (32 or more) lights. 0: by a tree of lights, from distance,
+  // direction and power; -1: by power alone.
+  int light_tree = 0;
+  // For "volpath" and "path" only: the number of pixels that share their subpaths from the second vertex on.
+  // 0: kUsualPathReuse or no sharing, chosen for the scene; -1 or 1: no sharing.
   int path_reuse = 0;
-  // For "volpath" only: whether Russian roulette applies to those shadow rays through grids that can only
-  // make a small contribution. 0: chosen for the scene; -1: all are traced.
+  // For "volpath" only: whether Russian roulette may skip a shadow ray through grids if its contribution can
+  // only be small. 0: where this is possible; -1: never, so that all shadow rays are traced.
   int shadow_roulette = 0;
   // For "volpath" and "path" only: whether the first surface of a path samples a second direction towards a
-  // constant environment. 0: chosen for the scene; -1: it does not.
+  // constant environment. 0: chosen for the scene; -1: never.
   int sky_samples = 0;
-  // For "volpath" and "path" only: whether directions towards the sky, an environment map or a constant
-  // environment, are also sampled through the openings by which its light enters the scene. 0: chosen for the
-  // scene; -1: never; 1: where possible.
+  // For "volpath" and "path" only: whether directions towards the environment (a map or a constant) are also
+  // sampled through the openings by which the environment's light enters the scene. 0: chosen for the scene;
+  // -1: never; 1: where possible.
   int sky_portals = 0;
-  // For "volpath" and "path" only: whether, in a scene with few lights, a light is chosen by probabilities
-  // that depend on the place and are learned from camera paths. 0: chosen for the scene; -1: never; 1: where
-  // possible.
+  // For "volpath" and "path" only: whether, in a scene with 2 to 64 lights, next-event estimation chooses a
+  // light with probabilities that depend on the place and are learned from camera paths. 0: chosen for the
+  // scene; -1: never; 1: where possible.
   int local_lights = 0;
-  // For "volpath" only, in scenes with grids: whether paths may split at their first scattering, and Russian
-  // roulette may end them where their throughput is lower than just after that scattering
+  // For "volpath" only, in scenes with grids: whether a path may split at its first scattering, and whether
+  // Russian roulette may end a path whose throughput has fallen below its value just after that scattering
   // (worker/render/world/roulette.h). 0: chosen for the scene; -1: neither.
   int path_splitting = 0;
   bool operator==(const IntegratorSettings&) const = default;
@@ -421,7 +438,8 @@ struct Scene {
   std::uint64_t sample_count = 4;
   std::vector<ShapeGroup> groups;
   std::vector<Instance> instances;
-  // Names of the AOVs that the scene requests (common/image/aov/aov.h), separated by commas
+  // Names of the AOVs (extra output images, common/image/aov/aov.h) that the scene requests, separated by
+  // commas.
   std::string aovs;
   // The labels of all shapes and of all instances, by index; empty unless requested (ReadOptions::labels).
   std::vector<Label> shape_labels, instance_labels;

@@ -13,10 +13,10 @@ namespace ls {
 struct RectangleShape {  // [-1,1]^2 in z = 0, normal +z, uv = (x+1)/2, (y+1)/2
   bool operator==(const RectangleShape&) const = default;
 };
-struct CubeShape {  // [-1,1]^3, normals outwards, uv per face
+struct CubeShape {  // [-1,1]^3, normals outwards; each face has its own uv from 0 to 1
   bool operator==(const CubeShape&) const = default;
 };
-struct SphereShape {  // center and radius apply before to_world
+struct SphereShape {  // Shape::to_world transforms the sphere of this center and radius
   Vec3 center{0, 0, 0};
   double radius = 1;
   bool operator==(const SphereShape&) const = default;
@@ -24,7 +24,8 @@ struct SphereShape {  // center and radius apply before to_world
 struct DiskShape {  // unit disk in z = 0, normal +z
   bool operator==(const DiskShape&) const = default;
 };
-// A cylinder without caps about the line from p0 to p1; normals point outwards, also if mirrored
+// A cylinder without caps about the line from p0 to p1. Its normals point outwards, even if to_world
+// mirrors it.
 struct CylinderShape {
   Vec3 p0{0, 0, 0}, p1{0, 0, 1};
   double radius = 1;
@@ -35,7 +36,9 @@ struct MeshShape {
   AssetIndex file;
   MeshFormat format = MeshFormat::obj;
   bool face_normals = false;
-  bool flat_without_normals = false;  // false: smooth normals are computed if the file has none
+  // What is done if the file has no vertex normals. true: faces are shaded flat; false: smooth normals are
+  // computed.
+  bool flat_without_normals = false;
   bool flip_tex_coords = false;
   int shape_index = 0;  // index of the mesh in a `serialized` file
   bool operator==(const MeshShape&) const = default;
@@ -59,11 +62,12 @@ struct Shape {
   bool flip_normals = false;
   BsdfIndex bsdf;
   std::optional<AreaEmitter> emitter;
-  std::optional<MediumIndex> interior, exterior;  // interior: the side that the normal points away from
-  bool is_medium_transition = false;              // true if the file gives an interior or exterior
-  // If set, the shape is visible only through instances of this group, and to_world places it within the
-  // group. The shapes of a group are contiguous in the scene's list, and groups are in the order of their
-  // indices. None of these shapes emits light.
+  // The media on the two sides: the normal points away from the interior, into the exterior.
+  std::optional<MediumIndex> interior, exterior;
+  bool is_medium_transition = false;  // true if the file gives an interior or exterior
+  // If set, the shape belongs to this group: it is visible only as part of the group's instances, and
+  // to_world places it within the group. It does not emit light. In the scene's list of shapes, the shapes of
+  // a group are contiguous, and those of a group of lower index come first.
   std::optional<GroupIndex> group;
   bool operator==(const Shape&) const = default;
 };
@@ -79,11 +83,11 @@ struct Instance {  // a copy of a group's shapes, placed in the world
 enum class FovAxis { x, y, diagonal, smaller, larger };
 
 // How the camera projects. orthographic: parallel rays from the rectangle [-1, 1] x [-1/a, 1/a] in the
-// camera's x and y (a: width / height of the image), which to_world may scale. spherical: all directions by
-// latitude and longitude; the top row is +y, the left edge -z, and a quarter of the width further is +x
-// (Mitsuba 0.x); it has no clip planes.
+// camera's x and y, where a is width / height of the image; to_world may scale this rectangle. spherical: all
+// directions by latitude and longitude, as in Mitsuba 0.x: the top row is +y; on the horizon the left edge is
+// -z, and a quarter of the width further is +x. It ignores near_clip and far_clip.
 enum class Projection { perspective, orthographic, spherical };
-struct Sensor {  // looks along +z of to_world, with +y up and +x to the LEFT (Mitsuba)
+struct Sensor {  // looks along the +z axis of to_world, with +y up and +x to the LEFT, as in Mitsuba
   Transform to_world;
   double fov = 50;  // in degrees, along fov_axis
   FovAxis fov_axis = FovAxis::x;
@@ -93,7 +97,8 @@ struct Sensor {  // looks along +z of to_world, with +y up and +x to the LEFT (M
   double focus_distance = 1;
   std::optional<MediumIndex> medium;  // the medium around the camera
   Projection projection = Projection::perspective;
-  // image over the frame; its value at a pixel is a factor on the aperture's radius
+  // An image that is stretched over the frame, with (u, v) = (0, 0) in the upper left corner. Its value at a
+  // pixel, from 0 to 1, is a factor on aperture_radius.
   std::optional<TextureIndex> aperture_scale;
   bool operator==(const Sensor&) const = default;
 };
@@ -106,8 +111,8 @@ struct TentFilter {
   double radius = 1;
   bool operator==(const TentFilter&) const = default;
 };
-struct GaussianFilter {  // truncated at 4 stddev, and shifted to reach 0 there (Mitsuba)
-  double stddev = .5;
+struct GaussianFilter {  // truncated at 4 stddev and lowered so that it is 0 there, as in Mitsuba
+  double stddev = .5;    // in pixels
   bool operator==(const GaussianFilter&) const = default;
 };
 using ReconstructionFilter = std::variant<BoxFilter, TentFilter, GaussianFilter>;
@@ -124,8 +129,8 @@ struct FilmSettings {
 };
 
 // On a ray through a medium, the integrator `volpath_distant_mis` samples a point and connects it to a light.
-// DistanceSampling: the density of this point; `mis` takes one sample of each density, and weights the two by
-// the MisHeuristic.
+// DistanceSampling is the probability density along the ray from which this point is drawn; `mis` draws one
+// point from each of the other two densities, and weights the two points by the MisHeuristic.
 enum class DistanceSampling { exponential, equiangular, mis };
 enum class MisHeuristic { power, balance };
 

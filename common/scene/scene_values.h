@@ -12,8 +12,8 @@ namespace ls {
 using Rgb = std::array<double, 3>;
 inline bool all_zero(const Rgb& c) { return c == Rgb{0, 0, 0}; }
 inline bool is_grey(const Rgb& c) { return c[0] == c[1] && c[1] == c[2]; }
-// A point or direction. A type of its own, different from Rgb, because files write points and colours
-// differently.
+// A point or direction. It is a type of its own, although Rgb has three numbers, too, so that readers and
+// writers of files can tell points from colours, which files write in different ways.
 struct Vec3 : std::array<double, 3> {};
 
 // A row-major 4 x 4 matrix for column vectors: p' = M p. It is the identity by default.
@@ -41,8 +41,8 @@ using PhaseIndex = Index<struct PhaseTag>;
 using MediumIndex = Index<struct MediumTag>;
 using GroupIndex = Index<struct GroupTag>;
 
-// A file that the scene uses. `name` is as written in the scene, for messages; the digest identifies the
-// bytes.
+// A file that the scene uses. `name` is the file's name as the scene file gives it, for messages; the digest
+// identifies the file's bytes.
 struct Asset {
   std::string name;
   Digest digest;

@@ -20,8 +20,9 @@ using Pairs = std::vector<std::pair<std::string, std::string>>;
 constexpr const char* kTracesPath = "/v1/traces";
 constexpr std::string_view kServiceName = "service.name";
 
-// The value of the variable for traces if it is set and not empty, otherwise that of the variable for all
-// signals (traces, metrics, logs). `name` is the variable that was used, for messages.
+// A setting of the exporter: the value of the environment variable that is for traces alone
+// (OTEL_EXPORTER_OTLP_TRACES_...) or, if that is not set or empty, of the one for all signals, which are
+// traces, metrics and logs (OTEL_EXPORTER_OTLP_...). `name` is the variable that was used, for messages.
 struct Setting {
   std::string name, value;
 };
@@ -42,8 +43,8 @@ std::string_view trimmed(std::string_view text) {
   return begin == std::string_view::npos ? "" : text.substr(begin, end + 1 - begin);
 }
 
-// Decodes %XX, as in W3C Baggage. nullopt: a wrong digit, or a control character, which could begin another
-// header.
+// Decodes %XX, as in W3C Baggage. nullopt: a digit is wrong, or the result has a control character; a line
+// end would let the text add another HTTP header.
 std::optional<std::string> decoded(std::string_view text) {
   auto out = percent_decode(text);
   if (out && std::any_of(out->begin(), out->end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
@@ -57,7 +58,7 @@ bool is_header_name(std::string_view name) {
   });
 }
 
-// Reads "name=value,name=value". Error messages do not contain the text, which may be secret.
+// Reads a list "name=value,name=value". Error messages do not contain the text, since it may contain secrets.
 Result<Pairs> read_pairs(const std::string& variable, std::string_view text) {
   Pairs pairs;
   while (!text.empty()) {
@@ -134,7 +135,7 @@ bool Sampler::takes(const TraceId& trace, std::optional<bool> parent_sampled) co
 
 Result<std::optional<Settings>> settings_from(const Environment& environment, const std::string& program) {
   const std::string exporter = plain(environment, "OTEL_TRACES_EXPORTER");
-  // By the specification, case is ignored.
+  // OpenTelemetry's specification says that "true" is recognised in any letter case.
   const bool off = ::strcasecmp(plain(environment, "OTEL_SDK_DISABLED").c_str(), "true") == 0;
   if (off || exporter == "none") return std::nullopt;
   auto url = read_url(environment);

@@ -12,9 +12,9 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t kMostMessage = 200;
-constexpr int kStatusError = 2;  // STATUS_CODE_ERROR
+constexpr int kStatusError = 2;  // OTLP's STATUS_CODE_ERROR
 
-// JSON numbers hold 53 bits, so OTLP writes 64-bit integers as texts.
+// OTLP writes 64-bit integers as JSON strings, since many programs read JSON numbers as doubles of 53 bits.
 std::string int64_text(std::int64_t value) { return std::to_string(value); }
 
 json typed(const char* type, json value) { return json{{type, std::move(value)}}; }

@@ -15,11 +15,11 @@ namespace ls::trace {
 std::string otlp_request(const Resource& resource, std::span<const Span> spans);
 
 struct PartialSuccess {
-  std::uint64_t rejected = 0;  // number of spans
-  std::string message;         // for the operator, of at most 200 characters; empty: none
+  std::uint64_t rejected = 0;  // number of spans of the request that the collector did not accept
+  std::string message;         // the collector's message to the operator, cut at 200 bytes; empty: none
 };
-// Reads the body of an answer of status 2xx. If it cannot be parsed, this counts as full success: it may be
-// empty or in another encoding.
+// Reads the body of an answer of status 2xx. A body that cannot be parsed counts as full success, since the
+// body may be empty or in another encoding.
 PartialSuccess otlp_partial_success(std::string_view answer);
 
 }  // namespace ls::trace

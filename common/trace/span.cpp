@@ -9,7 +9,7 @@
 namespace ls::trace {
 namespace {
 
-constexpr std::size_t kTraceparent = 55;  // characters of version 00
+constexpr std::size_t kTraceparent = 55;  // length of a `traceparent` of version 00, in characters
 constexpr std::uint8_t kSampledFlag = 1;
 
 template <class Id>

@@ -24,10 +24,11 @@ struct SpanId {
   std::array<std::uint8_t, 8> bytes{};
   auto operator<=>(const SpanId&) const = default;
 };
-std::string hex(const TraceId& id);  // 32 lower-case digits
-std::string hex(const SpanId& id);   // 16 lower-case digits
+std::string hex(const TraceId& id);  // returns 32 lower-case digits
+std::string hex(const SpanId& id);   // returns 16 lower-case digits
 
-// Identifies a span to other processes, which record its children. Plain data without allocations.
+// Identifies a span to other processes, so that they can record its child spans. Plain data without
+// allocations.
 struct SpanContext {
   TraceId trace;
   SpanId span;
@@ -37,16 +38,18 @@ struct SpanContext {
 
 // Returns the text "00-TRACE-SPAN-FLAGS", 55 characters.
 std::string to_traceparent(const SpanContext& context);
-// Parses such a text; nullopt: it is not valid. Of the texts of later versions only the fields of version 00
-// are read.
+// Parses a text that to_traceparent() or another program has written; nullopt: it is not valid. If its
+// version is later than 00, only the fields of version 00 are read.
 std::optional<SpanContext> parse_traceparent(std::string_view text);
 
-// The same text always gives the same id, so that a process continues its trace after a restart. Texts must
-// be unique: the ids are parts of their SHA-256.
+// Return an id that is computed from the text (the first bytes of a SHA-256), so that a restarted process
+// gets the same ids again and continues its trace. Different traces, and different spans of a trace, must
+// have different texts.
 TraceId trace_id_of(std::string_view text);
 SpanId span_id_of(const TraceId& trace, std::string_view text);
 
-// Keys are literals. Values must not contain tokens or users' file paths.
+// The attributes of a span: pairs of key and value. Keys are string literals. Values must not contain access
+// tokens or users' file paths, since they are sent to the collector.
 using Value = std::variant<std::string, std::int64_t, double, bool>;
 using Attributes = std::vector<std::pair<const char*, Value>>;
 
@@ -55,12 +58,12 @@ struct SpanEvent {
   std::string name;
 };
 
-enum class SpanKind { internal = 1, client = 3 };  // the numbers of OTLP
+enum class SpanKind { internal = 1, client = 3 };  // values as in OTLP
 
 // Times are nanoseconds since 1970 (UTC).
 struct Span {
   SpanContext context;
-  std::optional<SpanId> parent;  // nullopt: the first span of its trace
+  std::optional<SpanId> parent;  // the span that this one is part of; nullopt: this is the trace's first span
   const char* name = "";
   SpanKind kind = SpanKind::internal;
   std::int64_t start_ns = 0, end_ns = 0;

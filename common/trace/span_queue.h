@@ -1,5 +1,6 @@
-// A queue of spans to send. It depends only on the calls of its functions and the times passed to them. It is
-// bounded: if it is full, a new span is dropped and counted. Not thread-safe.
+// A queue of spans (named time intervals of a job, span.h) that are to be sent to the collector of traces, in
+// batches. It reads no clock: the caller passes the times. It is bounded: if it is full, a new span is
+// dropped and counted. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -13,45 +14,45 @@
 
 namespace ls::trace {
 
-inline constexpr std::size_t kMaxWaiting = 8192;  // spans, about 0.5 KB each
-inline constexpr std::size_t kMaxBatch = 512;     // spans in one request
-inline constexpr double kCollectSeconds = 1;      // time from the first span of a batch until it is sent
-inline constexpr int kMaxSendings = 5;            // attempts to send a batch; then it is dropped
-inline constexpr double kFirstPauseSeconds = 1;   // after a failed attempt; each further failure doubles it
+inline constexpr std::size_t kMaxWaiting = 8192;  // most spans in the queue; each takes about 0.5 KB
+inline constexpr std::size_t kMaxBatch = 512;     // most spans in one request
+inline constexpr double kCollectSeconds = 1;      // longest time for which a batch of spans is collected
+inline constexpr int kMaxSendings = 5;            // a batch is dropped after this number of failed attempts
+inline constexpr double kFirstPauseSeconds = 1;   // pause after a failed attempt; further failures double it
 
 struct Figures {
   std::uint64_t sent = 0;      // spans that the collector took
   std::uint64_t left_out = 0;  // spans dropped because the queue was full
-  std::uint64_t refused = 0;   // spans that the collector rejected, or did not take in kMaxSendings attempts
+  std::uint64_t refused = 0;   // spans rejected by the collector, or not taken in kMaxSendings attempts
 };
 
 class SpanQueue {
  public:
   void add(Span span, TimePoint now);
-  // Returns the batch to send now; empty: there is none, or its time has not come. The reference is valid
-  // until the next call of a non-const function other than add().
+  // Returns the batch to send now; empty: there is no span, or it is too early to send. The reference is
+  // valid until the next call of a non-const function other than add().
   const std::vector<Span>& due(TimePoint now);
-  // Returns the time from which due() will return a batch; nullopt: no span waits.
+  // Returns the earliest time at which due() will return a batch; nullopt: no span is to be sent.
   std::optional<TimePoint> next_due() const;
-  // Makes all waiting spans due at once and without pauses. Called when the program ends.
+  // From now on all spans are due at once, without any pause. Called when the program ends.
   void hurry() { hurried_ = true; }
 
-  // When sending the batch of due() has ended, call one of these three:
-  void taken(std::uint64_t rejected);              // the collector took it, except for `rejected` spans
-  void failed(TimePoint now);                      // the batch may be sent again
-  void refused();                                  // the batch is dropped: it would be refused again
-  bool in_trouble() const { return in_trouble_; }  // the last attempt to send a batch failed
+  // After an attempt to send the batch of due(), call one of these three functions.
+  void taken(std::uint64_t rejected);  // the collector took the batch, except for `rejected` spans
+  void failed(TimePoint now);          // the attempt failed, but may be repeated
+  void refused();                      // the collector refused the batch for good, so it is dropped
+  bool in_trouble() const { return in_trouble_; }  // true if the last attempt to send a batch did not succeed
 
   const Figures& figures() const { return figures_; }
 
  private:
   std::deque<Span> waiting_;
-  std::vector<Span> batch_;  // being sent, or to be sent again
+  std::vector<Span> batch_;  // the batch that is being sent, or is to be sent again
   int attempts_ = 0;         // failed attempts to send batch_
-  int failures_ = 0;         // failed attempts since the collector's last answer; each lengthens the pause
+  int failures_ = 0;         // calls of failed() since the last taken() or refused(); each doubles the pause
   bool in_trouble_ = false;
   TimePoint not_before_{};  // earliest time of the next attempt
-  TimePoint first_at_{};    // when waiting_ got its first span, or last gave a batch
+  TimePoint first_at_{};    // when waiting_ got its first span, or when a batch was last taken from it
   bool hurried_ = false;
   Figures figures_;
 };

@@ -14,9 +14,10 @@ namespace ls::trace {
 namespace {
 
 constexpr double kLastSeconds = 2;  // time limit for sending the waiting spans at the end of the program
-constexpr double kComplaintSeconds = 60;  // shortest time between two log lines about the collector
+constexpr double kComplaintSeconds = 60;  // shortest time between two warnings about the collector in the log
 constexpr std::size_t kMostAnswer = 64 << 10;
-// If the difference between wall clock and monotonic clock changes by more than this, the wall clock was set.
+// If the difference between wall clock and monotonic clock changes by more than this, the wall clock was set
+// or the machine slept, and the new difference is used. Smaller changes are errors of measurement.
 constexpr std::int64_t kClockStepNs = 100'000'000;
 constexpr int kClockReadings = 5;
 
@@ -35,7 +36,7 @@ std::uint64_t mixed(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-// True for a status after which OTLP allows the client to send the same request again.
+// True for an HTTP status after which OTLP allows the client to send the same request again.
 bool may_pass(int status) { return status == 429 || status == 502 || status == 503 || status == 504; }
 
 }  // namespace
@@ -44,7 +45,7 @@ Tracer::Tracer(Options options) : options_(std::move(options)), ids_(random_numb
   if (!options_.send) options_.send = &post;
   resource_.attributes = {{"service.name", options_.settings.service}, {"service.version", options_.version}};
   if (!options_.instance.empty()) resource_.attributes.emplace_back("service.instance.id", options_.instance);
-  auto& all = resource_.attributes;  // keys must be unique
+  auto& all = resource_.attributes;  // no two attributes may have the same key
   for (const auto& pair : options_.settings.resource)
     if (std::none_of(all.begin(), all.end(), [&](const auto& known) { return known.first == pair.first; }))
       all.push_back(pair);
@@ -76,12 +77,13 @@ std::int64_t Tracer::unix_ns(TimePoint at) const { return count(at) + offset_ns_
 
 Figures Tracer::figures() const { return queue_.lock()->figures(); }
 
-// Measures the difference between the wall clock and the monotonic clock. It changes if the wall clock is
-// set, or while the machine sleeps, when the monotonic clock stops. So this is called again and again.
+// Measures the difference between the wall clock and the monotonic clock. This function is called again and
+// again, since the difference changes if the wall clock is set, and while the machine sleeps, when the
+// monotonic clock stops.
 void Tracer::set_clock() {
   std::int64_t offset = 0, narrowest = std::numeric_limits<std::int64_t>::max();
-  // The wall clock is read several times, each between two readings of the monotonic clock. The reading with
-  // the shortest time between the two is used: the thread was interrupted least.
+  // The wall clock is read several times, each time between two readings of the monotonic clock. The result
+  // is taken from the attempt whose two monotonic readings are closest, since it was interrupted least.
   for (int i = 0; i < kClockReadings; ++i) {
     const std::int64_t before = count(options_.clock->now()), wall = options_.unix_ns(),
                        after = count(options_.clock->now());

@@ -24,19 +24,19 @@ class Tracer {
  public:
   struct Options {
     Settings settings;
-    std::string version;  // of this program
-    // Distinguishes several processes of this program, such as workers by their names; empty: not sent.
+    std::string version;  // version of this program
+    // Distinguishes several processes of this program, such as the name of a worker; empty: nothing is sent.
     std::string instance;
     std::shared_ptr<const Clock> clock;
-    std::function<std::int64_t()> unix_ns;  // nanoseconds since 1970
-    // Sends a request; ls::post by default
+    std::function<std::int64_t()> unix_ns;  // reads the wall clock, in nanoseconds since 1970
+    // Sends an HTTP request and returns the answer; empty: ls::post is used.
     std::function<Result<HttpAnswer>(const HttpPost&)> send = {};
   };
   explicit Tracer(Options options);
-  // Sends the waiting spans, if the collector takes them within kLastSeconds.
+  // Sends the waiting spans, but gives up after kLastSeconds (tracer.cpp).
   ~Tracer();
 
-  // Adds the span to the queue of spans to send. Thread-safe. The span must be of a sampled trace.
+  // Adds the span to the queue of spans to send. The span's trace must be sampled. Thread-safe.
   void record(Span span);
   SpanId new_span_id();
   // Converts a time of the injected clock to nanoseconds since 1970. In one process a later time gives a
@@ -54,18 +54,19 @@ class Tracer {
 
   Options options_;
   Resource resource_;
-  std::atomic<std::int64_t> offset_ns_{0};  // from the clock's time to nanoseconds since 1970
+  // What is added to a time of options_.clock, in nanoseconds, to get nanoseconds since 1970.
+  std::atomic<std::int64_t> offset_ns_{0};
   std::atomic<std::uint64_t> ids_;
   mutable Guarded<SpanQueue> queue_;
   std::condition_variable_any came_;
   std::atomic<bool> ending_{false};
-  // Used by the sending thread only
+  // Both are used by the sending thread only.
   std::optional<TimePoint> last_complaint_, ending_since_;
   std::jthread thread_;
 };
 
-// Returns a tracer if the environment names a collector (otel_settings.h), else null. `program` and
-// `version`: of this program.
+// Returns a tracer if environment variables name a collector (otel_settings.h), otherwise null. `program` and
+// `version` are the name and the version of this program.
 Result<std::shared_ptr<Tracer>> tracer_from_environment(const std::string& program,
                                                         const std::string& version,
                                                         const std::string& instance);

@@ -27,10 +27,12 @@
 namespace ls::coordinator {
 namespace {
 
-// A job's record lists at most this many items that are left out of the rendering, so that it stays small
+// The stored analysis of a job (StoredJob::analysis) lists at most this many parts of the scene that are not
+// rendered, so that it stays small
 constexpr std::size_t kMostListed = 64;
 
-// Returns the total bytes of the files that only this part of the renderer reads.
+// Returns the total size, in bytes, of the files that this part of the renderer reads; 0 for a part that
+// reads no files. `part` is a name such as "meshes".
 std::uint64_t bytes_of_files(const scene::Needs& needs, const std::string& part) {
   static const std::map<std::string, std::string> kReads = {{"meshes", "mesh"},
                                                             {"bitmap textures", "texture"},
@@ -47,8 +49,8 @@ std::uint64_t bytes_of_files(const scene::Needs& needs, const std::string& part)
 }
 
 // Describes for workers and users which features of the renderer the scene needs, and which parts of the
-// scene are not rendered: sets `needs`, the features and `analysis` of `job`. `pruned` is the part of the
-// scene that the job's integrator uses, with a list of the rest.
+// scene are not rendered: sets needs, features_used, features_left_out and analysis of `job`. `pruned` is the
+// part of the scene that the job's integrator uses, with a list of the rest.
 void note_analysis(const scene::Pruned& pruned, const RenderSettings& settings, StoredJob& job) {
   using nlohmann::json;
   const scene::Needs needs = scene::needs_of(pruned.scene, scene::sees_media(settings.integrator));
@@ -170,8 +172,8 @@ class UploadedAssets final : public AssetSource {
     return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
   }
 
-  std::size_t text_bytes = 0;     // of the scene files that the main file includes
-  std::set<Digest> not_uploaded;  // files that the scene names but that are not in the store
+  std::size_t text_bytes = 0;     // bytes of the scene files that the main file includes
+  std::set<Digest> not_uploaded;  // digests of files that the scene names but that are not in the store
 
  private:
   Result<Asset> find(std::string_view name, bool of_text) {
@@ -208,8 +210,8 @@ class UploadedAssets final : public AssetSource {
 struct UploadedScene {
   Scene scene;
   std::vector<Diagnostic> warnings;
-  std::size_t text_bytes = 0;     // as in UploadedAssets
-  std::set<Digest> not_uploaded;  // as in UploadedAssets
+  std::size_t text_bytes = 0;     // bytes of the scene files that the main file includes
+  std::set<Digest> not_uploaded;  // digests of files that the scene names but that are not in the store
 };
 
 // Reads the request's scene. `strict`: a file that is not in the store is an error, with its place in the
@@ -236,10 +238,11 @@ tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, 
   scene::Pruned pruned = scene::pruned(read.scene, whom);
   const auto missing = [&](const Asset& a) { return read.not_uploaded.contains(a.digest); };
   if (std::ranges::none_of(pruned.scene.assets, missing)) return pruned;
-  // Now read strictly, the scene gives an error at each place that names a missing file
+  // Read again with `strict`, the scene gives an error at each place that names a missing file. Without an
+  // error, the missing files have arrived meanwhile
   const auto again = read_uploaded(request, blobs, frame, true);
   if (!again) return tl::unexpected(again.error());
-  return scene::pruned(again->scene, whom);  // the file has arrived since the first reading
+  return scene::pruned(again->scene, whom);
 }
 
 Result<void> check_job(const StoredJob& job) {
@@ -277,7 +280,7 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
     if (!right) return rejected(right.error());
     origin = std::move(right->origin);
   }
-  if (!wants_labels(job.settings)) {  // only cryptomattes use the names of objects
+  if (!wants_labels(job.settings)) {  // labels, the names of objects, are only for cryptomattes
     read->scene.shape_labels.clear();
     read->scene.instance_labels.clear();
   }
@@ -319,7 +322,7 @@ Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, c
                 .features_left_out = before.features_left_out,
                 .needs = before.needs,
                 .analysis = before.analysis};
-  job.spec.frames = {};  // a single frame is not a sequence
+  job.spec.frames = {};  // the new job is a single image, even if the old one was a frame of a sequence
   if (changes.spp || changes.target_error || changes.time) {
     job.spp = job.spec.spp = changes.spp;
     job.spec.target_error = changes.target_error;
@@ -351,8 +354,9 @@ Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const Blob
         Errc::failed_precondition,
         fmt::format("the reference's blob {0} is not here: PUT /api/v1/blobs/{0} first", digest.hex()));
   ExrLimits limits;
-  // A reference must have the size of the image. This limit protects the memory. It is at least 2^22 pixels,
-  // so that for a picture of another size the error names the wrong size and not the limit.
+  // A reference must have the size of the image. This limit is checked before the file is decoded, since a
+  // huge image would exhaust the memory. It is at least 2^22 pixels: a smaller picture of a wrong size is
+  // decoded, so that the error can name its size.
   limits.max_pixels =
       std::max(std::uint64_t{1} << 22, static_cast<std::uint64_t>(std::int64_t{size.width} * size.height));
   const auto bytes = blobs.size(digest);
@@ -369,7 +373,8 @@ std::string replay_of(const StoredJob& job) {
   return replay_command(job.name, job.spec, frame ? std::optional(frame->frame) : std::nullopt);
 }
 
-// The size of the files is a lower bound of a loaded scene's memory. The user may request more.
+// Returns the total size of the job's files, or the memory that the user requests if that is more. A loaded
+// scene takes at least as much memory as its files.
 std::uint64_t memory_need(const StoredJob& job) {
   std::uint64_t files = 0;
   for (const BlobRef& file : job.assets) files += file.bytes;

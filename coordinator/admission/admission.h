@@ -14,16 +14,16 @@
 namespace ls::coordinator {
 
 struct Admission {
-  StoredJob job;               // the job to store, without id and time
+  StoredJob job;               // the job to store; it has no id and no time of submission yet
   std::string scene_json;      // the scene in canonical form; its digest is job.scene
   std::size_t text_bytes = 0;  // bytes of all scene files that were read
 };
 
-// Reads the scene. The scene can use only the request's assets as files, so it can never read a path on this
-// machine. Only assets that the scene uses become part of the job; each must be in `blobs`. Stores nothing.
-// `frame` is the number of a frame of a sequence (a job with frames). The scene is then read for this frame,
-// and the frame's seed is the job's seed plus this number. So frames have independent noise, and a frame that
-// is rendered alone has the same pixels.
+// Reads the submitted scene and makes a job of it. The scene can use only the request's assets as files, so
+// it can never read a path on this machine. Only assets that the scene uses become part of the job; each must
+// be in `blobs`. Stores nothing. `frame` is the number of a frame of a sequence (a job with frames). The
+// scene is then read for this frame, and the frame's seed is the job's seed plus this number. So frames have
+// independent noise, and a frame that is rendered alone has the same pixels as in the sequence.
 tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const BlobStore& blobs,
                                         std::optional<std::uint32_t> frame = {});
 
@@ -31,17 +31,18 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
 tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitRequest& request,
                                                               const BlobStore& blobs);
 
-// Returns a new job with the scene, settings and files of the job `before`, but without id, owner and time.
-// If `changes` has any of spp, target_error and time, it replaces all three. The seed and priority of
-// `changes` also apply; its other members are ignored. failed_precondition: a file of the scene is no longer
-// in `blobs`.
+// Returns a new job with the scene, settings and files of the job `before`, but without id, owner and time of
+// submission. If `changes` has any of spp, target_error and time, all three are taken from `changes`. Its
+// seed (if set) and priority also apply; its other members are ignored. failed_precondition: a file of the
+// scene is no longer in `blobs`.
 Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, const BlobStore& blobs);
 
-// Reads the job's reference image, for an image of this size. Errors: failed_precondition if its blob is
-// missing, invalid_argument if it is not a suitable picture.
+// Reads the reference image of a job whose image has this size. failed_precondition: its blob is missing.
+// invalid_argument: it is too large, has another size, or cannot be read.
 Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const BlobStore& blobs);
 
-// Returns the command that renders one of the job's samples again: common/job/health_notes.h.
+// Returns the command that renders a sample of the job again, still without the pixel and the number of the
+// sample (replay_command() in common/job/health_notes.h adds them).
 std::string replay_of(const StoredJob& job);
 
 // Returns the least memory, in bytes, that a worker needs for the job.

@@ -1,4 +1,5 @@
-// A Cryptomatte manifest maps the identifiers in an image's cryptomattes to the names of objects.
+// Makes Cryptomatte manifests. A cryptomatte is an image layer that identifies the objects in each pixel; its
+// manifest maps the identifiers to the names of the objects.
 #pragma once
 
 #include "common/image/aov/identifiers.h"
@@ -18,7 +19,8 @@ inline CryptomatteManifests manifests_of(const Scene& scene, AovSet aovs) {
   CryptomatteManifests out;
   std::vector<std::string> shapes, materials;
   for (std::size_t i = 0; i < scene.shape_labels.size(); ++i) {
-    // A shape that belongs to a group is not listed: in the image it appears as an instance of the group.
+    // A shape in a group (an object that is instanced) is not listed, since the image identifies the instance
+    // of the group instead. The instances are added below.
     if (!scene.shapes[i].group) shapes.push_back(scene.shape_labels[i].name);
     materials.push_back(scene.shape_labels[i].material);
   }

@@ -11,9 +11,9 @@
 namespace ls::coordinator {
 namespace {
 
-constexpr std::uint32_t kMostBadFrames = 64;  // reading stops after this many frames with errors
+constexpr std::uint32_t kMostBadFrames = 64;  // reading ends when this many frames have errors
 
-// Drops each warning of a frame that an earlier frame has already.
+// Removes from each frame those warnings that an earlier frame also has, so that the sequence has each once.
 void merge_warnings(std::vector<Admission>& frames) {
   std::set<std::string> reported;
   for (Admission& f : frames)
@@ -42,7 +42,7 @@ tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitReques
   };
   if (request.scene_text.size() > limits::kMaxSequenceText / numbers.size())
     return too_much("bytes of scene text", limits::kMaxSequenceText);
-  std::uint64_t text = 0, kept = 0, files = 0, tiles = 0;  // of all frames together
+  std::uint64_t text = 0, kept = 0, files = 0, tiles = 0;  // totals of all frames
   std::vector<Admission> frames;
   FrameDiagnostics found;
   std::uint32_t bad = 0;

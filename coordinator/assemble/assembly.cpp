@@ -36,8 +36,9 @@ std::string line(char kind, const std::pair<const TileIndex, Health>& tile) {
 }
 }  // namespace
 
-// Returns the health (counts of invalid values) as text. A line is "f TILE HEALTH" for the full rounds of a
-// tile, or "t TILE HEALTH" for its truncated last round. Tiles without invalid values have no line.
+// Returns the health (counts of invalid samples) of all tiles as text. It has a line "f TILE HEALTH" for each
+// tile whose full rounds have invalid samples, and a line "t TILE HEALTH" for each tile whose truncated last
+// round has any. HEALTH is JSON.
 std::string HealthTable::save() const {
   std::string text;
   for (const auto& tile : full_) text += line('f', tile);

@@ -24,24 +24,25 @@
 
 namespace ls::coordinator {
 
-// Numeric health (counts of invalid values) of the units in a job's film (its image); a unit is one round
+// Numeric health (counts of invalid samples) of the units in a job's film (its image); a unit is one round
 // (range of samples) of one tile. Each unit in the film counts once, even if it was rendered twice.
 class HealthTable {
  public:
-  // Adds the health of a unit that was added to the film. The health of a truncated round is kept separately:
-  // if the round is folded again with more samples, its new health replaces the old one, as its pixels do.
+  // Adds the health of a unit that was added to the film. The last round of a job may be truncated, with
+  // fewer samples than a full round. Its health is kept separately: if the round is folded again with more
+  // samples, its new health replaces the old one, as its new pixels replace the old ones.
   void folded(TileIndex tile, RoundIndex round, const SampleRange& samples, const Health& health);
-  void discard(TileIndex tile);  // removes the health of a tile that begins again without samples
+  void discard(TileIndex tile);  // removes the tile's health; its image restarts from zero samples
   Health total() const;
 
   std::string save() const;
-  std::string save_tile(TileIndex tile) const;  // load() also accepts the joined texts of several tiles
+  std::string save_tile(TileIndex tile) const;  // load() also reads the joined texts of several tiles
   static std::optional<HealthTable> load(std::string_view text);  // nullopt: the text is damaged
   bool operator==(const HealthTable&) const = default;
 
  private:
-  // The health of a tile's full rounds, and that of its truncated last round; only of tiles with invalid
-  // values
+  // By tile: the health of its full rounds (full_), and that of its truncated last round (tails_). Only tiles
+  // with invalid samples have an entry
   std::map<TileIndex, Health> full_, tails_;
 };
 
@@ -61,26 +62,26 @@ class UnitCosts {
 
  private:
   struct Tile {
-    RoundIndex summed = 0;     // number of rounds included in sum_
-    std::vector<float> ahead;  // core seconds of the rounds from `summed` on
+    RoundIndex summed = 0;     // number of rounds whose cost is included in sum_
+    std::vector<float> ahead;  // ahead[i]: core seconds of round summed + i
   };
   std::vector<Tile> tiles_;
   double sum_ = 0;
 };
 
-// An accepted partial (encoded pixel sums of a unit) that is not in the film yet. If `partial` is empty, its
-// pixels are read from `place` in the log.
+// An accepted partial (encoded pixel sums of a unit) that is not in the film yet. If `partial` is nullopt,
+// the pixels are in the log of partials, at `place`.
 struct WaitingPartial {
   std::optional<Partial> partial;
   std::optional<PartialLog::Place> place;
   SampleRange samples;
   Digest digest;
   Health health;
-  TimePoint arrived{};  // zero if it arrived before this start of the coordinator
+  TimePoint arrived{};  // zero if it arrived before the coordinator's latest start
 };
 
-// Counts the bytes of the pixels of one job's waiting partials. all() is the sum over all jobs of the
-// process.
+// Counts the bytes that the pixels of one job's waiting partials occupy in memory. all() is the sum over all
+// jobs of the process.
 class WaitingBytes {
  public:
   WaitingBytes() = default;
@@ -109,14 +110,15 @@ class Assembly {
         health_(std::move(health)),
         costs_(film_.grid().count()) {}
 
-  // Keeps a partial until take(). If it has a place in the log and the waiting pixels of all jobs exceed
-  // kMaxPendingPartials, its pixels are dropped and read from the log later.
+  // Keeps a partial until take() returns it. If the waiting partials of all jobs would exceed
+  // kMaxPendingPartials bytes, and this one is stored in the log, its pixels are dropped from memory and read
+  // from the log later.
   void hold(TileIndex tile, RoundIndex round, WaitingPartial waiting);
   std::optional<WaitingPartial> take(TileIndex tile, RoundIndex round, SampleRange samples);
-  // drops the waiting partials of this round, which was truncated and is rendered again in full
+  // Drops the waiting partials of this round of all tiles: it was truncated, and is rendered again in full
   void forget_round(RoundIndex round);
   void forget_waiting();
-  void discard(TileIndex tile);  // drops all data of the tile, which begins again without samples
+  void discard(TileIndex tile);  // drops all data of the tile; its image restarts from zero samples
   std::size_t waiting() const { return waiting_.size(); }
 
   Result<TileError> fold(TileIndex tile, RoundIndex round, const WaitingPartial& waiting);
@@ -133,7 +135,7 @@ class Assembly {
 
  private:
   template <class Unwanted>
-  void forget_if(Unwanted&& unwanted);  // drops waiting partials by tile and round
+  void forget_if(Unwanted&& unwanted);  // drops waiting partials for which unwanted(tile, round) is true
 
   Film film_;
   RoundErrors errors_;

@@ -17,13 +17,15 @@ json number(const std::optional<double>& value) { return value ? number(*value) 
 json interval(double from, double to) { return {number(from), number(to)}; }
 json text_or_null(const std::string& text) { return text.empty() ? json() : json(text); }
 
-// Writes samples per pixel as an integer if all pixels have the same number: 64 rather than 64.0.
+// Writes a whole number of samples per pixel as an integer: 64 rather than 64.0. Means over the pixels may be
+// fractions.
 json spp_value(double spp) {
   if (spp == std::floor(spp) && spp >= 0 && spp < 1e15) return static_cast<std::uint64_t>(spp);
   return number(spp);
 }
 
-// Adds true_rmse, true_relmse, true_flip, and whether the first two are below the reference's own noise.
+// Adds the errors against the reference (true_rmse, true_relmse, true_flip), and whether the first two are no
+// larger than the reference's own noise.
 void put_reference_error(json& object, const ReferenceError& reference_error) {
   object["true_rmse"] = number(reference_error.rmse);
   object["true_relmse"] = number(reference_error.relmse);
@@ -43,8 +45,8 @@ json reference_of(const ReportFacts& facts, const std::optional<ReferenceError>&
           {"relmse", figure(&ReferenceError::relmse)},
           {"flip", figure(&ReferenceError::flip)},
           {"same_seed", facts.job.reference_same_seed},
-          // True if the measured difference is no larger than the reference's own noise: it then says nothing
-          // about the image's error.
+          // True if the measured error is no larger than the reference's own noise: it then says nothing
+          // about the error of the image.
           {"below_noise", reference_error && reference_error->relmse_below_noise()},
           {"rmse_below_noise", reference_error && reference_error->rmse_below_noise()},
           {"mse_stderr", figure(&ReferenceError::mse_stderr)},
@@ -53,12 +55,12 @@ json reference_of(const ReportFacts& facts, const std::optional<ReferenceError>&
           {"noise_relmse", noise ? number(noise->relmse) : json()}};
 }
 
-// Adds forecasts of the cost of reaching the target to some points of the curve. Each is made from the points
-// up to this one, so users can see how reliable such forecasts were.
+// Adds a forecast to some points of the curve: the cost of reaching the target, predicted from the points up
+// to that point. Users can compare it with the actual cost, and see how reliable forecasts were.
 void put_forecasts(json& curve, const std::vector<ConvergencePoint>& points, double target) {
   const std::vector<ErrorPoint> all = error_points(points);
-  // One forecast each time the samples have doubled: forecasts in between would add little, and each
-  // evaluates all points before it
+  // A forecast is added each time the samples have doubled. More forecasts would show little more, and each
+  // takes time for all points before it.
   double next = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (all[i].spp < next) continue;
@@ -105,8 +107,8 @@ json denoised_of(const ReportFacts& facts) {
   return j;
 }
 
-// Returns the target error if it is that of the image itself. The convergence curve shows the errors of the
-// image, not those of its denoised layers.
+// Returns the job's target error if it applies to the image itself; nullopt if it applies to the denoised
+// layers, since the convergence curve does not show their errors.
 std::optional<double> target_of_image(const JobSpec& spec) {
   return spec.target_layer == TargetLayer::raw ? spec.target_error : std::nullopt;
 }
@@ -120,8 +122,8 @@ json checks_of(const std::vector<DenoisedCheck>& checks) {
   return all;
 }
 
-// Returns a forecast of the cost of reaching the job's target error. If the job has no target error or has
-// reached it, the forecast is for half of the present error.
+// Returns a forecast of the cost of reaching the job's target error. If the job has no target error for the
+// image itself, or has reached it, the forecast is for half of the present error.
 json forecast(const ReportFacts& facts) {
   if (facts.convergence.empty()) return {};
   const double now = facts.convergence.back().error.relmse;
@@ -201,7 +203,8 @@ ConvergenceStatus convergence_status_of(const ReportFacts& facts) {
   return judge(error_points(facts.convergence, !facts.job.reference_same_seed), facts.error->verdict);
 }
 
-// Returns the efficiency by wall-clock seconds and, for comparisons between farms, by core seconds.
+// Returns the efficiency per wall-clock second, 1 / (relMSE x seconds), and the same per core second, which
+// allows comparisons between farms.
 Efficiency efficiency_of(const ReportFacts& facts) {
   const auto over = [&](double seconds) -> std::optional<double> {
     const double cost = facts.error ? facts.error->relmse * seconds : 0;

@@ -1,5 +1,5 @@
-// Writes the report of a job, as JSON, and computes values that are derived from its image and its
-// convergence curve.
+// Writes the report of a job as JSON, and computes values for it from the job's image and its convergence
+// curve (the errors at earlier points of the render).
 #pragma once
 
 #include <map>
@@ -27,15 +27,15 @@ struct DenoisedFigures {
 };
 
 struct ReportFacts {
-  StoredJob job;  // the job as stored, but with current totals
+  StoredJob job;  // the job as stored, but with its totals brought up to date
   std::uint64_t samples = 0;
   // Error of the current image, over the pixels that have a sample. nullopt: no pixel has one
   std::optional<ImageError> error;
   std::uint64_t pixels_without_samples = 0;
   Digest pixels;
-  std::uint64_t clamped_values = 0;  // number of values that a half float of the final EXR cannot hold
+  std::uint64_t clamped_values = 0;  // number of values too large for the half floats of the final EXR
   std::vector<ConvergencePoint> convergence;
-  std::string replay;                             // the job's replay_command()
+  std::string replay;                             // command that renders one sample again (replay_command())
   std::optional<ReferenceNoise> reference_noise;  // nullopt: unknown, or there is no reference
   std::optional<DenoisedFigures> denoised;        // nullopt: not requested, or not made yet
 };
@@ -43,7 +43,7 @@ std::string report_json(const ReportFacts& facts);
 // Sets the facts that come from the film: samples, pixels without samples, and error.
 void put_film(ReportFacts& facts, const Film& film);
 
-// Returns how far the image's error estimates can be trusted, from its curve and its current error.
+// Judges from the curve and the current error whether the image's error estimates can be trusted.
 ConvergenceStatus convergence_status_of(const ReportFacts& facts);
 struct Efficiency {
   // wall: 1 / (relMSE x wall-clock seconds); per_core: 1 / (relMSE x core seconds)
@@ -53,12 +53,13 @@ Efficiency efficiency_of(const ReportFacts& facts);
 // Returns further numbers for the header of the final EXR: slope, efficiency, efficiency_per_core,
 // target_error, true_rmse, true_relmse, denoised_relmse, denoised_rmse. Those that are unknown are left out.
 std::map<std::string, double> header_figures(const ReportFacts& facts);
-// Returns texts for the header of the final EXR: true_below_noise, reference_same_seed, fake, target_layer
-// (if it is the denoised one), denoised_by, denoised_relmse_ci95 and denoised_rmse_ci95, if they apply
+// Returns texts for the header of the final EXR, each only if it applies: true_below_noise,
+// reference_same_seed, fake, target_layer (for denoised layers), denoised_by, denoised_relmse_ci95 and
+// denoised_rmse_ci95.
 std::map<std::string, std::string> header_notes(const ReportFacts& facts);
 
-// Returns a note for the image of a job that stopped at a target error or by time; else an empty text.
-// `layer` is the layer to which the job's target error applies.
+// Returns a note that goes with the image of a job that stopped at its target error or its time limit; an
+// empty text for other jobs. `layer` is the layer to which the target error applies.
 std::string note_on(StopReason stopped, TargetLayer layer);
 TimeSplit split_of(const JobTotals& totals);
 ErrorFigures figures_of(const ImageError& error);

@@ -7,15 +7,17 @@
 namespace ls::coordinator {
 namespace {
 
-// Sets the entry of this round, and drops those of later rounds. `rounds` is ascending.
+// `rounds` has pairs of a round and its value, with ascending rounds. Sets the value of `round`, and removes
+// all later rounds.
 template <class T>
 void put_round(RoundIndex round, T value, std::vector<std::pair<RoundIndex, T>>& rounds) {
   while (!rounds.empty() && rounds.back().first >= round) rounds.pop_back();
   rounds.emplace_back(round, std::move(value));
 }
 
-// Drops the entries of one tile that no later checkpoint needs. `rounds` is ascending. A checkpoint with at
-// least `next` rounds of the tile needs the latest entry before `next`, and later ones.
+// Drops the entries of one tile that no later checkpoint needs. `rounds` is ascending. A later checkpoint has
+// at least `next` rounds of the tile, that is, the rounds before `next`. So it needs the latest entry before
+// `next`, or a later one.
 template <class T>
 void drop_rounds_before(RoundIndex next, std::vector<std::pair<RoundIndex, T>>& rounds) {
   const auto later = std::ranges::find_if(rounds, [&](const auto& r) { return r.first >= next; });
@@ -67,8 +69,8 @@ std::vector<std::vector<double>> RoundErrors::relative() const {
 namespace {
 static_assert(std::is_trivially_copyable_v<TileError>);
 
-// Reads values from `bytes`. It never allocates more memory than the size of `bytes`, whatever counts they
-// contain.
+// Reads values from the front of `bytes`. holds() checks whether as many values as a count promises are
+// there. Callers check each count with it before they allocate memory, so a damaged count does no harm.
 class Reader {
  public:
   explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}
@@ -89,7 +91,7 @@ class Reader {
 
 // Returns the errors of one tile as bytes: u32 count, then {u32 round, TileError} of each kept round; u32
 // count, then the relative error sums as doubles. Only builds with the same memory layout can read these
-// bytes. A snapshot contains the name of its format, and other builds ignore it.
+// bytes; a snapshot contains the name of its format, so that other builds reject it.
 std::vector<std::byte> RoundErrors::save_tile(TileIndex tile) const {
   const Tile& t = tiles_[tile];
   std::vector<std::byte> out;
@@ -104,7 +106,7 @@ std::vector<std::byte> RoundErrors::save_tile(TileIndex tile) const {
 }
 
 namespace {
-// Reads the errors of one tile from the front of `in`, and removes them from `in`.
+// Reads the errors of one tile from the front of `in`. False: the bytes are damaged.
 template <class Rounds>
 bool read_tile(Reader& in, Rounds& rounds, std::vector<double>& relative) {
   std::uint32_t count = 0;

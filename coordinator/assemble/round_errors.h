@@ -1,7 +1,7 @@
 // Keeps what checkpoints need of tiles: their error sums (RoundErrors) and, to compare them with a reference
-// image, their pictures (ReferenceTiles). A round is a range of samples; folding adds a tile's next round to
-// the image. A checkpoint gives a number of rounds for each tile. It shows every tile as it was after these
-// rounds, even if some tiles already have later ones.
+// image, their pictures (ReferenceTiles). A round is a range of samples. Folding adds a tile's next round to
+// the film (the image in memory). A checkpoint gives a number of rounds for each tile. It shows every tile as
+// it was after these rounds, even if some tiles already have later ones.
 #pragma once
 
 #include <cstddef>
@@ -24,31 +24,32 @@ void append_value(std::vector<std::byte>& out, const T& value) {
   out.insert(out.end(), bytes.begin(), bytes.end());
 }
 
-// Error sums, as long as checkpoints need them. So the errors of a checkpoint do not depend on the order in
-// which results arrive.
+// Keeps the error sums that each tile had after each round, until no later checkpoint needs them. So the
+// errors of a checkpoint do not depend on the order in which results arrive.
 class RoundErrors {
  public:
-  // `keep_relative`: the relative error sums after all rounds are kept, even those that no checkpoint needs.
-  // A job with a target error needs them after a restart, when its stop rule is fed again.
+  // `keep_relative`: the relative error sum (TileError::relative.squares) after every round is kept forever,
+  // even if no checkpoint needs it. A job with a target error needs these sums after a restart: they are
+  // passed to its stop rule again.
   RoundErrors(TileIndex tiles, bool keep_relative) : tiles_(tiles), keep_relative_(keep_relative) {}
 
   // Adds the tile's error after this round. The rounds of a tile come in order. If a truncated round comes
   // again in full, its new error replaces the old one.
   void folded(TileIndex tile, RoundIndex round, const TileError& error);
-  // Returns the sum of all tiles' errors, in tile order, each after `rounds[tile]` rounds. A tile that has
-  // fewer rounds counts with the error after its latest round. If the error that is needed has been dropped,
-  // the next later one counts.
+  // Returns the sum of all tiles' errors, added in tile order. Each tile counts with its error after
+  // `rounds[tile]` rounds, or after its latest round if it has fewer. If the error that is needed has been
+  // dropped, the next later one that is kept counts.
   TileError at(std::span<const RoundIndex> rounds) const;
   // True if at(rounds) is exact: all errors that it needs are still there.
   bool knows(std::span<const RoundIndex> rounds) const;
-  // Called when the tile begins again without samples
+  // Drops the errors of a tile whose image restarts from zero samples
   void discard(TileIndex tile) { tiles_[tile] = {}; }
   // Drops errors that no later checkpoint needs. Later calls of at() must request at least `rounds[tile]`
   // rounds of every tile.
   void checkpoint_taken(std::span<const RoundIndex> rounds);
 
-  // Returns the relative error sums as [round][tile]; empty unless `keep_relative`. The sum is 0 for tiles
-  // that have not reached a round.
+  // Returns the relative error sums as [round][tile]: the sum after each round of each tile, 0 if the tile
+  // has not reached the round. Empty unless `keep_relative`.
   std::vector<std::vector<double>> relative() const;
 
   std::vector<std::byte> save_tile(TileIndex tile) const;
@@ -57,27 +58,27 @@ class RoundErrors {
 
  private:
   struct Tile {
-    std::vector<std::pair<RoundIndex, TileError>> rounds;  // ascending
-    std::vector<double> relative;                          // relative error sum after each round
+    std::vector<std::pair<RoundIndex, TileError>> rounds;  // kept errors, each after this round; ascending
+    std::vector<double> relative;                          // relative[k]: relative error sum after round k
     bool operator==(const Tile&) const = default;
   };
   std::vector<Tile> tiles_;
   bool keep_relative_ = false;
 };
 
-using Picture = std::shared_ptr<const std::vector<float>>;  // pixels row by row, three values each
+using Picture = std::shared_ptr<const std::vector<float>>;  // R, G, B of each pixel, row by row
 struct TilePicture {
   PixelRect rect;
   Picture rgb;
 };
 
-// Pictures of tiles, as long as a comparison with a reference image needs them. Sums of errors do not
-// suffice: the perceived error (FLIP) is not a sum over tiles. Not thread-safe; but pictures are shared and
-// immutable, so the result of at() may be used without a lock.
+// Keeps the picture that each tile had after each round, until no later comparison with a reference image
+// needs it. Sums of errors do not suffice: the perceived error (FLIP) is not a sum over tiles. Not
+// thread-safe; but pictures are shared and immutable, so the result of at() may be used without a lock.
 class ReferenceTiles {
  public:
-  // Starts with the picture of each tile in `film`. If `film` has rounds already (after a restart), the
-  // tiles' earlier pictures are unknown.
+  // Begins with the present picture of each tile in `film`. If `film` already has rounds (after a restart),
+  // the pictures before the present one are unknown.
   explicit ReferenceTiles(const Film& film);
 
   // Keeps the tile's picture after this round. Call it after each round that is added to `film`.
@@ -85,7 +86,7 @@ class ReferenceTiles {
   // Returns the picture of each tile after `rounds[tile]` rounds. A tile with fewer rounds gives its latest
   // picture. nullopt: the picture of some tile is lost, because the coordinator was restarted meanwhile.
   std::optional<std::vector<TilePicture>> at(std::span<const RoundIndex> rounds) const;
-  // Called when the tile begins again without samples
+  // Drops the pictures of a tile whose image restarts from zero samples
   void discard(TileIndex tile) { tiles_[tile].rounds.clear(); }
   std::optional<std::vector<TilePicture>> latest() const;
   // Drops pictures that no later checkpoint needs. Later calls of at() must request at least `rounds[tile]`
@@ -95,12 +96,12 @@ class ReferenceTiles {
  private:
   struct Tile {
     PixelRect rect;
-    std::vector<std::pair<RoundIndex, Picture>> rounds;  // ascending
+    std::vector<std::pair<RoundIndex, Picture>> rounds;  // kept pictures, each after this round; ascending
   };
   std::vector<Tile> tiles_;
 };
 
-// Joins the pictures of all tiles to one of the whole frame: pixels row by row, three values each.
+// Joins the pictures of all tiles into one of the whole frame: R, G, B of each pixel, row by row.
 std::vector<float> joined(const std::vector<TilePicture>& tiles, FrameSize frame);
 
 }  // namespace ls::coordinator

@@ -12,10 +12,10 @@ namespace {
 static_assert(std::endian::native == std::endian::little);
 constexpr std::string_view kMagic = "LSSNAP2\n";
 constexpr std::uint32_t kEnd = ~std::uint32_t{0};
-// at most this many bytes in one of the three parts (film, errors, health) of a tile
+// A tile has three parts: film, errors and health. Each has at most this many bytes
 constexpr std::uint64_t kMostPart = std::uint64_t{1} << 32;
 
-// Lengths of the three parts of a tile
+// Lengths, in bytes, of the three parts of a tile: film, errors and health
 using Lengths = std::array<std::uint64_t, 3>;
 
 std::vector<std::byte> head_of(const TileGrid& grid, AovSet aovs, std::string_view format) {
@@ -51,7 +51,7 @@ class Source {
     std::memcpy(&v, raw->data(), sizeof v);
     return v;
   }
-  // True if the rest of the file is the seal (SHA-256) of the bytes read so far.
+  // True if the rest of the file is exactly the seal: the SHA-256 of all bytes read before it.
   bool sealed() {
     const Digest read = hash_.finish();
     const auto seal = take(sizeof read.bytes);
@@ -65,8 +65,8 @@ class Source {
   Sha256 hash_;
 };
 
-// Reads one tile into `film` and `errors`, and appends the text of its health to `health`, which
-// HealthTable::load() reads at the end. False: the file is damaged.
+// Reads one tile into `film` and `errors`, and appends its health to the text `health`, which the caller
+// passes to HealthTable::load() after the last tile. False: the file is damaged.
 bool read_tile(Source& in, TileIndex tile, Film& film, RoundErrors& errors, std::string& health) {
   const auto lengths = in.value<Lengths>();
   if (!lengths) return false;

@@ -48,8 +48,8 @@ Result<std::vector<std::byte>> StoredLayers::pixels(const PixelLayer& layer, int
   const auto same = [&](const PixelLayer& other) { return other.name == layer.name; };
   const auto at =
       static_cast<std::size_t>(std::find_if(layers_.begin(), layers_.end(), same) - layers_.begin());
-  // The small version of a tile (its mip level kKeptLevel) serves this level and coarser ones, provided that
-  // no pixel of it covers two tiles: a tile's side must be a multiple of 2^kKeptLevel pixels.
+  // Mip levels from kKeptLevel on can be made from the small versions of tiles, which have level kKeptLevel.
+  // But no pixel of that level may cover two tiles: a tile's side must be a multiple of 2^kKeptLevel pixels.
   const bool from_small = level >= kKeptLevel && grid_.tile % (1 << kKeptLevel) == 0;
   for (const TileIndex tile : tiles_over(grid_, rect_in_image(grid_.frame, level, rect))) {
     if (from_small) {

@@ -1,6 +1,6 @@
-// Mip levels of images that are on disk only. Reading one layer of a tile costs as much as reading all its
-// layers. So for each tile that is read, a small version of all its layers stays in memory and answers later
-// requests. Thread-safe.
+// Returns mip levels (reduced versions) of the layers of images that are on disk only, in snapshots. Reading
+// one layer of a tile costs as much as reading all its layers. So for each tile that is read, a small version
+// of all its layers stays in memory and answers later requests. Thread-safe.
 #pragma once
 
 #include <functional>
@@ -23,13 +23,15 @@ class StoredLayers {
   StoredLayers(SnapshotTiles tiles, TileGrid grid, AovSet aovs)
       : tiles_(std::move(tiles)), grid_(grid), aovs_(aovs), layers_(pixel_layers(aovs)) {}
 
-  // Returns the rectangle of a mip level of the layer, as LayerMosaic::bytes() does.
+  // Returns the pixels of `rect` at mip level `level` of the layer, in the format of LayerMosaic::bytes().
+  // `rect` is in pixels of that level.
   Result<std::vector<std::byte>> pixels(const PixelLayer& layer, int level, const PixelRect& rect);
-  std::size_t bytes() const;  // bytes kept in memory
+  std::size_t bytes() const;  // bytes of the small versions in memory
 
  private:
-  // Pixels of each layer at mip level kKeptLevel. Empty if the tile has no samples: it must not take part in
-  // coarser levels then, since an identifier of zero would hide those of its neighbours.
+  // The small version of a tile: the pixels of each layer at mip level kKeptLevel. It is empty if the tile
+  // has no samples. Such a tile is left out of coarser levels, since its identifiers of zero would hide those
+  // of neighbouring tiles.
   using Small = std::vector<std::vector<std::byte>>;
   static constexpr int kKeptLevel = 2;
   Result<TileLayers> read(TileIndex tile) const;
@@ -45,19 +47,20 @@ class StoredLayers {
   std::size_t bytes_ = 0;
 };
 
-// Caches the images requested most recently: at most kMostImages, and the oldest of these are dropped while
-// all together use more than kMostBytes of memory.
+// Caches the images requested most recently: at most kMostImages, and fewer if they use more than kMostBytes
+// of memory together. The latest one is kept in any case.
 class StoredImages {
  public:
   static constexpr std::size_t kMostImages = 4, kMostBytes = std::size_t{256} << 20;
   using Open = std::function<std::shared_ptr<StoredLayers>()>;
-  // Returns the image of `key`, which open() makes if it is not cached; null if open() returns null. A key
-  // must also identify the content of the file: a job that is extended gets another file.
+  // Returns the image of `key`. If it is not cached, open() makes it; null if open() returns null. The key
+  // must identify the content of the file, not only the job: a job that is extended gets another file.
   std::shared_ptr<StoredLayers> image(const std::string& key, const Open& open);
 
  private:
   std::mutex mutex_;
-  std::list<std::pair<std::string, std::shared_ptr<StoredLayers>>> kept_;  // most recently used first
+  // Keys and images, most recently used first
+  std::list<std::pair<std::string, std::shared_ptr<StoredLayers>>> kept_;
 };
 
 }  // namespace ls::coordinator

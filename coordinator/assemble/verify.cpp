@@ -14,7 +14,8 @@ BadResult bad(const UnitResult& result, Errc code, std::string_view why) {
                              result.unit.round, why)}};
 }
 
-// True if `got` is the header of the same round, perhaps truncated at another sample than `expected`.
+// True if the headers `got` and `expected` are equal, except that this round may be truncated at different
+// samples.
 bool same_round(const UnitHeader& got, const UnitHeader& expected, RoundIndex round) {
   UnitHeader other = got;
   other.samples = expected.samples;

@@ -1,5 +1,6 @@
-// Verifies a worker's result. It has no state and no lock, and runs on any thread. A partial is the encoded
-// pixel sums of one unit, that is, of one round (range of samples) of one tile.
+// Verifies a worker's result: a partial, which is the encoded pixel sums of one unit, that is, of one round
+// (range of samples) of one tile. verify_result() keeps no state and needs no lock, so any thread may call
+// it.
 #pragma once
 
 #include <variant>
@@ -9,13 +10,15 @@
 
 namespace ls::coordinator {
 
-// The partial is valid and of the right round, but its sample range is no longer the one that is needed: the
-// job was extended meanwhile.
+// The partial is valid and of the right round, but has another sample range than the one needed now: the job
+// was extended meanwhile.
 struct OtherRange {
   SampleRange samples;
 };
-// The result is wrong: its size, windows, scene, settings, numeric class, tile or digest differ from the
-// expected ones, or it has values that are not finite. The error names the difference.
+// The result is wrong: it is too large, its EXR file cannot be decoded, its header (tile, samples, scene,
+// settings, numeric class), windows or digest differ from the expected ones, its values are not finite, or
+// its CPU time or health is impossible. The error names the fault. A numeric class is a set of machines that
+// compute the same bits.
 struct BadResult {
   Error error;
 };

@@ -24,7 +24,7 @@ class WorkQueue {
       const std::lock_guard lock(mutex_);
       items_.push_back(std::move(item));
     }
-    filled_.notify_one();  // one item can serve only one waiting thread
+    filled_.notify_one();  // one is enough: a new item gives work to one thread only
   }
   std::size_t size() const {
     const std::lock_guard lock(mutex_);
@@ -58,15 +58,15 @@ class WorkQueue {
   int held_back_ = 0;  // threads blocked in wait_for_room()
 };
 
-// Limits how many bytes are in use at the same time. ask() requests bytes, release() returns them; requests
-// that do not fit wait in line.
+// Limits how many bytes are in use at the same time. ask() requests bytes, and release() gives them back.
+// Requests that exceed the limit wait in line.
 class ByteBudget {
  public:
   explicit ByteBudget(std::size_t bytes) : room_(bytes) {}
-  // Calls `granted` once the bytes fit, in the order of requests: if they fit now, on this thread before
-  // ask() returns; else later on a thread that calls release(). `granted` is never called after close(). A
-  // single item larger than the whole budget is granted when nothing else is in use. Every waiting request is
-  // kept, so callers must limit their number.
+  // Calls `granted` as soon as the bytes fit into the budget, in the order of requests: on this thread before
+  // ask() returns if they fit now, else later on a thread that calls release(). `granted` is never called
+  // after close(). A request larger than the whole budget is granted when nothing else is in use. The number
+  // of waiting requests is unlimited, so callers must limit it.
   void ask(std::size_t bytes, std::function<void()> granted) {
     {
       const std::lock_guard lock(mutex_);

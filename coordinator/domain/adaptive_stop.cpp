@@ -12,9 +12,9 @@ namespace {
 
 std::int64_t divided_up(std::int64_t a, std::int64_t b) { return (a + b - 1) / b; }
 
-// One side of the frame: its number of tiles, and how they are grouped into blocks of `block` tiles. `whole`
-// is the number of tiles that the frame's edge does not cut, at least 1. Only these form blocks; the
-// remaining tile joins the last block.
+// How the tiles along one side of the frame form blocks. `tiles` is the number of tiles along this side, and
+// `whole` the number of those that the frame's edge does not cut, at least 1. Each `block` whole tiles form a
+// block; the remaining tiles join the last block.
 struct Side {
   int tiles, whole, block;
   int blocks() const { return std::max(1, whole / block); }
@@ -22,7 +22,7 @@ struct Side {
 };
 
 // Divides a side of `frame` pixels into blocks. A block has as many tiles of `tile` pixels along this side as
-// it needs for kMinStopPixels pixels; `across` is its extent along the other side, in pixels.
+// it needs to have kMinStopPixels pixels; `across` is the extent of a block along the other side, in pixels.
 Side side_of(int frame, int tile, int across) {
   const int whole = std::max(1, frame / tile);
   const auto wanted = divided_up(kMinStopPixels, std::int64_t{across} * std::min(tile, frame));
@@ -35,8 +35,8 @@ std::vector<std::vector<TileIndex>> stop_groups(const TileGrid& grid) {
   const int width = grid.frame.width, height = grid.frame.height;
   int square = grid.tile;
   while (std::int64_t{square} * square < kMinStopPixels) square += grid.tile;
-  // Blocks are about square, unless the frame is too low or too narrow for that: they are then longer along
-  // the other side.
+  // Blocks are about square, unless the frame is too narrow in one direction: blocks are then longer in the
+  // other.
   const Side x = side_of(width, grid.tile, std::min(square, height));
   const Side y = side_of(height, grid.tile, std::min(width, x.block * grid.tile));
   std::vector<std::vector<TileIndex>> groups(static_cast<std::size_t>(x.blocks()) *
@@ -52,10 +52,10 @@ std::vector<std::vector<TileIndex>> stop_groups(const TileGrid& grid) {
 
 namespace {
 
-// The earliest round after which a tile may stop: with it every pixel has kMinSppBeforeStop samples.
+// The earliest round after which a tile may stop. After this round every pixel has kMinSppBeforeStop samples.
 constexpr RoundIndex kFirstStop = round_count(kMinSppBeforeStop) - 1;
-// Number of rounds that every group of tiles needs before a forecast; the first 3 rounds have 8 samples per
-// pixel together
+// A forecast needs this many rounds of every group of tiles. The first 3 rounds together have 8 samples per
+// pixel
 constexpr RoundIndex kFirstForecast = 3;
 
 constexpr double samples_after(RoundIndex round) { return static_cast<double>(round_range(round).s1); }
@@ -69,13 +69,14 @@ double pixels_of(const TileGrid& grid, TileIndex tile) {
 double level_below(double gain) {
   if (!(gain > 0)) return 0;
   if (std::isinf(gain)) return std::numeric_limits<double>::max();
-  // 2^-1/4, 2^-1/2 and 2^-3/4 are constants, since exp2 may differ in its last bits between machines.
+  // These steps are 2^(-1/4), 2^(-1/2), 2^(-3/4) and 1/2. They are constants, since exp2() may differ in its
+  // last bits between machines.
   constexpr double kSteps[] = {0.84089641525371454303, 0.70710678118654752440, 0.59460355750136053336, .5};
   int exponent = 0;
   const double mantissa = std::frexp(gain, &exponent);  // in [1/2, 1)
   for (const double step : kSteps)
     if (step < mantissa) return std::ldexp(step, exponent);
-  return std::ldexp(kSteps[0], exponent - 1);  // mantissa is 1/2
+  return std::ldexp(kSteps[0], exponent - 1);  // no step was smaller, since the mantissa is exactly 1/2
 }
 
 AdaptiveStop::AdaptiveStop(const TileGrid& grid, std::uint64_t spp)
@@ -124,7 +125,7 @@ double AdaptiveStop::gain(const Group& g) const {
 }
 
 void AdaptiveStop::advance(Group& g) {
-  while (!g.settled && g.stop <= g.sums.size()) {  // gain() needs the errors of the rounds before `stop`
+  while (!g.settled && g.stop <= g.sums.size()) {  // gain() needs the error after round stop - 1
     if (g.stop == last_ || gain(g) <= level_) {
       g.settled = true;
       ++settled_;
@@ -220,9 +221,9 @@ void AdaptiveStop::foresee(double target) {
   const auto samples = [&](double variance, double root_level) {
     return std::clamp(std::sqrt(variance) / root_level, least, most);
   };
-  // The error of the image grows with the level (the threshold at which groups of tiles stop), so the level
-  // for `target` is found by bisection on its exponent. The midpoint is a square root, which has the same
-  // bits on every machine.
+  // The error of the image grows with the level (the threshold at which groups of tiles stop). So bisection
+  // finds the square root of the level for `target`. Each step halves the interval of its logarithm; the
+  // middle is sqrt(low * high), since a square root has the same bits on every machine.
   double low = 0x1p-100, high = 0x1p40;
   for (int i = 0; i < 40; ++i) {
     const double middle = std::sqrt(low * high);
@@ -301,8 +302,8 @@ void DenoisedTarget::add(const DenoisedCheck& check) {
 
 double DenoisedTarget::error_left(double target) const {
   const DenoisedCheck* now = find(due_);
-  // The job ends after one further check at the earliest, whose level has kDenoisedCheckGrowth times the
-  // samples
+  // The job cannot end before the next check, for which the samples grow by kDenoisedCheckGrowth. The error
+  // is taken to fall as 1 / samples
   const double next = 1 / kDenoisedCheckGrowth;
   return now != nullptr && now->at_most && *now->at_most > 0 ? std::min(next, target / *now->at_most) : next;
 }

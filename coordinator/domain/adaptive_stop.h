@@ -46,8 +46,8 @@ namespace ls::coordinator {
 // Returns the groups of tiles that stop getting samples together. The tiles of a group are ascending, and the
 // groups are in the order of their first tiles. Every tile is in exactly one group. A decision to stop that
 // rests on few pixels biases the image, so at least kMinStopPixels pixels decide together: small tiles form
-// blocks, and the remainder at the right and bottom edges joins the neighbouring block. An image with fewer
-// pixels forms a single group. The groups depend on the tiling alone.
+// blocks, and the tiles that remain at the right and bottom edges join the neighbouring block. An image with
+// fewer pixels than that forms a single group. The groups depend on nothing but the tiling.
 std::vector<std::vector<TileIndex>> stop_groups(const TileGrid& grid);
 
 // Returns the next level (threshold for stopping) below `gain`: the largest number of the grid {2^(-j/4)}, j
@@ -64,11 +64,11 @@ class AdaptiveStop {
   // rounds of one tile must come in order; tiles may come in any order.
   void folded(TileIndex tile, RoundIndex round, double rel_error_sum);
 
-  // Returns the last round of the tile that is certain to be needed: rounds up to this one may be added to
-  // the image. If the image meets the target at the current level, this is the tile's last round.
+  // Returns the last of the tile's rounds that are certain to be needed: all rounds up to this one may be
+  // added to the image. If the image meets the target at the current level, this is the tile's last round.
   RoundIndex wanted(TileIndex tile) const { return groups_[group_of_[tile]].stop; }
 
-  // Returns the group of tiles that stop together with this tile, including the tile itself.
+  // Returns the tiles that stop together with this tile, including the tile itself.
   std::span<const TileIndex> neighbours(TileIndex tile) const { return groups_[group_of_[tile]].tiles; }
 
   // True if all groups of tiles have stopped at the current level.
@@ -77,8 +77,8 @@ class AdaptiveStop {
   // tiles have stopped, or the error of some group's last round is not known yet.
   enum class Verdict { unknown, no, yes };
   Verdict judge(double target) const;
-  // Returns the relMSE of the image at the current level, predicted from the rounds before each tile's last.
-  // Requires settled().
+  // Returns the relMSE of the image at the current level. It is predicted for the end of each tile's last
+  // round, from the errors after the rounds before. Requires settled().
   double predicted() const;
   // True if every group of tiles has reached the sample limit, so that no group can continue.
   bool exhausted() const;
@@ -90,7 +90,7 @@ class AdaptiveStop {
 
   // Returns for each tile how many rounds it has if the image ends at this level. Requires settled().
   std::vector<RoundIndex> ends() const;
-  double mean_spp() const;  // samples per pixel at this level, mean over all pixels
+  double mean_spp() const;  // samples per pixel if the image ends at this level, mean over all pixels
 
   // True if at least one group of tiles has reached the sample limit.
   bool bound() const;
@@ -99,21 +99,22 @@ class AdaptiveStop {
   void extend(std::uint64_t spp);
 
   // Speculation: the functions below predict which rounds will probably be needed, so that workers can render
-  // them ahead. They affect no pixel.
+  // these early. They affect no pixel.
   //
-  // foresee() predicts the level (threshold for stopping) at which the image will meet `target`. It does
-  // nothing until every group of tiles has kFirstForecast rounds.
+  // foresee() predicts the level (threshold for stopping) at which the image will meet `target`, and with it
+  // how many rounds each tile gets. It does nothing until every group of tiles has kFirstForecast rounds.
   void foresee(double target);
-  // Returns how many rounds of the tile will probably be needed, at least those that are certain to be.
+  // Returns how many rounds of the tile will probably be needed, not fewer than are certain to be needed.
   RoundIndex predicted_last(TileIndex tile) const;
   // Returns the variance per sample of the tile's group, estimated from its last known round; NaN if unknown.
-  // The queue of units (unit_queue.h) orders speculative rounds by it.
+  // The queue of units (unit_queue.h) uses it to order speculative rounds.
   double variance(TileIndex tile) const;
-  // Returns how many pixel samples are still to be taken up to the predicted ends of all groups; nullopt
-  // before foresee() has predicted them.
+  // Returns how many pixel samples are still missing up to the predicted ends of all groups; nullopt if
+  // foresee() has not predicted them yet.
   std::optional<double> samples_left() const;
-  double samples_to_limit() const;  // how many pixel samples are still to be taken up to the sample limit
-  // Number of rounds added so far, summed over all groups of tiles
+  double samples_to_limit() const;  // how many pixel samples are missing up to the sample limit
+  // Number of rounds added so far, summed over all groups of tiles. A round of a group counts when all its
+  // tiles have it
   std::uint64_t rounds_seen() const { return rounds_seen_; }
   std::size_t groups() const { return groups_.size(); }
 
@@ -123,17 +124,18 @@ class AdaptiveStop {
     double pixels = 0;
     std::vector<double> sums;  // sums[k]: error sum of the group's tiles after round k, added in tile order
     RoundIndex stop = 0;       // the earliest round that may be the group's last
-    RoundIndex predicted_last = 0;  // the round that will probably be its last
+    RoundIndex predicted_last = 0;  // the round that will probably be the group's last
     bool settled = false;           // true if `stop` is the group's last round at this level
   };
-  // Variance per sample, estimated from the error after rounds 0..round
+  // Variance per sample, estimated from the group's error after rounds 0..round
   double variance(const Group& g, RoundIndex round) const;
   // Pixel samples that the group still needs up to the end of round `last`
   double samples_missing(const Group& g, RoundIndex last) const;
-  double gain(const Group& g) const;  // error that one more round after `stop` removes per sample
-  // relMSE of the image, from the errors of each group's last round. Requires that all of these are known
+  double gain(const Group& g) const;  // the error that the round after `stop` removes per sample
+  // relMSE of the image, from the error of each group after its round `stop`. Requires that all these are
+  // known
   double measured() const;
-  // True if the error of the group's round `stop` is known.
+  // True if the group's error after its round `stop` is known
   static bool whole(const Group& g) { return g.sums.size() > g.stop; }
   void advance(Group& g);
 
@@ -142,7 +144,7 @@ class AdaptiveStop {
   RoundIndex last_;  // the last round within the sample limit
   std::vector<Group> groups_;
   std::vector<std::uint32_t> group_of_;
-  // waiting_[tile] holds the error sums of rounds that some other tile of the same group has not reached yet
+  // waiting_[tile]: error sums of the tile after rounds that some other tile of its group has not reached yet
   std::vector<std::vector<double>> waiting_;
   std::size_t settled_ = 0;
   double level_ = std::numeric_limits<double>::infinity();
@@ -172,8 +174,8 @@ class DenoisedTarget {
   explicit DenoisedTarget(std::vector<DenoisedCheck> made = {}) : made_(std::move(made)) {}
 
   // Decides whether the job ends at the level with `spp` samples per pixel. Calls must come in the order of
-  // levels; a call for the latest level may be repeated, with another target. `check`: the error of the
-  // denoised layers at this level must be checked first.
+  // levels; a call for the latest level may be repeated, with another target. `check`: the caller must first
+  // compute the error of the denoised layers at this level, add() it, and call again.
   enum class Answer { go_on, check, end };
   Answer judge(double spp, double target);
   void add(const DenoisedCheck& check);
@@ -189,7 +191,8 @@ class DenoisedTarget {
   const DenoisedCheck* find(double spp) const;
 
   std::vector<DenoisedCheck> made_;
-  double due_ = 0, before_ = 0;  // samples of the last level that is checked, and of the one before; 0: none
+  // Samples per pixel of the latest level that needs a check, and of the one before it; 0: none
+  double due_ = 0, before_ = 0;
 };
 
 }  // namespace ls::coordinator

@@ -1,6 +1,7 @@
-// Effects: the actions that the farm requests. The service carries them out in the order given.
-// A unit is one round (range of samples) of one tile, and a partial is the encoded pixel sums of one unit. To
-// fold a partial is to add it to the job's image, its film.
+// Effects: the actions that the farm requests. The service carries them out in the order given. A unit is one
+// round (range of samples) of one tile, and a partial is the encoded pixel sums of one unit. To fold a
+// partial is to add it to the job's image, its film. A lease is a list of units that is assigned to one
+// worker. A numeric class is a set of machines that compute the same bits.
 #pragma once
 
 #include <cstdint>
@@ -17,16 +18,16 @@
 
 namespace ls::coordinator {
 
-// Send this message to the worker: an AssignLease (from now on its units are leased to the worker), a
+// Send this message to the worker: an AssignLease (the units in it are leased to the worker from now on), a
 // CancelLease or a CancelJob.
 struct Send {
   WorkerId worker;
   ToWorker message;
 };
 
-// These units are no longer part of this lease (a list of units that is assigned to the worker). If they are
-// still needed and no other lease holds them, they wait for another worker. `audit`: the lease was an audit,
-// in which a unit that has an accepted result is rendered again for comparison.
+// These units are no longer part of this lease. If they are still needed and no other lease holds them, they
+// wait for another worker. `audit`: the lease was an audit, in which a unit that already has an accepted
+// result is rendered again, for comparison.
 struct UnitsFreed {
   JobId job;
   LeaseId lease;
@@ -36,8 +37,7 @@ struct UnitsFreed {
   bool audit = false;
 };
 
-// The farm has accepted this result of the unit. The service stores its digest and the worker that delivered
-// it.
+// The farm has accepted this result of the unit. Store its digest and the worker that delivered it.
 struct RecordUnit {
   UnitKey unit;
   SampleRange samples;
@@ -45,9 +45,9 @@ struct RecordUnit {
   WorkerId worker;
 };
 
-// Add this unit's accepted partial (pixel sums) to the film (the image), then raise the event UnitFolded. The
-// farm requests the rounds of a tile in order, none after the tile's last one, and each once unless
-// TileDiscarded or ReopenRound has removed it from the film.
+// Fold this unit's accepted partial, then raise the event UnitFolded. The farm requests the rounds of a tile
+// in order, none after the tile's last one. It requests each round once, and again only if TileDiscarded or
+// ReopenRound has removed the round from the film.
 struct Fold {
   UnitKey unit;
   SampleRange samples;
@@ -58,17 +58,17 @@ struct DropDuplicate {
   UnitKey unit;
   WorkerId worker;
 };
-// The worker delivered a result that is not needed, for the reason in `why`: the worker is quarantined, the
-// job has ended, the round is after the tile's last one, or the result has another sample range or numeric
-// class than the job needs.
+// The worker delivered a result that is not needed. `why` is the reason: the worker is quarantined, the job
+// has ended, the round is after the tile's last one, or the result has another sample range or numeric class
+// than the job needs.
 struct DropUnwanted {
   UnitKey unit;
   WorkerId worker;
   std::string why;
 };
-// Two results of one unit differ although both workers are of one numeric class (machines that compute the
-// same bits): one of them has bad memory or lies. A third worker decides (farm_trust.cpp). If no third worker
-// exists, the job fails, unless it has ended or the second worker held no lease on the unit.
+// Two results of one unit differ although both workers are of one numeric class, so one of the workers has
+// bad memory or lies. A third worker decides (farm_trust.cpp). If no third worker exists, the job fails,
+// unless it has ended or the second worker held no lease on the unit.
 struct DigestMismatch {
   UnitKey unit;
   Digest first, second;
@@ -86,10 +86,10 @@ struct JobStateChanged {
   JobState to = JobState::queued;
 };
 // The image has at least `rounds[tile]` rounds of each tile. The service adds a point to the convergence
-// curve and may take a snapshot. In a job with a target error the tiles have different numbers of rounds from
-// some point on; they are then those at which the tiles stop at one level of the stop rule
-// (coordinator/domain/adaptive_stop.h). The checkpoints and their order do not depend on the order in which
-// results arrive.
+// curve and may take a snapshot. In a job with a target error, the tiles may stop at different rounds; from
+// then on each checkpoint belongs to a level of the stop rule (coordinator/domain/adaptive_stop.h) and has
+// the rounds at which the tiles stop at that level. The checkpoints and their order do not depend on the
+// order in which results arrive.
 struct Checkpoint {
   JobId job;
   std::vector<RoundIndex> rounds;  // for each tile, how many of its rounds the checkpoint includes
@@ -97,24 +97,27 @@ struct Checkpoint {
 };
 // Compute the error of this job's denoised layers, to which its target error applies. The film contains
 // exactly the rounds of the stop rule's current level (adaptive_stop.h), which has `spp` samples per pixel,
-// mean over all pixels. It does not change until the event DenoisedChecked is raised. If the layers cannot be
-// made, the service pauses the job; the farm repeats the effect when the job is resumed.
+// mean over all pixels. The film does not change until the event DenoisedChecked is raised. If the layers
+// cannot be made, the service pauses the job; the farm repeats this effect when the job is resumed.
 struct CheckDenoised {
   JobId job;
   double spp = 0;
 };
-// The job has been extended, but its old sample count had truncated its last round, `round`. This round is
-// rendered again in full: its pixel sums in the image (the tail) are replaced when the full round is added,
+// The job has been extended, and its old sample count had truncated its last round, `round`. This round is
+// rendered again in full: its pixel sums in the film (the tail) are replaced when the full round is folded,
 // and its stored partials are void.
 struct ReopenRound {
   JobId job;
   RoundIndex round = 0;
 };
-// The image contains all units that it needs. Sent after the JobStateChanged whose state is `done`.
+// The job is done: its image contains all units that it needs. This effect follows the JobStateChanged to
+// `done`.
 struct JobFinished {
   JobId job;
   StopReason stopped = StopReason::spp;
-  std::uint64_t unaudited = 0;  // results chosen for an audit when no other worker of the class was connected
+  // Number of results that were chosen for an audit but not audited, since no other worker of the class was
+  // connected
+  std::uint64_t unaudited = 0;
 };
 // The job has failed. `error` is the message for the user: what failed, where, what the workers reported and
 // how to replay it. This effect follows the JobStateChanged to `failed`.
@@ -134,18 +137,18 @@ struct WorkerBlocked {
   JobId job;
   std::string why;
 };
-// This worker rendered wrong pixels: two other workers agree on other pixels, or it delivered two different
-// results of one unit. It gets no more work of any job, and its messages are ignored. The service must store
-// this before it carries out the effects that follow; after a restart none of the worker's results may be
-// accepted.
+// This worker rendered wrong pixels: two other workers agree on other pixels, or the worker delivered two
+// different results of one unit. It gets no more work of any job, and its messages are ignored. The service
+// must store this before it carries out the effects that follow; after a restart none of the worker's results
+// may be accepted.
 struct WorkerFoundFaulty {
   WorkerId worker;
-  UnitKey unit;  // the unit whose differing results revealed it
+  UnitKey unit;  // the unit whose differing results revealed the worker
   std::string evidence;
 };
-// The pixels of this tile are void, since a quarantined worker rendered part of them or, in a job with a
-// target error, part of any tile. The tile is summed up again from round 0, and none of its earlier results
-// count.
+// The pixels of this tile are void, since a quarantined worker rendered part of them. In a job with a target
+// error all tiles are void if the worker rendered part of any, since the errors of a tile influence the
+// samples of the others. The tile restarts from round 0, and none of its earlier results count.
 struct TileDiscarded {
   JobId job;
   TileIndex tile = 0;

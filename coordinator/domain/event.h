@@ -25,29 +25,29 @@ namespace ls::coordinator {
 struct JobPlan {
   JobBrief brief;
   TileGrid grid;
-  std::optional<std::uint64_t> spp;    // samples per pixel; nullopt: kMaxSppWithoutLimit (limits.h)
+  std::optional<std::uint64_t> spp;    // samples per pixel; nullopt: at most kMaxSppWithoutLimit (limits.h)
   std::optional<double> target_error;  // the job ends when the image has this relMSE
-  bool target_denoised = false;        // target_error applies to the denoised layers instead
+  bool target_denoised = false;        // true: target_error applies to the denoised layers, not the image
   std::optional<double> time;          // the job ends this many seconds after the first ray, pauses excluded
-  int priority = 0;                    // higher first
-  std::vector<std::string> tags;       // a worker must have all of them
-  // Command that renders one sample again. replay_command() (common/job/health_notes.h) appends the pixel
-  // and the sample to it.
+  int priority = 0;                    // jobs of a higher priority go first
+  std::vector<std::string> tags;       // only a worker that has all these tags gets units of the job
+  // Command that renders a sample of the job again, still without the pixel and the number of the sample.
+  // replay_command() (common/job/health_notes.h) adds these.
   std::string replay = "lightshaft render SCENE";
   // Limits and fair shares (fair_share.h, docs/design/scheduling.md)
   std::string owner;  // the user (JobView::owner); empty: the administrator, to whom no user limits apply
   // The sequence (a job with frames) that this job is a frame of; empty: none. Jobs of one owner and group
   // count as one job for fair shares, and run in order.
   std::string group;
-  // Limits of the job, or of all jobs of its group together
+  // Limits of the job; if it has a group, all jobs of the group share them
   std::uint32_t max_workers = 0;   // at most this many workers hold units at the same time; 0: no limit
   std::uint32_t max_units = 0;     // at most this many units are leased at the same time; 0: no limit
   std::uint64_t memory_bytes = 0;  // memory that a worker needs for this job; 0: unknown
-  // The numeric class that the user requests: a prefix of its hexadecimal digits or of its platform's name.
-  // Empty: any class
+  // The numeric class that the user requests: the beginning of its hexadecimal digits, or of the name of its
+  // platform. Empty: any class
   std::string class_asked;
-  // Pixels of the frame whose tiles are leased before all other tiles; nullopt: no tile goes first. It
-  // changes only the order in which units are leased, not the image.
+  // A rectangle of the frame: the tiles that it touches are leased before all others; nullopt: no tile goes
+  // first. It changes only the order in which units are leased, not the image.
   std::optional<PixelRect> focus;
 };
 
@@ -56,14 +56,14 @@ struct JobSubmitted {
   JobPlan plan;
 };
 
-// Adds a stored job to the farm again, for example after a restart. It comes before any other event of the
-// job.
+// Adds a stored job to the farm again, for example after a restart. This event must come before any other
+// event of the job.
 struct JobRestored {
   struct Unit {
     TileIndex tile = 0;
     RoundIndex round = 0;
-    // The unit's sample range. The farm ignores the unit if the job needs another range now: the old sample
-    // count of the job had truncated the unit's round, and the job was extended since.
+    // The sample range of the result. The farm ignores the result if the job now needs another range of this
+    // unit: the job's old sample count had truncated the round, and the job was extended since.
     SampleRange samples;
     Digest digest;
     WorkerId worker;
@@ -71,25 +71,25 @@ struct JobRestored {
   JobPlan plan;
   JobState state = JobState::queued;
   std::optional<StopReason> stopped;    // set for a job that is done
-  std::optional<Digest> numeric_class;  // the class of its results; nullopt: it has none yet
-  std::vector<Unit> accepted;           // accepted results that still exist after the restart, in any order
+  std::optional<Digest> numeric_class;  // the class that rendered its results; nullopt: it has none
+  std::vector<Unit> accepted;           // accepted results that still exist, in any order
   // For each tile, how many rounds the restored image has. A last round that the job's sample count truncates
   // is included. Empty: no image was restored. Required for a job that is done.
   std::vector<RoundIndex> folded;
-  // rel_error[round][tile]: UnitFolded::rel_error_sum of each round in the image; only for a job with a
-  // target error
+  // rel_error[round][tile] is UnitFolded::rel_error_sum of that round of the tile, for each round in the
+  // image. Only for a job with a target error
   std::vector<std::vector<double>> rel_error;
-  double elapsed_seconds = 0;  // from the first ray until the restart
-  // An audit that was open at the restart (Farm::open_audits). In an audit another worker renders the unit of
-  // an accepted result again, for comparison.
+  double elapsed_seconds = 0;  // seconds from the first ray until the restart; 0: no ray yet
+  // An audit that had not ended at the restart (Farm::open_audits). In an audit another worker renders the
+  // unit of an accepted result again, for comparison.
   struct Audit {
     TileIndex tile = 0;
     RoundIndex round = 0;
-    std::optional<std::pair<WorkerId, Digest>> second;  // a differing result of another worker
+    std::optional<std::pair<WorkerId, Digest>> second;  // another worker's result, if it differs
     bool operator==(const Audit&) const = default;
   };
   std::vector<Audit> audits;
-  // The checks of the denoised layers' error so far, if the target error applies to these layers
+  // If the target error applies to the denoised layers: the checks of their error so far
   std::vector<DenoisedCheck> denoised_checks;
 };
 
@@ -116,29 +116,30 @@ struct JobFocused {
   JobId job;
   std::optional<PixelRect> focus;
 };
-// Changes the target error of a job. The job must have a target error, and must not have stopped for another
-// reason (Farm::may_retarget). A smaller target also resumes a job that reached the larger one. The image
-// then has the same bits as with the smaller target from the start: an image that missed the larger target
-// misses the smaller one, too. A larger target applies from the job's current state on.
+// Changes the target error of a job. The job must have a target error; if it has stopped, the reason must be
+// that it reached this error (Farm::may_retarget). A smaller target resumes such a job. The image then has
+// the same bits as with the smaller target from the start: wherever it missed the larger target, it would
+// also have missed the smaller one. A larger target applies from the job's current state on.
 struct JobRetargeted {
   JobId job;
   double target_error = 0;  // relMSE
 };
 // Raises the job's total of samples per pixel; the job may be running, paused or done. If the last round of
-// every tile is fixed already, because the job has stopped or is about to, the job loses its target error,
-// and all tiles get the new total. A time limit that has passed is dropped, too.
+// every tile is already fixed, because the job has ended or is about to end, the job loses its target error,
+// and all tiles get the new total. The job also loses a time limit that has passed.
 struct JobExtended {
   JobId job;
   std::uint64_t spp = 0;
 };
-// Forget a job that has ended. A later job may have its id only if it comes with JobRestored.
+// Makes the farm forget a job that has ended. Only a JobRestored may bring a job with the same id later.
 struct JobForgotten {
   JobId job;
 };
 
 // Workers
 
-// A worker has opened a stream. An older stream of the same worker counts as lost.
+// A worker has opened a stream (a connection to the coordinator). `epoch` rises from stream to stream; an
+// older stream of the worker counts as lost.
 struct WorkerJoined {
   WorkerId worker;
   std::uint64_t epoch = 0;
@@ -146,16 +147,16 @@ struct WorkerJoined {
   Digest numeric_class;
   int threads = 1;
   std::vector<std::string> tags;
-  // Memory that the worker's renderer may use; 0: unknown, and then any job may go to it
+  // Memory that the worker's renderer may use, in bytes; 0: unknown, and the worker may get units of any job
   std::uint64_t memory_bytes = 0;
-  std::vector<Digest> blobs_held;  // blobs in its cache, most recently used first
-  // False: the worker gets only units of jobs that are already pinned to its numeric class. This holds for
-  // workers of another version than the coordinator's.
+  std::vector<Digest> blobs_held;  // scene files in its cache, most recently used first
+  // False: the worker gets no units of jobs that have no numeric class yet, only of jobs that are pinned to
+  // its class. It is false for workers of another version than the coordinator's.
   bool may_begin = true;
-  std::string platform = {};  // machine and build of its numeric class in words
+  std::string platform = {};  // the machine and build of its numeric class, in words
 };
-// The worker rendered wrong pixels, as found before a restart or by another coordinator. It gets no work, and
-// its results for jobs of this farm are void.
+// The worker rendered wrong pixels; this was found before a restart or by another coordinator. It gets no
+// work, and its results for jobs of this farm are void.
 struct WorkerQuarantined {
   WorkerId worker;
   std::string why;
@@ -168,8 +169,8 @@ struct WorkerLost {
 struct WorkerDrains {
   WorkerId worker;
 };
-// The farm names leases "PREFIX-1", "PREFIX-2"... Returns the number in such an id; nullopt if the id has
-// another prefix, that of an earlier start of the coordinator.
+// The farm names leases "PREFIX-1", "PREFIX-2"... Returns the number in `id`; nullopt if `id` has another
+// prefix, which an earlier start of the coordinator used.
 std::optional<std::uint64_t> lease_number(const LeaseId& id, std::string_view prefix);
 
 struct LeaseProgress {
@@ -189,49 +190,47 @@ struct LeaseCameBack {
 // Units
 
 // A verified result of this numeric class is about to be made durable. If the job has no class yet, it is
-// pinned to this one: from now on only workers of this class may render it. So the job's log never holds
-// results of two classes.
+// pinned to this one: from now on only workers of this class may render it. So the job's stored results are
+// all of one class.
 struct ClassChosen {
   JobId job;
   Digest numeric_class;
 };
-// A verified and durable result has arrived. The event is raised once per arrival; the farm detects
-// duplicates.
+// A result has been verified and made durable. The event is raised for every result that arrives; the farm
+// detects duplicates.
 struct UnitAccepted {
   UnitKey unit;
   SampleRange samples;
   Digest digest;
   WorkerId worker;
   double cpu_seconds = 0;
-  // Seconds that the rendering thread waited for a core or for memory during the unit; for CoreShare
-  // (worker_table.h)
+  // Seconds that the rendering thread waited for a core or for memory while it rendered the unit; CoreShare
+  // (worker_table.h) uses them
   double wait_seconds = 0;
 };
-// The result of a unit (one tile, one range of its samples) has been added to the image, as the effect Fold
-// (effect.h) requested.
+// The result of a unit has been added to the image, as the effect Fold (effect.h) requested.
 struct UnitFolded {
   UnitKey unit;
-  SampleRange samples;  // the same as in the Fold
-  // Sum over pixels and channels of the tile's relative squared error after all rounds up to this one:
-  // TileError::relative.squares of common/image/error/error_estimate.h.
+  SampleRange samples;  // the same as in the Fold effect
+  // The tile's relative squared error after all rounds up to this one, summed over pixels and channels:
+  // TileError::relative.squares (common/image/error/error_estimate.h).
   double rel_error_sum = 0;
 };
-// The error of the denoised layers has been computed, as the effect CheckDenoised (effect.h) requested. It is
-// the error at one level (a step of adaptive sampling, adaptive_stop.h). The service has already stored it
-// with the job.
+// The error of the denoised layers has been computed, as the effect CheckDenoised (effect.h) requested, at
+// one level of the stop rule (adaptive_stop.h). The service has already stored the result with the job.
 struct DenoisedChecked {
   JobId job;
   DenoisedCheck check;
 };
-// A worker has failed to render a unit. The worker reports it, or the service does for a result that fails
+// A worker has failed to render a unit. Either the worker has reported it, or its result has failed
 // verification.
 struct UnitFailed {
   WorkerId worker;
   UnitFailure failure;
 };
 
-// Raised about once a second. Lease deadlines, copies of overdue units, forgiveness of failures and time
-// limits depend on it.
+// Raised about once a second. It lets the farm notice lease deadlines, overdue units, failures that are to be
+// forgiven, and time limits.
 struct Tick {};
 
 using Event =

@@ -5,12 +5,10 @@
 // user or job with the smallest share goes next (start-time fair queueing, Goyal et al. 1996, with measured
 // instead of declared lengths).
 //
-// A user or job that arrives, or returns after a pause, starts at least at the share of the one that got the
-// last lease. So a user gains no turns by waiting, and loses none after having used the farm alone. If two
-// users both have work for all workers all the time, their shares differ by at most one lease each, plus
-// errors of prediction.
-//
-// Every operation costs O(log jobs).
+// A user or job that arrives, or returns after a pause, starts at least at the share of the user or job that
+// got the last lease. So a user gains no turns by waiting, and loses none after having used the farm alone.
+// If two users both have work for all workers all the time, their shares differ by at most one lease each,
+// plus errors of prediction.
 #pragma once
 
 #include <cstdint>
@@ -34,28 +32,29 @@ class FairShare {
   void withdraw(Job& job);
   bool empty() const { return ready_ == 0; }
 
-  // charge() adds predicted core seconds of units that were leased to the job (negative: no longer leased).
-  // spend() adds core seconds that a result reported.
+  // charge() adds the predicted core seconds of units that were leased to workers; `seconds` is negative for
+  // units that are no longer leased. spend() adds core seconds that a result reported.
   void charge(Job& job, double seconds);
   void spend(Job& job, double seconds);
-  // Forgets users and groups without work whose share is not greater than the clock (the share of the user or
-  // group served most recently): if they come back, they start at the clock whether or not their share was
-  // remembered. Also forgets all groups of a user without work.
+  // Forgets users and groups that have no work and whose share is not greater than the clock, the share of
+  // the user or group served most recently. If such a user or group returned, it would start at the clock
+  // even if its share had been remembered. A group is a sequence, or a job that belongs to none. Also forgets
+  // all groups of a user without work.
   void tidy();
-  // Call leave() before the job's priority changes, and enter() afterwards: enter() adds the core seconds of
-  // the job's leases at the new priority. The caller then offers the job again.
+  // To change the priority of a job, call leave(), change it, and call enter(), which adds the core seconds
+  // of the job's leases at the new priority. Then offer() the job again.
   void leave(Job& job);
   void enter(Job& job);
 
-  // Calls visit(job, lag) for the jobs that have units to lease, the next in turn first, until a call returns
-  // true; returns true if one did. `lag`, in core seconds, is the sum of two differences of shares: the job's
-  // user minus the user who is first in turn, and the job's group minus the first group in turn of that same
-  // user. A group is a sequence, or a job that belongs to none. The lag is infinite for jobs below the
-  // highest priority that has units to lease.
+  // Calls visit(job, lag) for the jobs that have units to lease, in the order of turns, until a call returns
+  // true; returns true if one did. `lag`, in core seconds, says how far the job is behind in this order. It
+  // is the sum of two differences of shares: that of the job's user minus that of the user who is first in
+  // turn, and that of the job's group minus that of the group which is first in turn among the groups of the
+  // job's user. The lag is infinite for jobs below the highest priority that has units to lease.
   using Visit = std::function<bool(Job&, double lag)>;
   bool in_turn(const Visit& visit) const;
-  // Notes that the job gets a lease: users and groups that arrive later start at the present shares of its
-  // user and its group.
+  // Notes that the job gets a lease: users and groups that arrive later start at the present shares of this
+  // job's user and group.
   void served(const Job& job);
 
   struct Figure {
@@ -64,21 +63,20 @@ class FairShare {
     double seconds;
   };
   std::vector<Figure> figures() const;
-  std::size_t kept() const;  // number of priorities, users and groups remembered
+  std::size_t kept() const;  // number of entries in all tables, which tests use to find leaks
 
  private:
   struct Share {
     double spent = 0, out = 0;  // core seconds that results reported, and those predicted for leased units
-    std::uint32_t at_work = 0;  // number of its jobs that have units to lease or leased units
+    std::uint32_t at_work = 0;  // number of jobs that have units to lease or leased units
     double had() const { return spent + out; }
   };
   template <class T>
   struct Turn {
     double had;
-    // The earliest submitted of its jobs with units to lease; of equal shares, the one with the earlier job
-    // goes first
+    // The earliest submitted job of `who` that has units to lease. If shares are equal, the user or group
+    // with the earlier job goes first
     JobSeq first;
-    // submission
     T* who;
     bool operator<(const Turn& o) const { return std::tie(had, first) < std::tie(o.had, o.first); }
   };
@@ -90,10 +88,10 @@ class FairShare {
     Share share;
     double clock = 0;  // the share of the group that was served most recently
     std::map<std::string, Group> groups;
-    std::set<Turn<Group>> turns;  // groups that have jobs with units to lease
+    std::set<Turn<Group>> turns;  // the groups that have units to lease, next in turn first
     std::set<JobSeq> ready;
   };
-  // All users that have jobs of one priority.
+  // The users that have jobs of one priority
   struct Level {
     double clock = 0;
     std::map<std::string, User> users;
@@ -114,7 +112,7 @@ class FairShare {
   static void place(std::set<Turn<T>>& turns, const std::optional<Turn<T>>& before,
                     const std::optional<Turn<T>>& after);
 
-  std::map<std::int64_t, Level> levels_;  // key: minus the priority
+  std::map<std::int64_t, Level> levels_;  // by minus the priority, so the highest priority is first
   std::size_t ready_ = 0;
   std::set<JobSeq> at_work_;
 };

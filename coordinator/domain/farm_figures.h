@@ -1,4 +1,5 @@
-// Counters of the farm's work, which /metrics shows, and limits that other layers pass to the farm unchanged.
+// Counters of the farm's work, which /metrics shows; limits on the workers and units of a job or user
+// (ShareLimits); and the part of the farm that a job can use (ClassShare).
 #pragma once
 
 #include <cstdint>
@@ -18,11 +19,11 @@ struct WebhookFigures {
 // result.
 enum class FreedCause {
   worker_lost,
-  newer_stream,  // the worker has connected again
+  newer_stream,  // the worker has opened a new connection, which ends the leases of the old one
   deadline_passed,
   returned,        // the worker returned it, since it is draining or could not load the job
   failed,          // the worker failed to render it
-  moved,           // the unit waited behind other work of its worker and is given to an idle worker
+  moved,           // the unit waited behind other units of its worker, and an idle worker gets it
   paused,          // the job was paused
   round_reopened,  // the job was extended, and the round is rendered again with more samples
   worker_quarantined,
@@ -49,19 +50,20 @@ constexpr std::string_view to_string(FreedCause cause) {
   return "";
 }
 
-// The service's counters of the effects that it has carried out and of its own work. All start at 0 when the
-// coordinator starts; members whose names end in _now are current values. A unit is one round (range of
-// samples) of one tile.
+// Counters of leases, results and additions to the image. All start at 0 when the coordinator starts; members
+// whose names end in _now are current values. A unit is one round (range of samples) of one tile; a lease is
+// the list of units that is assigned to a worker at once.
 struct FarmFigures {
   // Leases
   std::uint64_t leases_granted = 0, units_leased = 0;
   std::uint64_t leases_now = 0, units_leased_now = 0;
-  std::map<FreedCause, std::uint64_t> units_freed;  // units that left a worker without a result
+  std::map<FreedCause, std::uint64_t> units_freed;  // units that left a lease without a result
   // Results
   std::uint64_t accepted = 0;
   std::uint64_t equal = 0;      // second results of a unit with the same bits as the first
   std::uint64_t differing = 0;  // second results with other bits: a worker has bad memory or lies
-  // Results that no job needs (effect DropUnwanted)
+  // Results that were dropped without being used, such as those of a job that has ended or of a quarantined
+  // worker
   std::uint64_t unwanted = 0;
   std::uint64_t refused = 0;  // results that failed verification
   // Results that could not be stored: the disk was full or the storage failed otherwise
@@ -72,7 +74,7 @@ struct FarmFigures {
   std::uint64_t arrived_now = 0;            // results that are being verified and stored
   std::uint64_t arrived_bytes = 0;          // bytes of memory that these results occupy
   std::uint64_t waiting_now = 0;            // accepted results that wait for an earlier round of their tile
-  std::uint64_t background_writes_now = 0;  // writes that wait for the disk
+  std::uint64_t background_writes_now = 0;  // number of writes that wait for the disk
   // Bytes
   std::uint64_t result_bytes = 0;  // bytes received in results from workers
   std::uint64_t blob_bytes = 0;    // bytes sent to workers in blobs (files of scenes)
@@ -86,8 +88,9 @@ struct ShareLimits {
   bool operator==(const ShareLimits&) const = default;
 };
 
-// The part of the farm that can render a job pinned to a numeric class: workers and threads of this class,
-// and of all classes (of_...). Only connected workers that are not quarantined count.
+// The part of the farm that can render a job pinned to a numeric class (set of machines that compute the same
+// bits). `workers` and `threads`: those of this class; `of_workers` and `of_threads`: those of all classes.
+// Only connected workers that are not quarantined count.
 struct ClassShare {
   int workers = 0, of_workers = 0;
   int threads = 0, of_threads = 0;
@@ -97,7 +100,7 @@ struct ClassShare {
 // Counts of audits since the start of the coordinator. In an audit another worker renders the unit of an
 // accepted result again, and the two results are compared.
 struct AuditFigures {
-  std::uint64_t asked = 0;  // audits begun
+  std::uint64_t asked = 0;  // number of audits that began
   std::uint64_t equal = 0;  // audits whose second result had the same bits
   // Units whose second result had other bits: a third worker had to decide, or the job failed
   std::uint64_t differ = 0;

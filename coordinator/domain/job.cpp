@@ -102,8 +102,8 @@ void Job::move_windows(int farm_threads) {
 
 void Job::move_window(TileIndex tile, int farm_threads) {
   if (!adaptive_running()) return queue.set_window(tile, units.rounds_complete() + kRoundsAhead);
-  // `busy`: number of rounds that must be leasable ahead in each tile so that all threads of the farm have
-  // work. A small image has few tiles, so it needs more rounds.
+  // `busy`: how many rounds of each tile may be leased beyond the tile's predicted end, so that all threads
+  // of the farm have work. The fewer tiles an image has, the more rounds of each tile this takes.
   const RoundIndex busy = kUnitsAThread * static_cast<RoundIndex>(std::max(farm_threads, 0)) / units.tiles();
   queue.set_window(tile, std::min(units.folded(tile) + kRoundsAhead, adaptive->predicted_last(tile) + busy));
   queue.set_wanted(tile, adaptive->wanted(tile) + 1, adaptive->variance(tile));

@@ -1,6 +1,8 @@
 // A job in the farm. A unit is one round (range of samples) of one tile; a lease is a list of units that is
 // assigned to one worker. At every moment each planned unit of the job is done (its result is accepted),
-// leased to a worker, or queued.
+// leased to a worker, or queued. The stop rule of a job with a target error (adaptive_stop.h) goes through
+// levels: falling thresholds, each of which determines for every tile the round after which it stops. A level
+// is identified by the mean number of samples per pixel that the image has there.
 #pragma once
 
 #include <algorithm>
@@ -54,7 +56,8 @@ class CostModel {
  private:
   // CPU seconds that any unit costs at least, however few its samples
   static constexpr double kLeastSeconds = 1e-4;
-  // Weight of the past per result: an exponential mean over the last few hundred results
+  // Each new result multiplies the sums of earlier results by this factor, so that mainly the last few
+  // hundred results count
   static constexpr double kMemory = 1 - 1.0 / 256;
   double seconds_ = 0, samples_ = 0;
   std::vector<float> tile_cost_;
@@ -105,8 +108,8 @@ struct WorkerFailures {
   bool blocked_at(TimePoint now) const { return blocked && !forgiven_at(now); }
 };
 
-// Returns the error message of a failed job for its owner: unit, pixel, signal, what each worker reported,
-// how to replay it.
+// Returns the error message of a failed job for the job's user. It names the unit, the pixel, the signal,
+// what each worker reported, and the command that renders the failed pixel again.
 std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
                              const std::vector<FailedAttempt>& attempts, const std::string& replay);
 
@@ -131,8 +134,8 @@ class VoterTable {
   std::set<std::pair<UnitCode, WorkerIndex>> held_;
 };
 
-using JobSeq = std::uint64_t;    // order of submission
-using LeaseSeq = std::uint64_t;  // order of leasing; 0: no lease
+using JobSeq = std::uint64_t;    // number of a job, in the order of submission
+using LeaseSeq = std::uint64_t;  // number of a lease, in the order of granting; 0: no lease
 
 // The leases that hold a unit: one, or two if an idle worker renders a copy of it
 struct Holders {
@@ -148,9 +151,10 @@ struct Holders {
 
 // The leased units of one job, or of all jobs of a user or group
 struct Load {
-  // Leased units. A unit that is leased twice counts twice; units of audits do not count
+  // Number of leased units. A unit that is leased twice counts twice; units of audits do not count
   std::uint32_t units = 0;
-  std::unordered_map<WorkerIndex, std::uint32_t> leases_at;  // number of leases of each worker that has any
+  // Number of leases, by worker; a worker without leases has no entry
+  std::unordered_map<WorkerIndex, std::uint32_t> leases_at;
 };
 
 // An audit: another worker renders the unit of an accepted result again. If the second result differs, a
@@ -161,22 +165,22 @@ struct Audit {
   std::optional<std::pair<WorkerIndex, Digest>> second;
   // A differing result of a worker that held no lease on the unit. It is not a vote, but it causes an audit
   std::optional<std::pair<WorkerIndex, Digest>> claim;
-  std::vector<WorkerIndex> tried;  // workers that tried to render it for the audit and failed
-  TimePoint since{};               // time of the second result, or of the restart
-  bool restored = false;           // true if the audit began before a restart
+  std::vector<WorkerIndex> tried;  // workers that failed to render the unit for the audit
+  TimePoint since{};               // when the second result arrived or the coordinator restarted
+  bool restored = false;           // true if the audit began before the coordinator restarted
   LeaseSeq lease = 0;              // lease under which the unit is rendered; 0: it waits for a worker
-  // True if this worker may render the unit for the audit: it has not delivered a result of it or failed at
-  // it.
+  // True if this worker may render the unit for the audit: it has neither delivered a result of this unit nor
+  // failed to render it.
   bool asks(WorkerIndex worker) const {
     return worker != first && (!second || worker != second->first) && (!claim || worker != claim->first) &&
            std::find(tried.begin(), tried.end(), worker) == tried.end();
   }
 };
 
-// A level of the adaptive stop rule (adaptive_stop.h). Its checkpoint is taken as soon as all its rounds are
-// in the image.
+// A level of the stop rule at which a checkpoint is to be taken: as soon as all rounds of this level are in
+// the image.
 struct LevelMark {
-  std::vector<RoundIndex> rounds;  // for each tile, how many rounds it has at this level
+  std::vector<RoundIndex> rounds;  // number of rounds at this level, by tile
   double spp = 0;                  // samples per pixel, mean over all pixels
   TileIndex missing = 0;           // number of tiles whose rounds of this level are not all in the image yet
 };
@@ -186,44 +190,51 @@ struct Job {
 
   JobSeq seq;
   JobPlan plan;
-  std::uint64_t spp;  // samples per pixel: the plan's, or kMaxSppWithoutLimit; always even
+  std::uint64_t spp;  // requested samples per pixel, made even; kMaxSppWithoutLimit if none were requested
   JobState state = JobState::queued;
-  // Why the job ends. It is set once the last round of every tile is fixed, even while some of their units
-  // are leased or not in the image yet. It is final once the job is done
+  // Why the job ends; nullopt: not decided yet. It is set as soon as the last round of every tile is fixed,
+  // even if some units are still leased or not in the image yet. It is final once the job is done
   std::optional<StopReason> stopping;
-  // Stopped by time or user: only units leased before, and the first round of each tile, still count
+  // True if the time limit or the user has stopped the job: it ends with the units that were leased until
+  // then and the first round of each tile
   bool frozen = false;
   std::optional<Digest> numeric_class;
-  // Time of the first ray, moved later by the periods in which the job's clock was stopped
+  // When the first ray was traced, plus the total time in which the job's clock was stopped; nullopt: no ray
+  // was traced yet
   std::optional<TimePoint> first_ray;
-  std::optional<TimePoint> still_since;  // set while the job is paused or done: its time budget does not run
+  // When the job was paused or done, which stops the clock of its time limit; nullopt: the clock runs
+  std::optional<TimePoint> still_since;
 
   UnitTable units;
   UnitQueue queue;
-  std::unordered_map<UnitCode, Holders> out;  // leased units
+  std::unordered_map<UnitCode, Holders> out;  // leases that hold a unit, by leased unit
   CostModel cost;
   UnitFailures failures;
   std::map<UnitCode, Audit> audits;
-  // Results chosen for an audit when no other worker of the class was connected
+  // Number of results that were chosen for an audit although no other worker of the numeric class (set of
+  // machines that compute the same bits) was connected, so that the audit did not begin
   std::uint64_t audits_missed = 0;
   VoterTable voters;
   Load load;
-  std::uint32_t leased = 0;   // units under all leases, including audits
-  bool has_units = false;     // true if it had units to lease when this was last checked
-  bool offered = false;       // true if FairShare lists it as a job that has units to lease
-  double charge_out = 0;      // core seconds charged for units that are leased now (fair_share.h)
-  double checkpoint_spp = 0;  // samples per pixel at the latest checkpoint with the same rounds in all tiles
+  std::uint32_t leased = 0;  // units under all leases, including audits
+  bool has_units = false;    // true if it had units to lease when this was last checked
+  bool offered = false;      // true if FairShare lists it as a job that has units to lease
+  double charge_out = 0;     // core seconds charged for units that are leased now (fair_share.h)
+  // Samples per pixel of the latest checkpoint at which all tiles had the same number of rounds; 0: none
+  double checkpoint_spp = 0;
 
   std::optional<AdaptiveStop> adaptive;  // only for a job with a target error
-  double level_seen = 0;                 // the level at which the image was judged most recently; 0: none
-  std::deque<LevelMark> marks;  // levels whose checkpoints are still to be taken, by rising number of samples
+  // AdaptiveStop::level() at which it was last decided whether the image meets the target; 0: none
+  double level_seen = 0;
+  std::deque<LevelMark> marks;  // levels whose checkpoints are not taken yet, by rising samples per pixel
   // Only for a job whose target error applies to its denoised layers
   std::optional<DenoisedTarget> denoised;
-  double checking_spp = 0;  // the level whose denoised error is being computed; 0: none
+  // Samples per pixel of the level whose denoised error is being computed; 0: none
+  double checking_spp = 0;
   // relMSE of the image itself (before denoising) at which the job will probably end; 0: unknown
   double predicted_error = 0;
-  double marked_spp = 0;           // LevelMark::spp of the latest mark
-  std::uint64_t predicted_at = 0;  // rounds_seen() at the last call of foresee()
+  double marked_spp = 0;           // samples per pixel of the latest level that was put into `marks`
+  std::uint64_t predicted_at = 0;  // AdaptiveStop::rounds_seen() at its latest prediction (foresee())
 
   bool ended() const { return is_terminal(state); }
   bool leasable() const { return state == JobState::queued || state == JobState::running; }
@@ -240,12 +251,14 @@ struct Job {
   double predict(UnitCode code) const { return cost.predict(tile_of(code), pixel_samples(code)); }
   std::uint64_t queued() const { return queue.planned() - units.accepted_count() - out.size(); }
 
-  // True while the stop rule of a target error has not decided the ends of the tiles yet.
+  // True if the job has a target error and its stop rule has not yet decided the last round of every tile.
   bool adaptive_running() const { return adaptive && !stopping; }
   // Starts the adaptive stop rule if the plan has a target error, drops the rule if the plan no longer has
   // one, and resets level_seen, so that the image is judged again.
   void steer();
-  // The relMSE of the image (before denoising) at which the job will probably end; nullopt: unknown
+  // Returns the relMSE of the image, before denoising, at which the job will probably end. This is the target
+  // error itself, unless the target applies to the denoised layers; nullopt: there is no target, or no
+  // prediction yet.
   std::optional<double> predicted_target() const {
     if (!denoised) return plan.target_error;
     return predicted_error > 0 ? std::optional(predicted_error) : std::nullopt;
@@ -254,23 +267,24 @@ struct Job {
   RoundIndex last_foldable(TileIndex tile) const {
     return adaptive_running() ? adaptive->wanted(tile) : std::numeric_limits<RoundIndex>::max();
   }
-  // Sets how far ahead of the rounds in the image further rounds may be leased. `farm_threads`: threads of
+  // move_windows() sets for every tile which rounds may be leased: only a limited number of rounds after
+  // those that are in the image. move_window() does this for one tile. `farm_threads`: number of threads of
   // all connected workers.
   void move_windows(int farm_threads);
   void move_window(TileIndex tile, int farm_threads);
-  // Returns for each tile how many rounds must still be rendered when the job stops: those that were leased
-  // or have accepted results, and the first round in any case.
+  // Returns the number of rounds that each tile gets if the job stops now: all rounds that were leased or
+  // have an accepted result, and at least the first round.
   std::vector<RoundIndex> begun() const;
-  // Sets the end of each tile to ends[tile] rounds, unless it ends earlier already, and forgets accepted
-  // results of later rounds. If this makes any tile end earlier, `stopping` becomes `reason`.
+  // Limits each tile to ends[tile] rounds, unless it has fewer already, and forgets accepted results of later
+  // rounds. If this shortens any tile, `stopping` becomes `reason`.
   void cut_off(const std::vector<RoundIndex>& ends, StopReason reason);
-  void look_at_focus();  // applies JobPlan::focus to the order of the units
-  void plan_all();       // sets every tile's end to the requested samples
+  void look_at_focus();  // puts the units of the tiles in JobPlan::focus first in the queue
+  void plan_all();       // plans all rounds of every tile, up to `spp` samples per pixel
   // Returns the time at which the job's time budget is used up; nullopt: the job has no time budget, or no
   // ray was traced yet.
   std::optional<TimePoint> time_limit(TimePoint now) const;
-  // stand_still() stops the job's clock at time `now`, and go_on() starts it again. Both do nothing if the
-  // clock is in that state already.
+  // stand_still() stops the clock of the job's time limit at `now`, unless it is stopped already. go_on()
+  // starts it again, unless it is running already.
   void stand_still(TimePoint now);
   void go_on(TimePoint now);
 };

@@ -1,5 +1,6 @@
-// The states of jobs and workers, as the farm decides them, and the reasons why jobs stop, each with its name
-// for users. Also the checks that end jobs with a denoised target.
+// The states of jobs and workers and the reasons why jobs stop, each with its name in the HTTP API. Also
+// DenoisedCheck, a measurement of the error of denoised layers, by which jobs with a target for this error
+// end.
 #pragma once
 
 #include <cstddef>
@@ -36,11 +37,12 @@ constexpr std::string_view to_string(WorkerState state) {
   return kWords[static_cast<std::size_t>(state)];
 }
 
-// The error of the denoised layers at one level of the stop rule (adaptive_stop.h).
+// The error of the denoised layers at one level of the stop rule (adaptive_stop.h). A level determines how
+// many samples each tile gets; each further level gives more.
 struct DenoisedCheck {
   double spp = 0;     // samples per pixel at this level, mean over all pixels; identifies the level
-  double relmse = 0;  // estimated; noise can bring it below 0
-  // The largest relMSE that the 95 % interval allows; nullopt: the interval is not known
+  double relmse = 0;  // estimated relMSE of the denoised layers; noise of the estimate can make it negative
+  // Upper end of the 95 % confidence interval of `relmse`; nullopt: the interval is not known
   std::optional<double> at_most;
   bool operator==(const DenoisedCheck&) const = default;
 };

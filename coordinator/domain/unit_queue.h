@@ -53,16 +53,16 @@ class UnitQueue {
     forget_from(tile, rounds);
     if (!was_open) offer(tile);
   }
-  // Holds back the tile's rounds from number `window` on, until a later call sets a higher one.
+  // Rounds of the tile from number `window` on are not leased until a later call sets a higher `window`.
   void set_window(TileIndex tile, RoundIndex window) {
     const bool was_open = open(tile);
     counting(tile, [&] { window_[tile] = window; });
     if (!was_open) offer(tile);
   }
-  // Declares the tile's rounds before `before` as certain to be needed. Later ones are speculative and
-  // ordered by the error that each removes per sample: `variance` divided by the product of the sample counts
-  // without and with that round. `variance` is the variance per sample of the group of tiles that stop
-  // together with this one; NaN: unknown.
+  // Declares the tile's rounds before `before` as certain to be needed. Later rounds are speculative and go
+  // in the order of the error that each removes per sample: `variance` / (n m), where n and m are the samples
+  // per pixel without and with the round. `variance` is the variance per sample of the group of tiles that
+  // stop together with this tile; NaN: unknown.
   void set_wanted(TileIndex tile, RoundIndex before, double variance) {
     if (wanted_.empty()) wanted_.assign(next_.size(), {});
     const float weight =
@@ -104,8 +104,8 @@ class UnitQueue {
   // be counted, too.
   std::uint64_t surely_waiting() const { return surely_ + surely_returned(); }
 
-  // Returns the tile's next round in order: every earlier round of the tile has been leased at least once, or
-  // accepted.
+  // Returns the first round of the tile whose turn has not come yet: every earlier round has been leased at
+  // least once, or has an accepted result.
   RoundIndex next(TileIndex tile) const { return next_[tile]; }
   // Puts the tile's rounds from `round` on back into the queue.
   void rewind(TileIndex tile, RoundIndex round) {
@@ -117,8 +117,8 @@ class UnitQueue {
 
   // Returns the first waiting unit that may be leased; nullopt if there is none. Certain units of the focus
   // go first, then the other certain ones, then speculative ones. Within each of these three, units that were
-  // leased and came back go first. Units that came back are skipped if `excluded` is true for them; it is
-  // called only for such units.
+  // leased and came back go first. excluded(unit) is called only for units that came back; if it returns
+  // true, the unit is skipped.
   template <class Excluded>
   std::optional<UnitCode> front(const UnitTable& units, Excluded&& excluded) {
     const auto first_of = [&](const std::set<UnitCode>& returned) {
@@ -154,7 +154,7 @@ class UnitQueue {
     if (plans(code) && round_of(code) < next_[tile_of(code)])
       (wanted(code) ? line_of(tile_of(code)).returned : returned_perhaps_).insert(code);
   }
-  // Removes the unit from those that came back, if it is among them: its result has arrived late.
+  // Removes the unit if it was leased and came back, because its result has arrived after all.
   void forget(UnitCode code) {
     line_of(tile_of(code)).returned.erase(code);
     returned_perhaps_.erase(code);
@@ -169,13 +169,14 @@ class UnitQueue {
  private:
   static constexpr RoundIndex kNoWindow = std::numeric_limits<RoundIndex>::max();
 
-  // The arguments of a tile's latest set_wanted(); unused while no tile has speculative units
+  // The values that the latest set_wanted() gave for a tile; `weight` is the variance (infinite if unknown).
+  // Not used while no tile has speculative units
   struct Wanted {
     RoundIndex before = kNoWindow;
     float weight = 0;
   };
-  // Units that are certain to be needed: `returned` were leased and came back, and go first; `heads` are the
-  // next ones of their tiles
+  // Units that are certain to be needed. `returned`: units that were leased and came back, which go first.
+  // `heads`: the next unit of each tile, in the order of rounds
   struct Line {
     std::priority_queue<UnitCode, std::vector<UnitCode>, std::greater<>> heads;
     std::set<UnitCode> returned;
@@ -210,8 +211,9 @@ class UnitQueue {
   Line& line_of(TileIndex t) { return lines_[focus_.empty() || focus_[t] ? 0 : 1]; }
   const Line& line_of(TileIndex t) const { return lines_[focus_.empty() || focus_[t] ? 0 : 1]; }
   std::size_t surely_returned() const { return lines_[0].returned.size() + lines_[1].returned.size(); }
-  // The heads of the two lines and perhaps_ together hold the next unit of every tile that has one to lease.
-  // They also hold outdated entries, which head() and perhaps_head() drop.
+  // Adds the tile's next unit, if it may be leased, to the heap of certain or of speculative units. So the
+  // heaps hold the next unit of every tile that has one to lease. They also hold outdated entries, which
+  // head() and perhaps_head() drop.
   void offer(TileIndex tile) {
     if (!open(tile)) return;
     const UnitCode code = unit_code(next_[tile], tile);
@@ -249,8 +251,8 @@ class UnitQueue {
     if (returned_count() == 0) return;
     for (RoundIndex k = round; k < next_[tile]; ++k) forget(unit_code(k, tile));
   }
-  // Called when the end of the tile's certain rounds changes from `from` to `to`. Moves those of its units
-  // that came back and are concerned between the certain and the speculative ones.
+  // Called when the end of the tile's certain rounds changes from `from` to `to`. Of the units that came
+  // back, those of the rounds between `from` and `to` become certain or speculative.
   void sort_returned(TileIndex tile, RoundIndex from, RoundIndex to) {
     if (returned_count() == 0) return;
     auto& surely = line_of(tile).returned;
@@ -262,11 +264,12 @@ class UnitQueue {
 
   std::vector<RoundIndex> next_, end_, window_;
   std::uint64_t planned_, surely_;
-  std::vector<bool> focus_;  // by tile; empty: there is no focus
-  // [0]: the tiles of the focus (all tiles if there is no focus); [1]: the other tiles
+  std::vector<bool> focus_;  // true for tiles of the focus, by tile; empty: there is no focus
+  // Certain units. [0]: those of the tiles of the focus (of all tiles if there is no focus); [1]: those of
+  // the other tiles
   std::array<Line, 2> lines_;
   std::priority_queue<Perhaps> perhaps_;
-  std::vector<Wanted> wanted_;  // by tile; empty: all units are certain
+  std::vector<Wanted> wanted_;  // latest values of set_wanted(), by tile; empty: all units are certain
   std::set<UnitCode> returned_perhaps_;
 };
 

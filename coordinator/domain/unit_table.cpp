@@ -46,7 +46,7 @@ void UnitTable::truncate(TileIndex tile, RoundIndex end) {
 }
 
 void UnitTable::reopen(RoundIndex index) {
-  // Later rounds are empty: the tiles' ends were cut before them
+  // Later rounds have no results: the tiles' last rounds were set before them, which discarded their results
   while (rounds_.size() > index + 1 && rounds_.back().accepted == 0 && rounds_.back().folded == 0)
     rounds_.pop_back();
   if (index >= rounds_.size()) return;

@@ -26,7 +26,9 @@ inline constexpr WorkerIndex kNoWorker = ~WorkerIndex{0};
 class UnitTable {
  public:
   struct Result {
-    Digest digest;  // all zero: unknown, since a restart found the unit in the image but not its record
+    // All zero: unknown, because the unit was found in the stored image after a restart, but no record of its
+    // result was found
+    Digest digest;
     WorkerIndex worker = kNoWorker;
   };
 
@@ -52,26 +54,29 @@ class UnitTable {
   // Returns the tiles with an accepted result of this worker, ascending
   std::vector<TileIndex> tiles_of(WorkerIndex worker) const;
   void mark_workers(std::vector<bool>& used) const;  // sets used[worker] for the workers of accepted results
-  // For a job that failed or was cancelled: frees the memory, keeps the numbers of folded rounds
+  // Frees the memory of results and errors but keeps the numbers of folded rounds; for a job that failed or
+  // was cancelled
   void forget_results();
 
   // Folding
 
-  // Returns the tile's next round to add to the image and counts it in issued(); nullopt if this round has no
-  // accepted result, is above `limit` or not below `end`.
+  // Returns the tile's next round to add to the image and counts it in issued(). nullopt: this round has no
+  // accepted result, is greater than `limit`, or is not less than `end`.
   std::optional<RoundIndex> issue_fold(TileIndex tile, RoundIndex limit, RoundIndex end);
   // Number of rounds whose addition to the image was requested
   RoundIndex issued(TileIndex tile) const { return issued_[tile]; }
-  // Notes that the tile's round is in the image. If it is not the next of the tile's requested rounds,
+  // Notes that the tile's round is in the image. `rel_error_sum`: relative squared error after this round,
+  // summed over the tile's pixels and channels. If the round is not the next of the tile's requested rounds,
   // returns false and changes nothing.
   bool fold(TileIndex tile, RoundIndex round, double rel_error_sum);
   void restore_folded(TileIndex tile, RoundIndex rounds);
   void restore_error(RoundIndex round, TileIndex tile, double rel_error_sum);
   RoundIndex folded(TileIndex tile) const { return folded_[tile]; }
   std::uint64_t folded_count() const { return folded_count_; }
-  // Number of rounds that the image has of every tile
+  // Number of rounds, from round 0 on, that are in the image for every tile
   RoundIndex rounds_complete() const { return rounds_complete_; }
-  double error(RoundIndex round, TileIndex tile) const;  // rel_error_sum after this round; NaN: unknown
+  // Returns the tile's sum of relative squared errors after this round, as passed to fold(); NaN: unknown
+  double error(RoundIndex round, TileIndex tile) const;
 
  private:
   struct Round {

@@ -37,7 +37,8 @@ class CoreShare {
   double get() const { return wall_ > 0 ? std::max(kLeastCoreShare, cpu_ / wall_) : 1; }
 
  private:
-  // Weight of the past per result: an exponential mean over about the last hundred results
+  // Each new result multiplies the sums of earlier results by this factor, so that mainly the last hundred
+  // results count
   static constexpr double kMemory = 1 - 1.0 / 64;
   double cpu_ = 0, wall_ = 0;
 };
@@ -45,8 +46,8 @@ class CoreShare {
 // Why a connected worker gets no work for a while
 enum class Pause {
   none,
-  silent,   // the deadline of a lease passed without a message; ends when the worker reports
-  stuck,    // the worker reports but finishes nothing; ends when it finishes a unit or is idle
+  silent,   // the deadline of a lease passed without a message from the worker; ends when it reports
+  stuck,    // the worker reports but has finished no unit for long; ends when it finishes one or is idle
   returned  // the worker returned a lease; ends at the next tick
 };
 
@@ -58,8 +59,8 @@ struct Worker {
   Digest numeric_class;
   std::string platform;
   int threads = 1;
-  std::vector<std::string> tags;   // sorted
-  std::uint64_t memory_bytes = 0;  // 0: unknown
+  std::vector<std::string> tags;   // tags that the worker has announced, sorted
+  std::uint64_t memory_bytes = 0;  // memory that its renderer may use; 0: unknown
   // For each blob that the worker reports to hold, the first 8 bytes of its digest (head_of()), sorted
   std::vector<std::uint64_t> blobs;
   bool quarantined = false;  // it rendered wrong pixels
@@ -76,8 +77,8 @@ struct Worker {
   double seconds_out = 0;       // predicted CPU seconds of its leased units
   std::uint64_t units_done = 0;
   CoreShare core_share;
-  std::set<JobSeq> briefed;  // jobs whose settings (JobBrief) were sent on this stream
-  // Jobs whose world (loaded scene) it has: it has finished a unit of them on this stream
+  std::set<JobSeq> briefed;  // jobs whose settings (JobBrief) were sent to it on its present connection
+  // Jobs whose scene it has loaded: it has finished a unit of them on its present connection
   std::set<JobSeq> warmed_up;
   std::map<JobSeq, WorkerFailures> failures;
 
@@ -91,9 +92,10 @@ struct Worker {
     const auto it = failures.find(job);
     return it != failures.end() && it->second.blocked_at(now);
   }
-  // True if the worker should get another lease: it holds fewer than kUnitsAThread units per thread, or it
-  // holds fewer than kQueuedLeases leases, and its leased work takes less time than kQueuedLeases full leases
-  // (kLeaseSeconds each). It never holds more than kMaxLeasesPerWorker leases.
+  // True if the worker should get another lease. This is so if it holds fewer than kUnitsAThread units per
+  // thread. It is also so if it holds fewer than kQueuedLeases leases and its leased work takes less time
+  // than kQueuedLeases full leases (kLeaseSeconds each). In both cases it must hold fewer than
+  // kMaxLeasesPerWorker leases.
   bool wants_more() const {
     if (leases.size() >= kMaxLeasesPerWorker) return false;
     if (units_out < kUnitsAThread * static_cast<std::uint32_t>(threads)) return true;
@@ -111,14 +113,14 @@ struct Worker {
 
 class WorkerTable {
  public:
-  // Returns the worker of this id, and creates it if it is unknown. A worker keeps its index when it is lost
-  // and comes back.
+  // Returns the worker with this id, and creates it if it is unknown. A worker that is lost and comes back
+  // keeps its index.
   Worker& get(const WorkerId& id);
   Worker* find(const WorkerId& id);
   const Worker* find(const WorkerId& id) const;
   const WorkerId& name_of(WorkerIndex index) const { return ids_[index]; }
-  // Returns the index of this id, and gives it one if it has none. The id may come from a stored record and
-  // belong to a worker that never connected to this farm.
+  // Returns the index of the worker with this id; a new id gets an index. The id may come from a stored
+  // record, and its worker may never have connected to this farm.
   WorkerIndex index_of(const WorkerId& id);
   void forget(Worker& worker);
   // True if it is time for keep_names(). Names accumulate: results refer to workers that are gone, and
@@ -137,8 +139,9 @@ class WorkerTable {
   Worker& at(WorkerIndex index) { return *workers_.at(index); }
 
   const std::map<WorkerIndex, std::unique_ptr<Worker>>& all() const { return workers_; }
-  int threads() const { return threads_; }  // threads of all connected workers
-  // Returns the cores of all connected workers (threads times core share), up to rounding
+  int threads() const { return threads_; }  // number of threads of all connected workers
+  // Returns the number of cores that the threads of all connected workers get together (Worker::cores()), up
+  // to rounding errors
   double cores() const { return cores_; }
   int connected() const { return connected_; }
   void connected(Worker& worker, bool yes);
@@ -163,40 +166,42 @@ class WorkerTable {
   int threads_ = 0, connected_ = 0;
   double cores_ = 0;
   void count(const Worker& worker, bool yes);
-  std::map<Digest, Count> classes_;  // classes without workers are left out
+  std::map<Digest, Count> classes_;  // by numeric class; classes without workers have no entry
 };
 
 // Returns the first 8 bytes of a digest, as in Worker::blobs
 std::uint64_t head_of(const Digest& digest);
-// True if the worker has loaded the job's world, or at least reports to hold its scene file.
+// True if the worker has loaded the job's scene, or at least reports to hold its scene file.
 bool holds(const Job& job, const Worker& worker);
 
 // True if the user requests no numeric class for the job, or that of this worker (JobPlan::class_asked).
 bool of_class_asked(const Job& job, const Worker& worker);
-// True if the worker has the job's numeric class (or may begin a job that has none yet), the requested class
-// and the job's tags, has enough memory, and is not quarantined. The worker may be busy or lost.
+// True if the worker has the job's numeric class (if the job has none yet: if the worker may begin jobs), is
+// of the class that the user requests, has the job's tags and enough memory, and is not quarantined. The
+// worker may be busy or lost.
 bool fits(const Job& job, const Worker& worker);
-// True if the worker fits the job and may also take units of it now.
+// True if the worker fits the job, can get work now (Worker::available()), and is not blocked from the job by
+// its failures.
 bool may_serve(const Job& job, const Worker& worker, TimePoint now);
 
 struct LeaseRecord {
   LeaseSeq seq = 0;
   Job* job = nullptr;
   Worker* worker = nullptr;
-  // All units of the lease, finished ones included. A unit is still leased if its Holders (job.h) name this
-  // lease
+  // All units of the lease, including finished ones and ones that were taken back. A unit is still leased if
+  // its Holders (job.h) name this lease
   std::vector<UnitCode> units;
   std::uint32_t remaining = 0;  // number of units still leased
-  std::uint32_t reported = 0;   // number of units done, from the worker's progress reports
+  std::uint32_t reported = 0;   // number of finished units, as the worker last reported
   double seconds_per_unit = 0;  // predicted CPU seconds of a unit, mean over all units of the lease
   // Core seconds per unit charged to the owner's share: seconds_per_unit, or kAssumedUnitSeconds if nothing
   // is measured
   double charge_per_unit = 0;
-  // An audit: a lease of one unit that has an accepted result and is rendered again for comparison
+  // True for an audit: a lease of one unit that has an accepted result and is rendered again for comparison
   bool audit = false;
   TimePoint issued{};
-  // Predicted time from `issued` until its last unit is done, including the wait for the worker's earlier
-  // leases
+  // Predicted time from `issued` until the last unit of this lease is done, including the wait for the
+  // worker's earlier leases
   Duration predicted{};
   TimePoint deadline{};
 };

@@ -20,21 +20,21 @@ namespace pb = ::lightshaft::farm::v1;
 
 namespace {
 
-// At most this many workers are connected at the same time; the same as kMaxWorkers
+// At most this many workers are connected at the same time; equals limits::kMaxWorkers (base/limits.h).
 constexpr int kWorkStreams = 16'384;
 // At most this many blob transfers are in progress; further ones are rejected, and workers retry them
 constexpr int kFetches = 512;
 // Number of threads that read blobs for these transfers; many, because most of them may be waiting for blobs
 // that the coordinator must first fetch from another machine
 constexpr int kReadThreads = 64;
-// A worker may send at most this many bytes before the coordinator reads them.
+// A worker can send at most this many bytes that the coordinator has not read yet; then its sending pauses.
 constexpr int kUnreadBytes = 64 << 10;
-constexpr int kHelloSeconds = 20;  // seconds after opening its stream in which a worker must send its hello
+constexpr int kHelloSeconds = 20;  // a worker must send its hello within this time after opening its stream
 constexpr int kHandshakeMs = 10'000;
 // Clients that ping at shorter intervals are disconnected (GOAWAY too_many_pings).
 constexpr int kPingsNotOftenerMs = 5'000;
 
-// A reactor whose only purpose is to reject the call.
+// A gRPC reactor (the object that serves one call) that only ends the call with the error `status`.
 template <class Reactor>
 class Refusal final : public Reactor {
  public:
@@ -162,7 +162,7 @@ void GrpcServer::stop() {
       stream->end(grpc::Status(grpc::StatusCode::UNAVAILABLE, "the coordinator is going down"));
   }
   impl_->sweeper.request_stop();
-  // Streams that do not end within this time are cut off.
+  // Streams and calls that have not ended after 2 s are cut off.
   impl_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(2));
   impl_->server->Wait();
   for (auto& reader : impl_->readers) reader.request_stop();

@@ -14,7 +14,7 @@ namespace ls::coordinator {
 
 class GrpcServer {
  public:
-  struct Tls {       // texts in PEM format
+  struct Tls {       // certificates and the server's private key, as texts in PEM format
     std::string ca;  // CA that must have signed the workers' certificates
     std::string cert, key;
   };

@@ -1,3 +1,5 @@
+// WorkStream with its Outlet, and BlobStream: the gRPC reactors (objects that serve one call each) for a
+// worker's stream of messages and for its fetches of blobs (files of scenes).
 #include "coordinator/rpc/streams.h"
 
 #include <fmt/format.h>
@@ -12,11 +14,11 @@
 namespace ls::coordinator::rpc {
 namespace {
 
-// At most this many messages wait for a worker that does not read them; if there are more, the worker is
-// disconnected
+// At most this many messages to one worker wait until it reads them. A worker for which one more would have
+// to wait is disconnected.
 constexpr std::size_t kQueuedMessages = 8192;
 
-// The only mapping from Errc to gRPC status.
+// Returns the gRPC status for an error. No other function maps Errc to gRPC status codes.
 grpc::Status to_status(const Error& error) {
   using enum grpc::StatusCode;
   static constexpr std::pair<Errc, grpc::StatusCode> kCodes[] = {
@@ -92,8 +94,8 @@ void WorkStream::OnReadDone(bool ok) {
     end(grpc::Status::OK);
     return;
   }
-  // A message of an unknown kind comes from a newer worker and is ignored; workers must not rely on messages
-  // that older coordinators do not know
+  // A message of an unknown kind comes from a newer worker and is ignored. So a newer worker must also work
+  // with a coordinator that ignores its new kinds of messages.
   if (greeted_ && !wire::known(incoming_)) {
     StartRead(&incoming_);
     return;
@@ -109,13 +111,13 @@ void WorkStream::OnReadDone(bool ok) {
     if (session_) StartRead(&incoming_);
     return;
   }
-  // The callback uses the outlet, because this stream may be deleted before there is room for the next
-  // message.
+  // The session calls the callback when there is room for the worker's next message. This stream may have
+  // been deleted by then; so the callback holds the Outlet, which knows whether the stream still exists.
   session_->receive(std::move(*message), [outlet = outlet_] { outlet->read_on(); });
 }
 
-// Starts to read the worker's next message; no thread waits for it. gRPC does not delete the stream before
-// Finish is called, so it may be used here until then.
+// Starts to read the worker's next message; no thread waits for it. The stream deletes itself in OnDone,
+// which gRPC calls only after Finish. So while `finished` is false, the stream exists.
 void Outlet::read_on() {
   const auto state = state_.lock();
   if (state->stream && !state->finished) state->stream->StartRead(&state->stream->incoming_);
@@ -194,8 +196,8 @@ BlobStream::BlobStream(Coordinator& coordinator, const pb::FetchBlobRequest& req
       run_(std::move(run)),
       on_gone_(std::move(on_gone)) {}
 
-// After a write or Finish has been started, no member may be used: OnDone, which deletes this object, may run
-// immediately.
+// Here and in the functions below, no member may be used after StartWrite() or Finish(): OnDone, which
+// deletes this object, may run immediately.
 void BlobStream::begin(const JoinGuard& guard, const std::string& address) {
   if (const int wait = guard.wait(address, request_.join_token()); wait > 0)
     return Finish({grpc::StatusCode::RESOURCE_EXHAUSTED, too_many_wrong_tokens(wait)});
@@ -235,8 +237,9 @@ void BlobStream::next() {
   StartWrite(&chunk_);
 }
 
-// Ends the call with an error. A missing blob is reported to the coordinator before Finish, so that the jobs
-// that need the blob are paused before the worker returns their units.
+// Ends the call with an error. If the blob is missing or damaged, the coordinator is informed before
+// Finish(): it pauses the jobs that need the blob. Only then does the worker learn of the error and return
+// its units (a unit is one tile and one round of samples), which are therefore not leased again immediately.
 void BlobStream::refuse(const Error& why) {
   if (why.code == Errc::not_found || why.code == Errc::failed_precondition)
     coordinator_.blob_missing(digest_, why);

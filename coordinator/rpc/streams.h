@@ -1,4 +1,5 @@
-// The two calls of a worker as gRPC's reactors: its stream of messages, and its fetches of blobs.
+// The gRPC reactors (objects that serve one call each) for the two calls that a worker makes: its stream of
+// messages (WorkStream), and its fetches of blobs, the files of scenes (BlobStream).
 #pragma once
 
 #include <atomic>
@@ -23,7 +24,7 @@ namespace pb = ::lightshaft::farm::v1;
 // A stream consists of two objects. The Outlet is the WorkerSink through which the coordinator sends; the
 // coordinator may keep it after the stream has ended. The WorkStream is gRPC's reactor and deletes itself in
 // OnDone. The outlet's lock is never held during calls to the coordinator, so the coordinator may call the
-// sink with its own locks held.
+// Outlet while it holds its own locks.
 class WorkStream;
 
 class Outlet final : public WorkerSink {
@@ -38,7 +39,7 @@ class Outlet final : public WorkerSink {
   struct State {
     explicit State(WorkStream* s) : stream(s) {}
     void end(const grpc::Status& with);  // ends the stream with this status once the queue is empty
-    void pump();                         // starts the next write, or ends the stream
+    void pump();  // starts the next write; if nothing is queued and `closing` is set, ends the stream
 
     WorkStream* stream;  // null after OnDone
     std::deque<pb::ToWorker> queue;
@@ -79,13 +80,13 @@ class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWo
   const TimePoint hello_deadline_;
   const std::function<void(WorkStream*)> on_gone_;
   std::shared_ptr<Outlet> outlet_;
-  // Used in the callbacks for reads and in OnDone, which never overlap
+  // Used in OnReadDone() and OnDone() only, which gRPC never runs at the same time
   std::unique_ptr<WorkerSession> session_;
   std::atomic<bool> greeted_{false};
   pb::FromWorker incoming_;
 };
 
-using RunOn = std::function<void(std::function<void()>)>;  // runs the function on another thread
+using RunOn = std::function<void(std::function<void()>)>;  // runs the function that it gets on another thread
 
 // One FetchBlob call: sends a blob to a worker in chunks, as fast as the worker takes them. The blob is read
 // on separate threads: the coordinator may first have to fetch it from another machine, which can take
@@ -107,7 +108,7 @@ class BlobStream final : public grpc::ServerWriteReactor<pb::BlobChunk> {
 
   Coordinator& coordinator_;
   BlobStore& blobs_;
-  const pb::FetchBlobRequest& request_;  // exists as long as the call
+  const pb::FetchBlobRequest& request_;  // owned by gRPC; exists until OnDone
   const JoinCheck& may_join_;
   const RunOn run_;
   const std::function<void()> on_gone_;

@@ -1,3 +1,5 @@
+// BlobWatch: pauses jobs whose blobs (files of scenes) are missing, resumes them when the blobs are there
+// again, and removes blobs that no job needs.
 #include "coordinator/service/blob_watch.h"
 
 #include <fmt/format.h>
@@ -13,10 +15,11 @@ namespace ls::coordinator {
 namespace {
 
 constexpr Duration kLongestPause = std::chrono::hours(1);
-// Number of searches for unused blobs within the time keep_unused; an unused blob thus stays for at most 1.25
-// times keep_unused
+// Unused blobs are searched for this many times within the time keep_unused. So an unused blob is removed at
+// the latest 1.25 * keep_unused after its last use.
 constexpr int kSweepsPerTime = 4;
-// Number of jobs whose needed blobs are collected before the lock is released and taken again
+// The blobs that jobs need are listed for this many jobs at a time; between two such groups the lock is
+// released, so that other threads can take it.
 constexpr std::size_t kJobsAtOnce = 256;
 
 std::optional<BlobRef> file_of(const StoredJob& job, const Digest& digest) {
@@ -70,7 +73,8 @@ void BlobWatch::missing(const Digest& digest, const Error& why) {
       waiting.push_back(entry);
   }
   if (waiting.empty()) return;
-  (void)core->records.put_together([&] {  // if storing fails, the next start finds the missing blob again
+  // An error of storing is ignored: after a restart the coordinator notices again that the blob is missing.
+  (void)core->records.put_together([&] {
     for (const EntryPtr& entry : waiting) {
       core->records.log(entry->stored.id, why.message);
       await_blob(*core, *entry, *file_of(entry->stored, digest), why.code == Errc::failed_precondition);

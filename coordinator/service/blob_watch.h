@@ -1,6 +1,7 @@
-// Watches over blobs (files of scenes). Jobs whose blobs are missing or damaged are paused; this counts as no
-// failure of a unit or worker. They resume automatically when the blobs are available again. Blobs that no
-// job needs are removed.
+// Watches over blobs (files of scenes). Jobs whose blobs are missing or damaged are paused; this does not
+// count as a failure of a unit (one tile and one round of samples) or of a worker. The jobs resume
+// automatically when the blobs are available again. Blobs that no job needs are removed. "The lock" is that
+// of Core.
 #pragma once
 
 #include <optional>
@@ -16,9 +17,11 @@
 
 namespace ls::coordinator {
 
-// Returns the blobs that the job needs and the store lacks. May need the network: call it without the lock.
+// Returns the blobs that the job needs and the store lacks. Do not hold the lock during the call: it may wait
+// for the network.
 Result<std::vector<BlobRef>> missing_blobs_of(const StoredJob& job, const BlobStore& blobs);
-// Pauses the job until the blob is available.
+// Notes in the job's entry that it waits for the blob, and what its user can do. `damaged`: the blob exists
+// but has wrong bytes. The caller pauses the job.
 void await_blob(Core& core, JobEntry& entry, const BlobRef& file, bool damaged);
 
 class BlobWatch {
@@ -28,10 +31,11 @@ class BlobWatch {
             std::optional<Duration> keep_unused, const Clock& clock)
       : core_(core), blobs_(blobs), commands_(commands), keep_unused_(keep_unused), clock_(clock) {}
 
-  // Handles a worker's request for a blob that is missing or damaged here.
+  // Called when a worker has requested a blob that the store lacks or has only with damaged bytes: pauses the
+  // jobs that need the blob. `why`: the store's error.
   void missing(const Digest& digest, const Error& why);
-  // Starts a lookup of missing blobs if one is due. It runs on a separate thread, since it may need the
-  // network.
+  // If a lookup is due, checks whether blobs that were missing are in the store again. The lookup runs on a
+  // separate thread (look_loop()), since it may wait for the network.
   void look_if_due(Core& core);
   void look_loop(const std::stop_token& token);
 

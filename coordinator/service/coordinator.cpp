@@ -40,7 +40,8 @@ std::uint64_t random_number() {
 
 }  // namespace
 
-// The parts of the coordinator, each with its own state. A part mostly uses parts above it.
+// The parts of the coordinator, each with its own state. Most parts use only parts that are declared above
+// them.
 struct Coordinator::Parts {
   Parts(Options o, std::shared_ptr<BlobStore> inner, std::shared_ptr<JobStore> s, File l, std::uint64_t n)
       : options(std::move(o)),
@@ -55,7 +56,7 @@ struct Coordinator::Parts {
   const Options options;
   const std::shared_ptr<JobStore> store;
   const File lock;
-  const std::uint64_t start;  // number of this start of the coordinator, counted over all its restarts
+  const std::uint64_t start;  // number of this start with the job store: 1 for the first, 2 for the second
   const std::string lease_prefix = fmt::format("l{}", start);
   const Tracing tracing{options.tracer, lease_prefix};
   const Clock& clock = *options.clock;

@@ -25,20 +25,20 @@ namespace ls::coordinator {
 class Coordinator {
  public:
   struct Options {
-    // empty: everything is in memory and is lost at the end (`lightshaft render`)
+    // The data folder. Empty: everything is in memory and is lost at the end (`lightshaft render`).
     std::filesystem::path data;
     // Where jobs are stored: sqlite, or a redis:// address (store/redis/redis_link.h)
     std::string store = "sqlite";
-    std::shared_ptr<JobStore> jobs;    // set by tests; null: opened from `store`
-    std::shared_ptr<BlobStore> blobs;  // set for in-memory use; null: opened from `blobs_at`
+    std::shared_ptr<JobStore> jobs;    // the job store, set by tests; null: opened as `store` says
+    std::shared_ptr<BlobStore> blobs;  // the blob store, set if it is in memory; null: opened at `blobs_at`
     // Where blobs are stored: a folder or an s3:// address; empty: a folder under `data`
     std::string blobs_at;
     // How long to keep a blob (file of a scene) that no job needs and nobody requests, and an interrupted
     // upload that is not continued. nullopt: blobs are kept forever, interrupted uploads for a day.
     std::optional<Duration> keep_unused = std::chrono::hours(24);
-    bool shared = false;      // other coordinators use the same store and blobs
-    std::string join_token;   // empty: any worker may join
-    JoinCheck may_join;       // if set, decides which workers may join, instead of join_token
+    bool shared = false;      // true: other coordinators use the same job store and blob store
+    std::string join_token;   // the token that a worker needs to join; empty: any worker may join
+    JoinCheck may_join;       // if set, it decides which workers may join, and join_token is not used
     bool allow_fake = false;  // true: fake workers, which invent their pixels, may join (for tests)
     // Version of this program. Workers of another version finish the jobs of their numeric class (machines
     // that compute the same bits) but begin none, so that jobs submitted during an upgrade do not depend on
@@ -67,20 +67,21 @@ class Coordinator {
   // `traceparent`: as in SubmitRequest.
   Result<JobId> submit_again(const JobId& before, const JobSpec& changes, const std::string& owner,
                              const std::string& traceparent = {});
-  JobsPage list(const JobsAsked& asked) const;  // a page of jobs(), filtered and ordered
-  std::vector<JobView> jobs() const;            // a sequence counts as one job; its frames are not listed
+  JobsPage list(const JobsAsked& asked) const;  // returns one page of the jobs, filtered and ordered as asked
+  std::vector<JobView> jobs() const;  // returns all jobs; a sequence is listed as one job, without its frames
   Result<JobView> job(const JobId& id) const;
-  Result<std::string> owner(const JobId& id) const;  // JobView::owner, cheaper than by job()
+  Result<std::string> owner(const JobId& id) const;  // returns JobView::owner; faster than job()
   Result<void> change(const JobId& id, const JobChange& change);
   Result<void> cancel(const JobId& id);
-  // Removes an ended job with all its results; a job that has not ended is cancelled and kept.
+  // Removes an ended job with all its results; a job that has not ended is cancelled and kept. Frames are
+  // removed only together, with their sequence.
   Result<void> remove(const JobId& id);
   // Returns when the job is done, failed or cancelled, or is paused because something went wrong
   // (JobView::error).
   Result<void> wait(const JobId& id) const;
 
-  // The job's span, as parent of spans that other code records; nullopt: the job is not traced or does not
-  // exist
+  // Returns the job's trace span, which other code uses as the parent of the spans that it records. nullopt:
+  // the job is not traced or does not exist.
   std::optional<trace::SpanContext> trace_of(const JobId& id) const;
 
   // Images and reports
@@ -105,8 +106,8 @@ class Coordinator {
   Result<std::vector<std::byte>> pixels(const JobId& id, const PixelsAsked& asked) const;
   Result<std::string> report_json(const JobId& id) const;
   Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const;
-  // Returns the path of the file `name` (image.exr or report.json) of a done job. Empty if there is no such
-  // file: then use the functions above.
+  // Returns the path of the file `name` (image.exr or report.json) of a done job. Empty if the job is not
+  // done, or if everything is in memory: then image_exr() and report_json() give the contents.
   std::filesystem::path final_file(const JobId& id, const std::string& name) const;
   Result<std::vector<TileView>> tiles(const JobId& id) const;
   Result<std::string> job_log(const JobId& id) const;
@@ -118,17 +119,17 @@ class Coordinator {
 
   // Events
 
-  // Calls `on_event` (on any thread, in order) for every event after `after_id` that is still kept, then for
-  // new ones. The subscription ends when the returned handle is destroyed. The callback must not block: a
-  // slow reader must drop events itself.
+  // Calls `on_event` for every event with an id above `after_id` that is still kept, then for new events, in
+  // the order of their ids, on a thread of the coordinator. The subscription ends when the returned handle is
+  // destroyed. The callback must not block: if it passes events to a slow reader, it must drop some.
   std::shared_ptr<void> subscribe(std::uint64_t after_id, std::function<void(const StreamEvent&)> on_event);
   std::uint64_t last_event_id() const;
 
   // Blobs
 
   BlobStore& blobs();
-  // Notes that a worker requested a blob that is missing or damaged here. The jobs that need the blob are
-  // paused until it is available again.
+  // Notes that a worker requested a blob that is missing or damaged in the blob store. The jobs that need the
+  // blob are paused until it is available again.
   void blob_missing(const Digest& digest, const Error& why);
   void blob_sent(std::uint64_t bytes);  // counts bytes sent to a worker
   // Removes blobs that no job needs, and interrupted uploads, after Options::keep_unused. With Options::tick

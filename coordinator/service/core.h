@@ -1,10 +1,12 @@
-// The state of the coordinator's jobs and workers. One mutex guards all of it: it can be reached only through
-// Guarded<Core>::lock(). So a function with a Core& parameter runs under the lock, and a function without one
-// does not need the lock. Members of a JobEntry that never change (id, scene, settings, grid) may also be
-// read without the lock. Slow work has its own threads, which take the lock briefly:
-//   receive() -> [verify threads: decode, digest] -> [commit thread: append, one fdatasync for all]
-//     -> farm -> acknowledge
-//   [writer thread: convergence points, logs, snapshots, final images; strictly in order]
+// The state of the coordinator's jobs and workers. One mutex guards the whole state, which can be reached
+// only through Guarded<Core>::lock(). So a function with a Core& parameter runs under the lock, and a
+// function without one does not need the lock. Members of a JobEntry that never change (id, scene, settings,
+// grid) may also be read without the lock. Slow work has its own threads, which take the lock briefly. The
+// path of a worker's result:
+//   receive() -> [verify threads: decode, digest] -> [commit thread: append to the job's log, one fdatasync
+//     for many results] -> farm (the state machine that decides which worker renders what) -> acknowledge
+// What may be stored later goes to the writer thread: convergence points, logs, snapshots (the image so far,
+// for a restart) and final images, strictly in order.
 #pragma once
 
 #include <condition_variable>
@@ -33,9 +35,11 @@ class FarmDriver {
 
   const Farm& farm() const { return farm_; }
   void run(Event first);
-  // Gives a stored job to the farm. Results that are added to the image again publish no events.
+  // Gives a stored job to the farm after a restart. No events are published for the results that are added to
+  // the image again.
   void replay(JobEntry& entry, JobRestored event);
-  void quarantine(const std::vector<QuarantinedWorker>& workers);  // `workers` are stored already
+  // Quarantines workers that were read from the job store, so that they need not be stored again.
+  void quarantine(const std::vector<QuarantinedWorker>& workers);
   // Unloads an ended job whose files are complete on disk: frees its image in memory and its state in the
   // farm; only its files and its record remain. Results that still arrive for it are dropped.
   void unload(JobEntry& entry);
@@ -71,8 +75,10 @@ class FarmDriver {
   const JobFiles& files_;
   ImageWriter& images_;
   ReferenceComparer& comparer_;
-  std::deque<Event> todo_;        // events raised by effects, to be handled next
-  std::vector<EntryPtr> folded_;  // jobs whose images got units from the events that are being handled
+  std::deque<Event> todo_;  // the farm's next events; carrying out an effect may add some
+  // Jobs to whose images run() has added results so far; at its end it checks whether a snapshot of them is
+  // due
+  std::vector<EntryPtr> folded_;
 };
 
 struct Core {
@@ -93,7 +99,7 @@ struct Core {
   const JobViews views;
   Records records;
   Publisher publisher;
-  FarmFigures figures;            // counters; Coordinator::figures() fills in the current values (..._now)
+  FarmFigures figures;            // the counters; Coordinator::figures() sets the other members (..._now)
   std::condition_variable ended;  // notified when a job ends or is removed
 };
 

@@ -1,6 +1,6 @@
-// Denoised images of jobs. Denoising takes seconds, gigabytes and all cores, so one image is denoised at a
-// time. The latest image is kept, since report, image and preview of one state of a job need the same one.
-// Thread-safe.
+// Denoised images of jobs. Denoising an image takes seconds, gigabytes of memory and all cores, so only one
+// image is denoised at a time. The latest denoised image is kept: if a job's report, image and preview are
+// requested in the same state of the job, they all need this image. Thread-safe.
 #pragma once
 
 #include <memory>
@@ -30,11 +30,12 @@ class Denoising {
   // Returns the error of Denoiser::find() if this machine cannot denoise.
   Result<void> available() const;
 
-  // Denoises the film, which must have the AOVs that the denoiser needs. The figures lack the true error,
-  // which needs the job's reference image.
+  // Denoises the film (an image in memory), which must have the AOVs that the denoiser needs. The error in
+  // the figures is estimated from the samples; the true error is not set, because it needs a reference image.
   std::shared_ptr<const Denoised> of(const Film& film);
-  // Returns the denoised image of a job with JobSpec::denoise, and puts its figures into the facts. `made` is
-  // the image if it exists already. Null if the job has no denoising or no samples.
+  // Returns the denoised image of a job with JobSpec::denoise, and puts its figures into `facts` (the values
+  // for the job's report). `made`: this image, if it has been made already. Null if the job was submitted
+  // without denoising or has no samples yet.
   std::shared_ptr<const Denoised> of_job(const Film& film, ReportFacts& facts,
                                          std::shared_ptr<const Denoised> made = nullptr);
 

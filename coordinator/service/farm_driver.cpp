@@ -1,3 +1,7 @@
+// FarmDriver: carries out the effects of the farm (the state machine that decides which worker renders what).
+// A unit is one tile and one round (a range of samples); a lease is a list of units assigned to one worker;
+// to fold a unit is to add its pixel sums (a partial) to the job's image; an audit is a second rendering of a
+// unit by another worker, for comparison.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -28,8 +32,8 @@ void FarmDriver::run(Event first) {
     for (const Effect& effect : farm_.handle(event, clock_.now()))
       std::visit([&](const auto& e) { on(e); }, effect);
   }
-  // Snapshots are taken after all events are handled: a snapshot includes points of the convergence curve,
-  // and these must be queued for writing before it.
+  // Snapshots (the image so far, for a restart) are taken after all events are handled: the points of the
+  // convergence curve up to a snapshot must be queued for writing before the snapshot itself.
   for (const EntryPtr& entry : std::exchange(folded_, {})) images_.snapshot_if_due(core_, entry);
   for (const JobId& id : farm_.take_changed_audits())
     if (const auto entry = core_.jobs.find(id)) images_.keep_audits(core_, entry, farm_.open_audits(id));
@@ -54,7 +58,7 @@ void FarmDriver::unload(JobEntry& entry) {
   run(JobForgotten{entry.stored.id});
 }
 
-// Leases
+// Effects that concern leases
 
 void FarmDriver::on(const Send& e) {
   const auto found = core_.workers.find(e.worker);
@@ -97,15 +101,16 @@ void FarmDriver::on(const UnitsFreed& e) {
     const auto held = entry->leased.find({unit.tile, unit.round});
     if (held != entry->leased.end() && std::erase(held->second, e.worker) > 0 && held->second.empty())
       entry->leased.erase(held);
-    if (e.audit) continue;  // the unit has a result
+    if (e.audit) continue;  // an audited unit has a result already: its tile is not shown as free
     core_.publisher.tile(*entry, unit.tile, entry->grid.rect(unit.tile), "free", round_range(unit.round).s0,
                          e.worker);
   }
 }
 
-// Results
+// Effects that concern results
 
-// The result is in the job's log already, so nothing is stored here. The first result starts the job's clock.
+// Handles an accepted result. It is in the job's log already, so nothing is stored here. The first result
+// starts the job's clock.
 void FarmDriver::on(const RecordUnit& e) {
   const auto entry = core_.jobs.find(e.unit.job);
   if (!entry) return;
@@ -117,8 +122,8 @@ void FarmDriver::on(const RecordUnit& e) {
     entry->stored.totals.began_unix = system_unix_seconds() - entry->elapsed(clock_.now());
 }
 
-// Returns the accepted partial (the encoded pixel sums of one unit) that is to be added to the image. Reads
-// it from the log if it is not in memory, since it arrived before a restart or too many partials wait.
+// Returns the accepted partial (the pixel sums of one unit) that is to be added to the image. If it is not in
+// memory, because it arrived before a restart or because too many partials wait, reads it from the job's log.
 Result<WaitingPartial> FarmDriver::partial_for(JobEntry& entry, const Fold& e) const {
   auto waiting = entry.assembly->take(e.unit.tile, e.unit.round, e.samples);
   if (!waiting) return fail(Errc::internal, "an accepted partial is not at hand");
@@ -143,8 +148,8 @@ void FarmDriver::on(const Fold& e) {
   const auto error =
       waiting ? entry->assembly->fold(e.unit.tile, e.unit.round, *waiting) : tl::unexpected(waiting.error());
   if (!error) {
-    // If the partial cannot be read, the tile gets no further rounds and the job is paused: the image must
-    // never have a wrong pixel.
+    // The partial cannot be read, or not be added. No UnitFolded event is raised, so that nothing more is
+    // added to the tile, and the job is paused: the image must never have a wrong pixel.
     entry->trouble =
         fmt::format("tile {} round {} cannot be folded: {}; restart the coordinator to render it again",
                     e.unit.tile, e.unit.round, error.error().message);
@@ -163,7 +168,8 @@ void FarmDriver::on(const Fold& e) {
   todo_.push_back(UnitFolded{e.unit, e.samples, error->relative.squares});
   const TimePoint end = clock_.now();
   entry->stored.totals.time.merge += seconds(end - begin);
-  // results that are only added again after a restart cause no events
+  // While a restart adds stored results to the image again, no figures count them, and no events are
+  // published.
   if (core_.publisher.quiet()) return;
   failpoint("result-folded");
   if (entry->trace)
@@ -211,7 +217,7 @@ void FarmDriver::on(const ReopenRound& e) {
   if (entry && entry->assembly) entry->assembly->forget_round(e.round);
 }
 
-// Jobs
+// Effects that concern jobs
 
 void FarmDriver::on(const JobPinned& e) {
   const auto entry = core_.jobs.find(e.job);
@@ -237,7 +243,8 @@ void FarmDriver::on(const JobPinned& e) {
 // The state `done` is published and stored only after the final image is written: see ImageWriter.
 void FarmDriver::on(const JobStateChanged& e) {
   const auto entry = core_.jobs.find(e.job);
-  // The record of a removed job must not be written: the job is gone, or another coordinator owns it.
+  // The record of a removed job must not be written: it no longer exists, or it belongs to another
+  // coordinator.
   if (!entry || entry->removed || e.to == JobState::done) return;
   entry->stored.state = e.to;
   entry->stored.stopped.reset();
@@ -279,7 +286,8 @@ void FarmDriver::on(const JobFinished& e) {
   images_.finish(core_, entry);
 }
 
-// Stores the cost of the final image of a job that has ended, and ends its convergence curve.
+// When a job has ended: puts the cost of its final image into the job's totals, ends its convergence curve,
+// and queues the last comparison with the reference image.
 void FarmDriver::end_image(const EntryPtr& entry) {
   JobTotals& totals = entry->stored.totals;
   totals.render_seconds = entry->fold_seconds;
@@ -303,7 +311,7 @@ void FarmDriver::on(const JobFailed& e) {
   core_.publisher.job(*entry);
 }
 
-// Convergence curves
+// Effects that concern convergence curves (error over samples and time)
 
 void FarmDriver::on(const Checkpoint& e) {
   const auto entry = core_.jobs.find(e.job);
@@ -313,8 +321,8 @@ void FarmDriver::on(const Checkpoint& e) {
   entry->assembly->checkpoint_taken(e.rounds);
   entry->stored.totals.doubt = error.verdict;
   entry->stored.totals.few_hits = error.few_hits;
-  // The curve already contains this checkpoint, from before a restart. It may still lack the comparison with
-  // the reference
+  // If the curve has this checkpoint already, from before a restart, no point is added. The point may still
+  // lack the comparison with the reference image; then the comparison is made now.
   if (!entry->points.empty() && entry->points.back().spp >= error.spp) {
     const bool compared = std::none_of(entry->points.begin(), entry->points.end(), [&](const auto& p) {
       return p.spp == error.spp && !p.reference_error;
@@ -322,8 +330,9 @@ void FarmDriver::on(const Checkpoint& e) {
     if (!compared) comparer_.compare(core_, entry, e.rounds, error.spp);
     return;
   }
-  // The errors of this checkpoint are unknown if a tile is being rendered again, since earlier errors of the
-  // other tiles are not kept. Then the curve gets no point.
+  // After a tile was rendered again, a checkpoint may come at which the other tiles have more rounds already.
+  // Their errors after fewer rounds are not kept, so the error of this checkpoint is unknown, and the curve
+  // gets no point.
   if (!exact) return;
   core_.records.add_point(
       entry, {entry->fold_seconds, entry->assembly->costs().until(e.rounds), error.spp, figures_of(error)});
@@ -348,7 +357,7 @@ void FarmDriver::end_curve(const EntryPtr& entry) {
       entry, {entry->fold_seconds, entry->stored.totals.core_seconds, error.spp, figures_of(error)});
 }
 
-// Workers
+// Effects that concern workers
 
 void FarmDriver::on(const WorkerStateChanged& e) {
   log_info(fmt::format("worker={} state={}", e.worker.value, to_string(e.to)), e.why);

@@ -1,3 +1,5 @@
+// ImageWriter: writes the files of jobs. A snapshot is a file with a job's image so far, from which a restart
+// or an extension of the job continues.
 #include "coordinator/service/image_writer.h"
 
 #include <fmt/format.h>
@@ -16,7 +18,8 @@
 namespace ls::coordinator {
 namespace {
 
-// Number of tiles of a snapshot that are copied before the lock is released and taken again
+// Tiles of a snapshot are copied under the lock in groups of this many; between two groups the lock is
+// released for other threads.
 constexpr TileIndex kTilesAtOnce = 64;
 
 std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
@@ -32,7 +35,8 @@ class ImageFile final : public ByteSink {
   AtomicFile& file_;
 };
 
-// Writes the final image. Returns how many values are out of range for the file.
+// Writes the final image. Returns how many values had to be clamped, because they are larger than the file's
+// number format can hold.
 Result<std::uint64_t> write_image(const std::filesystem::path& path, const Film& film,
                                   const ReportFacts& facts, const BlobStore& blobs,
                                   const Denoised* denoised) {
@@ -82,10 +86,10 @@ void ImageWriter::snapshot_if_due(Core&, const EntryPtr& entry) {
   writes_.push([this, entry] { take_snapshot(entry); });
 }
 
-// Takes a snapshot while results are still added to the image. Results that are added to a tile after the
-// tile was copied are added again after a restart. The points of the convergence curve that the snapshot
-// includes must be stored before it; they are queued for writing already, so the snapshot is queued behind
-// them.
+// Takes a snapshot while other threads still add results to the image. Results that are added to a tile after
+// the tile was copied are not in the snapshot; a restart adds them again, from the job's log. The points of
+// the convergence curve up to the snapshot must be stored before it. They are queued for writing already, so
+// the function writes the file under another name and queues its renaming behind them.
 void ImageWriter::take_snapshot(const EntryPtr& entry) {
   const auto done = [this, entry](const Result<void>& written) {
     if (!written) log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
@@ -153,7 +157,8 @@ void ImageWriter::note_check(const EntryPtr& entry, std::uint64_t curve, double 
   StoredJob& job = entry->stored;
   if (entry->removed || entry->unloaded || entry->curve != curve) return;
   if (made.image.rgb.empty()) {
-    // A job that has ended or has no such target any more needs no check
+    // The check is not needed any more if the job has ended, or if its target error does not concern the
+    // denoised layers now.
     if (job.state != JobState::running || job.spec.target_layer != TargetLayer::denoised) return;
     entry->trouble = fmt::format(
         "its target is the error of the denoised layers, which cannot be made: {}; then resume the job",
@@ -186,8 +191,8 @@ void ImageWriter::finish_again(Core&, const EntryPtr& entry) {
   writes_.push([this, entry, number = last_final_] { write_final(entry, number); });
 }
 
-// Denoises the final image of a job before it is written. Runs on the ReferenceComparer's thread, not the
-// writer thread.
+// Denoises the final image of a job before it is written. Runs on the ReferenceComparer's thread, so that the
+// writer thread need not wait for it.
 void ImageWriter::denoise(const EntryPtr& entry, std::uint64_t number) {
   auto core = core_.lock();
   if (entry->finishing != number || !entry->assembly) return;
@@ -256,7 +261,8 @@ Result<void> ImageWriter::write_files(const EntryPtr& entry, const Folded& folde
   facts.clamped_values = *clamped;
   facts.pixels = pixels_sha256(folded.film);
   if (auto done = write_atomically(where / "report.json", bytes_of(report_json(facts))); !done) return done;
-  // The snapshot comes last and must succeed, since an extension of the job continues from it.
+  // The files count as written only if the snapshot is written too, since an extension of the job continues
+  // from the snapshot.
   return write_snapshot(entry, folded);
 }
 

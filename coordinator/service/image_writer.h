@@ -29,9 +29,9 @@ class ImageWriter {
 
   void keep_audits(Core&, const EntryPtr& entry, const std::vector<JobRestored::Audit>& audits);
   void snapshot_if_due(Core&, const EntryPtr& entry);
-  // Starts to denoise the job's film as it is now, at `spp` samples per pixel. Afterwards the error of its
-  // denoised layers is stored and reported to the farm. If denoising fails, the job is paused, with the
-  // reason in JobEntry::trouble.
+  // For a job whose target is the error of the denoised image: starts to denoise the job's film (its image in
+  // memory) as it is now, at `spp` samples per pixel. Afterwards the error of the denoised image is stored
+  // and reported to the farm. If denoising fails, the job is paused, with the reason in JobEntry::trouble.
   void check_denoised(Core&, const EntryPtr& entry, double spp);
   // Starts to write the final image of a job that the farm has finished. The job becomes `done` when the
   // image is written.
@@ -46,8 +46,8 @@ class ImageWriter {
     RoundErrors errors;
     HealthTable health;
   };
-  // These run on the writer thread, except denoise() and note_check(), which run on the thread of the
-  // ReferenceComparer
+  // The following functions run on the writer thread, except denoise() and note_check(), which run on the
+  // thread of the ReferenceComparer.
   void take_snapshot(const EntryPtr& entry);
   Result<SnapshotFile> copy_folded(const EntryPtr& entry);
   Result<void> write_snapshot(const EntryPtr& entry, const Folded& folded);
@@ -68,11 +68,12 @@ class ImageWriter {
   std::uint64_t last_final_ = 0;  // number of the latest request for a final image; guarded by the lock
 };
 
-// Makes the header of a final image, which describes the job. If the image has cryptomattes, the scene is
-// read for their names.
+// Returns the attributes for the header of a final image, which describe the job. If the image has
+// cryptomattes (layers that identify shapes or materials), the scene is read for the names of shapes and
+// materials.
 Provenance provenance_of(const ReportFacts& facts, const BlobStore& blobs);
-// Returns the names for the identifiers of the cryptomattes. Reads the scene if the job has any; empty if
-// reading fails.
+// Returns the names of the shapes and materials that the identifiers in the job's cryptomattes stand for.
+// Reads the scene if the job has cryptomattes. Empty if the job has none, or if the scene cannot be read.
 CryptomatteManifests cryptomatte_manifests_of(const StoredJob& job, const BlobStore& blobs);
 
 }  // namespace ls::coordinator

@@ -1,3 +1,6 @@
+// JobCommands: carries out users' commands on jobs and sequences (jobs with frames; each frame is a job too).
+// To extend a job is to let it render more samples, which is possible even after its end; its image is then
+// loaded from disk again. The farm is the state machine that decides which worker renders what.
 #include "coordinator/service/job_commands.h"
 
 #include <fmt/format.h>
@@ -74,8 +77,8 @@ Result<void> may_wake(double pixels) {
                           pixels, limits::kMaxWokenPixels));
 }
 
-// Returns the frames to which a new target error applies: those that have not ended, and those that ended
-// because they reached a larger target.
+// Returns the frames whose target error is to be changed: frames that have not ended, and frames that ended
+// because they reached a target error larger than the new one.
 Result<std::vector<EntryPtr>> may_retarget(const Farm& farm, const JobId& id,
                                            const std::vector<EntryPtr>& sound, double target_error) {
   std::vector<EntryPtr> chosen;
@@ -101,8 +104,8 @@ Result<std::vector<EntryPtr>> may_retarget(const Farm& farm, const JobId& id,
   return chosen;
 }
 
-// Returns the frames that do not have `spp` samples yet. Some may have them already, if an earlier change was
-// interrupted.
+// Returns the frames that are to be extended to `spp` samples per pixel. Frames that were set to `spp`
+// already are left out: an earlier change of the sequence may have been interrupted after some frames.
 Result<std::vector<EntryPtr>> may_extend(const Farm& farm, const Sequence& sequence, std::uint64_t spp) {
   std::vector<EntryPtr> chosen;
   double woken = 0;
@@ -188,7 +191,7 @@ Result<void> JobCommands::become(Core& core, const EntryPtr& entry, JobState ask
       core.driver.run(JobPaused{id});
     else
       core.records.put(entry);
-  } else if (entry->finishing) {  // its final image could not be written: try this again
+  } else if (entry->finishing) {  // the job's final image could not be written: it is written again
     entry->trouble.clear();
     images_.finish_again(core, entry);
   } else if (state == JobState::paused) {
@@ -201,8 +204,8 @@ Result<void> JobCommands::become(Core& core, const EntryPtr& entry, JobState ask
   return {};
 }
 
-// Applies edit() to the records of the jobs. All are stored in one transaction: either all are stored or
-// nothing is changed.
+// Applies edit() to the records of all these jobs, and stores them in one transaction. If that fails, no
+// record is changed, neither in the store nor in memory.
 template <class Edit>
 Result<void> JobCommands::edit_all(const Entries& jobs, Edit edit) const {
   std::vector<StoredJob> edited;
@@ -261,7 +264,8 @@ Result<void> JobCommands::set_target(Core& core, JobEntry& entry, double target_
                fmt::format("target error {} from now on", target_error));
 }
 
-// Applies an extension (more samples or a tighter target) to the farm and to the stored job.
+// Extends a job (more samples or a smaller target error), in the farm and in its stored record. `possible`:
+// the farm's check of the extension; if it is an error, the job is unloaded again and the error returned.
 Result<void> JobCommands::go_on(Core& core, JobEntry& entry, const Result<void>& possible,
                                 const Event& change, std::string log_line) const {
   const JobState state = entry.stored.state;
@@ -299,8 +303,8 @@ void JobCommands::drop(Core& core, const EntryPtr& entry) const {
   if (!entry->unloaded) core.driver.run(JobForgotten{id});
   core.jobs.remove(entry);
   log_info(fmt::format("job={}", id.value), "removed");
-  // Background writes of the job may still be queued. The folder is removed after them, and so are the files
-  // that they write.
+  // Background writes of the job may still be queued. They would create files in the job's folder again, so
+  // the removal of the folder is queued behind them.
   writes_.push([this, id] {
     (void)store_.remove_job(id);
     files_.discard_folder(id);
@@ -312,7 +316,9 @@ void JobCommands::drop(Core& core, const EntryPtr& entry) const {
 Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Sequence& sequence,
                                           const JobChange& change) const {
   const Farm& farm = core.driver.farm();
-  Entries sound, open, retargeted, extended;  // `sound`: frames whose records can be read
+  // `sound`: frames that could be restored at the start; `open`: those of them that have not ended;
+  // `retargeted` and `extended`: frames that get the new target error, or more samples
+  Entries sound, open, retargeted, extended;
   for (const EntryPtr& frame : sequence.frames) {
     if (!frame->broken.empty()) continue;
     sound.push_back(frame);
@@ -336,7 +342,8 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
       return fail(Errc::failed_precondition,
                   fmt::format("all frames of job {} have ended: it is {}", id.value, to_string(state)));
   }
-  // The farm can check a frame only when it is loaded. All frames are checked before the first is extended.
+  // The farm can check only frames that are loaded. So all frames to be extended are loaded, and all are
+  // checked before the first one is extended.
   for (const EntryPtr& frame : extended) {
     auto possible = restore_.wake(core, *frame);
     if (possible) possible = farm.may_extend(frame->stored.id, *change.spp);
@@ -363,8 +370,8 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
   return {};
 }
 
-// Changes the state of the frames and stores them together. A frame whose final image is being written is
-// left unchanged; if writing has failed, it is repeated.
+// Changes the state of the frames to `asked` and stores them together. A frame whose final image is being
+// written is left unchanged; if that writing has failed and `asked` is `running`, the image is written again.
 Result<void> JobCommands::become_all(Core& core, const Entries& frames, JobState asked) const {
   Result<void> done;
   const auto saved = core.records.put_together([&] {
@@ -377,7 +384,8 @@ Result<void> JobCommands::become_all(Core& core, const Entries& frames, JobState
   return done ? saved : done;
 }
 
-// Open frames are cancelled and kept, as with a single job.
+// If some frames have not ended, cancels these frames and removes nothing, as with a single job. Otherwise
+// removes all frames.
 Result<void> JobCommands::remove_sequence(Core& core, const JobId& id, const Sequence& sequence) const {
   Entries open;
   std::vector<JobId> ids;

@@ -25,10 +25,11 @@ class JobCommands {
         writes_(writes),
         clock_(clock) {}
 
-  // Changes a job, or all frames of a sequence. Frames that have ended change only if they get more samples.
+  // Changes a job, or all frames of a sequence. An ended job or frame renders again only if it gets more
+  // samples or a smaller target error.
   Result<void> change(const JobId& id, const JobChange& change) const;
-  // Removes an ended job, or the ended frames of a sequence, with all results. A job or frame that has not
-  // ended is cancelled and kept.
+  // Removes an ended job, or a sequence whose frames have all ended, with all results. If the job or some
+  // frames have not ended, these are cancelled, and nothing is removed. The id of a single frame is an error.
   Result<void> remove(const JobId& id) const;
   // Changes the state of a job. The caller must have checked that the change is possible.
   Result<void> become(Core& core, const EntryPtr& entry, JobState asked) const;

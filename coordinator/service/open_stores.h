@@ -13,8 +13,9 @@ namespace ls::coordinator {
 // Checks the value of --store: sqlite, or a redis:// address.
 Result<void> check_store(const std::string& store);
 
-// Opens the job store that `store` names: SQLite in the folder `data`, or also Redis. With `shared` other
-// coordinators use the same Redis; `node` is this coordinator's name among them.
+// Opens the job store that `store` names: with `sqlite`, an SQLite file in the folder `data`; with a redis://
+// address, a Redis server together with that file. `shared`: other coordinators use the same Redis server;
+// `node` is this coordinator's name among them.
 Result<std::unique_ptr<JobStore>> open_jobs(const std::string& store, const std::filesystem::path& data,
                                             bool shared, const std::string& node);
 

@@ -26,7 +26,7 @@ std::string log_text(const std::vector<LogLine>& lines) {
   return text;
 }
 
-// Sorts the lines by time and keeps the latest `most`.
+// Sorts the lines by time and keeps only the latest `most` lines.
 void shorten(std::vector<LogLine>& lines, std::size_t most) {
   std::stable_sort(lines.begin(), lines.end(),
                    [](const LogLine& a, const LogLine& b) { return a.unix_time < b.unix_time; });
@@ -35,7 +35,7 @@ void shorten(std::vector<LogLine>& lines, std::size_t most) {
 
 }  // namespace
 
-// Returns the job's current film (its image) and facts.
+// Returns the job's current image in memory (the film) and the values for its report (the facts).
 Result<Pictures::Picture> Pictures::picture(const JobId& id) const {
   auto core = core_.lock();
   const auto entry = core->jobs.usable(id);
@@ -140,8 +140,8 @@ Result<std::string> Pictures::report_json(const JobId& id) const {
   return coordinator::report_json(facts);
 }
 
-// Returns the log lines of a job, or of all frames of a sequence. If there are more than kLogLinesKept, the
-// oldest are left out.
+// Returns the log lines of a job, or those of all frames of a sequence. If the frames have more than
+// kLogLinesKept lines together, the oldest lines are left out.
 Result<std::string> Pictures::log(const JobId& id) const {
   std::vector<JobId> jobs;
   {
@@ -163,8 +163,8 @@ Result<std::string> Pictures::log(const JobId& id) const {
   return log_text(all);
 }
 
-// Returns the report of a sequence. Its pixels_sha256 is the digest of the frames' pixel digests, or null if
-// some frame is not done.
+// Returns the report of a sequence. Its member pixels_sha256 is a digest over the pixel digests of all
+// frames, or null if some frames are not done.
 std::string Pictures::sequence_report(const JobView& view) const {
   static constexpr const char* kKept[] = {"seed",
                                           "scene",

@@ -27,8 +27,9 @@ class Pictures {
   Result<std::vector<std::byte>> image_exr(const JobId& id) const;
   Result<std::vector<std::byte>> image_png(const JobId& id, double exposure, bool denoised) const;
   Result<std::vector<std::byte>> thumbnail_png(const JobId& id) const;
-  // The tone-mapped picture at the finest mip level at which it has at most `most_side` pixels on a side:
-  // 8 bits of R, G and B of each pixel, row by row. Pixels without samples are black.
+  // A job's tone-mapped picture for screens, reduced to the finest mip level at which neither side has more
+  // than `most_side` pixels. `rgb` holds 8 bits each of R, G and B for every pixel, row by row. Pixels
+  // without samples are black.
   struct Shown {
     FrameSize size;
     std::vector<std::uint8_t> rgb;
@@ -44,7 +45,8 @@ class Pictures {
   Result<std::string> report_json(const JobId& id) const;
   // The log of a sequence has the lines of all frames, ordered by time.
   Result<std::string> log(const JobId& id) const;
-  // Returns the path of the file `name` of a done job; empty if there is none.
+  // Returns the path of the file `name` (image.exr or report.json) in the folder of a done job. Empty if the
+  // job is not done, or if everything is in memory.
   std::filesystem::path final_file(const JobId& id, const std::string& name) const;
 
  private:
@@ -52,10 +54,10 @@ class Pictures {
     Film film;
     ReportFacts facts;
   };
-  // The denoised image of a job for viewers. The image of a running job is reused for a multiple of the time
-  // that denoising took (kDenoisedAge), so several requests get the same image.
+  // The denoised image that clients requested last. While its job runs, requests get this image until its age
+  // is kDenoisedAge times the time that denoising took, although the job's image changes meanwhile.
   struct DenoisedView {
-    std::string key;  // names the image
+    std::string key;  // the job's id while it runs, then JobFiles::image_version()
     TimePoint made{};
     Duration cost{};
     std::shared_ptr<const Denoised> image;  // null: no samples yet

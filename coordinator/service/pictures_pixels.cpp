@@ -1,4 +1,5 @@
-// Pixels of one layer of an image, as numbers: Pictures::layers_json() and pixels().
+// The functions of Pictures that return pixels of one layer of an image as numbers (layers_json(), pixels()),
+// and those that return small tone-mapped pictures (shown(), thumbnail_png()).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,7 +17,8 @@ namespace {
 
 using nlohmann::json;
 
-// Returns the names of a cryptomatte's identifiers; null if they are unknown.
+// Returns the names that the identifiers of a cryptomatte (a layer that identifies shapes or materials) stand
+// for, read from the JSON text `manifest`. Null if the text is no JSON object, so that the names are unknown.
 json names_of_identifiers(const std::string& manifest) {
   json names = json::parse(manifest, nullptr, false);
   return names.is_object() ? names : json();
@@ -43,9 +45,9 @@ std::vector<std::byte> pixels_of_rows(const std::vector<TileRow>& rows, const Ti
   return mosaic.bytes();
 }
 
-constexpr int kThumbnailSide = 160;  // pixels
+constexpr int kThumbnailSide = 160;  // a thumbnail has at most this many pixels on each side
 
-// Returns the mip level at which the image has at most `most_side` pixels on a side.
+// Returns the finest mip level at which neither side of the image has more than `most_side` pixels.
 int level_for(FrameSize frame, int most_side) {
   int level = 0;
   while (std::max(level_size(frame, level).width, level_size(frame, level).height) > most_side) ++level;
@@ -142,8 +144,9 @@ Result<std::vector<std::byte>> Pictures::pixels(const JobId& id, const PixelsAsk
     return mosaic.bytes();
   }
   if ((*entry)->assembly) {
-    // Only the requested rows of tiles are copied (a cheap copy, which shares their memory with the film). So
-    // the film's other tiles can be freed while these are read.
+    // Copies only the rows of tiles that the rectangle touches. The copy is cheap, because it shares the
+    // memory of these tiles with the film. So the film can free its other tiles while the copied ones are
+    // read.
     std::vector<TileRow> rows;
     for (int row = wanted.y0 / grid.tile; row * grid.tile < wanted.y1; ++row)
       rows.push_back({row, (*entry)->assembly->film().row(row)});
@@ -158,7 +161,7 @@ Result<std::vector<std::byte>> Pictures::pixels(const JobId& id, const PixelsAsk
                  : std::shared_ptr<StoredLayers>();
   });
   if (image) return image->pixels(*layer, asked.level, asked.rect);
-  // The job has no image: the answer has no values
+  // The job has no image yet: all pixels of the answer are without samples.
   return LayerMosaic(*layer, grid.frame, asked.level, asked.rect).bytes();
 }
 

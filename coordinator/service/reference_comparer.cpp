@@ -11,8 +11,8 @@
 
 namespace ls::coordinator {
 namespace {
-// At most this many comparisons of checkpoints wait, since each holds a picture. Above this number further
-// checkpoints are not compared; the final image always is.
+// At most this many comparisons of checkpoints wait, since each holds a picture in memory. While so many
+// wait, new checkpoints are not compared. The final image is always compared.
 constexpr std::size_t kMaxComparisons = 64;
 
 // True if FLIP (the perceived error) should be computed for this checkpoint. It takes about a second per
@@ -50,8 +50,8 @@ void ReferenceComparer::compare_last(Core&, const EntryPtr& entry) {
   });
 }
 
-// Returns the job's reference image. Only the one used last is kept in memory, so waiting comparisons hold no
-// references.
+// Returns the job's reference image; null if it cannot be read. Only the reference image that was used last
+// is kept in memory. Comparisons that wait do not hold theirs; it is read when their turn comes.
 std::shared_ptr<const Reference> ReferenceComparer::reference_of(const StoredJob& job) {
   const Digest& digest = *job.spec.reference;
   if (reference_ && reference_digest_ == digest && reference_->size == job.settings.size) return reference_;

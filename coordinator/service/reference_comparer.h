@@ -23,10 +23,10 @@ class ReferenceComparer {
  public:
   ReferenceComparer(Guarded<Core>& core, const BlobStore& blobs) : core_(core), blobs_(blobs) {}
 
-  // Queues the comparison of a checkpoint: the one just taken, or one from before a restart that was not
-  // compared then.
+  // Queues the comparison of a checkpoint: of the checkpoint just taken or, after a restart, of an earlier
+  // one whose comparison was not made or stored before the restart.
   void compare(Core&, const EntryPtr& entry, std::span<const RoundIndex> rounds, double spp);
-  // Queues the comparison of the final image, so that the report is complete.
+  // Queues the comparison of the final image. Its result is a part of the job's report.
   void compare_last(Core&, const EntryPtr& entry);
   // Runs `task` on the comparing thread, after the comparisons that were queued before.
   void run_afterwards(std::function<void()> task) { tasks_.push(std::move(task)); }

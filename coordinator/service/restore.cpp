@@ -1,3 +1,5 @@
+// Restore and Takeover: add stored jobs to the farm (the state machine that decides which worker renders
+// what) again. A job's image so far comes from its snapshot file and from its log of accepted results.
 #include "coordinator/service/restore.h"
 
 #include <fmt/format.h>
@@ -40,7 +42,7 @@ void set_aside(JobEntry& entry, const Error& why) {
   entry.stored.state = JobState::failed;
   entry.stored.error = entry.broken;
   entry.free_image();
-  // the trace is not ended here: it continues when the job has been repaired
+  // The job's trace span is not ended here: it continues after a restart with the job repaired.
   entry.trace.reset();
   log_error(fmt::format("job={}", entry.stored.id.value), entry.broken);
 }
@@ -102,9 +104,9 @@ Result<void> Restore::take_up(Core& core, JobEntry& entry,
   if (auto loaded = load(core, entry); !loaded) return loaded;
   const bool begins_again =
       entry.assembly->film().samples() == 0 && (!entry.log || entry.log->found().empty());
-  // If a quarantined worker's results are in the log, some pixels were wrong: the points of the curve and the
-  // checks of the denoised layers describe wrong pixels and are dropped. If the image is only lost, the
-  // checks stay, since rendering again gives the same pixels.
+  // If the log has results of a quarantined worker, the points of the convergence curve and the checks of the
+  // denoised layers may describe wrong pixels: both are dropped. If the image is only lost, the curve is
+  // dropped, since it will be made again; the checks are kept, since rendering again gives the same pixels.
   if (has_quarantined(core.driver.farm(), entry))
     core.records.forget_wrong_pixels(entry);
   else if (begins_again)
@@ -141,8 +143,9 @@ Result<void> Restore::load(Core& core, JobEntry& entry) const {
     if (!log) return tl::unexpected(log.error());
     entry.log = std::move(*log);
   }
-  // The snapshot may contain results of a worker that was quarantined later. Then the image is summed up
-  // again from the results of the other workers.
+  // If the job has results of a worker that was quarantined later, the snapshot may contain them. So it is
+  // not used: the image begins without samples, and the results of the other workers are added again from the
+  // log.
   if (has_quarantined(core.driver.farm(), entry))
     entry.begin_image();
   else
@@ -172,8 +175,10 @@ void Restore::take_up_records(Core& core, JobEntry& entry, JobRestored& event) c
   const std::uint64_t spp = entry.stored.spp.value_or(kMaxSppWithoutLimit);
   JobTotals& totals = entry.stored.totals;
   totals.core_seconds = 0;
-  // Units that the loop has counted. A unit of a full round is identified by its code alone, since there may
-  // be millions; a unit of a truncated round by its code and the end of its sample range.
+  // The units (one tile and one round of samples) whose results the loop below has counted, since the log may
+  // have several results of a unit. A unit of a full round is identified by its code alone, which needs
+  // little memory for millions of units; a unit of a truncated round by its code and the end of its sample
+  // range.
   std::unordered_set<UnitCode> seen;
   std::set<std::pair<UnitCode, std::uint64_t>> seen_cut;
   seen.reserve(entry.log->found().size());
@@ -264,7 +269,7 @@ void Takeover::take_over(Inheritance inheritance) {
     return;
   }
   if (core->jobs.find(id)) return;
-  // A folder that exists here is outdated: it is from an earlier time at which this coordinator owned the job
+  // If there is a folder of the job here, it is outdated: this coordinator owned the job at an earlier time.
   files_.remove_folder(id);
   restore_.reopen_if_image_is_lost(job);
   const auto entry = restore_.add(*core, std::move(job), missing);

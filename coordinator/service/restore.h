@@ -25,7 +25,7 @@ class Restore {
   // Restores all jobs. A job that cannot be restored is reported and left unchanged on disk; the others
   // continue.
   Result<void> restart(Core& core) const;
-  // If the image of a done job is lost, sets the job back so that it is rendered again.
+  // If the image of a done job is lost, sets the job back to `queued`, so that it is rendered again.
   void reopen_if_image_is_lost(StoredJob& job) const;
   // Adds a stored job. `missing` lists the blobs that it needs but the store lacks; the job waits for them.
   EntryPtr add(Core& core, StoredJob job, const Result<std::vector<BlobRef>>& missing) const;
@@ -45,9 +45,9 @@ class Restore {
   const Clock& clock_;
 };
 
-// Several coordinators on one store: takes over jobs from a coordinator that is gone, and drops jobs that
-// another one has taken over (store/redis/redis_members.h). Both happen on the writer thread, after earlier
-// writes of these jobs.
+// Used if several coordinators share a job store: takes over the jobs of a coordinator that is gone, and
+// drops jobs that another coordinator has taken over from this one (store/redis/redis_members.h). Both happen
+// on the writer thread, after the earlier writes of these jobs.
 class Takeover {
  public:
   Takeover(Guarded<Core>& core, JobStore& store, const JobFiles& files, const BlobStore& blobs,
@@ -60,13 +60,14 @@ class Takeover {
         writes_(writes),
         clock_(clock) {}
 
-  // Takes over jobs of coordinators that are gone, and drops those that another coordinator owns now.
+  // Asks the job store which jobs have changed their coordinator, and queues their takeover or removal on the
+  // writer thread.
   void look_for_moved_jobs();
 
  private:
   struct Inheritance {
     JobStore::Inherited job;
-    TimePoint again{};  // time of the next attempt
+    TimePoint again{};  // time of the next attempt, if an earlier one failed
   };
   void take_over(Inheritance inheritance);
   void let_go(const JobId& id);

@@ -1,3 +1,6 @@
+// ResultPipeline: handles results that workers send. A result contains the pixel sums of one unit (one tile
+// and one round of samples). The farm is the state machine that decides which worker renders what; it also
+// decides whether a result is needed.
 #include "coordinator/service/result_pipeline.h"
 
 #include <fmt/format.h>
@@ -13,13 +16,14 @@
 namespace ls::coordinator {
 namespace {
 
-// While more background writes than this wait for the disk, no results are committed
+// While more background writes than this wait for the disk, no results are made durable.
 constexpr std::size_t kMaxBackgroundWrites = 4096;
 
 using Verdict = Wanted::Verdict;
 
-// Sets implausible times reported by a worker to 0, since their sums go into records that must stay readable.
-// NaN and infinity are rejected with the result (verify_result).
+// Sets implausible times that a worker reported to 0: sums of these times are stored in the job's record, and
+// a huge value would make the record unreadable. A result whose cpu_seconds are negative or NaN is rejected
+// later (verify_result).
 void drop_impossible_times(UnitResult& result) {
   if (result.cpu_seconds > kMostUnitSeconds) result.cpu_seconds = 0;
   for (double* part : {&result.times.load, &result.times.build, &result.times.transfer, &result.times.idle,
@@ -91,8 +95,9 @@ void ResultPipeline::commit_loop(const std::stop_token& token) {
   }
 }
 
-// Makes a batch of results durable, with one sync for each log file, and passes them to the farm. While the
-// disk syncs one batch, results for the next one arrive, so a result waits for at most two syncs.
+// Makes a batch of results durable, with one sync for each log file, and passes the results to the farm.
+// While the disk syncs one batch, the next batch collects results, so a result waits for the syncs of at most
+// two batches.
 void ResultPipeline::commit(std::vector<Checked> batch) {
   std::vector<Stored> stored = prepare(batch);
   append(batch, stored);
@@ -100,8 +105,8 @@ void ResultPipeline::commit(std::vector<Checked> batch) {
     const auto core = core_.lock();
     for (std::size_t i = 0; i < batch.size(); ++i) conclude(*core, batch[i], stored[i]);
   }
-  // release() may run waiting requests on this thread before it returns, so it must not be called under the
-  // lock.
+  // release() may call the functions of results that wait for memory, on this thread. These functions take
+  // the lock, so release() is called without it.
   for (const Checked& item : batch) budget_.release(item.arrived.bytes);
 }
 
@@ -119,12 +124,13 @@ std::vector<ResultPipeline::Stored> ResultPipeline::prepare(const std::vector<Ch
     const Wanted wanted = farm.wanted(a.result.unit, a.from->numeric_class);
     const bool accept = wanted.verdict == Verdict::yes;
     const bool sound = !farm.quarantined(a.from->worker) && std::holds_alternative<Partial>(item.verified);
-    // The class is stored before the result, so that the log never has results of a class that the record
-    // does not name.
+    // The first result decides the job's numeric class (machines that compute the same bits). The class is
+    // stored in the job's record before any result is stored in the job's log. So the record always states
+    // the class of the results in the log.
     if (accept && sound && !wanted.pinned)
       core->driver.run(ClassChosen{a.result.unit.job, a.from->numeric_class});
-    // A job that accepts a result of a fake worker (which invents pixels, for tests) is marked as fake,
-    // whatever numeric class the worker claims.
+    // A job that accepts a result of a fake worker (which invents pixels, for tests) is marked as fake. The
+    // numeric class cannot show this, since a fake worker may claim any class.
     if (a.from->fake && accept && !std::exchange(a.job->stored.fake, true)) a.job->pin_unsaved = true;
     if (const auto saved = core->records.put_pin(a.job); !saved) stored.error = saved.error();
     if (const auto saved = core->records.put_quarantined(); !saved) stored.error = saved.error();
@@ -181,7 +187,7 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
   core.records.set_trouble("");
   const Wanted wanted = core.driver.farm().wanted(r.unit, a.from->numeric_class);
   const bool accepted = wanted.verdict == Verdict::yes;
-  // this copy is not in the log: the farm did not need it when storing began
+  // True if the result was not stored, because the farm did not need it when storing began.
   const bool lost = entry.log && !place;
   if (accepted && wanted.samples == a.expected.samples && !lost) {
     ++core.figures.accepted;
@@ -196,10 +202,12 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
           {std::move(std::get<Partial>(item.verified)), place, a.expected.samples, r.digest, r.health, a.at});
     }
   }
-  // Reports the result to the farm, which compares duplicates. Two kinds of results are only removed from
-  // their lease. One is a copy that the farm needs now but that is not in the log (`lost`). The other is a
-  // result of another numeric class than the job's: the farm would take it for one of the worker's present
-  // class, which may be the job's if the worker has joined again meanwhile.
+  // Reports the result to the farm, which compares it with other results of the unit. But two kinds of
+  // results must not count as accepted, and the farm only learns that the worker no longer works on the unit.
+  // The first is a result that the farm needs now but that is not in the log (`lost`). The second is a result
+  // of another numeric class than the job's: the farm knows only the worker's present class, and if the
+  // worker has joined again with the job's class meanwhile, the farm would take the result for one of the
+  // job's class.
   if ((accepted && lost) || wanted.verdict == Verdict::other_class)
     core.driver.run(LeaseCameBack{a.from->worker, {r.lease, {r.unit}}});
   else

@@ -25,10 +25,10 @@ class ResultPipeline {
   ResultPipeline(Guarded<Core>& core, BackgroundWrites& writes, const Clock& clock)
       : core_(core), writes_(writes), clock_(clock) {}
 
-  // Takes a result. Calls `next` when the worker's next message may be read: when this result was dropped, or
-  // when there is room for it.
+  // Takes a result that a worker sent. Calls `next` when the worker's next message may be read: as soon as
+  // this result is dropped or gets room in memory.
   void receive(const std::shared_ptr<Connection>& from, UnitResult result, std::function<void()> next);
-  void close() { budget_.close(); }  // after this, no `next` is called
+  void close() { budget_.close(); }  // afterwards no `next` is called any more
   void put_figures(FarmFigures& figures) const;
 
   void verify_loop(const std::stop_token& token);
@@ -40,18 +40,18 @@ class ResultPipeline {
     UnitResult result;
     EntryPtr job;
     UnitHeader expected;
-    std::size_t bytes = 0;  // bytes requested from budget_
+    std::size_t bytes = 0;  // memory in bytes that it takes from budget_
     TimePoint at{};         // time of arrival
   };
   struct Checked {
     Arrived arrived;
     Verified verified;
-    TimePoint began{};   // when verification began
-    double seconds = 0;  // time spent on it
+    TimePoint began{};   // time at which verification began
+    double seconds = 0;  // duration of verification
   };
   // A result on its way into the log. prepare() decides whether it is stored; append() stores it.
   struct Stored {
-    std::shared_ptr<PartialLog> log;         // the log to store it in; null: it is not stored
+    std::shared_ptr<PartialLog> log;         // log in which the result is stored; null: it is not stored
     double at_seconds = 0;                   // time of storing, in seconds on the job's clock
     std::uint64_t resumes = 0;               // the job's JobEntry::resumes when storing began
     std::optional<PartialLog::Place> place;  // set by append()

@@ -1,6 +1,7 @@
 // Videos of sequences, made on request: ffmpeg gets the tone-mapped pictures of the frames that are done. One
 // video is made at a time, on a thread of its own; a few more requests wait. A video lies in the folder of
-// its sequence's first frame and is removed with it. Requests are forgotten at a restart. Thread-safe.
+// its sequence's first frame and is removed with that frame. When the coordinator restarts, it forgets all
+// requests and videos. Thread-safe.
 #pragma once
 
 #include <filesystem>
@@ -42,7 +43,7 @@ class Videos {
   const JobFiles& files_;
   const Pictures& pictures_;
   const Clock& clock_;
-  mutable std::mutex mutex_;  // taken after the lock of the core
+  mutable std::mutex mutex_;  // a thread that needs both locks takes core_ first
   std::map<JobId, Video> videos_;
   WorkQueue<JobId> waiting_;
 };

@@ -105,7 +105,7 @@ Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello
   if (worker.connection) worker.connection->close();
   worker.hello = hello;
   worker.hello.join_token.clear();
-  worker.hello.blobs_held.clear();  // freed here; the farm gets those of `hello`
+  worker.hello.blobs_held.clear();  // not needed in the table; the farm gets the list of `hello`
   worker.connection = connection;
   worker.last_seen = clock_.now();
   connection->sink->send(Welcome{id, connection->epoch});
@@ -146,14 +146,16 @@ void WorkerSessions::handle(Core& core, Connection& from, FromWorker message) {
   if (!from.open || found == core.workers.end()) return;
   found->second.last_seen = clock_.now();
   std::visit(
-      // receive() handles UnitResult, and connect() WorkerHello; a second WorkerHello is rejected earlier
+      // UnitResult and WorkerHello never come here: receive() handles the former, connect() the latter, and a
+      // second WorkerHello on a stream is rejected before.
       overloaded{[](const UnitResult&) {}, [](const WorkerHello&) {},
                  [&](const WorkerProgress& m) { note_progress(core, from, found->second, m); },
                  [&](const UnitFailure& m) {
-                   // The acknowledgement is sent first: if it came later, the worker could mistake it for the
-                   // answer to its next attempt.
+                   // The acknowledgement is sent first, since run() may lease the unit to this worker again.
+                   // If the acknowledgement came after that lease, the worker could mistake it for the answer
+                   // to its new attempt.
                    from.sink->send(ResultAck{m.unit, std::nullopt});
-                   if (!core.jobs.find(m.unit.job)) return;  // unknown jobs have no log
+                   if (!core.jobs.find(m.unit.job)) return;  // a job that is not known has no log
                    core.records.log(m.unit.job, fmt::format("tile {} round {} failed on {}: {}", m.unit.tile,
                                                             m.unit.round, from.worker.value, m.reason));
                    core.driver.run(UnitFailed{from.worker, m});

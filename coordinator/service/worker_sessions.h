@@ -14,9 +14,11 @@ class WorkerSessions {
   struct Options {
     JoinCheck may_join;
     bool allow_fake = false;
-    std::string version;       // version of the workers that may begin jobs; empty: any
+    // Only workers of this version get units of jobs that are not yet pinned to a numeric class (machines
+    // that compute the same bits); empty: workers of all versions do
+    std::string version;
     std::uint64_t start = 0;   // number of this start of the coordinator
-    std::string lease_prefix;  // first part of the farm's lease ids
+    std::string lease_prefix;  // the ids of the farm's leases begin with this text
   };
   WorkerSessions(Guarded<Core>& core, ResultPipeline& results, Options options, const Clock& clock)
       : core_(core),
@@ -29,8 +31,8 @@ class WorkerSessions {
   // Reports to the farm the workers whose results wait for memory in the coordinator, so that their leases
   // are renewed.
   void report_held_back(Core& core) const;
-  // Sessions may outlive this object. After abandon() their functions do nothing; close() closes their
-  // streams.
+  // Sessions may outlive this object. After abandon() the functions of all sessions do nothing; close()
+  // closes the streams of all workers.
   void abandon() { *alive_ = false; }
   void close();
 
@@ -45,7 +47,7 @@ class WorkerSessions {
   ResultPipeline& results_;
   const Options options_;
   const Clock& clock_;
-  std::uint64_t last_epoch_;  // guarded by the lock
+  std::uint64_t last_epoch_;  // number of the latest stream of any worker; guarded by the lock of core_
   std::shared_ptr<std::atomic<bool>> alive_ = std::make_shared<std::atomic<bool>>(true);
 };
 

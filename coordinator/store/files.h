@@ -32,7 +32,8 @@ class File {
   int fd_ = -1;
 };
 
-// Makes an error from errno: a full disk is resource_exhausted, a missing file not_found.
+// Makes an error from errno. A full disk becomes resource_exhausted, a missing file not_found, a forbidden
+// access permission_denied; most others become unavailable.
 Error errno_error(std::string_view what, const std::filesystem::path& path);
 
 Result<void> make_folder(const std::filesystem::path& folder);  // also creates its parents

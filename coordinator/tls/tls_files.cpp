@@ -27,8 +27,8 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxBytes = 1u << 20;
 
-// The certificates of a farm: its own certificate authority, and the certificates that it signs. Keys are on
-// P-256, signatures ECDSA-SHA256. Times are seconds since 1970.
+// The certificates of a farm: its own certificate authority, and the certificates that this authority signs.
+// All keys are on the curve P-256, and all signatures are ECDSA with SHA-256. Times are seconds since 1970.
 
 struct Certificate {  // texts in PEM format
   std::string cert, key;
@@ -140,7 +140,7 @@ enum class Use { server, client };
 struct Wanted {
   std::string common_name;
   Use use = Use::client;
-  std::vector<std::string> names;  // only for a server: its host names and addresses
+  std::vector<std::string> names;  // host names and addresses of a server; empty for a client
 };
 
 // Makes a new certificate authority, valid for kAuthorityDays from `now` on.

@@ -56,7 +56,7 @@ json to_value(const DenoisedCheck& c) {
       {"spp", number(c.spp)}, {"relmse", number(std::max(0.0, c.relmse))}, {"at_most", number(c.at_most)}};
 }
 
-// The value "share" is null if no workers are connected.
+// In the result, "share" is null if no workers are connected.
 json to_value(const ClassShare& s) {
   return {{"workers", s.workers},
           {"of_workers", s.of_workers},
@@ -95,7 +95,7 @@ json to_value(const JobView& v) {
                                                    {"seconds", number(*v.eta_with_more)},
                                                    {"ci95", interval(v.eta_with_more_ci95)}}
                                             : json()},
-          // Older names of the same values, for clients of earlier versions.
+          // The same values under their earlier names, for clients of earlier versions.
           {"eta_with_8_more", number(v.eta_with_more)},
           {"eta_with_8_more_ci95", interval(v.eta_with_more_ci95)},
           {"error", text_or_null(v.error)},
@@ -252,7 +252,8 @@ std::optional<FrameId> frame_of(const JobId& job) {
   const auto number = parse_number<std::uint32_t>(std::string_view(job.value).substr(at + kMark.size()));
   if (!number || *number > kMaxFrameNumber) return std::nullopt;
   const FrameId id{{job.value.substr(0, at)}, *number};
-  // Only the exact form that frame_job() makes is accepted: "-frame07" is not a frame.
+  // Accepts only ids that frame_job() makes: an id that ends in "-frame07" is not a frame's, since
+  // frame_job() writes no leading zeros.
   return frame_job(id.sequence, id.frame) == job ? std::optional(id) : std::nullopt;
 }
 

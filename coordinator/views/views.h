@@ -32,19 +32,20 @@
 namespace ls::coordinator {
 
 // How the time of a job was spent, in core seconds of the workers (`merge`: of the coordinator). These totals
-// are stored now and then: if the coordinator is killed, all but `render` lose what was added since.
+// are stored only from time to time: if the coordinator is killed, what was added to them since is lost.
+// `render` is not affected, because it is computed again from the stored results.
 struct TimeSplit {
   double load = 0;      // fetching files
   double build = 0;     // parsing files, building worlds
   double render = 0;    // CPU time of units (rounds of tiles): JobView::core_seconds
   double transfer = 0;  // packing results
-  double merge = 0;     // coordinator: verifying results and adding them to the image
-  double idle = 0;      // worker threads between two units of the job
+  double merge = 0;     // on the coordinator: verifying results and adding them to the image
+  double idle = 0;      // time of worker threads between two units of the job
   void add(const TimeSplit& o);
   bool operator==(const TimeSplit&) const = default;
 };
 
-// The name in JSON of each part, for writing and reading
+// A part of TimeSplit and its name in JSON
 struct TimePart {
   const char* name;
   double TimeSplit::*seconds;
@@ -57,7 +58,7 @@ inline void TimeSplit::add(const TimeSplit& o) {
   for (const TimePart& part : kTimeParts) this->*part.seconds += o.*part.seconds;
 }
 
-// JobView::eta_with_more is the prediction for this many workers more
+// Number of additional workers for which JobView::eta_with_more is predicted
 inline constexpr int kMoreWorkers = 8;
 
 // Estimated errors of an image: at a checkpoint, or at the end of the job
@@ -66,14 +67,15 @@ struct ErrorFigures {
   double relmse = 0;
   // 95 % interval for the actual relMSE of this image
   double relmse_lo = 0, relmse_hi = 0;
-  // The same for the RMSE; both 0: unknown
+  // 95 % interval for the actual RMSE of this image; both 0: unknown
   double rmse_lo = 0, rmse_hi = 0;
 };
-// Error against a reference image, from which the reference's own noise is subtracted
-// (common/image/reference/reference.h)
+// Error of an image against a reference image. The error that the reference's own noise causes is subtracted
+// (common/image/reference/reference.h).
 struct ReferenceError {
   double rmse = 0, relmse = 0;
-  // Mean HDR-FLIP (common/image/reference/flip.h); computed when the samples have doubled, and at the end
+  // Mean HDR-FLIP, a perceived error (common/image/reference/flip.h). Computed only each time the number of
+  // samples has doubled, and at the job's end; nullopt: not computed
   std::optional<double> flip;
   std::optional<double> mse_stderr = {}, relmse_stderr = {};
   // True if the error is too small to be distinguished from the reference's own noise. Clients then show this
@@ -83,8 +85,8 @@ struct ReferenceError {
   bool operator==(const ReferenceError&) const = default;
 };
 struct ConvergencePoint {
-  double seconds = 0;       // seconds since the first ray
-  double core_seconds = 0;  // CPU seconds of workers for these samples
+  double seconds = 0;       // time of the checkpoint, in seconds since the job's first ray
+  double core_seconds = 0;  // CPU seconds that workers spent on the job until then
   double spp = 0;
   ErrorFigures error;
   // nullopt: the job has no reference, the comparison is not finished, or a restart of the coordinator
@@ -113,8 +115,8 @@ struct FrameView {
 struct FramesView {
   FrameRange range;
   std::uint32_t total = 0, done = 0, running = 0, failed = 0, cancelled = 0;
-  // The frame to show: the first one that is being rendered, else the last one with finished units, else the
-  // first
+  // Number of the frame to show: the first frame that is being rendered; if there is none, the last frame
+  // with finished units; if there is none, the first frame
   std::uint32_t current = 0;
   std::vector<FrameView> all;  // all frames, ascending; filled in by Coordinator::job() only
 };
@@ -122,64 +124,75 @@ struct FramesView {
 struct JobView {
   JobId id;
   std::string name;  // name of the scene file, for display
-  // The user who submitted it, by token. Empty: the administrator, or the job was stored before users existed
+  // Name of the user whose token submitted the job. Empty: the administrator submitted it, or it was stored
+  // by a version without users.
   std::string owner;
   JobState state = JobState::queued;
-  std::string stopped;    // once done or cancelled: "spp", "error", "time" or "user"
-  double progress = 0;    // 0..1
-  std::uint64_t spp = 0;  // samples per pixel: requested, or the limit
+  // What ended the job: "spp" (it has its samples), "error" (it reached its target error), "time" (its time
+  // was used up) or "user" (a user cancelled it). Empty: it is not done or cancelled, or the frames of a
+  // sequence ended for different reasons.
+  std::string stopped;
+  double progress = 0;    // from 0 to 1
+  std::uint64_t spp = 0;  // samples per pixel that were requested; if none were, the limit
   bool spp_asked = true;  // false: no number of samples was requested; a target error or a time ends the job
-  std::optional<double> target_error;  // relMSE at which the job is to end, if requested
-  // the layers whose relMSE target_error limits
+  std::optional<double> target_error;  // relMSE at which the job ends; nullopt: none was requested
+  // The layers to which target_error applies
   TargetLayer target_layer = TargetLayer::raw;
-  // the latest check of the denoised layers' error, if target_error limits that error
+  // The latest check of the denoised layers' error; nullopt: target_error does not apply to these layers, or
+  // no check was made yet
   std::optional<DenoisedCheck> denoised_check;
-  bool denoise = false;  // its image also gets denoised layers
+  bool denoise = false;  // true: its image also gets denoised layers
   double spp_done = 0;   // samples per pixel so far, mean over all pixels
   std::optional<ErrorFigures> error_now;
-  // Error against the reference, at the last checkpoint that was compared
+  // Error against the reference image, at the last checkpoint that was compared with it; nullopt: none was
   std::optional<ReferenceError> reference_error;
   // True if the reference and the image share scene and seed. They then share their noise as well, so
   // reference_error is meaningless (common/image/reference/reference.h: same_noise())
   bool reference_same_seed = false;
-  std::optional<ConvergenceStatus> convergence_status;  // nullopt: no samples yet
-  std::optional<std::uint64_t> few_hits;                // pixels with few hits in the current image
+  std::optional<ConvergenceStatus> convergence_status;  // nullopt: no checkpoint yet
+  // Number of pixels that too few samples with light have hit for a reliable error estimate
+  // (error_estimate.h) at the last checkpoint; nullopt: no checkpoint yet
+  std::optional<std::uint64_t> few_hits;
   std::optional<Trend> trend;                           // nullopt: too few checkpoints
-  std::optional<double> efficiency;                     // 1 / (relMSE x core seconds) at the last checkpoint
-  std::optional<std::uint64_t> pixels_without_samples;  // number in the current image; nullopt: unknown
-  std::optional<double> eta_seconds;
-  // 95 % interval of eta_seconds, if an error target ends the job
+  std::optional<double> efficiency;                     // 1 / (relMSE * core seconds) at the last checkpoint
+  std::optional<std::uint64_t> pixels_without_samples;  // nullopt: unknown
+  std::optional<double> eta_seconds;  // predicted seconds until the job is done; nullopt: unknown
+  // 95 % interval of eta_seconds; nullopt unless the target error is predicted to end the job
   std::optional<std::pair<double, double>> eta_ci95;
-  // eta_seconds if kMoreWorkers more workers like the present ones joined
+  // Predicted seconds until the job is done if kMoreWorkers more workers like the present ones joined;
+  // nullopt: unknown, or they would not make the job end sooner
   std::optional<double> eta_with_more;
-  // Interval of eta_with_more, if an error target ends the job
+  // 95 % interval of eta_with_more; nullopt unless the target error is predicted to end the job
   std::optional<std::pair<double, double>> eta_with_more_ci95;
-  std::string error;                  // why it failed, or why it waits
+  std::string error;                  // why the job failed, or why it waits; empty: neither
   std::vector<std::string> warnings;  // warnings about the scene
   FrameSize size;
   int tile = 32;
   int priority = 0;
   std::optional<PixelRect> focus;                       // pixels whose tiles are rendered before the others
   std::optional<std::uint32_t> max_workers, max_units;  // limits that the user requested
-  std::uint64_t memory_bytes = 0;                       // the least memory that a worker needs for it
+  std::uint64_t memory_bytes = 0;                       // least memory that a worker needs for the job
   std::uint64_t units_done = 0, units_total = 0;
   // Predicted CPU seconds of the units that wait for a worker; 0: no cost is known yet
   double queued_core_seconds = 0;
   double elapsed_seconds = 0, core_seconds = 0;
   TimeSplit time;
   double submitted_unix = 0;  // time of submission by the wall clock, for display
-  // Numeric health of the units in its image (rounds of tiles); for a sequence only the totals
+  // Numeric health of the job's image: counts of bad samples, such as NaNs. A sequence has only the sums of
+  // the three counts over its frames.
   Health health;
-  std::vector<HealthNote> notes;  // the numeric health as sentences for users; empty: no problems
-  // The numeric class (machines that compute the same bits) that it is pinned to, and the class's platform
+  std::vector<HealthNote> notes;  // `health` as sentences for users; empty: no problems
+  // The numeric class (the set of machines that compute the same bits) to which the job is pinned; nullopt:
+  // to none. `platform`: the machines and build of this class in words
   std::optional<Digest> numeric_class;
   std::string platform;
-  // How much of the farm is of that class; nullopt: the job is pinned to none, has ended, or is a sequence
+  // The part of the farm that belongs to that class; nullopt: the job is pinned to no class, has ended, or is
+  // a sequence
   std::optional<ClassShare> class_share;
   bool fake = false;  // true if fake workers invented its pixels; for a sequence: the pixels of any frame
-  // Set only for a sequence. The other values of its view combine all frames: they are sums or means over
-  // pixels, and elapsed_seconds counts from the first ray of any frame until the last result was added to an
-  // image.
+  // Set only for a sequence. The other values of a sequence's view combine its frames: they are sums over the
+  // frames or means over all their pixels. elapsed_seconds counts from the first ray of any frame until now
+  // or, once all frames have ended, until the end of the last one.
   std::optional<FramesView> frames;
 };
 
@@ -188,26 +201,28 @@ struct JobChange {
   std::optional<JobState> state;  // the new state: paused, running or cancelled
   std::optional<int> priority;
   std::optional<std::uint64_t> spp;  // the new total of samples per pixel
-  // The new target error; only for a job that has one and did not end for another reason. A smaller target
-  // resumes a job that reached the larger one
+  // The new target error. Allowed only for a job that has a target error and has not ended, or has ended
+  // because it reached the target. A smaller target resumes a job that has reached its target.
   std::optional<double> target_error;
-  // Pixels whose tiles are rendered before the others from now on; inner nullopt: no tile goes first any more
+  // Pixels whose tiles are rendered before the others from now on. Outer nullopt: no change; inner nullopt:
+  // no tiles are preferred any more.
   std::optional<std::optional<PixelRect>> focus = {};
 };
 
-// `order`: order of submission. `active`: running jobs first, then paused, queued and ended ones; among
-// equals the newest first.
+// How a list of jobs is sorted. `order`: in order of submission. `active`: running jobs first, then paused,
+// queued and ended ones; in each of these groups the newest job first. The other names: by this value,
+// ascending.
 enum class JobOrder { order, active, submitted, name, owner, state, progress, relmse };
 inline constexpr std::array<std::string_view, 8> kJobOrders = {"order", "active", "submitted", "name",
                                                                "owner", "state",  "progress",  "relmse"};
 
 struct JobsAsked {
-  // True for owners whose jobs the client may see; empty: all owners
+  // Returns true if the client may see the jobs of this owner; an empty function: it may see all jobs
   std::function<bool(const std::string& owner)> visible;
   std::set<JobState> states;  // states to list; empty: all
   std::optional<std::string> owner;
-  std::string search;     // part of the name or the id, in upper or lower case
-  double since_unix = 0;  // lists only jobs submitted at this time or later
+  std::string search;     // text that the name or id must contain, in any case; empty: all jobs
+  double since_unix = 0;  // earliest time of submission, in seconds since 1970
   JobOrder by = JobOrder::order;
   bool descending = false;
   std::size_t offset = 0, limit = std::numeric_limits<std::size_t>::max();
@@ -238,8 +253,8 @@ struct PixelsAsked {
 
 // A request for a video of a sequence.
 struct VideoAsked {
-  double fps = 24;        // pictures per second
-  double exposure = 0;    // stops
+  double fps = 24;        // frames of the sequence per second of video
+  double exposure = 0;    // in stops: pixels are multiplied by 2^exposure
   bool denoised = false;  // true: shows the denoised images; requires JobSpec::denoise
 };
 enum class VideoState { none, waiting, making, ready, failed };
@@ -247,8 +262,8 @@ struct VideoView {
   VideoState state = VideoState::none;
   VideoAsked asked;
   std::size_t frames = 0, frames_done = 0;  // number of frames in the video, and of those encoded so far
-  std::uint64_t bytes = 0;                  // size of a video that is ready
-  std::string error;                        // why it failed
+  std::uint64_t bytes = 0;                  // size of the video file when it is ready
+  std::string error;                        // why the video could not be made; empty: it did not fail
 };
 
 struct WorkerView {
@@ -256,13 +271,13 @@ struct WorkerView {
   std::string name;
   std::string build;
   Digest numeric_class;
-  std::string platform;  // machine and build of the class; empty: unknown
+  std::string platform;  // machine and build of the numeric class in words; empty: unknown
   bool fake = false;     // true for a fake worker (for tests), which invents its pixels instead of rendering
   int threads = 1;
   std::vector<std::string> tags;
   std::string state;     // "connected", "draining", "lost", "sick"
-  std::string activity;  // as last reported by the worker
-  std::string job;       // the job it works on; may be empty
+  std::string activity;  // what it does now, in its own words, or what is wrong with it
+  std::string job;       // id of the job that it works on; empty: none
   std::uint64_t units_done = 0;
   double cpu_seconds = 0;
   std::uint64_t rss_bytes = 0;
@@ -270,13 +285,13 @@ struct WorkerView {
   double last_seen_seconds = 0;    // seconds since its last message
 };
 
-// An event of the event stream. `data` is JSON. Ids increase by one and survive restarts.
+// An event of the stream of events that clients read. `data` is JSON. Ids increase, also over restarts.
 struct StreamEvent {
   std::uint64_t id = 0;
   std::string type;  // "job", "tile", "worker"
   std::string data;
-  // The job that a `job` or `tile` event is about. Empty: the event is not about a single job and is sent to
-  // every reader
+  // Id of the job that a `job` or `tile` event reports. Empty: the event does not concern a single job and is
+  // sent to every reader
   std::string job;
   // Owner of that job; for a `worker` event: the owner of the job that the worker works on
   std::string owner = {};
@@ -285,7 +300,7 @@ struct StreamEvent {
 struct SubmitRequest {
   std::string scene_name;  // name of the main file, for diagnostics
   std::string scene_text;  // Mitsuba or Nori XML
-  // The files that the scene may name; their blobs must be in the store
+  // Digests of the files that the scene may name, by file name; the store must have these files
   std::map<std::string, Digest> assets;
   JobSpec spec;
   std::string owner = {};  // the user who submits it: JobView::owner
@@ -300,10 +315,10 @@ inline tl::unexpected<Rejected> rejected(Error error, std::vector<Diagnostic> di
   return tl::unexpected(Rejected{std::move(error), std::move(diagnostics)});
 }
 
-// Write views; missing values are null.
+// These functions write views as JSON or CSV. In JSON, values that are not set are null.
 std::string time_json(const TimeSplit& time);
 std::string job_json(const JobView& job);
-// returns {"jobs": [...], "total", "states": {NAME: number}, "owners"}
+// Returns {"jobs": [...], "total": number, "states": {STATE: number of jobs}, "owners": [...]}.
 std::string jobs_json(const JobsPage& page);
 std::string worker_json(const WorkerView& worker);
 std::string workers_json(const std::vector<WorkerView>& workers);  // returns {"workers": [...]}
@@ -311,13 +326,14 @@ std::string video_json(const VideoView& video);
 std::string tiles_json(const std::vector<TileView>& tiles);                // returns {"tiles": [...]}
 std::string convergence_csv(const std::vector<ConvergencePoint>& points);  // starts with a header line
 
-// The functions below return the data of events for clients. `state` of a tile is "leased", "folded" (a
-// result was added to the image) or "free".
+// The functions below return the JSON data of events for clients. The `state` of a tile is "leased" (assigned
+// to a worker), "folded" (a result was added to the image) or "free".
 std::string tile_event_json(const JobId& job, TileIndex tile, const PixelRect& rect, std::string_view state,
                             std::uint64_t spp, std::string_view worker);
 std::string worker_gone_json(const WorkerId& worker);
-std::string job_removed_json(const JobId& job);  // the last `job` event of this job
-// The last `job` event that this coordinator sends for the job: another coordinator continues the job
+std::string job_removed_json(const JobId& job);  // of the last `job` event: the job is removed
+// Returns the data of the last `job` event that this coordinator sends for the job, when another coordinator
+// has taken the job over.
 std::string job_moved_json(const JobId& job);
 
 }  // namespace ls::coordinator

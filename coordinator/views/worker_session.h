@@ -1,5 +1,5 @@
-// The two directions of a worker's stream: the coordinator sends through a WorkerSink and receives through a
-// WorkerSession. Also the check whether a worker may join.
+// The two directions of the message stream between the coordinator and one worker: the coordinator sends
+// through a WorkerSink and receives through a WorkerSession. JoinCheck decides whether a worker may join.
 #pragma once
 
 #include <functional>
@@ -26,15 +26,18 @@ class WorkerSession {
  public:
   virtual ~WorkerSession() = default;
   virtual void receive(FromWorker message) = 0;
-  // Takes a message without blocking. When there is room for another message, calls `next`: before receive()
-  // returns, or later on another thread. It is never called if the coordinator closes first.
+  // Takes a message without blocking. Calls `next` as soon as the coordinator has room for another message of
+  // this worker: before receive() returns, or later on another thread. If the coordinator closes the stream
+  // before that, it never calls `next`.
   virtual void receive(FromWorker message, std::function<void()> next) = 0;
   virtual void disconnected() = 0;
 };
 
-// A function that returns true if a worker with this token may join. Called from any thread; must not block.
+// A function that returns true if a worker that presents this token may join. It may be called from any
+// thread and must not block.
 using JoinCheck = std::function<bool(std::string_view token)>;
-// Returns a check that admits workers with this token; if the token is empty, it admits every worker.
+// Returns a check that admits the workers that present exactly this token. If the token is empty, the check
+// admits every worker.
 JoinCheck join_check(std::string token);
 
 }  // namespace ls::coordinator

@@ -1,10 +1,11 @@
-// The notifications that receivers have not accepted yet: a queue for each receiver in memory, and a copy on
-// disk, in the folder DIR (webhooks in the folder of --data). If the coordinator is killed, it sends them
-// after its next start.
+// The notifications that receivers have not accepted yet: for each receiver a queue in memory, and a copy of
+// each notification on disk. If the coordinator is killed, it sends the notifications on disk after its next
+// start. DIR is the subfolder `webhooks` of the folder that --data names:
 //
-//   DIR/open/JOB               exists until a notification of the job's end has been stored
+//   DIR/open/JOB               an empty file that marks a job until the notification of its end has been
+//                              stored for every receiver
 //   DIR/RECEIVER/NUMBER.json   a delivery (one notification to one receiver) that is not accepted yet;
-//                              RECEIVER is named after the receiver's address
+//                              RECEIVER is a hash of the receiver's address
 #pragma once
 
 #include <cstddef>
@@ -22,36 +23,41 @@
 
 namespace ls::coordinator::webhooks {
 
-// A delivery is dropped after this many failed attempts, the last about an hour after the first
+// A delivery is dropped after this many failed attempts. The last attempt is about an hour after the first.
 inline constexpr int kMaxAttempts = 20;
-inline constexpr std::size_t kMaxWaiting = 10000;  // when more deliveries wait, the oldest is dropped
+inline constexpr std::size_t kMaxWaiting = 10000;  // most deliveries in the queue of a receiver
+// The pause after the first failed attempt. Each later pause is twice as long, up to the maximum.
 inline constexpr double kFirstRetrySeconds = 1, kMaxRetrySeconds = 300;
 
 struct Delivery {            // a notification that waits to be sent
-  std::uint64_t number = 0;  // ascending in the order of events; also the name of the delivery's file
-  std::string id;            // lets receivers detect repeated deliveries
-  std::string event;         // "job.done"
-  std::string body;          // JSON
+  std::uint64_t number = 0;  // ascending in the order of events; the delivery's file is NUMBER.json
+  std::string id;            // the same in all attempts, so that receivers detect repetitions
+  std::string event;         // "job." and the new state: "job.done"
+  std::string body;          // the body of the request, JSON text
 };
 
-// One receiver's deliveries, in order, and the times of its retries. Later deliveries wait until the first is
-// accepted or dropped, so that "done" never arrives before "running". The state of a Line depends only on the
-// deliveries added, the outcomes reported and the times passed in. Not thread-safe.
+// The queue of the deliveries to one receiver, oldest first, and the time of the next attempt. Only the first
+// delivery is sent; the others wait until it is accepted or dropped, so that "done" never arrives before
+// "running". The state of a Line depends only on the deliveries added, the outcomes reported and the times
+// passed in. Not thread-safe.
 class Line {
  public:
-  // Returns the delivery that was dropped because too many wait, else nullopt.
+  // Appends a delivery. If kMaxWaiting deliveries wait already, drops the oldest one and returns it;
+  // otherwise returns nullopt.
   std::optional<Delivery> add(Delivery delivery);
-  // Returns the delivery to send now; null if there is none or the time for its next attempt has not come.
+  // Returns the first delivery if it should be sent now. Returns null if none waits, or if the pause before
+  // its next attempt has not ended.
   const Delivery* due(TimePoint now) const;
-  // Returns the time from which due() will return a delivery; nullopt: there is none.
+  // Returns the time from which due() returns the first delivery; nullopt: no delivery waits.
   std::optional<TimePoint> next_due() const;
-  // Call taken() when the receiver has accepted the delivery that due() returned, failed() when the attempt
-  // failed. Both return the delivery if it leaves the queue: taken() always, failed() after kMaxAttempts
-  // attempts.
+  // To be called when the receiver has accepted the delivery that due() returned. Removes this delivery from
+  // the queue and returns it.
   std::optional<Delivery> taken();
+  // To be called when an attempt to send that delivery has failed. After kMaxAttempts attempts, removes the
+  // delivery and returns it; before, sets the time of the next attempt and returns nullopt.
   std::optional<Delivery> failed(TimePoint now);
   std::size_t waiting() const { return waiting_.size(); }
-  int attempts() const { return attempts_; }  // number of failed attempts to send the first delivery
+  int attempts() const { return attempts_; }  // failed attempts of the first delivery
 
  private:
   Delivery pop();
@@ -60,15 +66,16 @@ class Line {
   TimePoint not_before_{};
 };
 
-double retry_seconds(int attempts);  // seconds to wait after this many attempts
+// Returns the pause in seconds after this many failed attempts (at least 1).
+double retry_seconds(int attempts);
 
-// The copies of the deliveries on disk.
+// Reads and writes the files of the folder DIR.
 class Outbox {
  public:
   static Result<Outbox> open(std::filesystem::path folder, const std::vector<std::string>& urls);
 
-  // Returns the stored deliveries to a receiver, given by its index in `urls`, ascending by number. Other
-  // files in the folder are neither returned nor removed.
+  // Returns the stored deliveries to one receiver, ascending by number. `receiver` is an index of the list
+  // `urls` that open() got. Files that do not contain a delivery are skipped and stay in the folder.
   std::vector<Delivery> waiting(std::size_t receiver) const;
   Result<void> keep(std::size_t receiver, const Delivery& delivery);
   void forget(std::size_t receiver, const Delivery& delivery);

@@ -47,7 +47,7 @@ struct webhooks::State {
     outbox.job_has_ended(job);
   }
 
-  // Adds a notification for every receiver.
+  // Stores the notification of a job's new state for every receiver, and appends it to the receivers' queues.
   void add(const std::string& job, const std::string& state, std::uint64_t event, json view) {
     Delivery delivery;
     delivery.number = ++last_number;
@@ -62,7 +62,8 @@ struct webhooks::State {
     }
   }
 
-  // Records the receiver's answer to the first delivery in its line.
+  // Applies the answer to the first delivery of the receiver's queue: removes the delivery if it was
+  // accepted, otherwise counts a failed attempt.
   void settle(std::size_t receiver, const std::string& url, const Result<HttpAnswer>& answer, TimePoint now) {
     Line& line = lines[receiver];
     if (answer && answer->status / 100 == 2) {
@@ -84,9 +85,9 @@ struct webhooks::State {
   }
 
   webhooks::Outbox outbox;
-  std::set<JobId> open;                       // the same as the outbox's files open/JOB
-  std::map<std::string, std::string> states;  // last reported state of each job
-  std::deque<Line> lines;                     // one line per receiver
+  std::set<JobId> open;                       // jobs that have a file open/JOB in the outbox
+  std::map<std::string, std::string> states;  // last reported state, by job id
+  std::deque<Line> lines;                     // one queue per receiver, in the order of Options::urls
   std::uint64_t last_number = 0;
   WebhookFigures figures;
 };
@@ -107,17 +108,17 @@ class Webhooks::Impl {
   }
 
   ~Impl() {
-    subscription_.reset();  // waits until no callback is in progress
+    subscription_.reset();  // waits for a running callback; then there are no more
     for (auto& thread : threads_) thread.request_stop();
   }
 
   void start(Coordinator& coordinator) {
     coordinator_ = &coordinator;
-    // The subscription begins before the jobs' states are read, so that no change is missed.
+    // The subscription begins before catch_up() reads the states of the jobs, so that no change is missed.
     std::uint64_t last = coordinator.last_event_id();
     subscription_ = coordinator.subscribe(last, [this, &coordinator, last](const StreamEvent& event) mutable {
-      // The coordinator keeps a limited number of events. A gap in the ids means that events were dropped
-      // while this callback waited for the disk; then the jobs' states are read instead.
+      // The coordinator keeps a limited number of events. A gap in the ids means that it dropped events while
+      // this callback waited for the disk. Then look_again() reads the states of all jobs instead.
       if (event.id != last + 1) look_again(coordinator, event.id);
       last = event.id;
       if (event.type == "job") changed(event.job, event.data, event.id);
@@ -135,16 +136,16 @@ class Webhooks::Impl {
   }
 
  private:
-  // Reports the ends of jobs that an earlier run did not report because it was killed. Then notes the
-  // present states of all jobs, so that only later changes are reported.
+  // Reports the jobs that have ended, but whose end the previous process could not report because it was
+  // killed. Then notes the present states of all jobs, so that only later changes are reported.
   void catch_up(Coordinator& coordinator) {
     const std::set<JobId> open = state_.lock()->outbox.open_jobs();
     for (const JobId& job : open) {
       const auto view = coordinator.job(job);
       const std::string word(view ? to_string(view->state) : "");
-      // If the previous run was killed after it had stored the notification of the job's end, but before it
-      // recorded the end, the notification is still pending: the end is recorded now, and not reported again.
-      // A job that no longer exists is handled in the same way.
+      // The end of the job is recorded without a notification in two cases. In the first, the previous
+      // process was killed after it had stored the notification of the end, but before it recorded the end:
+      // then this notification is among the pending ones. In the second, the job does not exist any more.
       if (!view || kept_.contains(job.value + "/" + word)) {
         const auto state = state_.lock();
         state->mark_ended(job);
@@ -175,7 +176,7 @@ class Webhooks::Impl {
   }
 
   void changed(const std::string& job, const std::string& data, std::uint64_t event) {
-    if (frame_of(JobId{job})) return;  // frames of a sequence are not reported, only the whole sequence
+    if (frame_of(JobId{job})) return;  // of a sequence only the whole is reported, not each frame
     json view = json::parse(data, nullptr, false);
     if (!view.is_object() || !view.contains("state") || !view["state"].is_string()) return;
     const std::string word = view["state"].get<std::string>();
@@ -199,7 +200,8 @@ class Webhooks::Impl {
         wait(state, state->lines[receiver].next_due(), token);
         continue;
       }
-      // A copy, since newer deliveries may remove the original while it is being sent
+      // Sends a copy: during the attempt the lock is free, and newer deliveries may push this one out of a
+      // full queue.
       const Delivery sent = *next;
       state.unlock();
       const auto answer = send(receiver, sent);
@@ -235,7 +237,7 @@ class Webhooks::Impl {
     request.headers.emplace_back("traceparent", to_traceparent(own));
     const TimePoint begin = options_.clock->now();
     auto answer = options_.send(request);
-    // The receiver's address is not recorded: it may contain a secret.
+    // The span does not contain the receiver's address, which may include a secret.
     options_.tracer->record(
         {.context = own,
          .parent = parent->span,
@@ -252,7 +254,7 @@ class Webhooks::Impl {
 
   Options options_;
   Coordinator* coordinator_ = nullptr;
-  std::set<std::string> kept_;  // JOB/STATE of the deliveries that were pending at the start
+  std::set<std::string> kept_;  // "JOB/STATE" of each delivery that was pending at the start
   mutable Guarded<webhooks::State> state_;
   std::condition_variable_any woken_;
   std::shared_ptr<void> subscription_;

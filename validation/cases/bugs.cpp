@@ -1,6 +1,6 @@
-// Cases that fail for a renderer with one of three bugs that other renderers have had
-// (docs/design/validation.md describes how this is checked): a phase function clamped to |g| = 0.99, the
-// cancellation in 1 - exp(-tau) at small optical depths tau, and 0 / 0 at null collisions.
+// Cases for three bugs that other renderers have had: a phase function clamped to |g| = 0.99, the
+// cancellation in 1 - exp(-tau) at small optical depths tau, and 0 / 0 at null collisions. Each case fails
+// for a renderer with its bug (docs/design/validation.md describes how this is checked).
 #include <fmt/format.h>
 
 #include <cmath>
@@ -12,8 +12,9 @@
 namespace ls::cases {
 namespace {
 
-// Textbook formulas for sampling and density lose their digits from g = 0.999 on, so other renderers clamp g
-// at 0.99. At g = 0.9995 the peak of the phase function is then 400 times too low.
+// Near |g| = 1, the textbook formulas for sampling the Henyey-Greenstein phase function and for its density
+// lose their digits, from |g| = 0.999 on. So other renderers clamp |g| to 0.99. At |g| = 0.9995 the peak of
+// the phase function is then 400 times too low.
 void clamped_g(Table& t) {
   for (const double g : {.9995, -.9995})
     t.mean(fmt::format("bug-g-clamped-to-.99/homogeneous/volpath{}", g > 0 ? "" : "-backward"), "N18 bug",
@@ -33,8 +34,9 @@ void one_minus_exp(Table& t) {
         {.band = 1e-4});
 }
 
-// A row of purely absorbing voxels, full or empty, without interpolation. A white environment is seen through
-// it or, with `by_shadow`, the sun shines through it onto a white disk.
+// A row of kVoxels voxels without interpolation, of which kFull have the given density and the others are
+// empty. The medium only absorbs. A white environment is seen through the row or, with `by_shadow`, the sun
+// shines through it onto a white disk.
 constexpr int kVoxels = 16, kFull = 7;
 SceneBuilder row_of_voxels(float density, double sigma, bool by_shadow) {
   std::vector<float> values(kVoxels, 0);
@@ -56,11 +58,12 @@ SceneBuilder row_of_voxels(float density, double sigma, bool by_shadow) {
   return builder;
 }
 
-// If a voxel's density equals the majorant of its macro cell, no collision in it is a null collision. If the
-// medium does not scatter either, the probabilities of scattering and of a null collision are both 0, and a
-// division by their sum is 0 / 0. This renderer's majorants are 4 ulps above the densities, so the
-// probability of a null collision is never exactly 0. But for densities of 2e-32 the 4 ulps are 1e-38, a
-// denormal, and every thread of the renderer flushes denormals to 0.
+// If a voxel's density equals the majorant of its macro cell (a block of voxels with a common majorant), no
+// collision in the voxel is a null collision. If the medium does not scatter either, the probabilities of
+// scattering and of a null collision are both 0, and a division by their sum is 0 / 0. This renderer's
+// majorants are 4 ulps above the densities, so the probability of a null collision is never exactly 0. But
+// for densities of 2e-32 the 4 ulps are 1e-38, a denormal, and every thread of the renderer flushes denormals
+// to 0.
 void null_collisions(Table& t) {
   for (const bool by_shadow : {false, true})
     for (const bool tiny : {false, true}) {

@@ -8,7 +8,7 @@
 namespace ls::cases {
 namespace {
 
-constexpr double kSheet = 2 * .04 / 1.04;  // reflectance of a sheet of index 1.5 at normal incidence
+constexpr double kSheet = 2 * .04 / 1.04;  // reflectance of a thin sheet, index 1.5, normal incidence
 
 BsdfIndex two_sided(SceneBuilder& builder, double reflectance) {
   const BsdfIndex one = builder.diffuse(reflectance);
@@ -27,13 +27,13 @@ BsdfIndex plastic(SceneBuilder& builder, const Rgb& base) {
   const TextureIndex b = builder.texture(base), white = builder.texture(rgb(1));
   return builder.bsdf(PlasticBsdf{1.5, 1, true, b, white});
 }
-// Rough glass with facets so flat that they mask less than alpha^2 of the light.
+// Rough glass of alpha = 2e-3. Its facets are so flat that masking removes less than alpha^2 of the light.
 BsdfIndex nearly_smooth(SceneBuilder& builder, Microfacet facets) {
   const TextureIndex white = builder.texture(rgb(1)), alpha = builder.texture(rgb(2e-3));
   return builder.bsdf(RoughDielectricBsdf{facets, alpha, alpha, 1.5, 1, white, white});
 }
 
-// The floor of floor_point() below a horizontal sheet of a material.
+// The floor of floor_point() with a horizontal sheet of a material above it.
 SceneBuilder floor_below(auto material) {
   SceneBuilder builder = floor_point();
   builder.shape(RectangleShape{}, translate({0, 0, 1}) * scale(3), material(builder));
@@ -56,16 +56,17 @@ void null_transmission(Table& t) {
            "Light on a floor below a mask or a sheet: what they let pass.", std::move(builder),
            reflected(irradiance), {.channels = true});
   };
-  // Only shadow rays find the light of a point or a single direction: paths never hit it by chance.
+  // Only shadow rays find a light at a point or in a single direction: BSDF sampling never hits it.
   direct("mask-below-a-point", with(floor_below(third), PointEmitter{{.5, 0, 2}, rgb(3)}),
          .7 * 3 * 2 / std::pow(4.25, 1.5));
   direct("sheet-below-the-sun", with(floor_below(thin_sheet), DirectionalEmitter{{0, 0, -1}, rgb(2)}),
          2 * (1 - kSheet));
-  // Shadow rays and paths both find the light through the mask.
+  // Both shadow rays and BSDF sampling find this light through the mask.
   direct("mask-below-a-sphere",
          with_lamp(floor_below(third), SphereShape{}, translate({0, 0, 3}) * scale(1.5)),
          .7 * kPi * 2.25 / 9);
-  // Two masks and an absorbing medium between them.
+  // A cube of side 2 with an absorbing medium inside; its faces are masks that let half of the light pass.
+  // Light crosses two faces and a length of 2 in the medium.
   const Rgb sigma{1, .5, .25};
   Channels passed, lit;
   for (std::size_t c = 0; c < 3; ++c) {
@@ -107,8 +108,9 @@ void coated(Table& t) {
       2e-4);
 }
 
-// A thin sheet, and a plate with two faces of nearly_smooth(), in front of a black wall. The plate's facets
-// deflect light by about alpha = 2e-3 rad; the relative change of its Fresnel terms is of the order of
+// Two cases in front of a black wall: a thin sheet, and a plate whose two faces consist of the glass of
+// nearly_smooth(). The facets of this glass deflect light by about alpha = 2e-3 rad. Near normal incidence
+// the Fresnel reflectances depend on the square of the angle, so they change by a share of the order of
 // alpha^2.
 void sheets(Table& t) {
   const auto add = [&](const char* name, SceneBuilder builder, double slack) {
@@ -127,9 +129,10 @@ void sheets(Table& t) {
       1e-4);
 }
 
-// Plastic lit along its normal and seen at i = 60 degrees from it. With t the angle of refraction, the
-// amplitudes of Fresnel reflection are r_s = (cos i - n cos t) / (cos i + n cos t) and
-// r_p = (n cos i - cos t) / (n cos i + cos t).
+// Plastic of index n, lit along its normal and seen at i = 60 degrees from it. With t the angle of
+// refraction, the amplitudes of Fresnel reflection are
+//   r_s = (cos i - n cos t) / (cos i + n cos t),
+//   r_p = (n cos i - cos t) / (n cos i + cos t).
 void plastic_by_the_sun(Table& t) {
   const double n = 1.5, ci = .5, ct = std::sqrt(1 - .75 / (n * n));
   const double rs = (ci - n * ct) / (ci + n * ct), rp = (n * ci - ct) / (n * ci + ct);
@@ -144,8 +147,8 @@ void plastic_by_the_sun(Table& t) {
          builder, {f(.2), f(.5), f(.8)});
 }
 
-// A grey floor whose shading normal leans by 36.87 degrees, lit from straight above: the cosine of the
-// incident light is 0.8. The bumps that a normal map describes cast no shadows.
+// A grey floor whose normal map tilts the shading normal by 36.87 degrees, lit from straight above: the
+// cosine between light and shading normal is 0.8. The bumps that a normal map describes cast no shadows.
 void normal_map(Table& t) {
   SceneBuilder builder;
   const BsdfIndex floor = builder.diffuse(.5);

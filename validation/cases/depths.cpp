@@ -11,13 +11,12 @@ namespace ls::cases {
 namespace {
 
 constexpr double kThin[] = {1e-12, 1e-9, 1e-6, 1e-3};
-// The tolerance for a figure that is the same in all samples. It is a product of about ten float32 numbers,
-// each with an error of 2^-24.
+// The relative tolerance for values that are equal in all samples. Each is a product of about ten float32
+// numbers with relative errors of 2^-24 = 6e-8.
 constexpr double kTenRoundings = 6e-7;
 
 constexpr Configuration kDistant{false, true}, kDistantGrid{true, true}, kVolpath{false, false};
 
-// (1 - e^-x) / x.
 double phi(double x) { return x == 0 ? 1 : -std::expm1(-x) / x; }
 
 void nothing(Table& t) {
@@ -42,9 +41,10 @@ void nothing(Table& t) {
   }
 }
 
-// The radiance of a ray of unit length through a medium that emits eps per length:
-// L = eps (1 - e^-tau) / sigma. The estimate has no variance, except in those macro cells of grids in which
-// a tracker (an algorithm that steps from collision to collision) samples free flights.
+// A medium that emits eps per length and has the extinction sigma, seen along a ray of length 1, so of
+// optical depth tau = sigma. The radiance is eps (1 - e^-tau) / sigma. The estimate has no variance, except
+// in those macro cells of grids (blocks of voxels with a common majorant) in which a tracker, an algorithm
+// that steps from collision to collision, samples free flights.
 void emission(Table& t) {
   const auto emitting = [](const Configuration& configuration, double tau) {
     SceneBuilder builder = unit_cube(configuration, rgb(tau));
@@ -93,19 +93,20 @@ void opaque(Table& t) {
               });
     }
   }
-  // The answers are 1 - sqrt(1 - a) H(1), with a the albedo (Chandrasekhar 1950), to six digits. From depth
-  // 1e5 on, the mean free path is shorter than the offset of rays from surfaces (2^-20 of the world), so the
-  // distance to the face must be measured from the path's true position, not from the offset one. At depth
-  // 1e6 the mean free path is 17 ulps of float32 at the face's height. Next to the face the renderer then
-  // computes a trapezoidal sum over float32 positions z instead of an integral over z. For isotropic
-  // scattering the integrand is E_2(z), the second exponential integral, and the sum is 3.1e-3 too large.
+  // The answer is 1 - sqrt(1 - a) H(1), to six digits, with the albedo a = 0.9 and Chandrasekhar's function H
+  // (1950). The mean free path is 1e-5 at depth 1e5 and 1e-6 at depth 1e6, while rays start about 2e-6 from
+  // the surface that they leave (2^-20 of the scene's largest coordinate). So the distance to the face must
+  // be measured from the path's true position, not from the offset one. At depth 1e6 the mean free path is 17
+  // ulps of float32 at the face's height. Next to the face the renderer then computes a trapezoidal sum over
+  // float32 positions z instead of an integral over z. For isotropic scattering the integrand is E_2(z), the
+  // second exponential integral, and the sum is larger than the integral by a share of 3.1e-3.
   constexpr double kDigits = 2e-6, kPlaces = 3.1e-3;
   for (const Configuration& configuration : all_configurations()) {
     for (const double tau : {1e3, 1e5, 1e6}) {
       const bool coarse = tau == 1e6;
       if (tau == 1e5 && configuration.grid != configuration.distant) continue;
       if (coarse && configuration.grid && configuration.distant)
-        continue;  // takes half a minute; three configurations remain
+        continue;  // takes half a minute; three other configurations test this depth
       t.mean(fmt::format("N03-semi-infinite-a.9-{:g}{}", tau, configuration.name()), "N3 7.1",
              "An all but endless medium of this depth reflects what Chandrasekhar's H gives.",
              [=] { return half_space(configuration, .9, tau, 1); }, grey(.414947),
@@ -123,9 +124,9 @@ void opaque(Table& t) {
 void shadows(Table& t) {
   for (const double tau : {20., 30., 80.}) {
     const double expected = std::exp(-tau) / (2 * kPi);
-    // The first term is for the rounding of the factors. The second is for the exponent, the product of a
-    // coefficient and a length: the relative rounding error of each, 2^-24, changes e^-tau by a share of
-    // tau 2^-24.
+    // The relative tolerance has two terms. The first is for the rounding of the factors of the radiance. The
+    // second is for the exponent tau, the product of a coefficient and a length: each has a relative rounding
+    // error of 2^-24, which changes e^-tau by a share of tau 2^-24.
     const double tolerance = kTenRoundings + 2 * tau * 0x1p-24;
     for (const Configuration& configuration : both_media()) {
       t.exact(fmt::format("N05-shadow-{:g}{}", tau, configuration.name()), "N5 N60",
@@ -140,10 +141,10 @@ void shadows(Table& t) {
               });
     }
   }
-  // Where the density varies, a shadow ray estimates its transmittance step by step. When little
-  // transmittance is left, Russian roulette (kRouletteDepth) ends most of these estimates and weights up the
+  // Where the density varies, a shadow ray estimates its transmittance in steps. When little transmittance is
+  // left, Russian roulette (kRouletteDepth) ends most of these estimates and increases the weights of the
   // others, so the mean stays the same. The density is 0, 1, 2, 3 at the centres of four voxels along z and
-  // constant beyond, so its integral is 1.5.
+  // constant below the first and above the last centre, so its integral over the unit length is 1.5.
   t.mean("N05-shadow-ramp-8/grid/volpath", "N5 7.6a",
          "A shadow ray through a ramp of densities, by residual tracking.",
          [] {

@@ -1,6 +1,6 @@
 // Direct light on a grey floor from lamps and from environment maps, and light reflected between surfaces.
-// The closed forms of maps are of those that are constant, that fall linearly from the zenith to the horizon,
-// and that are black but for one texel.
+// The environment maps are constant, fall linearly from the zenith to the horizon, or are black but for one
+// texel: for these the irradiance has a closed form.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -12,8 +12,8 @@ namespace ls::cases {
 namespace {
 
 void direct(Table& t) {
-  // BSDF sampling hits the smallest of these lights with one path in 40,000, so it contributes only a small
-  // share of the light.
+  // BSDF sampling hits the smallest of these lights with one path in 40,000, so nearly all of its light comes
+  // from light sampling.
   const auto add = [&](const char* name, SceneBuilder builder, double irradiance) {
     t.mean(std::string("7.6g-") + name, "7.6g N26", "Direct light on a floor, by the light's closed form.",
            std::move(builder), reflected(irradiance), {.slack = 5e-5});
@@ -27,17 +27,17 @@ void direct(Table& t) {
       kPi * .49 / (.49 + 2.25));
   add("direct-sphere", below(SphereShape{}, translate({0, 0, 2}) * scale(.5)), kPi * .25 / 4);
   add("direct-distant-sphere", below(SphereShape{}, translate({0, 0, 1000}) * scale(5)),
-      kPi * 25 / 1e6);  // solid angle 8e-5 sr
+      kPi * 25 / 1e6);  // the light has a solid angle of 8e-5 sr
   add("direct-point", with(floor_point(), PointEmitter{{.5, 0, 1}, rgb(3)}), 3 / std::pow(1.25, 1.5));
-  // The direction to the floor's point is 20 degrees off the light's axis, halfway between beam (10 degrees)
-  // and cutoff (30), so the intensity is a half. The light is aimed along -z.
+  // The light points along -z. The direction from it to the point of the floor that is seen is 20 degrees off
+  // its axis, halfway between the beam width (10 degrees) and the cutoff (30), so the intensity is halved.
   const double tangent = std::tan(20 * kPi / 180), cosine = std::cos(20 * kPi / 180);
   add("direct-spot-falloff",
       with(floor_point(), SpotEmitter{translate({tangent, 0, 1}) * rotate_x(180), rgb(2), 30, 10, {}}),
       .5 * 2 * cosine * cosine * cosine);
   {
-    // A checkerboard of two colours divides the sphere into quarters; from below, equal parts of both are
-    // seen.
+    // A checkerboard of two colours divides the sphere into quarters. From below, equal parts of both colours
+    // are visible, so the floor receives the mean of the two.
     SceneBuilder builder = floor_point();
     const TextureIndex dark = builder.texture(rgb(.25)), bright = builder.texture(rgb(1.5));
     builder.lamp(SphereShape{}, translate({0, 0, 2}) * scale(.5)).emitter = AreaEmitter{
@@ -51,10 +51,10 @@ void direct(Table& t) {
       kPi * .25 / 4 + .3 / std::pow(1.25, 1.5) + .2 / std::sqrt(2.));
 }
 
-// The reflectance of m plates of n = 1.5 at normal incidence, in front of black, is 1 - T with
-// T = (1 - r) / (1 + (2 m - 1) r), since each face reflects r = 0.04. For 500 plates, a thousand interfaces,
-// T = 3 / 128, and paths have a thousand vertices on average. The band, half a per cent of the reflectance,
-// is a fifth of T, so the case also tests T.
+// m glass plates of index 1.5 at normal incidence, in front of a black wall. Each face reflects r = 0.04, so
+// the plates transmit T = (1 - r) / (1 + (2 m - 1) r) and reflect 1 - T. For 500 plates, a thousand
+// interfaces, T = 3 / 128, and paths have a thousand vertices on average. The band, half a per cent of the
+// reflectance, is a fifth of T, so the case also tests T.
 void plates(Table& table, int m) {
   SceneBuilder builder;
   const BsdfIndex glass = builder.glass(1.5), black = builder.diffuse(0);
@@ -72,11 +72,12 @@ void plates(Table& table, int m) {
 
 constexpr int kWidth = 64, kRows = 33, kSunX = 21, kSunY = 7;
 
-// Maps have y up; here z is up.
+// The up axis of maps is y. This rotation turns it to z, the up axis of these scenes.
 Transform upright() { return rotate_x(90); }
 
-// Rows of the upper half of a map of height `height`, which fall linearly with the angle from `top` at the
-// zenith to black at the horizon:
+// Returns a map of height `height`. Its upper half falls linearly with the polar angle q from `top` at the
+// zenith to black at the horizon, and its lower half is black. A zenith of radiance 1 gives a horizontal
+// plane the irradiance
 //   E = 2 pi int_0^(pi/2) (1 - 2 q / pi) sin q cos q dq = pi / 2.
 SkyImage gradient(const Rgb& top, int width = 4, int height = 3) {
   SkyImage s(width, height);
@@ -110,8 +111,8 @@ void on_a_floor(Table& t) {
     add("sun-of-one-texel", s, reflected_of({34000, 30000, 20000}, of_sun()));
   }
   {
-    // Sky and sun differ in colour. Directions must be sampled by luminance: the case fails if they are
-    // sampled by one channel with the density of another.
+    // Sky and sun have different colours. Directions must be sampled by luminance: the case fails if they are
+    // sampled by one colour channel while the pdf is computed from another.
     const Rgb top{.5, 1, 4}, sun{340, 300, 200};
     SkyImage s = gradient(top, kWidth, kRows);
     const double k = 1 - kSunY / 16.;
@@ -128,8 +129,9 @@ void on_a_floor(Table& t) {
          reflected(kOfGradient + 3 / std::pow(1.25, 1.5) + 2 / std::sqrt(2.)), {.channels = true});
 }
 
-// The floor's middle is the centre of a ball that only absorbs: light from any direction comes in through a
-// null boundary and goes one radius. The camera is in the ball, close to the floor.
+// The point of the floor that is seen is the centre of a ball of radius 1 whose medium only absorbs. Light
+// from any direction enters the ball through a null boundary and travels one radius. The camera is in the
+// ball, close to the floor.
 void through_a_ball(Table& t) {
   SceneBuilder builder = floor_point(.5);
   const Rgb sigma{.3, .6, 1.1};

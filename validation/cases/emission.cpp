@@ -1,5 +1,6 @@
-// Emissive media. The answers are closed forms for emission with absorption, and equilibria for emission with
-// scattering, in which everything is as bright as the source.
+// Emissive media. With absorption only, the answers are closed forms. With scattering they follow from
+// equilibrium: between walls whose radiance equals the source radiance of the medium (emission per length
+// divided by the absorption coefficient), the radiance has this value everywhere, in every direction.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -44,8 +45,9 @@ void absorbing(Table& t) {
   add("per-absorption/grid", true, true, {.5, 1, 16});
 }
 
-// Walls of radiance B around a medium that also scatters, and whose source radiance is B: an isothermal
-// enclosure, with radiance B in every direction. Mirror walls give the same.
+// A medium that also scatters, of source radiance B, between walls that emit the radiance B: an isothermal
+// enclosure, in which the radiance is B in every direction. With mirror walls that emit nothing the answer is
+// the same.
 void enclosures(Table& t) {
   const auto add = [&](const char* name, bool mirrors, auto medium, bool per_absorption) {
     SceneBuilder builder;

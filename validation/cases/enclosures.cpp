@@ -1,5 +1,6 @@
-// Bodies of all sizes with light inside. Closed ones let no light out and lose none; out of those that
-// scatter and absorb nothing or almost nothing comes all the light that they emit.
+// Closed rooms of many sizes that emit light, and translucent bodies that emit light or are lit from all
+// sides. No light may leak into or out of a room. A body that absorbs nothing or almost nothing must lose no
+// light, however it scatters.
 #include <fmt/format.h>
 
 #include <array>
@@ -12,10 +13,11 @@
 namespace ls::cases {
 namespace {
 
-// The radiance outside of a room, so high that a single leak in a million paths would be noticed.
+// The radiance outside of a room. It is so high that a single leak in a million paths would be noticed.
 constexpr double kOutside = 1e6;
 
-// A room with grey emitting walls, seen from inside: the radiance is 1 / (1 - .5) everywhere.
+// A closed room seen from inside. Its walls emit radiance 1 and reflect half, so the radiance is 1 / (1 - .5)
+// everywhere.
 SceneBuilder room(const Geometry& g, double size, const Vec3& shift = {0, 0, 0}) {
   SceneBuilder builder;
   Shape& s = builder.shape(g, translate(shift) * scale(size), builder.diffuse(.5));
@@ -43,8 +45,9 @@ void closed(Table& t) {
            return room(CubeShape{}, 1, {1e5, -1e5, 1e5});
          },
          grey(2), {.band = 1e-3});
-  // More than ten million rays in all: each path has about two from wall to wall, and about two towards the
-  // environment (shadow rays).
+  // Three million paths: 2048 samples for each of 256 pixels in six rooms. Each path has about two rays from
+  // wall to wall and about two shadow rays towards the environment, so there are more than ten million rays
+  // in all.
   t.exact(
       "N39-leaks", "N39", "Of ten million rays in closed boxes of six sizes none gets out.",
       [](const Bench& b) {
@@ -60,9 +63,11 @@ void closed(Table& t) {
       true);
 }
 
-// The mean path length of light through a body in uniform light is 4 V / S, however it is scattered (Blanco
-// and Fournier 2003): 4/3 in the unit ball. A medium that emits 1 per length measures it: the rays of the
-// view are spread evenly over the ball's disk, which fills pi / 4 of the view.
+// The mean path length of light through a body in uniform light is 4 V / S, with V its volume and S its
+// surface, however it scatters (Blanco and Fournier 2003). For the unit ball it is 4/3. A medium that emits 1
+// per length and absorbs nothing measures it: the radiance of the body, averaged over all rays, is the mean
+// path length. The rays of the view are spread evenly over the disk of the ball, which fills pi / 4 of the
+// view.
 SceneBuilder ball(bool grid, double sigma_s, double g) {
   SceneBuilder builder;
   MediumIndex m;
@@ -94,7 +99,8 @@ void paths(Table& t) {
       }
 }
 
-// A furnace: every pixel is white, with any shape, coating and phase function.
+// A body that absorbs nothing in a white sky (a white furnace): every pixel has the radiance of the sky,
+// whatever the phase function, and with a glass surface or without.
 void furnaces(Table& t) {
   for (const bool grid : {false, true})
     for (const double g : {-.5, .9})
@@ -124,17 +130,19 @@ Transform rotate_z(double degrees) {
   return {{c, -s, 0, 0, s, c, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
 }
 
-// Gauss-Legendre points on [0, 1], and their weights.
+// The four Gauss-Legendre points on [0, 1], each with its weight.
 constexpr std::array<std::array<double, 2>, 4> kGauss = {{{.06943184420297371, .17392742256872693},
                                                           {.33000947820757187, .32607257743127307},
                                                           {.66999052179242813, .32607257743127307},
                                                           {.93056815579702629, .17392742256872693}}};
 
-// Sixteen unit cubes, each in a cell of 2 x 2 with black walls. A quadrature over an octant has sixteen
-// directions (a cube looks the same from all eight octants). Each cube is turned so that it is seen along one
-// of them, and its emission is scaled by that direction's weight. So the frame's mean is the mean over all
-// directions of a cube's light, divided by its mean projected area, S / 4 = 1.5. The cubes emit 1 per length
-// and absorb nothing, so this is 4 V / S, the mean path length.
+// Sixteen unit cubes that are filled with the medium, each in a cell of 2 x 2 with black walls. They measure
+// the mean path length 4 V / S (see ball()) by a quadrature over directions: sixteen directions in one
+// octant, since a cube looks the same from all eight octants. Each cube is turned so that it is seen along
+// one of these directions. The emission of a cube, 1 per length, is multiplied by the weight of its
+// direction, by 16 (the number of cubes) and by 4 (the area of a cell), and divided by 1.5, the mean
+// projected area S / 4. So the mean of the frame is the mean over all directions of the light that a cube
+// emits in a direction, divided by S / 4. The cubes absorb nothing, so this is 4 V / S.
 SceneBuilder cubes(const Configuration& configuration, double sigma_s, double g) {
   SceneBuilder builder({16, 16});
   configuration.choose(builder);
@@ -172,14 +180,16 @@ void mean_way_through_a_cube(Table& t) {
     t.mean(fmt::format("7.6d-cube-{:g}-g{:g}{}", r.sigma_s, r.g, r.configuration.name()), "7.6d",
            "Light's mean way through the unit cube is 4 V / S = 2/3, however it is scattered.",
            [=] { return cubes(r.configuration, r.sigma_s, r.g); }, grey(2. / 3),
-           // The quadrature has four points per angle. It is accurate to 1e-3 of the part of the answer that
-           // scattering changes, which is a tenth of it.
+           // The quadrature has four points for each of two angles. Scattering changes the light in each
+           // direction by about a tenth. The quadrature integrates this part with a relative error of 1e-3,
+           // which is 1e-4 of the answer.
            {.slack = 2e-4, .slow = r.sigma_s > 2 || r.configuration.grid});
 }
 
-// A ball of albedo 1 - 1e-7 with a source radiance of 1e6: per length it emits its absorption coefficient,
-// 1.6e-6, times that source. Its light is the mean path length, 4/3, times this emission. An albedo rounded
-// to float32 would be off by a fifth of 1e-7.
+// A ball of radius 1, extinction 16 and albedo 1 - 1e-7, so its absorption coefficient is 1.6e-6. Its source
+// radiance is 1e6, so it emits 1.6 per length (source radiance times absorption coefficient). Its radiance,
+// averaged over all rays, is this emission times the mean path length, 4/3. If the renderer rounded the
+// albedo to float32, the absorption coefficient would be wrong by a fifth.
 void bodies_all_but_white(Table& t) {
   constexpr double kDepth = 16, kAbsorbed = 1e-7, kSource = 1e6;
   for (const Configuration& configuration : all_configurations())
@@ -196,7 +206,8 @@ void bodies_all_but_white(Table& t) {
              builder.scene.sensor.projection = Projection::orthographic;
              return builder;
            },
-           // Reabsorption takes a share of 1.6e-6 per length, over path lengths of about 20.
+           // The answer neglects that the ball absorbs some of its own light: a share of 1.6e-6 per length,
+           // over path lengths of about 20, is within the slack.
            grey(kPi / 3 * kDepth * kAbsorbed * kSource),
            {.band = .01,
             .why_band = "16 mean free paths: ways that vary by more than their mean",

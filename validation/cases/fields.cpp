@@ -1,5 +1,5 @@
-// Closed forms for varying media: atmospheres, mean path lengths in bodies, and the light of a ball or a lamp
-// in an infinite medium.
+// Media with closed forms: grids whose density varies along the ray (atmospheres), the mean path length in a
+// ball, and the light of a ball or a lamp in an infinite medium.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -10,9 +10,9 @@
 namespace ls::cases {
 namespace {
 
-// The unit cube with densities that vary along x only, seen along x in front of a white environment. They
-// are linear between the voxels' centres and constant in the outer halves of the first and last voxel, so
-// that the mean of the voxels is exactly the integral.
+// A unit cube whose density varies along x only, seen along x in front of a white environment. The density is
+// interpolated linearly between the centres of the voxels, and is constant in the outer halves of the first
+// and last voxel. So its integral over the cube is exactly the mean of the voxels.
 SceneBuilder layered(const std::vector<float>& values, double sigma) {
   SceneBuilder builder;
   const BsdfIndex null = builder.null();
@@ -32,8 +32,8 @@ std::vector<float> sampled(F density, int n) {
   return v;
 }
 
-// The mean of the n voxels is a midpoint sum of the density f over z from 0 to 1, with an error of about
-// (f'(1) - f'(0)) / (24 n^2): at most 6e-6 in depth for 256 voxels.
+// The optical depth of the cube is the mean of the n voxels, a midpoint sum of the density f over [0, 1]. It
+// differs from the integral of f by about (f'(1) - f'(0)) / (24 n^2): at most 6e-6 for 256 voxels.
 void atmospheres(Table& t) {
   const auto add = [&](const char* name, const char* about, auto density, double depth) {
     t.mean(fmt::format("7.6a-{}/grid/volpath", name), "7.6a", about,
@@ -50,12 +50,16 @@ void atmospheres(Table& t) {
       3 * std::sqrt(kPi) * .2 * std::erf(.5 / .2));
 }
 
-// The mean path length in a ball is 4V/S = 4R/3, whatever scatters inside (Blanco and Fournier 2003). A path
-// of length l absorbs the share 1 - e^(-sigma_a l) of the sky's light, to first order sigma_a l. So the mean
-// of 1 - L, with L the radiance, is sigma_a 4R/3. The second-order term makes it smaller by a share of
-// sigma_a <l^2> / (2 <l>), and <l^2> / (2 <l>) is the mean remaining path length from a point inside: 0.75 R
-// without scattering, to which diffusion adds about R^2 sigma_s / 5 = 0.4 R. So the share is below 2 sigma_a
-// R. A path's weight is a product of albedos, each rounded by 2^-25; relative to sigma_a / sigma_t = 5e-4
+// A ball of radius R = 1 that scatters (coefficient sigma_s) and absorbs a little (sigma_a), in a white sky.
+// The mean path length l of light in it is 4 V / S = 4 R / 3, with V its volume and S its surface, however it
+// scatters (Blanco and Fournier 2003). A path of length l absorbs the share 1 - e^(-sigma_a l) of the light,
+// to first order sigma_a l. So the mean of 1 - L, with L the radiance, is sigma_a 4 R / 3.
+//
+// The slack has two terms. The second order of 1 - e^(-sigma_a l) makes the answer smaller by the share
+// sigma_a <l^2> / (2 <l>), where <> is a mean over paths. The factor <l^2> / (2 <l>) is the mean remaining
+// path length from a point inside: 0.75 R without scattering, to which diffusion adds about
+// R^2 sigma_s / 5 = 0.4 R. So the share is below 2 sigma_a R. The weight of a path is a product of albedos,
+// each rounded by 2^-25; relative to the absorbed share of a collision, sigma_a / (sigma_a + sigma_s) = 5e-4,
 // this is an error of 6e-5.
 void mean_paths(Table& t) {
   constexpr double kAbsorption = 1e-3, kScattering = 2, kDistance = 1000, kMargin = 1.01;
@@ -72,7 +76,7 @@ void mean_paths(Table& t) {
                builder.container(SphereShape{}, {}, builder.null(), m);
                builder.environment();
                builder.scene.integrator.rr_depth =
-                   1000;  // roulette on weights of 0.9995 would be the only noise
+                   1000;  // late, since roulette would cause nearly all of the noise
                builder.look({0, -kDistance, 0}, {0, 0, 0}, 2 * std::atan(kMargin / kDistance) * 180 / kPi);
                return builder;
              },
@@ -87,8 +91,8 @@ void mean_paths(Table& t) {
 }
 
 // A practically infinite medium of extinction 1, seen in all directions from (r, 0, 0). It ends at a black
-// sphere of so large a radius R that only a share e^(-2 kappa R) of the light is missing, where kappa, the
-// rate at which fluence decays with distance, is 0.055 at albedo 0.999.
+// sphere whose radius R is 150, or 40 at albedos up to 0.9. The fluence decays with distance at the rate
+// kappa, which is 0.055 at albedo 0.999, so the sphere removes only a share e^(-2 kappa R) of the light.
 SceneBuilder endless(double albedo, double r, MediumIndex* medium) {
   SceneBuilder builder({64, 64});
   *medium = builder.homogeneous(rgb(1), rgb(albedo));
@@ -99,10 +103,10 @@ SceneBuilder endless(double albedo, double r, MediumIndex* medium) {
   return builder;
 }
 
-// The fluence of a ball that emits 1 W, at a distance of twice its radius. A camera that sees all directions
-// has the mean radiance fluence / (4 pi). The source is a ball because estimates for a point light have
-// infinite variance: radiance grows like the inverse of the angle to the point. At albedo 0.999 paths have a
-// thousand segments, so the band is wider.
+// The fluence at a distance r from the centre of a ball that emits 1 W; the radius of the ball is r / 2. A
+// camera that sees all directions measures the mean radiance, fluence / (4 pi). The source is a ball because
+// estimates for a point light have infinite variance: their radiance grows like the inverse of the angle to
+// the point. At albedo 0.999 paths have a thousand segments, so the band is wider.
 void endless_medium(Table& t) {
   for (const double c : {.3, .5, .8, .9, .99, .999}) {
     for (const double r : {.25, 1., 2., 5.}) {
@@ -128,9 +132,9 @@ void endless_medium(Table& t) {
   }
 }
 
-// A point light, which no camera sees directly: the answer is its fluence without the direct part
-// e^-r / (4 pi r^2). The lower the albedo, the heavier the tails of the estimates, so only high albedos are
-// tested.
+// A point light, which a camera does not see directly: so the answer is the fluence without the direct part
+// e^-r / (4 pi r^2). The lower the albedo, the heavier are the tails of the estimates, so only high albedos
+// are tested.
 void endless_lamp(Table& t) {
   struct Row {
     double c, r;

@@ -36,9 +36,9 @@ void white_sky(Table& t) {
     const MediumIndex m = k.heterogeneous(k.grid({6, 5, 4}, patchy(120, 9), box), rgb(1), 3, .6);
     k.container(SphereShape{}, {}, k.null(), m);
   });
-  // A grid with a density for each channel: without absorption, and (`warm`) with absorption and emission in
-  // balance with its surroundings. A medium whose source radiance equals the radiance around it is invisible,
-  // whatever its albedo.
+  // A grid with a density for each channel. Without `warm` it absorbs nothing. With `warm` it absorbs, and
+  // its source radiance (emission per length divided by the absorption coefficient) equals the radiance of
+  // the sky: such a medium is invisible, whatever its albedo.
   for (const bool warm : {false, true})
     add(warm ? "three-channel-grid-in-balance" : "three-channel-grid", [warm](SceneBuilder& k) {
       const VolumeIndex v = k.grid({12, 9, 7}, patchy(12 * 9 * 7 * 3, 5), kBox, 3);
@@ -46,8 +46,9 @@ void white_sky(Table& t) {
       if (warm) k.set_emission(m, rgb(1), true);
       k.container(CubeShape{}, {}, k.null(), m);
     });
-  // Some macro cells are so dense that the field is integrated voxel by voxel; in the others a tracker (an
-  // algorithm that steps from collision to collision) samples tentative collisions.
+  // Some macro cells (blocks of voxels with a common majorant) are so dense that the optical depth is
+  // integrated voxel by voxel. In the others a tracker (an algorithm that steps from collision to collision)
+  // samples tentative collisions.
   add("dense-grid", [](SceneBuilder& k) {
     const VolumeIndex v = k.grid({12, 9, 7}, patchy(12 * 9 * 7, 6), kBox);
     k.container(CubeShape{}, {}, k.null(), k.heterogeneous(v, rgb(1), 30, .8));
@@ -59,8 +60,8 @@ void white_sky(Table& t) {
   add("mirror-cube", [](SceneBuilder& k) { k.shape(CubeShape{}, rotate_x(30) * rotate_y(20), k.mirror()); });
 }
 
-// Walls that emit 1 around a medium without absorption: light sampling, phase sampling and equi-angular
-// sampling all find the walls, and only correct weights add up to 1.
+// Walls of radiance 1 around a medium without absorption. Light sampling, phase function sampling and
+// equi-angular sampling all find the walls, and only correct MIS weights give the radiance 1.
 void shining_walls(Table& t) {
   const auto add = [&](const char* name, const Geometry& walls, const Transform& to_world, auto medium) {
     SceneBuilder builder;
@@ -88,18 +89,19 @@ void shining_walls(Table& t) {
   add("shining-cube-forward", CubeShape{}, {}, forward);
   add("shining-cube-grid", CubeShape{}, {}, grid);
   {
-    // Five emitting rectangles, and the environment seen through a window. Among these lights the environment
-    // is never sampled: only paths that leave through the window find it.
+    // A room of five emitting rectangles and a window, through which the environment is seen. When these
+    // lights are present, light sampling never chooses the environment: only paths that leave through the
+    // window find it.
     SceneBuilder builder;
     const MediumIndex m = builder.homogeneous(rgb(.8), rgb(1), .2);
     const BsdfIndex open = builder.null();
     const Transform sides[] = {Transform{},  rotate_x(90),  rotate_x(-90),
                                rotate_y(90), rotate_y(-90), rotate_x(180)};
-    for (int i = 0; i < 6; ++i) {  // each at distance 1, facing the origin
+    for (int i = 0; i < 6; ++i) {  // six rectangles at distance 1 from the origin, facing it
       const Transform to_world = sides[i] * translate({0, 0, -1});
       if (i == 5) {
-        // The window, through which the environment is seen; the medium ends at it. Its normal points
-        // inwards.
+        // The window. The medium ends at it; its normal points inwards, so the medium is on its exterior
+        // side.
         Shape& window = builder.shape(RectangleShape{}, to_world, open);
         window.exterior = m;
         window.is_medium_transition = true;
@@ -115,8 +117,9 @@ void shining_walls(Table& t) {
   }
 }
 
-// White furnaces: light of radiance 1 from all sides, from an environment or from the walls of a box, with
-// each setting that looks for light along segments.
+// White furnaces: the contents absorb nothing, and light of radiance 1 comes from all sides, from an
+// environment or from the walls of a box. Each is rendered with several settings that sample light from
+// points along path segments.
 void surrounded(Table& t) {
   constexpr Configuration kVolpath{}, kMis{false, true}, kPoint{.camera_points = 1},
       kPoints{.camera_points = 5}, kEquiangular{false, true, DistanceSampling::equiangular},

@@ -1,4 +1,5 @@
-// Grids with majorants far too high, single dense voxels, rays along cell faces, and invalid densities.
+// Media given by grids: majorants (upper bounds of the density) far above the density, single dense voxels,
+// rays along the faces of voxels, and invalid densities.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,9 +18,9 @@ std::size_t at(const std::array<int, 3>& n, int x, int y, int z) {
   return static_cast<std::size_t>((z * n[1] + y) * n[0] + x);
 }
 
-// The unit cube of a purely absorbing grid. It is in front of a white environment (this tests flights of
-// camera rays) or, with `by_shadow`, between the sun and a white disk (this tests shadow rays). The ray goes
-// through `from` and `to`.
+// The unit cube filled with a purely absorbing grid, and a ray that goes through the points `from` and `to`.
+// The ray is a camera ray that ends at a white environment behind the cube (this tests free flights) or, with
+// `by_shadow`, a shadow ray from a white disk behind the cube to the sun in front of it.
 SceneBuilder seen_through(const std::array<int, 3>& n, const std::vector<float>& values, double sigma,
                           const Vec3& from, const Vec3& to, bool by_shadow) {
   SceneBuilder builder;
@@ -32,7 +33,8 @@ SceneBuilder seen_through(const std::array<int, 3>& n, const std::vector<float>&
     return {from[0] + s * d[0], from[1] + s * d[1], from[2] + s * d[2]};
   };
   if (by_shadow) {
-    // A small white disk behind the cube, seen from the side past the cube and lit through it.
+    // A small white disk behind the cube. The camera sees it from the side, past the cube; the sun lights it
+    // through the cube.
     builder.shape(DiskShape{}, look_at(along(4), along(0), up) * scale(.01), builder.diffuse(.5));
     builder.scene.emitters.push_back(DirectionalEmitter{d, rgb(1)});
     builder.scene.integrator.max_depth = kOnce;
@@ -44,15 +46,16 @@ SceneBuilder seen_through(const std::array<int, 3>& n, const std::vector<float>&
   }
   return builder;
 }
-// Returns the radiance for a given transmittance: seen directly, or (`by_shadow`) as light on the white disk.
+// Returns the radiance that the camera sees if the ray has this transmittance: that of the white environment,
+// or (`by_shadow`) that of the disk.
 double shown(double transmittance, bool by_shadow) {
   return by_shadow ? transmittance * .5 / kPi : transmittance;
 }
 const char* way_of(bool by_shadow) { return by_shadow ? "/grid/shadow" : "/grid/volpath"; }
 
-// The integral of the trilinear field along a line within the unit cube, from one of its faces to another.
-// Along the line, the field is a cubic polynomial between two planes of voxel centres, so Simpson's rule is
-// exact.
+// Returns the integral of the trilinear density along a line within the unit cube, from one of its faces to
+// another. The line is cut where it crosses planes of voxel centres. On each piece the density is a cubic
+// polynomial, so Simpson's rule is exact.
 double depth_along(const std::array<int, 3>& n, const std::vector<float>& values, const Vec3& from,
                    const Vec3& to) {
   const auto value = [&](double s) {
@@ -86,7 +89,8 @@ double depth_along(const std::array<int, 3>& n, const std::vector<float>& values
 
 void bounds_too_high(Table& t) {
   // A grid with sixteen voxels per side, all of density 1 except one voxel beside the ray, which is `times`
-  // times denser. The ray crosses macro cells that contain this voxel, so its density is their bound.
+  // times denser. The ray crosses macro cells (blocks of voxels with a common majorant) that contain this
+  // voxel, so its density is their majorant.
   for (const bool shadow : {false, true}) {
     for (const double times : {1., 10., 1e4, 1e6}) {
       t.mean(
@@ -137,11 +141,12 @@ void hot_voxels(Table& t) {
   }
 }
 
-// Thin fog with a dense wall across it. The camera's ray stays three voxels away from the wall, and the light
-// that reaches the ray does not cross the wall, either. But macro cells on the ray contain part of the wall;
-// if their mean density were used, no light would get through. The light comes from a lamp in the fog and is
-// scattered once: the answer is the integral over the ray of sigma / (4 pi) e^-(sigma (t + r)) / r^2, with t
-// the position on the ray and r its distance from the lamp.
+// Thin fog with a dense wall across it. The camera ray stays three voxels away from the wall, and the light
+// that reaches the ray does not cross the wall, either. But macro cells on the ray contain part of the wall:
+// if the mean density of these cells were used, no light would get through. The light comes from a lamp of
+// intensity 1 in the fog and is scattered once. With sigma the extinction of the fog, t the position on the
+// ray and r its distance from the lamp, the answer is the integral over the ray of
+// sigma / (4 pi) e^-(sigma (t + r)) / r^2.
 void beside_a_wall(Table& t) {
   constexpr int n = 33, wall = 16;
   constexpr double sigma = .5, density = 1e4;
@@ -192,7 +197,8 @@ void along_faces(Table& t) {
                         {"all-but-an-axis", {0, .5, .5}, {1, .5 + 1e-7, .5 - 1e-7}}};
   for (const Line& line : lines) {
     for (const bool shadow : {false, true}) {
-      // The mean density along each of these lines is between 0.4 and 0.7.
+      // The mean density along each of these lines is between 0.4 and 0.7, so the transmittance is far from 0
+      // and from 1.
       const double tau = depth_along(n, values, line.from, line.to);
       t.mean(
           fmt::format("N12-{}{}", line.name, way_of(shadow)), "N12 N13",
@@ -201,8 +207,8 @@ void along_faces(Table& t) {
           grey(shown(std::exp(-tau), shadow)));
     }
   }
-  // The density x y z over the unit cube, given at the grid's nodes. On the diagonal, whose length is
-  // sqrt(3), it is t^3 at the share t of that length.
+  // The density x y z over the unit cube, given by its values at the eight corners. On the diagonal, whose
+  // length is sqrt(3), the density is t^3 at the share t of that length, so its integral is sqrt(3) / 4.
   for (const bool shadow : {false, true}) {
     t.mean(
         std::string("N12-corner-grid-diagonal") + way_of(shadow), "N12 7.6a",
@@ -218,7 +224,8 @@ void along_faces(Table& t) {
   }
 }
 
-// Returns the scene with null boundaries that cut a unit cube of medium 0 into pieces along x.
+// Returns the scene with `pieces` - 1 null boundaries that cut a unit cube of its first medium into pieces
+// along x.
 SceneBuilder cut(SceneBuilder builder, int pieces) {
   const BsdfIndex null = builder.null();
   for (int i = 1; i < pieces; ++i)
@@ -238,9 +245,9 @@ void cut_in_pieces(Table& t) {
           [=] { return in_white(cut(unit_cube(configuration, rgb(.25)), pieces)); }, grey(std::exp(-.25)));
     }
     for (const int pieces : {10, 1000}) {
-      // Each piece's length is a difference of float32 positions. A piece begins at the position where the
-      // previous one ends, so errors of positions do not add up; but the length of each piece is rounded by
-      // an ulp of the scene's size.
+      // The length of each piece is a difference of float32 positions. A piece begins at the position where
+      // the previous one ends, so errors of positions do not add up. But each length is rounded by an ulp of
+      // the scene's size, and these errors add up over the pieces.
       const double tolerance = 2e-6 + pieces * 0x1p-24;
       t.exact(fmt::format("N13-light-of-{}-pieces{}", pieces, configuration.name()), "N13 N42",
               "Light given off without extinction, summed up over pieces: the whole length.",
@@ -267,7 +274,8 @@ void cut_in_pieces(Table& t) {
   }
 }
 
-// Voxels ten thousand times as long as wide: depths along each axis.
+// Voxels of 0.25 x 25 x 0.0025 units, so the longest side is ten thousand times the shortest. A ray along
+// each axis must have the right optical depth.
 void long_voxels(Table& t) {
   const std::array<int, 3> n{4, 4, 4};
   std::vector<float> values(64);
@@ -337,8 +345,8 @@ void no_densities(Table& t) {
             if (!p) return {.why = p.error().message};
             return {1, static_cast<double>(p->clamped_inputs), 0, {}, 0};
           });
-  // All densities are 1e-40 or 1e-38, and the scale of 1e20 makes the optical depth 2e-20 or 2e-18. Such
-  // denormal values must neither produce invalid results nor be slow.
+  // All densities are 1e-40 or 1e-38, denormal float32 numbers. With the scale 1e20 the optical depth of the
+  // cube is 2e-20 or 2e-18. Denormal values must neither produce invalid results nor be slow.
   for (const float value : {1e-40f, 1e-38f}) {
     t.exact(fmt::format("N58-denormal-{:g}/grid/volpath", value), "N14 N58",
             "Densities around the smallest float32: nothing is in the way, and nothing goes wrong.",
@@ -353,8 +361,8 @@ void no_densities(Table& t) {
   }
 }
 
-// A medium without extinction in red, almost opaque in blue. Free flights are sampled for one randomly chosen
-// (hero) channel, and the path's weight uses the pdfs of all channels.
+// A medium without extinction in red and almost opaque in blue. A free flight is sampled by the extinction of
+// one channel, the hero, which is chosen at random; the weight of the path uses the pdfs of all channels.
 void heroes(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     t.mean("N15-hero-without-extinction" + configuration.name(), "N15 7.6a",

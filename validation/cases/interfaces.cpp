@@ -1,4 +1,4 @@
-// Many interfaces in a row, degenerate shapes, instances, textures, cameras.
+// Cases of many interfaces in a row, degenerate shapes, instances, textures and cameras.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -11,7 +11,7 @@
 namespace ls::cases {
 namespace {
 
-// `m` glass plates between a shining wall and the camera, at normal incidence.
+// `m` glass plates between an emitting wall and the camera, which looks at them along their normal.
 SceneBuilder plates(int m) {
   SceneBuilder builder;
   const BsdfIndex glass = builder.glass(1.5);
@@ -25,7 +25,7 @@ SceneBuilder plates(int m) {
 }
 SceneBuilder floor_behind(int boundaries) {
   SceneBuilder builder;
-  // A haze of optical depth 2e-4 fills the scene, since pruning would remove boundaries without a medium on
+  // A haze of optical depth 2e-4 fills the scene, since pruning removes boundaries that have no medium on
   // either side.
   const MediumIndex haze = builder.homogeneous(rgb(1e-5), rgb(0));
   builder.scene.sensor.medium = haze;
@@ -57,7 +57,8 @@ void stacks(Table& t) {
       {.band = .002, .slack = 1e-3, .slow = true});
 }
 
-// A square as an OBJ file of two triangles, with the faces `more` between them.
+// A square as an OBJ file of two triangles. `more` are lines of the file with further faces, placed between
+// the two.
 SceneBuilder mesh(const std::string& more) {
   SceneBuilder builder;
   MeshShape m;
@@ -107,8 +108,8 @@ void shapes(Table& t) {
         "A box as an instance, mirrored or squeezed, is the box there.",
         [m = maps[i]] { return placed(true, m); }, [m = maps[i]] { return placed(false, m); },
         {.band = .003});
-  // In the first two cases the whole scene is scaled by `s`. In the third, only the box in it is squeezed, by
-  // 1e6.
+  // In the first two cases the whole scene is scaled by `s`. In the third, only the box is squeezed: its
+  // height is multiplied by 1e-6.
   for (const double s : {1e-6, 1e6})
     t.same(
         fmt::format("N44-instance-scaled-{:g}", s), "N44 N4",
@@ -124,7 +125,7 @@ void shapes(Table& t) {
   });
 }
 
-// A floor with a texture image whose texels all have the value `texel`.
+// A floor with a square texture image of `side` texels per side, whose texels all have the value `texel`.
 SceneBuilder painted(float texel, const UvTransform& to_uv = {}, int side = 1) {
   SceneBuilder builder;
   BitmapTexture image;
@@ -137,7 +138,8 @@ SceneBuilder painted(float texel, const UvTransform& to_uv = {}, int side = 1) {
   return builder;
 }
 
-// A floor, lit by the sun and an environment, whose normal map has one constant normal, given as a colour.
+// A floor, lit by the sun and an environment, with a normal map that is constant: `normal` is the normal as a
+// colour, each component mapped from [-1, 1] to [0, 1].
 SceneBuilder mapped(const Rgb& normal) {
   SceneBuilder builder;
   builder.shape(RectangleShape{}, scale(9),
@@ -184,7 +186,8 @@ void textures(Table& t) {
           });
 }
 
-// Compares a cropped frame with the same part of the whole frame: counts the values that differ.
+// Compares a cropped frame with the same part of the whole frame. The figure is the number of values (pixels
+// times channels) that differ. `radius` is the radius of the tent filter in pixels.
 Figure cropped(const Bench& b, double radius) {
   SceneBuilder whole = placed(false, {});
   whole.scene.film.filter = TentFilter{radius};
@@ -245,8 +248,8 @@ void cameras(Table& t) {
   for (const double fov : {179.9, .01, 1e-9})
     t.exact(fmt::format("N48-fov-{:g}", fov), "N48", "A white sky is white in any field of view.",
             [=](const Bench& b) { return every_value(b, sky_only(fov), 4, grey(1), 0); });
-  // The second filter has the largest allowed width: 64 pixels, more than the frame and than any of its
-  // tiles.
+  // The second radius is the largest allowed: such a filter is 64 pixels wide, more than the frame and any of
+  // its tiles.
   for (const double radius : {2., 32.})
     t.exact(fmt::format("N48-crop-filter-{:g}", radius), "N48",
             "A crop is that part of the frame, bit for bit.",

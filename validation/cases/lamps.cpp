@@ -1,4 +1,5 @@
-// Lamps at any distance from a ray, very far away, enormous, and inside or just outside a medium.
+// Light that is scattered once: lamps at any distance from a ray, lamps very far away, enormous lamps, and
+// lamps inside or just outside a medium.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -13,9 +14,10 @@ namespace {
 constexpr Configuration kAngles{false, true, DistanceSampling::equiangular},
     kAnglesInGrid{true, true, DistanceSampling::equiangular};
 
-// A ray along z through a very thin medium (sigma 1e-12), from 0 to a plate at `length`. A lamp of 1 W/sr
-// stands beside the ray's point z = `where`, at `distance` D from it. The answer is sigma / (4 pi) times the
-// angle that the ray subtends at the lamp, divided by D. Equi-angular sampling gives it without variance.
+// A ray along z through a very thin medium (extinction sigma = 1e-12), from z = 0 to a plate at z = `length`.
+// A lamp of intensity 1 stands at the distance D = `distance` beside the ray's point z = `where`. The answer
+// is sigma / (4 pi) times the angle that the ray subtends at the lamp, divided by D. Equi-angular sampling
+// estimates it without variance.
 SceneBuilder beside(const Configuration& configuration, double length, double where, double distance) {
   SceneBuilder builder;
   configuration.choose(builder);
@@ -32,7 +34,7 @@ SceneBuilder beside(const Configuration& configuration, double length, double wh
   return builder;
 }
 double beside_answer(double length, double where, double distance) {
-  // atan(b) - atan(a), without cancellation.
+  // The angle is atan(b) - atan(a). This form of it has no cancellation.
   const double a = -where / distance, b = (length - where) / distance;
   return 1e-12 / (4 * kPi) * std::atan2(b - a, 1 + a * b) / distance;
 }
@@ -41,8 +43,8 @@ void passing_by(Table& t) {
   struct Pass {
     double length, where, distance;
   };
-  // The lamp's position, D and the ray's length are rounded to float32 relative to the size of the world, so
-  // D is accurate to 2^-24 of that size.
+  // The position of the lamp and the length of the ray are rounded to float32 relative to the size of the
+  // world. So D has an absolute error of a few 2^-24 of that size.
   for (const Pass p : {Pass{1, .5, 1e-2}, Pass{1, .5, 1}, Pass{1, .5, 100}, Pass{1, .5, 1e6},
                        Pass{1, -100, .1}, Pass{1, -1e4, 10}, Pass{1e3, 500, 1}}) {
     const double extent = std::max({p.length, std::abs(p.where), 1.});
@@ -58,8 +60,8 @@ void passing_by(Table& t) {
   }
   for (const Configuration& configuration : all_configurations()) {
     for (const double h : {1., .5, .01, 1e-4}) {
-      // In grids only volpath_distant_mis samples distances equi-angularly. The free flights of volpath have
-      // too few collisions close to the lamp.
+      // The integrator volpath is tested with close lamps in homogeneous media only: in grids it does not
+      // sample distances equi-angularly, and too few of its free flights end close to the lamp.
       if (configuration.grid && !configuration.distant && h < .5) continue;
       t.mean(fmt::format("N22-passing-a-lamp-at-{:g}{}", h, configuration.name()), "N22 N23 7.6f",
              "A ray that passes a lamp at this distance, light scattered once.",
@@ -69,17 +71,17 @@ void passing_by(Table& t) {
   }
 }
 
-// Rays that pass through the lamp itself or close by; D is a ray's distance from the lamp. Over a pixel of
-// half width w about the lamp, the mean of 1 / D is 2 ln(1 + sqrt 2) / w. The square of 1 / D has no finite
-// mean there, so the band is wide.
+// Rays that pass through the lamp itself or close by; D is the distance of a ray from the lamp. Over a square
+// pixel of half width w about the lamp, the mean of 1 / D is 2 ln(1 + sqrt 2) / w. The mean of 1 / D^2 is
+// infinite there, so the estimate has no finite variance, and the band is wide.
 void through_a_lamp(Table& t) {
   for (const Configuration& configuration :
        {Configuration{false, false}, Configuration{false, true}, kAngles, kAnglesInGrid}) {
     constexpr double kHalf = .01, kSigma = 1e-3;
     const double mean = 2 * std::log(1 + std::sqrt(2.)) / kHalf;
     // With t the position along the ray, the integral of dt / (D^2 + t^2) over -3..3 is pi / D - 2 / 3 up to
-    // terms of order D^2. Light that is scattered at t has travelled a length of about 3 + |t| in the
-    // medium; the answer takes 3 for all of it, since most is scattered close to the lamp.
+    // terms of order D^2. Light that is scattered at t has travelled a length of about 3 + t + |t| in the
+    // medium. The answer takes 3 for this length, since most of the light is scattered close to the lamp.
     const double angles = kPi * mean - 2. / 3;
     t.mean(
         "N23-through-a-lamp" + configuration.name(), "N23",
@@ -119,9 +121,10 @@ void from_afar(Table& t) {
                           rgb(1 / (2 * kPi * (1 - std::sqrt(.99)))));
              return builder;
            },
-           // The slack: the lamp's rim is 0.1 rad off the vertical, so paths down through the cube are longer
-           // by at most 0.005; the extinction is 0.01. The first run: on grids volpath samples free flights,
-           // which rarely scatter in a medium this thin.
+           // The slack: light from the rim of the lamp falls 0.1 rad off the vertical, so paths down through
+           // the cube are longer by at most 0.005; with the extinction 0.01 this changes the answer by 5e-5.
+           // The number of paths: on grids volpath samples free flights, which rarely scatter in a medium
+           // this thin, so a pilot run would tell too little.
            grey(lit_cube_answer(.01, 1)),
            {.slack = 5e-5,
             .slow = configuration.grid && !configuration.distant,
@@ -129,17 +132,18 @@ void from_afar(Table& t) {
   }
 }
 
-// Lights of radius (or half side) 1e5 at distance 1e7, of fluence 1, over a cube of size 2. In so large a
-// world, float32 coordinates separate the cube's faces only near the origin.
+// Lights of radius (or half side) 1e5 at distance 1e7 over a cube of side 2; each gives the cube a fluence of
+// 1. The world is so large that float32 coordinates separate the faces of the cube only near the origin.
 void enormous(Table& t) {
   constexpr double kSize = 1e5, kFar = 1e7;
   const double cone = 2 * kPi * (1 - std::sqrt(1 - kSize * kSize / kFar / kFar)),
                disk = 2 * kPi * (1 - kFar / std::hypot(kFar, kSize)),
                square = 4 * std::atan(kSize * kSize / (kFar * std::sqrt(kFar * kFar + 2 * kSize * kSize)));
-  // The view is a line along z through the cube's middle; light straight from above has a path of length 1 to
-  // it inside the cube. Light that is tilted along z by the angle q and reaches the line within q of one end
-  // has entered through the cube's side instead of its top, so its path has a length u < 1. At that end
-  // this adds q int_0^1 (e^-u - e^-1) du = q (1 - 2 / e). `lean` is the mean of max(q, 0) over the light.
+  // The view is a line along z through the middle of the cube; its ends are on the faces z = -1 and z = 1.
+  // Light from straight above reaches the line after a path of length 1 in the cube. Light that is tilted
+  // along z by a small angle q has a shorter path, of length u < 1, if it reaches the line within q of one
+  // end: it has entered through the side of the cube instead of its top. At this end it adds
+  // q int_0^1 (e^-u - e^-1) du = q (1 - 2 / e). `lean` is the mean of max(q, 0) over the light.
   const auto leaning = [](double lean) {
     return 1 + lean * (std::exp(1.) - 2) * (1 + std::exp(-2.)) / -std::expm1(-2.);
   };
@@ -162,14 +166,15 @@ void enormous(Table& t) {
                             rgb(1 / light.solid_angle));
                return builder;
              },
-             // The light's rim is 0.01 rad off the vertical, 0.014 in the corners, so paths down through the
-             // cube are longer by a share of at most 1e-4.
+             // Light from the rim of the lamp falls 0.01 rad off the vertical (0.014 from the corners of the
+             // square), so paths down through the cube are longer by a share of at most 1e-4.
              grey(lit_cube_answer(1, 1) * leaning(light.lean)), {.slack = 1e-4});
   }
 }
 
-// The answer for a cube [-1, 1]^3 seen along z through its middle, and a lamp on the y axis inside or outside
-// the cube. Extinction acts inside only.
+// The answer for a cube [-1, 1]^3 of extinction sigma and albedo 1, seen along z through its middle, and a
+// lamp of 1 W at (0, y, 0), inside or outside the cube. Light is scattered once; outside the cube there is no
+// medium.
 double cube_answer(double y, double sigma) {
   const double end = std::atan(1 / y);
   return sigma / (16 * kPi * kPi * y) *
@@ -193,8 +198,8 @@ void across_boundaries(Table& t) {
             return lit_by(lit_cube(configuration, rgb(1), rgb(1)),
                           PointEmitter{{0, y, 0}, rgb(1 / (4 * kPi))});
           },
-          // A ray from the view to a lamp above the cube always leaves through the cube's top, never through
-          // a side, since it approaches the y axis.
+          // A shadow ray to a lamp above the cube always leaves through the top of the cube, never through a
+          // side, since it approaches the y axis. So cube_answer() needs no case for the sides.
           grey(cube_answer(y, 1)));
     }
   }

@@ -41,7 +41,7 @@ void huge(Table& t) {
       },
       reflected(kPi));
   for (const double height : {1e-3, .1, 1.}) {
-    // The light is a square of half side 1 at this height.
+    // The light is a square of half side 1, at `height` above the floor.
     t.mean(fmt::format("N27-square-at-{:g}", height), "N27 7.6g",
            "A floor this close below a shining square: up to pi, where the square is all it sees.",
            [=] {
@@ -53,8 +53,8 @@ void huge(Table& t) {
            },
            reflected(below_a_square(1 / height)), {.slack = 1e-5});
   }
-  // The floor at the foot of an emitting wall that is 20 wide and 10 high. With b half the width, h the
-  // height, c the distance from the wall and r^2 = c^2 + h^2, the irradiance is
+  // A point of the floor near the foot of an emitting wall that is 20 wide and 10 high. With b half the
+  // width, h the height, c the distance of the point from the wall and r^2 = c^2 + h^2, the irradiance is
   // atan(b / c) - (c / r) atan(b / r).
   constexpr double kFar = 1e-2, kSide = 10, kR = 10.000005;
   t.mean("N27-at-the-foot-of-a-wall", "N27 7.6g", "A floor up to the very edge of a shining wall.",
@@ -119,7 +119,8 @@ void of_nothing(Table& t) {
 }
 
 void orders_apart(Table& t) {
-  // Lamps with intensities from 1e-20 to 1e20; only the brightest few contribute to the sum noticeably.
+  // Four or 1000 lamps with intensities from 1e-20 to 1e20. Only the brightest few contribute to the sum
+  // noticeably.
   for (const bool tree : {false, true}) {
     const int count = tree ? 1000 : 4;
     double irradiance = 0;
@@ -135,8 +136,8 @@ void orders_apart(Table& t) {
            "Lamps of powers forty orders apart: the brightest make up the sum, and none is lost.", builder,
            reflected(irradiance));
   }
-  // A point light (delta light) reflected by a mirror (delta lobe): no sampling strategy can find this path,
-  // and none may divide by a pdf of 0.
+  // A point light (a delta light) reflected by a mirror (a delta lobe): no sampling strategy can find this
+  // path, so the answer is black. No strategy may divide by a pdf of 0.
   t.exact("N32-lamp-in-a-mirror", "N32", "A point light in a mirror is not seen, and nothing goes wrong.",
           [](const Bench& b) {
             SceneBuilder builder;

@@ -12,10 +12,11 @@
 namespace ls::cases {
 namespace {
 
-constexpr double kSlant = 30;  // angle of the view from the normal, in degrees
+constexpr double kSlant = 30;  // angle between the viewing direction and the normal, in degrees
 
-// A white metal in z = 0, seen by parallel rays and lit by a directional light. The half vector between view
-// and light is at the angle `off` from the normal.
+// A white metal in the plane z = 0, seen by parallel rays and lit by a directional light. The half vector
+// between the directions to camera and light is at the angle `off` (radians) from the normal. `alpha` is the
+// roughness.
 SceneBuilder glint(double alpha, Microfacet d, double off) {
   SceneBuilder builder;
   const TextureIndex a = builder.texture(rgb(alpha));
@@ -30,8 +31,8 @@ SceneBuilder glint(double alpha, Microfacet d, double off) {
   return builder;
 }
 
-// Returns GGX's masking and shadowing (Smith's, separable) at the angles of view and light; Beckmann's is 1
-// here to all digits.
+// Returns the masking-shadowing factor G of GGX (Smith's, separable) at the angles of view and light, in
+// radians. For Beckmann, G is 1 here to all digits.
 double unmasked(double alpha, double view, double light) {
   const auto lambda = [alpha](double angle) {
     return (std::sqrt(1 + std::pow(alpha * std::tan(angle), 2)) - 1) / 2;
@@ -39,19 +40,20 @@ double unmasked(double alpha, double view, double light) {
   return 1 / ((1 + lambda(view)) * (1 + lambda(light)));
 }
 
-// The answer is D G / (4 cos) times the light's irradiance, with the cosine of the view's angle.
+// The answer is D G E / (4 cos v): D is the density of facet normals at the half vector, G the
+// masking-shadowing factor, E = 1 the irradiance perpendicular to the light, and v the angle of the view.
 void peaks(Table& t) {
   for (const auto d : {Microfacet::ggx, Microfacet::beckmann})
     for (const double alpha : {2e-3, .01, .1})
-      for (const int slopes : {0, 3}) {  // tangent of the half vector's angle, in units of alpha
+      for (const int slopes : {0, 3}) {  // the half vector's slope (tangent of its angle), divided by alpha
         const double tangent = slopes * alpha, s2 = static_cast<double>(slopes * slopes),
                      view = kSlant * kPi / 180, off = std::atan(tangent);
         const bool ggx = d == Microfacet::ggx;
         const double shape =
                          ggx ? std::pow(1 + s2, -2) * unmasked(alpha, view, view + 2 * off) : std::exp(-s2),
                      density = shape * std::pow(1 + tangent * tangent, 2) / (kPi * alpha * alpha);
-        // Directions are accurate to 2^-24, so slopes in units of alpha are accurate to 2^-24 / alpha. The
-        // density depends on their square.
+        // Directions are accurate to 2^-24, so slopes divided by alpha are accurate to 2^-24 / alpha. D
+        // depends on the square of this slope.
         const double tolerance = 1e-5 + 2. * slopes * 4 * 0x1p-24 / alpha;
         t.exact(
             fmt::format("N34-{}-alpha-{:g}-{}", ggx ? "ggx" : "beckmann", alpha,
@@ -85,9 +87,10 @@ void normals(Table& t) {
             builder.lamp(SphereShape{}, translate({6, 0, -1.5}), rgb(10));
             return every_value(b, builder, 64, grey(0), 0);
           });
-  // A white floor whose shading normals lean by b from the geometric one receives light from the directions
-  // that are above both its plane and the plane perpendicular to the shading normal. The projected solid
-  // angle of this wedge about the shading normal is pi (1 + cos b) / 2.
+  // A white floor whose shading normals lean by b from the geometric normal receives light from the
+  // directions that are above both the floor and the plane perpendicular to the shading normal. The projected
+  // solid angle of these directions about the shading normal is pi (1 + cos b) / 2; that of a whole
+  // hemisphere is pi.
   t.mean(
       "N37-furnace", "N37 N38", "That floor, white, in a white sky: it gives the part of it that it sees.",
       [] { return in_white(leaning()); }, grey((1 + std::cos(kLean)) / 2));

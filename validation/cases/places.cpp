@@ -1,6 +1,6 @@
-// Coincident objects: faces in the same place, nested and overlapping media, cameras at a boundary and inside
-// glass, and lights that reflect light themselves; and defocus. Splitting a medium into parts that touch, or
-// into thinner media in the same place, must not change the light.
+// Coincident objects: faces in the same place, nested and overlapping media, cameras at a boundary or inside
+// glass, and lights that also reflect light. Also cases of defocus. Splitting a medium into parts that touch,
+// or into thinner media in the same place, must not change the light.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -20,8 +20,8 @@ void add_box(SceneBuilder& builder, MediumIndex m, const Vec3& lo, const Vec3& h
   builder.container(CubeShape{}, box(lo, hi) * box({.5, .5, .5}, {1, 1, 1}), builder.null(), m);
 }
 
-// The light that is measured falls straight down the line x = y = 0, along an edge that boxes share or across
-// the face between them.
+// The floor of lit_floor() below boxes of media. The light that is measured falls straight down the line
+// x = y = 0: along an edge that four boxes share, or across the face between two boxes.
 void faces_on_each_other(Table& t) {
   for (const Configuration& configuration : both_media()) {
     const auto medium = [configuration](SceneBuilder& builder, double sigma) {
@@ -67,7 +67,7 @@ void faces_on_each_other(Table& t) {
 }
 
 // A pane that absorbs half the light, in the same place as the face of a box with a medium. A shadow ray may
-// hit either surface first, and must be attenuated by both pane and medium.
+// hit either surface first. The light must be attenuated both by the pane and by the medium.
 void panes_on_faces(Table& t) {
   for (const Configuration& configuration : both_media())
     for (const bool first : {false, true})
@@ -111,8 +111,8 @@ void lights_on_walls(Table& t) {
         grey(2));
 }
 
-// A medium that emits per length but has no extinction, seen from both sides of its face and from the face
-// itself.
+// A medium that emits 1 per length and has no extinction, seen by cameras just outside and just inside one of
+// its faces. The answer is the length of the ray in the medium.
 void cameras_at_a_boundary(Table& t) {
   for (const Configuration& configuration : both_media())
     for (const double x : {-1e-2, -1e-5, -1e-7, 1e-7, 1e-5, 1e-2})
@@ -144,7 +144,7 @@ void cameras_at_a_boundary(Table& t) {
   from_inside("N43-in-a-bubble-in-glass", "A camera in a bubble of air in a ball of glass: 1.", 1, true);
 }
 
-// Lights that also reflect: the shaded points are on the light itself.
+// Lights that also reflect, so that the shaded points lie on the light itself.
 void on_lights(Table& t) {
   const auto alone = [&](const char* name, const Geometry& g) {
     t.exact(fmt::format("N27-on-a-shining-{}", name), "N27",
@@ -161,9 +161,10 @@ void on_lights(Table& t) {
   alone("cube", CubeShape{});
 }
 
-// A small bright disk of radius rho at distance z, out of focus; the focus distance is f, the lens radius R.
-// In the middle of its circle of confusion, only rays from the part of the lens within rho / |1 - z / f| of
-// its centre hit the disk. The circle's diameter, seen at the focus distance, is 2 R |z - f| / z.
+// A small disk of radiance 1 and radius rho at distance z, out of focus: the focus distance is f, the lens
+// radius R. The disk appears as a circle of confusion, of the diameter 2 R |z - f| / z at the focus distance.
+// In the middle of this circle, only rays from the part of the lens within r = rho / |1 - z / f| of its
+// centre hit the disk. So the radiance there is (r / R)^2.
 void out_of_focus(Table& t) {
   constexpr double kAperture = .1, kFocus = 4, kDisk = .02;
   for (const double z : {2., 3., 8.}) {
@@ -185,7 +186,8 @@ void out_of_focus(Table& t) {
 
 constexpr Rgb kAlbedo{.9, .9, .9};
 
-// An endless slab of optical depth 1 and albedo .9, made of boxes that `fill` adds between mirrors.
+// Adds a case of an endless slab of optical depth 1 and albedo .9. `fill` adds the boxes of media that form
+// the slab between the mirrors.
 void add_slab(Table& t, const std::string& name, bool transmitted, const Configuration& configuration,
               auto fill) {
   SceneBuilder builder = empty_column({.albedo = .9, .tau = 1, .wall = .5}, transmitted);
@@ -212,7 +214,8 @@ void slabs_of_parts(Table& t) {
     add_layer(builder, half);
     add_layer(builder, half);
   });
-  // Both integrators must see both media, also volpath_distant_mis, which samples light along whole segments.
+  // A homogeneous medium and a grid in the same place. Both integrators must sample both media, also
+  // volpath_distant_mis, which samples light along whole segments.
   const auto grid_and_constant = [](SceneBuilder& builder) {
     add_layer(builder, builder.homogeneous(rgb(.4), kAlbedo));
     const VolumeIndex v =
@@ -230,16 +233,16 @@ void slabs_of_parts(Table& t) {
           CubeShape{},
           translate({i & 1 ? .3 : -.3, i & 2 ? .3 : -.3, i & 4 ? .75 : .25}) * scale(.3, .3, .25), null, m);
   });
-  // In the lower half of the slab a medium of extinction 0.5 and higher priority replaces one of extinction
-  // 1.5: their mean is 1.
+  // Extinction 1.5 fills the slab. In its lower half, a medium of extinction 0.5 and higher priority replaces
+  // it, so the mean is 1.
   add_slab(t, "by-priority-R", false, {}, [](SceneBuilder& builder) {
     add_layer(builder, builder.homogeneous(rgb(1.5), kAlbedo));
     add_layer(builder, ranked(builder, rgb(.5), kAlbedo, 2), .5);
   });
 }
 
-// Overlapping media that scatter all light and absorb none, in a white sky. Every pixel is white, in
-// whatever way the media overlap.
+// Overlapping media that scatter and do not absorb, in a white sky. Every pixel has the radiance of the sky,
+// in whatever way the media overlap.
 void white_crowd(Table& t) {
   SceneBuilder builder;
   const BsdfIndex null = builder.null();
@@ -256,8 +259,8 @@ void white_crowd(Table& t) {
          furnace(builder, 25), grey(1), {.channels = true});
 }
 
-// Two media in one box that absorb, with extinctions s1 and s2, and emit e1 and e2 per length. Over a path of
-// length d the radiance is (e1 + e2) (1 - e^(-(s1 + s2) d)) / (s1 + s2).
+// Two media in the same box that absorb, with extinctions s1 and s2, and emit e1 and e2 per length. Over a
+// path of length d the radiance is (e1 + e2) (1 - e^(-(s1 + s2) d)) / (s1 + s2).
 void emitting(Table& t, const Configuration& configuration) {
   SceneBuilder builder;
   const Rgb s1{.5, 1, .2}, s2{1, .25, .6}, e1{1, 2, 0}, e2{.5, 1, 3};

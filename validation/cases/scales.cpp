@@ -1,4 +1,5 @@
-// Scenes of any scale (extinctions of 1e8 over lengths of 1e-8), at any position, and seen from far away.
+// Scenes of very different scales (extinctions of 1e8 over lengths of 1e-8), at any position, and seen from
+// far away.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -11,7 +12,8 @@
 namespace ls::cases {
 namespace {
 
-// A scene with many features, at a given scale: a medium in glass, a floor, a lamp and the sun.
+// A scene with many features, all of whose lengths are multiplied by s: a medium in a glass sphere, a floor,
+// a disk light, a point light and the sun.
 SceneBuilder miniature(const Configuration& configuration, double s) {
   SceneBuilder builder;
   configuration.choose(builder);
@@ -30,8 +32,8 @@ SceneBuilder miniature(const Configuration& configuration, double s) {
 void of_any_scale(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     for (const int k : {-40, -13, 20, 60}) {
-      // The bounding box in Mitsuba's grid files is float32, which would round differently at each scale. So
-      // the grids' boxes are the unit cube at every scale, and `to_world` scales them.
+      // Mitsuba's grid files store the bounding box in float32, which would round differently at each scale.
+      // So the files have the unit cube as their box at every scale, and `to_world` scales it.
       t.exact(fmt::format("N04-scaled-by-2^{}{}", k, configuration.name()), "N4 7.7",
               "A scene scaled by a power of two has the same pixels, bit for bit.", [=](const Bench& b) {
                 return same_bits(b, miniature(configuration, 1), miniature(configuration, std::ldexp(1., k)),
@@ -70,7 +72,8 @@ void anywhere(Table& t) {
           },
           grey(lit_cube_answer(1, 1)));
     }
-    // The cube is a ten-thousandth of the scene: ray offsets of 2^-20 of the scene are 1e-2 of the cube.
+    // The cube is a ten-thousandth of the scene in size. Rays are offset from surfaces by 2^-20 of the scene,
+    // which is 1e-2 of the cube.
     t.mean(
         "N11-small-in-a-large-scene" + configuration.name(), "N11 N4",
         "A cube in the middle of a scene ten thousand times its size.",
@@ -84,7 +87,8 @@ void anywhere(Table& t) {
   }
 }
 
-// Renders one sample in each half with seed 0: the first point of every sample sequence.
+// Renders one sample in each half of the samples, with seed 0: these samples use the first point of every
+// sample sequence.
 void first_samples(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     t.exact("N70-first-samples-of-seed-0" + configuration.name(), "N70 N6",

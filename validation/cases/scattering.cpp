@@ -47,8 +47,8 @@ void white(Table& t) {
   }
 }
 
-// A slab of albedo 1 - 1e-7. The share of light that it absorbs is 1e-7 times the mean number of scatterings,
-// which is about 40 here.
+// A slab of albedo 1 - 1e-7. It absorbs a share of the light that is 1e-7 times the mean number of
+// scatterings, about 40 here. So to five digits it reflects like a slab of albedo 1.
 void all_but_white(Table& t) {
   for (const Configuration& configuration : two_configurations()) {
     t.mean("N16-all-but-white-16" + configuration.name(), "N16 7.2",
@@ -60,21 +60,21 @@ void all_but_white(Table& t) {
   }
 }
 
-// The transmittance of a white slab at normal incidence by the formula for large depths tau:
-// T = (4/3) K / (tau + 1.42089) with K = (sqrt(3) / 4) H(1), where Chandrasekhar's H(1) is 2.907811. Already
-// at tau = 16 the formula gives the tabulated 0.096368 to all digits.
+// Returns the transmittance T of a white slab for light at normal incidence, by the formula for large optical
+// depths tau: T = (4/3) K / (tau + 1.42089) with K = (sqrt(3) / 4) H(1), where Chandrasekhar's H(1) is
+// 2.907811. Already at tau = 16 the formula gives all digits of the tabulated value, 0.096368.
 double white_transmittance(double tau) { return std::sqrt(3.) / 3 * 2.907811 / (tau + 1.42089); }
 
 void deep(Table& t) {
   for (const Configuration& configuration : both_media()) {
     for (const double tau : {64., 256.}) {
-      if (tau > 100 && configuration.grid) continue;  // takes minutes, and depth 64 shows the same
+      if (tau > 100 && configuration.grid) continue;  // takes minutes; grids are tested at depth 64
       t.mean(
           fmt::format("N17-white-slab-{:g}{}", tau, configuration.name()), "N17 N16 7.2",
           "A white slab this deep: paths of hundreds of vertices, ended by no cap.",
           [=] { return column(configuration, {.tau = tau}, false); }, grey(1 - white_transmittance(tau)),
-          // At depth 256 the error comes from a few very long paths, and few pixels have one. A short first
-          // run would find none of them, or overestimate their share.
+          // At depth 256 most of the variance comes from a few very long paths, which few pixels have. A
+          // short pilot run would find no such path, or overestimate their share.
           {.slack = 1e-6, .slow = true, .paths = tau < 100 ? 0u : 1u << 17, .frames = tau < 100 ? 0u : 64u});
     }
   }
@@ -103,15 +103,16 @@ void roulette(Table& t) {
   }
 }
 
-// Parallel light that reaches the camera scattered by 0 degrees if g > 0, by 180 degrees otherwise: the peak
-// of the phase function p in both cases. 4 pi p(0) = (1 + g) / (1 - g)^2, which is 1.9999e8 at g = 0.9999.
+// Parallel light that is scattered towards the camera by 0 degrees if g > 0, by 180 degrees otherwise. In
+// both cases the camera sees the peak of the phase function p. For g > 0, 4 pi p(0) = (1 + g) / (1 - g)^2,
+// which is 1.9999e8 at g = 0.9999.
 void phase_peaks(Table& t) {
   const auto add = [&](const std::string& id, const char* rows, const Configuration& configuration,
                        double g) {
     t.mean(id, rows, "Light scattered straight on: 4 pi p = (1 + |g|) / (1 - |g|)^2, not clamped.",
            [=] { return head_on(configuration, g, .5, g > 0); }, grey(head_on_answer(g, .5)),
-           // g is rounded to float32, by at most 2^-25, so 1 - g has a relative error of 2^-25 / (1 - g); the
-           // peak depends on its square.
+           // The slack: g is rounded to float32, by at most 2^-25, so 1 - |g| has a relative error of
+           // 2^-25 / (1 - |g|), and the peak depends on the square of 1 - |g|.
            {.band = .003, .slack = 2 * 0x1p-25 / (1 - std::abs(g))});
   };
   for (const Configuration& configuration : all_configurations()) {
@@ -120,9 +121,9 @@ void phase_peaks(Table& t) {
   }
 }
 
-// Returns the share of singly scattered light that is deflected by less than an angle q. The camera measures
-// it by looking through the medium at a sun of angular radius q. Phase function sampling, light sampling or
-// both find the sun.
+// Returns the share of singly scattered light that is deflected by less than the angle q (`degrees`). The
+// camera measures it by looking through the medium at a sun of angular radius q, which phase function
+// sampling and light sampling both find.
 double share_within(double g, double degrees) {
   const double h = std::sin(degrees * kPi / 360), x = 2 * h * h;  // 1 - cos q
   return (1 - g) * (1 + g) / (2 * g) * (1 / (1 - g) - 1 / std::sqrt((1 - g) * (1 - g) + 2 * g * x));
@@ -135,8 +136,9 @@ void cones(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     for (const Cone c : {Cone{.9999, .0115}, Cone{.999, .115}, Cone{.99, .6}}) {
       const double radius = c.degrees * kPi / 180, x = 2 * std::pow(std::sin(radius / 2), 2);
-      // For radiance 1, the sun's irradiance is its projected solid angle. The path length through the cube
-      // is the same for all angles up to a share of radius^2 / 2, 5.5e-5 at 0.6 degrees.
+      // The sun has radiance 1, so its irradiance is its projected solid angle. The slack is for the path
+      // length through the cube: it is the same for all directions of the light up to a share of
+      // radius^2 / 2, which is 5.5e-5 at 0.6 degrees.
       const double irradiance = 2 * kPi * x * (1 - x / 2);
       t.mean(fmt::format("N18-cone-g-{:g}{}", c.g, configuration.name()), "N18 N26",
              "A sun of a few thousandths of a degree, seen directly and by light scattered into the view.",
@@ -173,8 +175,8 @@ void small_and_forbidden(Table& t) {
             });
 }
 
-// Reflectance R and transmittance T of slabs with Henyey-Greenstein phase functions (van de Hulst 1980), also
-// for backward scattering.
+// Tabulated reflectance R and transmittance T of slabs with Henyey-Greenstein phase functions (van de Hulst
+// 1980), among them one that scatters backwards.
 void slabs(Table& t) {
   struct Row {
     Slab slab;
@@ -184,8 +186,8 @@ void slabs(Table& t) {
     for (const Row& row : {Row{{.9, .75, 2}, .097395, .660958}, Row{{1, .85, 8}, .358432, .641568},
                            Row{{1, -.5, 2}, .620494, .379506}}) {
       for (const bool through : {false, true}) {
-        // Reflection by forward-scattering slabs takes half a minute on grids; it is tested on homogeneous
-        // media only.
+        // On grids, the reflectance of a forward-scattering slab takes half a minute. It is tested on
+        // homogeneous media only.
         if (configuration.grid && !through && row.slab.g > 0) continue;
         t.mean(fmt::format("7.2-slab-a{:g}-g{:g}-tau{:g}-{}{}", row.slab.albedo, row.slab.g, row.slab.tau,
                            through ? "T" : "R", configuration.name()),

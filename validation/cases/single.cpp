@@ -1,5 +1,5 @@
-// Single scattering, by every integrator and with all of its settings, against closed forms and quadrature
-// (docs/measurements/stability.md 7.6f).
+// Single scattering by every integrator, with all of its settings, compared with closed forms and with
+// numerical integration (docs/measurements/stability.md 7.6f).
 #include <fmt/format.h>
 
 #include <cmath>
@@ -10,7 +10,8 @@
 namespace ls::cases {
 namespace {
 
-// The settings that are tested: the default integrator, and volpath_distant_mis with each of its settings.
+// A tested setting: the default integrator, or volpath_distant_mis with one of its ways of sampling distances
+// and one of its MIS heuristics.
 struct Setting {
   std::string name;
   Configuration configuration;
@@ -42,7 +43,7 @@ void cubes(Table& t) {
   }
 }
 
-// The scene passing() with the setting's heuristic.
+// The scene of passing() with the configuration and the MIS heuristic of the setting.
 SceneBuilder passing_lit(const Setting& s, const Rgb& sigma, const Rgb& albedo) {
   SceneBuilder builder = passing(s.configuration, sigma, albedo);
   builder.scene.integrator.heuristic = s.heuristic;
@@ -58,13 +59,14 @@ double along(double sigma, F arriving) {
                    3, 1200);
 }
 
-// The answer for a sphere of radiance 1 and radius r at distance h from the ray: at each point of the ray,
-// the integral over the sphere's solid angle of the light that reaches the point, by quadrature over the
-// cosine of the angle to the sphere's centre.
+// The answer for a sphere of radiance 1 and radius r whose centre is at distance h from the ray. The light
+// that reaches a point of the ray is integrated over the solid angle of the sphere, numerically over the
+// cosine c of the angle to the centre of the sphere.
 double sphere_answer(double h, double r, double sigma) {
   return along(sigma, [=](double t) {
     const double d2 = h * h + t * t, d = std::sqrt(d2), cos_max = std::sqrt(1 - r * r / d2);
-    // The substitution c = cos_max + (1 - cos_max)(1 - v^2) removes the square root singularity at the rim.
+    // The substitution c = cos_max + (1 - cos_max)(1 - v^2) removes the square root singularity of the
+    // integrand at the rim of the sphere.
     return 2 * kPi *
            integrate(
                [=](double v) {
@@ -75,7 +77,7 @@ double sphere_answer(double h, double r, double sigma) {
                0, 1, 200);
   });
 }
-// The answer for a square light of side 2a that faces the ray at distance h.
+// The answer for a square light of radiance 1 and side 2a that faces the ray at distance h.
 double square_answer(double h, double a, double sigma) {
   return along(sigma, [=](double t) {
     return integrate(
@@ -90,8 +92,8 @@ double square_answer(double h, double a, double sigma) {
         -a, a, 80);
   });
 }
-// The answer for a lamp at distance h whose intensity falls linearly with the angle from 30 to 60 degrees off
-// its axis.
+// The answer for a spot light at distance h from the ray that points at the middle of the ray. Its intensity
+// is 1 up to 30 degrees off its axis and falls linearly with the angle to 0 at 60 degrees.
 double spot_answer(double h, double sigma) {
   return along(sigma, [=](double t) {
     const double d2 = h * h + t * t, degrees = std::abs(std::atan2(t, h)) * 180 / kPi;
@@ -105,8 +107,8 @@ void lights(Table& t) {
                spot = spot_answer(.5, .7);
   for (const bool grid : {false, true}) {
     for (const Setting& s : settings(grid)) {
-      // With these settings paths come near a light only by chance. A short pilot run finds no such path, or
-      // overestimates their light.
+      // With these settings paths come near a light only by chance. A short pilot run would find no such
+      // path, or overestimate the light that they carry.
       const bool by_chance =
           s.configuration.distance == DistanceSampling::exponential || (grid && !s.configuration.distant);
       const MeanOptions options{.slow = by_chance, .paths = by_chance ? 1u << 21 : 0u},

@@ -1,4 +1,4 @@
-// Multiple scattering in plane-parallel media: tabulated reflectances and transmittances
+// Multiple scattering in plane-parallel media, compared with tabulated reflectances and transmittances
 // (docs/measurements/stability.md 7.1, 7.2 and 7.5; Chandrasekhar 1950, Giovanelli 1955, van de Hulst 1980).
 #include <fmt/format.h>
 
@@ -34,8 +34,8 @@ void semi_infinite(Table& t) {
              {.slack = row.digits});
     }
   }
-  // A white slab of optical depth 64: the half space's 0.336428 minus what the slab transmits,
-  // (4/3) K^2 / (tau + 1.42089) / pi with K = (sqrt(3) / 4) H(1).
+  // The answer for a white slab of optical depth tau = 64 is the radiance of a white half space, 0.336428,
+  // minus the part that the slab transmits, (4/3) K^2 / (tau + 1.42089) / pi with K = (sqrt(3) / 4) H(1).
   const double k = std::sqrt(3.) / 4 * 2.907811;
   t.mean("7.1-normal-to-normal-a1/homogeneous/volpath", "7.1 N17", "The same of a white slab of depth 64.",
          [] {
@@ -45,9 +45,10 @@ void semi_infinite(Table& t) {
          {.band = .01, .why_band = "paths of hundreds of scatterings", .slack = 1e-5, .slow = true});
 }
 
-// Adds a white disk of radius height / 20, at `height` above the face at `foot`, and points the camera at its
-// underside. The cosine-weighted light of the whole face falls on the disk, so the disk's radiance is the
-// medium's reflectance in uniform light, less the little light that the disk itself blocks.
+// Adds a white disk of radius height / 20, at `height` above the point `foot` of a face of a medium, and
+// points the camera at its underside. The cosine-weighted light of the whole face falls on the disk. So the
+// radiance of the disk is the reflectance of the medium in uniform light, less the little light that the disk
+// itself blocks.
 void add_small_plate(SceneBuilder& builder, const Vec3& foot, double height) {
   const double radius = height / 20, x = foot[0], y = foot[1], z = foot[2];
   builder.shape(DiskShape{}, translate({x, y, z + height}) * rotate_x(180) * scale(radius),
@@ -56,9 +57,10 @@ void add_small_plate(SceneBuilder& builder, const Vec3& foot, double height) {
   builder.scene.sensor.near_clip = 1e-9;
 }
 
-// The spherical albedo of a half space, by a cube of side 1 and optical depth 40. The disk is 0.001 above the
-// face, which is 0.04 mean free paths. Its radius is 0.002 mean free paths, so it shadows a share of about
-// (0.002)^2 of the light that it receives. Of its cosine-weighted view, (2 x 0.001)^2 lies beside the cube.
+// The spherical albedo of a half space (its reflectance in uniform light), measured on a cube of side 1 and
+// optical depth 40. The disk is 0.001 above the face, which is 0.04 mean free paths. The radius of the disk
+// is 0.002 mean free paths, so it shadows a share of about (0.002)^2 of the light that it receives. A share
+// of (2 x 0.001)^2 of its cosine-weighted view lies beside the cube.
 void spherical(Table& t) {
   struct Row {
     double albedo, reflected;
@@ -87,7 +89,8 @@ std::string named(const char* what, const Slab& s, const char* side, const Confi
   return fmt::format("7.2-{}-a{:g}-tau{:g}-{}{}", what, s.albedo, s.tau, side, configuration.name());
 }
 
-// Where a slab transmits little light, and only by long paths, the band is 1 %.
+// Returns the options of a case whose answer is the transmittance `through`. If it is small, the light comes
+// by long paths, and the band is 1 %.
 MeanOptions of_little(double through, bool slow) {
   const bool little = through < .3;
   return {.band = little ? .01 : kBand,
@@ -95,8 +98,8 @@ MeanOptions of_little(double through, bool slow) {
           .slack = kDigits * 10,
           .slow = slow};
 }
-// False: the slab's transmittance is tested in the faster configuration only. The reflectance is tested in
-// both.
+// True if the transmittance of the slab is tested in both configurations, false if only in the faster one.
+// The reflectance is always tested in both.
 bool by_both(const Slab& slab) { return slab.tau < 10; }
 
 void isotropic(Table& t) {
@@ -122,9 +125,10 @@ void isotropic(Table& t) {
          grey(.267410), {.slack = kDigits * 10, .slow = true});
 }
 
-// A plate of reflectance 1/2 in the column above the slab, with the environment below, lit by the slab's
-// cosine-weighted light. With R and T the slab's reflectance and transmittance for diffuse light, and B the
-// plate's irradiance divided by pi, B = T + R B / 2. The plate's radiance is B / 2.
+// A plate of reflectance 1/2 above the slab, with the environment below the slab; the mirrors of the column
+// surround both. The plate receives the cosine-weighted light of the slab. With R and T the reflectance and
+// transmittance of the slab for diffuse light, and B the irradiance of the plate divided by pi,
+// B = T + R B / 2. The radiance of the plate is B / 2.
 SceneBuilder plate_above(const Configuration& configuration, Slab slab) {
   slab.wall = .5;
   SceneBuilder builder = column(configuration, slab, true);
@@ -135,8 +139,8 @@ SceneBuilder plate_above(const Configuration& configuration, Slab slab) {
   return builder;
 }
 
-// The light that the slab reflects from an environment above it, gathered by a small disk that hides at most
-// (0.0025)^2 of the environment.
+// A small white disk above the slab, which receives the light that the slab reflects from an environment
+// above it. The disk hides at most (0.0025)^2 of the environment.
 SceneBuilder plate_facing(const Configuration& configuration, const Slab& slab) {
   SceneBuilder builder = column(configuration, slab, false);
   add_small_plate(builder, {.1, .15, slab.tau}, .05);
@@ -146,7 +150,7 @@ SceneBuilder plate_facing(const Configuration& configuration, const Slab& slab) 
 void diffuse(Table& t) {
   for (const Row& row : kIsotropic) {
     for (const Configuration& configuration : two_configurations()) {
-      if (configuration.grid && row.slab.tau > 1) continue;  // takes long, and the slabs above cover grids
+      if (configuration.grid && row.slab.tau > 1) continue;  // takes long; isotropic() tests deep grids
       const double lit = row.t_diffuse / (1 - row.r_diffuse / 2);
       const bool slow = row.slab.albedo != .9 || configuration.grid;
       t.mean(
@@ -176,7 +180,8 @@ void dielectric(Table& t) {
            },
            grey(.55168), {.slack = 1e-4, .slow = configuration.grid});
   }
-  // The slab reflects little light, most of it by few paths; tested in the faster configuration only.
+  // The slab reflects little light, most of it by few paths, so this is slow. It is tested in the faster
+  // configuration only.
   t.mean("7.5-water-slab-R/homogeneous/volpath", "7.5", "A slab of water that scatters forward.",
          [] {
            return column({}, {.9, .75, 2, 1.33}, false);
@@ -184,8 +189,8 @@ void dielectric(Table& t) {
          grey(.10931), {.slack = 1e-4, .slow = true});
 }
 
-// The share of uniform light that a slab reflects along its normal by single scattering, with a the albedo
-// and mu the cosine of the incident light:
+// Returns the share R_1 of uniform light that a slab reflects along its normal by single scattering. With a
+// the albedo, tau the optical depth and mu the cosine of the angle of incidence,
 // R_1 = (a/2) int_0^1 mu / (1 + mu) (1 - e^(-tau (1 + 1/mu))) dmu.
 double first_order(double albedo, double tau) {
   return albedo / 2 *
@@ -194,10 +199,11 @@ double first_order(double albedo, double tau) {
              1, 20'000);
 }
 
-// Reflection of a white half space along its normal by one to three scatterings: the first terms of
-// 1 - sqrt(1 - a) H(1) as a power series of the albedo a. The terms of H follow from its equation,
-// H(mu) = 1 + (a / 2) mu H(mu) int_0^1 H(m) / (mu + m) dm. The substitution m = x^2 removes the logarithm at
-// the ends of the integrals, so that Simpson's rule is accurate to 1e-8.
+// Returns the light that a white half space reflects along its normal after one, two and three scatterings.
+// These are the first three terms of 1 - sqrt(1 - a) H(1) as a power series of the albedo a, at a = 1. The
+// terms of H follow from its equation, H(mu) = 1 + (a / 2) mu H(mu) int_0^1 H(m) / (mu + m) dm. The
+// substitution m = x^2 removes the logarithm at the ends of the integrals, so that Simpson's rule is accurate
+// to 1e-8.
 std::array<double, 3> orders_of_endless() {
   const auto over = [](auto h, double mu) {
     return integrate([&](double x) { return h(x * x) / (mu + x * x) * 2 * x; }, 0, 1, 100);
@@ -210,8 +216,8 @@ std::array<double, 3> orders_of_endless() {
   return {1. / 2 - first, 1. / 8 + first / 2 - second, 1. / 16 + first / 8 + second / 2 - third};
 }
 
-// A white slab in an environment. It has no mirror walls at its sides, which would count as scatterings, so
-// it is very wide.
+// A white slab in an environment, with paths of at most `scatterings` scatterings. It has no mirrors at its
+// sides, since reflections there would count as scatterings; instead it is very wide.
 SceneBuilder wide_slab(const Configuration& configuration, double tau, int scatterings) {
   SceneBuilder builder = column(configuration, {1, 0, tau}, false);
   builder.scene.shapes.erase(builder.scene.shapes.begin(), builder.scene.shapes.begin() + 4);
@@ -220,8 +226,8 @@ SceneBuilder wide_slab(const Configuration& configuration, double tau, int scatt
   return builder;
 }
 
-// The figure is 1 if a column (a slab between mirrors) gets brighter when paths may scatter `order` + 1 times
-// instead of `order`.
+// Compares a column (a slab between mirrors) whose paths may scatter `order` times with one whose paths may
+// scatter once more. The figure is 1 if the second is brighter; 1 is expected.
 Figure more_light(const Bench& bench, int order) {
   double mean[2] = {0, 0};
   Figure f{.expected = 1};
@@ -241,7 +247,7 @@ Figure more_light(const Bench& bench, int order) {
 void orders(Table& t) {
   for (const Configuration& configuration : two_configurations()) {
     for (const double tau : {1., 4., 60.}) {
-      if (tau == 4 && configuration.grid) continue;  // its free flights are sampled as at depths 1 and 60
+      if (tau == 4 && configuration.grid) continue;  // grids are tested at depths 1 and 60
       t.mean(fmt::format("7.6h-once-tau{:g}{}", tau, configuration.name()), "7.6h",
              "What a slab reflects of light scattered once: .142015352, .153412899, (1 - ln 2) / 2.",
              [=] { return wide_slab(configuration, tau, 1); }, grey(first_order(1, tau)),
@@ -254,7 +260,7 @@ void orders(Table& t) {
            "What a slab reflects of light scattered at most twice, or three times: .250699746, .319941097.",
            [=] { return wide_slab({}, 60, most); }, grey(each[0] + each[1] + (most > 2 ? each[2] : 0)),
            {.slack = 1e-4, .slow = true});
-  // Each order of scattering adds light, and all of them together give the whole.
+  // Each order of scattering must add light.
   for (int order = 1; order <= 8; order *= 2) {
     t.exact(fmt::format("7.6h-order-{}-adds-light/homogeneous/volpath", order), "7.6h",
             "One more scattering, more light: the same numbers, paths one segment longer.",

@@ -1,5 +1,5 @@
-// Rays through grids whose density is linear, in one channel or in three with a density each; and a ray that
-// no surface ends.
+// Rays through grids whose density is linear, either the same in all channels or with a density for each of
+// three channels. Also a ray in a medium that no surface ends.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,13 +12,13 @@
 namespace ls::cases {
 namespace {
 
-constexpr double kAbove = .5;  // height of lamps above the middle of the ray
+constexpr double kAbove = .5;  // distance of the lamps from the middle of the ray
 constexpr Configuration kGrid{true, false}, kGridDistant{true, true},
     kExponential{true, true, DistanceSampling::exponential};
 
-// Channel c has the density level (1 + slope z / 6), as a grid whose two nodes lie at z = -6 and 6. Because
-// the density is linear, its integral over a straight path is the length times the mean of the values at both
-// ends.
+// A density for each channel: level (1 + slope z / 6) for the level and slope of the channel, as a grid of
+// two voxels with their centres at z = -6 and 6. Since the density is linear, its integral over a straight
+// path is the length times the mean of the values at both ends.
 struct Slopes {
   std::size_t channels;
   Channels level, slope;
@@ -33,9 +33,10 @@ struct Slopes {
 };
 constexpr Slopes kOne{1, {1, 1, 1}, {1, 1, 1}}, kThree{3, {1, .5, 3}, {1, -1, 0}};
 
-// The ray of passing() in such a grid, and a lamp of intensity f(q) at (h, 0, 0), where q is the angle
-// between a direction and that to the origin. With a the albedo, s r(t) the extinction at z = t, and d the
-// distance from there to the lamp, the radiance of light scattered once is in each channel
+// The ray of passing() in such a grid, and a lamp at distance kAbove from the middle of the ray. With q the
+// angle between a direction and the direction from the lamp to the middle, the lamp has the intensity f(q)
+// (`intensity`). With a the albedo, s r(t) the extinction at z = t (s is `sigma`, r the density), and d the
+// distance of this point from the lamp, the radiance of light that is scattered once is, in each channel,
 //   a / (4 pi) int s r(t) e^(-s ((t + 3) (r(-3) + r(t)) + d (r(0) + r(t))) / 2) f / d^2 dt.
 void beside_a_lamp(Table& t, const std::string& name, const Configuration& configuration,
                    const Slopes& slopes, double sigma, const Emitter& lamp, double (*intensity)(double),
@@ -65,7 +66,7 @@ void lamps(Table& t) {
   const auto even = [](double) { return 1.; };
   for (const double sigma : {.05, 1.})
     beside_a_lamp(t, fmt::format("lamp-beside-a-slope-of-{:g}", sigma), kGrid, kOne, sigma, point, even);
-  // The intensity is full within 30 degrees and falls linearly with the angle to 0 at 60.
+  // The intensity is 1 up to 30 degrees from the axis and falls linearly with the angle to 0 at 60 degrees.
   beside_a_lamp(t, "spot-beside-a-slope", kGrid, kOne, .7,
                 SpotEmitter{look_at({kAbove, 0, 0}, {0, 0, 0}, {0, 1, 0}), rgb(1), 60, 30, {}},
                 [](double q) { return std::clamp(2 - std::abs(q) * 6 / kPi, 0., 1.); });
@@ -95,7 +96,8 @@ void without_end(Table& t) {
   }
 }
 
-// One medium of densities kThree, or two in the same place, seen through from z = -3 to 3.
+// One medium with the densities kThree, or two such media in the same place, in front of a white environment.
+// The ray crosses the media over about 6 units along z.
 void through_slopes(Table& t) {
   for (const int media : {1, 2}) {
     SceneBuilder builder;
@@ -107,8 +109,8 @@ void through_slopes(Table& t) {
       sigma += more;
     }
     builder.environment();
-    // The ray passes beside the diagonals of the faces, where triangles meet: so narrow a view would show
-    // their rounding.
+    // The ray avoids the diagonals of the faces of the cubes, where two triangles meet: in so narrow a view
+    // rounding errors there would be visible.
     builder.look({.7, .3, -8}, {.7, .3, 3}, 1e-4, {0, 1, 0});
     Channels expected;
     for (std::size_t c = 0; c < 3; ++c) expected[c] = std::exp(-sigma * 6 * kThree.at(c, 0));

@@ -1,4 +1,5 @@
-// Surfaces at extreme parameters: smooth, rough, grazing, index-matched, transparent.
+// Surfaces with extreme parameters: perfectly smooth, very rough, seen at grazing angles, index-matched,
+// transparent.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -15,8 +16,8 @@ BsdfIndex rough_mirror(SceneBuilder& builder, double alpha, Microfacet d = Micro
   return builder.bsdf(RoughConductorBsdf{d, a, a, {0, 0, 0}, {1, 1, 1}, builder.texture(rgb(1))});
 }
 
-// A large rectangle in z = 0 with the material from `make`, seen `degrees` off its normal. Callers add what
-// it reflects or transmits.
+// A large rectangle in the plane z = 0 with the material that `make` returns, seen from `degrees` off its
+// normal. The callers add the lights or walls whose light it reflects or transmits.
 SceneBuilder sheet(double degrees, auto make) {
   SceneBuilder builder;
   builder.shape(RectangleShape{}, scale(1e3), make(builder));
@@ -24,8 +25,8 @@ SceneBuilder sheet(double degrees, auto make) {
   builder.look({5 * std::sin(a), 0, 5 * std::cos(a)}, {0, 0, 0}, 1e-3, {0, 1, 0});
   return builder;
 }
-// Adds a wall of two colours behind the rectangle and an environment, so that the direction of the ray
-// matters.
+// Adds a checkered wall of two colours behind the scene's shapes and an environment, so that a ray with a
+// wrong direction changes the image.
 SceneBuilder before_a_wall(SceneBuilder builder) {
   const TextureIndex dark = builder.texture(rgb(.25)), bright = builder.texture({1, .75, .5});
   const TextureIndex board = SceneBuilder::push<TextureTag>(
@@ -37,9 +38,10 @@ SceneBuilder before_a_wall(SceneBuilder builder) {
   return builder;
 }
 
-// For a white GGX metal seen from this many degrees off its normal: the mean of the shadowing on the way out,
-// 1 / (1 + lambda), over the facet normals that are visible from this direction (Heitz 2018), by the midpoint
-// rule. Masking and shadowing are separable, as in Mitsuba.
+// Returns the reflectance of a white GGX metal of roughness alpha in a white sky, seen from this many degrees
+// off its normal. It is the mean, over the facet normals that are visible from this direction (Heitz 2018),
+// of the shadowing of the reflected ray, 1 / (1 + lambda). It is computed by the midpoint rule. Masking and
+// shadowing are separable, as in Mitsuba.
 double unmasked_at(double degrees, double alpha) {
   constexpr int kSteps = 400;
   const double a = degrees * kPi / 180, l = std::hypot(alpha * std::sin(a), std::cos(a));
@@ -114,8 +116,8 @@ void microfacets(Table& t) {
     t.mean(fmt::format("N35-grazing-rough-{:g}", alpha), "N35",
            "A rough white metal at 89.99 degrees: what facets leave of a white sky, by quadrature.",
            [=] { return in_white(sheet(89.99, [=](SceneBuilder& k) { return rough_mirror(k, alpha); })); },
-           // The answer comes from the midpoint rule, which is accurate to 2e-5 here: the integrand has a
-           // square root at its rim.
+           // The answer comes from the midpoint rule, which is accurate to 2e-5 here, since the integrand has
+           // a square root at the rim of its domain.
            grey(unmasked_at(89.99, alpha)), {.slack = 2e-5});
 }
 
@@ -179,8 +181,8 @@ void diffuse_sheets(Table& t) {
         return in_white(sheet(30, [](SceneBuilder& k) { return leaf(k, {.125, .75, .5}, {.875, .25, .5}); }));
       },
       grey(1), {.channels = true});
-  // A lamp of intensity 3 at distance 2: the irradiance is 3/4, and the sheet's radiance is that times R / pi
-  // or T / pi.
+  // A lamp of intensity 3 at distance 2 gives the irradiance E = 3/4. The radiance of the sheet, of
+  // reflectance R and transmittance T, is R E / pi on the side of the lamp and T E / pi on the other.
   for (const bool behind : {false, true})
     t.exact(behind ? "7.6g-leaf-before-a-lamp" : "7.6g-leaf-under-a-lamp", "7.6g",
             behind ? "A leaf with a point light behind it: T E / pi in every sample."
@@ -188,12 +190,13 @@ void diffuse_sheets(Table& t) {
             [behind](const Bench& b) {
               SceneBuilder builder = sheet(40, [](SceneBuilder& k) { return leaf(k, rgb(.25), rgb(.625)); });
               builder.scene.emitters.push_back(PointEmitter{{0, 0, behind ? -2. : 2.}, rgb(3)});
-              // The frame shows a width of 1e-4 of the sheet. Over it, the cosine and the distance to the
-              // lamp vary by about 1e-9; float32 rounding is about 1e-6.
+              // The frame shows a part of the sheet that is about 1e-4 wide. Over it, the cosine and the
+              // distance to the lamp vary by about 1e-9; float32 rounding is about 1e-6.
               return every_value(b, builder, 4, grey((behind ? .625 : .25) * .75 / kPi), 1e-5);
             });
-  // A lamp in the middle of a ball lights its wall through absorbing fog. The wall transmits T and reflects
-  // nothing, so its radiance outside is T / pi times the irradiance that the fog leaves.
+  // A lamp in the middle of a ball of radius 1 lights the wall of the ball through fog that absorbs. The wall
+  // transmits T and reflects nothing, so its radiance outside is T / pi times the irradiance of the wall from
+  // inside.
   t.exact("7.6g-lampshade-full-of-smoke", "7.6g",
           "A ball of paper around a lamp in smoke that absorbs: T I e^-sigma / pi from outside, in every "
           "sample.",
@@ -261,9 +264,10 @@ void coated_metals(Table& t) {
                   degrees, [=](SceneBuilder& s) { return coated_metal(s, 1.5, 0, 0, white_eta, white_k); })),
               16, grey(1), 1e-6);
         });
-  // A lamp of intensity 3 at distance 2 gives the irradiance 3/4. In the direction of the lamp the facets of
-  // alpha .02 have the value R D / 4 with D = 1 / (pi alpha^2), which the coat multiplies by T^2 / (n^2 (1 -
-  // F R)). What stays in the coat is 3e-6 of that.
+  // A lamp of intensity 3 at distance 2 gives the irradiance 3/4. Camera and lamp are in the same direction.
+  // In this direction the BSDF of the metal, whose facets have alpha .02, is R D / 4 with D = 1 / (pi
+  // alpha^2). The coat multiplies it by T^2 / (n^2 (1 - F R)), with n = 1.5 its index. Light that the coat
+  // reflects back to the metal and that leaves later adds a share of 3e-6.
   t.exact(
       "7.6g-coated-metal-under-a-lamp", "7.6g",
       "A rough metal under a smooth coat, with a lamp behind the viewer: the facets' value through the coat.",

@@ -14,8 +14,8 @@ namespace {
 
 namespace math = boost::math;
 
-// NaN figures and zero degrees of freedom are errors of the measurement: they get the probability 0 instead
-// of an exception, and the caller reports them.
+// NaN figures and zero degrees of freedom are errors of the measurement. Under this policy they give the
+// probability 0 instead of an exception, and the caller reports them.
 using Quiet = math::policies::policy<math::policies::domain_error<math::policies::ignore_error>,
                                      math::policies::overflow_error<math::policies::ignore_error>,
                                      math::policies::evaluation_error<math::policies::ignore_error>,
@@ -47,7 +47,7 @@ ChiSquare chi_square(std::span<const double> expected, std::span<const double> o
   std::vector<std::size_t> order(expected.size());
   std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(), [&](auto a, auto b) { return expected[a] < expected[b]; });
-  std::vector<std::array<double, 2>> cells;  // expected, observed
+  std::vector<std::array<double, 2>> cells;  // expected and observed samples of each merged cell
   double e = 0, o = 0;
   for (const std::size_t i : order) {
     e += std::max(0., expected[i]);

@@ -7,26 +7,28 @@
 
 namespace ls::cli {
 
-// Returns the level for each of n independent checks such that a correct program fails any of them with
-// probability `level` (Sidak): 1 - (1 - level)^(1/n).
+// Returns the significance level for each of n independent checks. With it, a correct program fails at least
+// one of the checks with probability `level` (Sidak): 1 - (1 - level)^(1/n).
 double sidak(double level, std::size_t n);
 
-// P(|T| > |t|) for Student's t with `freedom` degrees of freedom, which need not be whole.
+// Returns P(|T| > |t|), where T has Student's t distribution with `freedom` degrees of freedom, which need
+// not be whole.
 double student_tails(double t, double freedom);
 
-// Returns x with P(|T| > x) = p, for p in (0, 1).
+// Returns x with P(|T| > x) = p, where T has Student's t distribution; p is in (0, 1).
 double student_quantile(double p, double freedom);
 
-// P(X > x) for chi-square with `freedom` degrees of freedom.
+// Returns P(X > x), where X has the chi-square distribution with `freedom` degrees of freedom.
 double chi2_tail(double x, double freedom);
 
-// Pearson's test of the numbers of samples in cells. `expected` and `observed` have equal sums, except for
-// samples that fall into no cell. Cells with fewer than `least` expected samples are merged, the smallest
-// first, since the statistic follows the chi-square distribution only if the numbers are nearly normal.
+// The result of Pearson's chi-square test of the numbers of samples in cells. The numbers in `expected` and
+// `observed` have equal sums, except for samples that fall into no cell. Cells with fewer than `least`
+// expected samples are merged, the smallest first, since the statistic follows the chi-square distribution
+// only if the numbers are nearly normal.
 struct ChiSquare {
   double statistic = 0, p = 1;
   int freedom = 1;
-  double impossible = 0;  // samples in a cell where none is expected; 0 if there are at most `least`
+  double impossible = 0;  // samples in a cell where none is expected; 0 if at most `least`
 };
 ChiSquare chi_square(std::span<const double> expected, std::span<const double> observed, double least);
 

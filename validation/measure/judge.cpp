@@ -13,18 +13,19 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// Sets z. Its unit includes the allowance: in units of the standard error alone, a figure with almost no
-// variance that is off by one ulp would have a z in the hundreds.
+// Sets z and the allowance. The unit of z includes the allowance: in units of the standard error alone, a
+// figure with almost no variance that is off by one ulp would have a z in the hundreds.
 void measure_z(ValidateCase& c, double allowance) {
   const double unit = std::hypot(c.standard_error, allowance);
   c.allowance = allowance;
   c.z = unit > 0 ? (c.got - c.expected) / unit : 0;
 }
 
-// JSON has no infinity.
+// Returns the number, or null if it is infinite or NaN, which JSON cannot express.
 ordered_json number(double x) { return std::isfinite(x) ? ordered_json(x) : ordered_json(); }
 
-// Cases of a Nori file have no band (the deviation that the table's own cases tolerate).
+// Returns the column "band" of a line. The band is the deviation that a case tolerates. Cases of a Nori file
+// have none.
 std::string band_of(const ValidateCase& c) {
   return c.kind.empty() ? "-" : c.kind == "exact" ? "exact" : fmt::format("{:.3g} %", 100 * c.band);
 }

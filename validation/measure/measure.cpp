@@ -18,7 +18,7 @@ namespace ls::cli {
 namespace {
 
 constexpr double kEnoughPixels = 1024;
-constexpr std::size_t kPlanes = 6;  // number of planes of sums from render_tile()
+constexpr std::size_t kPlanes = 6;  // render_tile() sums R, G and B of each half of the samples
 constexpr double kLuminance[3] = {.212671, .715160, .072169};
 
 FrameSize enough(FrameSize size) {
@@ -27,8 +27,8 @@ FrameSize enough(FrameSize size) {
   return {size.width * factor, size.height * factor};
 }
 
-// Sums over the pixels of a frame: of the pixels' means, of their estimated squared errors, and of the
-// squares of these squared errors.
+// Sums over the pixels of a frame. mean: of the means of the pixels; square: of their estimated squared
+// errors; fourth: of the squares of these squared errors.
 struct Sums {
   double mean = 0, square = 0, fourth = 0;
   void add(double weight, double a, double b) {
@@ -39,8 +39,9 @@ struct Sums {
   }
 };
 
-// Returns the weight in the mean of each row's pixels; the mean weight is 1. For a spherical camera a weight
-// is proportional to the pixel's solid angle, so that the mean is over directions; otherwise all are equal.
+// Returns, for each row of pixels, the weight of its pixels in the mean of the frame; the mean weight is 1.
+// For a spherical camera a weight is proportional to the solid angle of the pixel, so that the mean is over
+// directions. For other cameras all weights are equal.
 std::vector<double> row_weights(const Scene& scene, FrameSize size) {
   std::vector<double> weights(static_cast<std::size_t>(size.height), 1);
   if (scene.sensor.projection != Projection::spherical) return weights;
@@ -169,7 +170,7 @@ Result<Measured> measure(const Scene& given, const render::AssetFiles& files, st
 Result<Measured> measure_frames(const Scene& scene, const render::AssetFiles& files, std::uint64_t paths,
                                 std::uint64_t seed, int threads, std::uint64_t frames) {
   Measured all;
-  std::array<double, 4> squares{};  // of deviations from the running mean (Welford)
+  std::array<double, 4> squares{};  // sums of squared deviations from the mean (Welford)
   for (std::uint64_t i = 0; i < frames; ++i) {
     const auto frame = measure(scene, files, paths / frames, seed + i * 0x9e3779b97f4a7c15ull, threads);
     if (!frame) return tl::unexpected(frame.error());

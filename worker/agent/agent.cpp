@@ -1,5 +1,6 @@
-// The agent's control thread: it keeps the connection, handles messages and timers, and ends the work when
-// the worker drains.
+// The control thread of the agent, the part of a worker that talks to the coordinator. The thread keeps the
+// connection, handles messages and timers, and ends the work when the worker drains (finishes its units and
+// leaves).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,11 +13,13 @@
 
 namespace ls::worker {
 namespace {
-// Time after connecting within which Welcome must arrive
+// The connection is given up if the Welcome of the coordinator does not arrive within this time.
 constexpr Duration kWelcomeLimit = std::chrono::seconds(30);
-// A connection that lasted this long resets the back-off.
+// After a connection that lasted this long, the pauses between attempts to connect start at kFirstPause
+// again.
 constexpr Duration kGoodConnection = std::chrono::seconds(5);
-// First pause after a lost connection, and after a problem of this machine such as a full disk.
+// The first pause before a new attempt: after a lost connection, and after a problem of this machine such as
+// a full disk.
 constexpr Duration kFirstPause = std::chrono::milliseconds(100), kFirstTroublePause = std::chrono::seconds(1);
 constexpr Duration kLongestWait = std::chrono::seconds(1);
 constexpr int kProgressWhenIdle = 5;  // an idle worker sends only every fifth progress report
@@ -157,8 +160,8 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
   const JobId& id = assign.lease.job;
   if (assign.brief) {
     const auto it = jobs.find(id);
-    // A job with a known id but another brief (its settings and files) is a different job: the coordinator's
-    // data were replaced.
+    // A brief describes a job (its settings and files). If the id is known but the brief differs, the
+    // coordinator's data were replaced and this is a different job.
     if (it != jobs.end() && it->second.brief != *assign.brief) {
       drop_work(id);
       jobs.erase(it);
@@ -177,7 +180,8 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
   table.add(
       assign.lease, [this](const UnitKey& key) { return outbox.has_result(key); },
       traced ? assign.trace : std::nullopt, traced ? options.tracer->unix_ns(clock.now()) : 0);
-  // Jobs that were not used for long are forgotten: each takes little memory, but a worker may run for years.
+  // If the worker knows more than kJobsRemembered jobs, it forgets those whose last use is longest ago. Each
+  // takes little memory, but a worker may run for years.
   while (jobs.size() > kJobsRemembered) {
     auto oldest = jobs.end();
     for (auto it = jobs.begin(); it != jobs.end(); ++it)

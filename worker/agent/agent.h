@@ -6,8 +6,11 @@
 // Threads: run() is the control thread (connection, progress reports, timers). One loader thread fetches
 // blobs and prepares worlds (scenes that are built and ready to render) ahead of need. Each of `threads`
 // render threads takes the next unit as soon as it has delivered the previous one. One mutex guards the state
-// (worker/agent/held_work.h). While a thread holds it, it makes no call that may block: of
-// the backend it calls only forget() and rss_bytes(), of the link and the files nothing.
+// (worker/agent/held_work.h). While a thread holds it, it makes no call that may block: it calls only
+// forget() and rss_bytes() of the backend, and no function of the link or of the files.
+//
+// To drain means to end in an orderly way: the worker finishes the units that are being rendered, delivers
+// all results, returns its other units to the coordinator, and ends.
 #pragma once
 
 #include <cstdint>
@@ -25,17 +28,18 @@ namespace ls::worker {
 struct AgentOptions {
   WorkerHello hello;  // threads, numeric_class, platform and blobs_held are filled in by the agent
   int threads = 1;
-  // No further unit is begun while unacknowledged results occupy this many bytes
+  // No further unit is begun while results that are not acknowledged occupy this many bytes or more
   std::size_t outbox_bytes = 64 << 20;
   Duration progress_period = std::chrono::seconds(1);
   Duration backoff_most = std::chrono::seconds(10);  // longest pause before another attempt
-  // If the worker has held no units for this long, it drains; if it has not joined the coordinator by then,
-  // run() ends with an error. Zero: no limit
+  // A worker that has held no units for this long drains, or, if it has never joined the coordinator, ends
+  // run() with an error. Zero: no limit
   Duration idle_limit = Duration::zero();
-  // When the worker drains: the time to deliver finished results, after which run() ends with an error
+  // Longest time that a draining worker may take; if it is exceeded, run() ends with an error
   Duration drain_limit = std::chrono::seconds(60);
-  std::shared_ptr<trace::Tracer> tracer;  // records spans of units and scenes; null: nothing is traced
-  std::uint64_t backoff_seed = 0;         // seed of the jitter; should differ between the workers of a farm
+  std::shared_ptr<trace::Tracer> tracer;  // records trace spans of units and scenes; null: no tracing
+  // Seed of the random pauses between attempts to connect. Each worker of a farm should have a different one.
+  std::uint64_t backoff_seed = 0;
 };
 
 class Agent {
@@ -46,8 +50,8 @@ class Agent {
   ~Agent();
 
   // Runs the worker until its end; call it once. Returns success when the agent has drained, and also after
-  // stop(). Otherwise returns an error: the coordinator's if it rejects this worker permanently, or the
-  // backend's if the backend is broken (after finished results were delivered).
+  // stop(). Otherwise returns an error: the coordinator's error if it rejects this worker permanently, or the
+  // backend's error if the backend is broken; in the latter case finished results are delivered first.
   Result<void> run();
 
   // drain() and stop() may be called from any thread. After drain(), run() finishes the running units,

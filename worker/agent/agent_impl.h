@@ -1,5 +1,8 @@
 // The agent's state and its threads (see agent.h). agent.cpp contains the control thread, agent_loader.cpp
-// the loader thread, agent_render.cpp the render threads.
+// the loader thread, agent_render.cpp the render threads. A unit, the smallest piece of work, is one tile and
+// one range of samples; a world is a scene that is ready to render. To drain means to finish the running
+// units, deliver all results and end. With a tracer (AgentOptions), the agent records trace spans: named time
+// intervals, each with a parent span.
 #pragma once
 
 #include <algorithm>
@@ -68,7 +71,8 @@ class Inbox {
     nudged_ = true;
     changed_.notify_one();
   }
-  // Waits for an event or a nudge, at most this long, and returns all events in the queue.
+  // Waits for an event or a nudge, but no longer than `at_most`. Removes all events from the queue and
+  // returns them, oldest first.
   std::deque<Arrival> wait(Duration at_most) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, at_most, [this] { return nudged_ || !arrivals_.empty(); });
@@ -103,25 +107,30 @@ struct Agent::Impl {
     JobBrief brief;
     enum class State { idle, loading, ready } state = State::idle;
     std::shared_ptr<const LocalJob> local;
-    std::vector<std::shared_ptr<const BlobFile>> files;  // these objects keep the job's files in the cache
-    std::uint64_t last_use = 0;  // value of the counter `uses` when the job was used last; the least recently
-                                 // used job is forgotten first
-    TimePoint retry_at{};  // earliest next attempt to load, after a broken transfer or a fault of the machine
-    std::string trouble;   // the fault of this machine that made the last attempt to load fail
+    std::vector<std::shared_ptr<const BlobFile>> files;  // each keeps one file of the job in the cache
+    // Value of the counter `uses` when the job was used last. The world of the least recently used job is
+    // freed first.
+    std::uint64_t last_use = 0;
+    // Earliest time of the next attempt to load, after an interrupted transfer or a fault of this machine
+    TimePoint retry_at{};
+    // The fault of this machine that made the last attempt to load fail; empty: there was none
+    std::string trouble;
     UnitTimes unreported;  // time spent on loading the job, not yet reported to the coordinator
   };
+  // The state of one render thread.
   struct RenderSlot {
-    std::atomic<bool> stop{false};
-    std::optional<UnitKey> unit;  // the unit being rendered; guarded by mutex
-    // Used only by the slot's own thread: the job of its previous unit, and when that unit ended.
+    std::atomic<bool> stop{false};  // tells the backend to abandon the current unit
+    std::optional<UnitKey> unit;    // the unit being rendered; nullopt: none; guarded by mutex
+    // The members below are used only by this thread. They give the job of its previous unit, and when that
+    // unit ended.
     JobId last_job;
     TimePoint last_end{};
     double last_transfer = 0;  // seconds spent packing the previous unit's result
-    TimePoint began{};         // when the current unit began; set only with a tracer
+    TimePoint began{};         // when the current unit began; set only if there is a tracer
   };
   enum class Connection { down, opening, up };
 
-  // Control thread.
+  // Functions that the control thread calls.
   Result<void> run();
   void handle(Arrival& arrival);
   void handle_message(ToWorker& message);
@@ -132,40 +141,42 @@ struct Agent::Impl {
   void drop_work(const JobId& job);  // drops the job's units and results; call with the mutex held
   void stop_dropped_units();         // sets the stop flag of each running unit that is no longer in `table`
   void begin_drain();
-  void look_at_backend();   // drains if the backend is broken, so that run() ends with the backend's error
-  void look_at_idleness();  // drains or ends this worker after options.idle_limit without work
+  void look_at_backend();  // drains if the backend is broken, so that run() ends with the backend's error
+  // If the worker was without work for options.idle_limit: drains, or ends run() if it has never joined.
+  void look_at_idleness();
   std::vector<FromWorker> due_messages();
   std::optional<Result<void>> verdict();  // the result of run() if it should end now; nullopt: it continues
   Duration until_next_timer() const;
   WorkerProgress progress() const;
   void end_threads();
 
-  // Loader thread.
+  // Functions that the loader thread calls, except trouble().
   void load_loop(std::stop_token token);
   std::optional<JobId> next_to_load();
-  bool make_room();  // forgets an unused world if too many are kept; false: all are in use
+  bool make_room();  // frees an unused world if too many are kept; false: all are in use
   void load(const JobBrief& brief);
   void try_to_load(const JobBrief& brief);
   void loading_failed(const JobId& id, UnitFailure failure);
   void postpone(const JobId& id, const Error& why);
   void hold_off(const JobId& id, const std::string& trouble);
-  // Returns a problem of this machine that recently kept it from loading a job; empty: there is none. Call
-  // with the mutex held.
+  // Returns a recent fault of this machine because of which a job could not be loaded; empty: there is none.
+  // Call with the mutex held.
   std::string trouble() const;
 
-  // Render threads.
+  // Functions that the render threads call, except those of tracing, which all threads call.
   void render_loop(RenderSlot& slot, std::stop_token token);
   std::optional<HeldLeases::Held> next_unit(RenderSlot& slot, std::stop_token token,
                                             std::shared_ptr<const LocalJob>& job);
   // Call right after the slot has rendered a unit of `job`, which took `wall_seconds` from its first to its
-  // last sample. Records and returns the seconds that the slot idled between its previous unit and this one;
-  // 0, unrecorded, if the previous unit was of another job.
+  // last sample. Returns the seconds that the slot idled between its previous unit and this one, and records
+  // them in `gaps`. If the previous unit was of another job, returns 0 and records nothing.
   double note_gap(RenderSlot& slot, const JobId& job, double wall_seconds);
   tl::expected<UnitResult, UnitFailure> rendered_unit(RenderSlot& slot, const LocalJob& job,
                                                       const HeldLeases::Held& held);
   tl::expected<UnitResult, UnitFailure> render(RenderSlot& slot, const LocalJob& job,
                                                const HeldLeases::Held& held);
-  // Record trace spans as children of `parent` or of the span of the unit's lease. Call only with a tracer.
+  // The next three functions record trace spans; call them only if there is a tracer. record() makes the span
+  // a child of `parent`, the other two make it a child of the span of the unit's lease.
   void record(const char* name, const trace::SpanContext& parent, TimePoint begin, TimePoint end,
               trace::Attributes attributes, bool failed = false) const;
   void trace_unit(const RenderSlot& slot, const HeldLeases::Held& held,
@@ -174,8 +185,8 @@ struct Agent::Impl {
   // Returns the span of the lease that has the job's first waiting unit; nullopt: that lease is not traced,
   // or no unit waits.
   std::optional<trace::SpanContext> trace_of(const JobId& job) const;
-  // A guard: its destructor records the trace span of loading a scene, as a child of `parent` (the span of a
-  // lease), unless `parent` is nullopt.
+  // A guard: its destructor records the trace span of loading a scene. The parent of that span is the span of
+  // the lease that needs the scene (trace_of()). If that lease is not traced, nothing is recorded.
   struct LoadSpan {
     LoadSpan(const Impl& agent, const JobId& job, TimePoint begin);
     ~LoadSpan();
@@ -184,7 +195,7 @@ struct Agent::Impl {
     const TimePoint begin;
     const std::optional<trace::SpanContext> parent;
     const trace::SpanContext own;
-    std::optional<TimePoint> loaded_at;  // nullopt: the scene could not be loaded
+    std::optional<TimePoint> loaded_at;  // when the world was built; nullopt: the scene could not be loaded
   };
   void finished(RenderSlot& slot, const UnitKey& key, tl::expected<UnitResult, UnitFailure> outcome);
 
@@ -195,7 +206,7 @@ struct Agent::Impl {
   const Clock& clock;
   const std::shared_ptr<Inbox> inbox = std::make_shared<Inbox>();
 
-  // Used by the control thread only.
+  // The members from here to `id` are used only by the control thread.
   std::uint64_t connection_count = 0;
   Backoff backoff;
   // While the connection is down: the time of the next attempt to connect. While it is being opened: the time
@@ -211,19 +222,19 @@ struct Agent::Impl {
   std::atomic<bool> drain_requested{false}, stop_requested{false};
 
   mutable std::mutex mutex;
-  // Wakes the loader and render threads when leases, worlds or the room in the outbox change
+  // Wakes the loader and render threads when the leases, the worlds or the free space of the outbox change
   std::condition_variable_any work;
-  // Guarded by mutex.
+  // All members from here to `loading` are guarded by `mutex`.
   HeldLeases table;
   Outbox outbox;
   std::map<JobId, Job> jobs;
-  // For results of traced leases that are not sent yet: the span of the lease, and when the result was packed
+  // A result of a traced lease that is not sent yet: the span of the lease, and when the result was packed.
   struct Unsent {
     trace::SpanContext lease;
     TimePoint since{};
   };
   std::map<UnitKey, Unsent> unsent;
-  std::deque<FromWorker> outgoing;  // returned leases and notices of draining, sent when the connection is up
+  std::deque<FromWorker> outgoing;  // returned units and notices of draining, sent when the connection is up
   std::vector<std::unique_ptr<RenderSlot>> slots;
   Connection connection = Connection::down;
   bool draining = false;
@@ -233,7 +244,7 @@ struct Agent::Impl {
   double load_seconds = 0;
   GapMeter gaps;
   Backoff trouble_backoff;
-  // Name of the file that the loader fetched last, while it loads a job; otherwise empty.
+  // While the loader loads a job: the name of the file that it fetched last or is fetching; otherwise empty
   std::string loading;
 
   std::vector<std::jthread> threads;

@@ -10,13 +10,14 @@
 
 namespace ls::worker {
 namespace {
-// Number of worlds kept in memory: the one being rendered and the next one. So render threads need not wait
-// between two jobs, and memory stays bounded.
+// Number of worlds kept in memory: that of the job being rendered and that of the next job. So render threads
+// need not wait between two jobs, and memory stays bounded.
 constexpr std::size_t kWorldsKept = 2;
-constexpr std::size_t kBlobsTraced = 64;  // blobs of one scene that get a span each
+constexpr std::size_t kBlobsTraced = 64;  // most blobs of a scene whose transfers are traced
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
-// A problem with loading a job is reported until this long after Job::retry_at, the time of the next
-// attempt. If no attempt was made by then, the worker has no more units of the job.
+// If this machine could not load a job, progress reports state the reason until this long after
+// Job::retry_at, the time at which loading may be tried again. A worker that still has units of the job tries
+// again by then, so an older reason concerns a job of which it has no units.
 constexpr Duration kTroubleShown = std::chrono::seconds(30);
 
 // True if the error is a problem of this machine, such as a full disk. Such an error must not count as a
@@ -38,8 +39,8 @@ void Agent::Impl::load_loop(std::stop_token token) {
       try_to_load(brief);
       lock.lock();
     } else {
-      // The timeout is for interrupted transfers, which are retried after a pause; all other changes notify
-      // this thread.
+      // The timeout is needed because jobs become loadable again when their retry_at has passed, of which
+      // nothing notifies this thread. All other changes notify it.
       work.wait_for(lock, token, kTransferRetry, [&] { return next_to_load().has_value() && make_room(); });
     }
   }
@@ -154,7 +155,7 @@ void Agent::Impl::load(const JobBrief& brief) {
   loading.clear();
   load_seconds = seconds(clock.now() - start);
   const auto it = jobs.find(id);
-  // The job was replaced by another one while it was being loaded
+  // True if the job was replaced by another job with this id while it was being loaded
   if (it == jobs.end() || it->second.state != Job::State::loading) return;
   it->second.state = Job::State::ready;
   it->second.local = std::move(local);

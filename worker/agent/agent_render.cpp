@@ -16,8 +16,8 @@ namespace {
 
 constexpr std::int64_t kExrOverhead = 16 << 10;  // allowance for an EXR's header and line offsets, in bytes
 
-// Returns a failure if the result of this unit would not fit into a message, so that the unit is not rendered
-// in vain.
+// Returns a failure if the result of this unit would not fit into a message; otherwise nullopt. The check is
+// made before rendering, so that no unit is rendered in vain.
 std::optional<UnitFailure> too_large(const LocalJob& job, const LeaseUnit& unit) {
   const auto per_pixel = static_cast<std::int64_t>(partial_bytes_per_pixel(aovs_of(job.brief.settings)));
   const std::int64_t bytes = unit.rect.pixels() * per_pixel + kExrOverhead;
@@ -93,7 +93,8 @@ void Agent::Impl::render_loop(RenderSlot& slot, std::stop_token token) {
   }
 }
 
-// Waits until there is a unit to render and takes it; sets `job` to its job. nullopt: the thread should end.
+// Waits until there is a unit to render, takes it and sets `job` to the unit's job. Returns nullopt if the
+// thread should end.
 std::optional<HeldLeases::Held> Agent::Impl::next_unit(RenderSlot& slot, std::stop_token token,
                                                        std::shared_ptr<const LocalJob>& job) {
   std::unique_lock lock(mutex);
@@ -115,8 +116,8 @@ std::optional<HeldLeases::Held> Agent::Impl::next_unit(RenderSlot& slot, std::st
   return held;
 }
 
-// Records the spans of a unit: of rendering it and, unless it failed, of packing its result. Call with the
-// mutex held, before the unit leaves the table.
+// Records the trace spans of a unit: that of rendering it and, unless it failed, that of packing its result.
+// Call with the mutex held, before the unit is removed from `table`, the units that this worker holds.
 void Agent::Impl::trace_unit(const RenderSlot& slot, const HeldLeases::Held& held,
                              tl::expected<UnitResult, UnitFailure>& outcome) {
   trace::Attributes attributes{{"lightshaft.job", held.key.job.value},

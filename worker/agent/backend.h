@@ -26,11 +26,11 @@ namespace ls::worker {
 struct LocalJob {
   JobBrief brief;
   std::filesystem::path scene;                     // file of the canonical scene
-  std::map<Digest, std::filesystem::path> assets;  // files by digest
+  std::map<Digest, std::filesystem::path> assets;  // files of the assets, by digest
 };
 
-// Identifies the world of a job (its scene, ready to render). The job's id is not enough: a coordinator whose
-// data were replaced may reuse it for another job.
+// Identifies the world of a job (its scene, ready to render). The job's id alone does not identify it: a
+// coordinator whose data was lost or replaced may give the id of an old job to a new one.
 struct WorldKey {
   JobId job;
   Digest scene, settings;
@@ -43,10 +43,10 @@ struct RenderedUnit {
   double cpu_seconds = 0;
   double wall_seconds = 0;  // wall-clock time from the first sample to the last
   Health health;
-  TechniqueSet techniques;  // techniques that the integrator uses for this world
+  TechniqueSet techniques;  // sampling techniques that the integrator uses for this scene
 };
 
-// Returns a failure of a unit with this reason, which is not the scene's fault.
+// Returns a failure of a unit for `reason`, marked as not the fault of the scene.
 inline tl::unexpected<UnitFailure> unit_failure(std::string reason) {
   return tl::unexpected<UnitFailure>(UnitFailure{.reason = std::move(reason)});
 }
@@ -58,14 +58,16 @@ class RenderBackend {
  public:
   virtual ~RenderBackend() = default;
   virtual Digest numeric_class() const = 0;
-  // Describes the numeric class (builds and CPUs that produce the same bits) in words; empty: unknown
+  // Returns a description in words of the numeric class, that is, of the builds and CPUs that render the same
+  // bits; empty: unknown
   virtual std::string platform() const { return {}; }
-  // Builds the job's world (its scene, ready to render). Does nothing if the world is already built. Returns
-  // the reason if it cannot be built.
+  // Builds the job's world (its scene, ready to render), unless it is already built. Returns a failure with
+  // the reason if the world cannot be built.
   virtual tl::expected<void, UnitFailure> prepare(const LocalJob& job) = 0;
   virtual tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
                                                          const std::atomic<bool>& stop) = 0;
-  virtual void forget(const JobId& job) = 0;  // frees all worlds of jobs with this id
+  // Frees every world whose WorldKey contains this job id.
+  virtual void forget(const JobId& job) = 0;
   virtual std::uint64_t rss_bytes() const = 0;
   // Returns an error once the backend can no longer render anything. The worker then ends with this error,
   // and the units that failed because of it are not reported as failed.
@@ -86,8 +88,9 @@ inline std::uint64_t resident_bytes(pid_t process) {
 // A backend that renders in this process and can show which sample it is rendering.
 class LocalBackend : public RenderBackend {
  public:
-  // The same as render(), but also writes to `where`, unless that is null, which sample it is rendering. The
-  // stores are relaxed; another process may read them.
+  // Does what render() does, and keeps in `where` (null: nowhere) the pixel and number of the sample that is
+  // being rendered. `where` may be in memory that another process reads. Its members are atomic and are
+  // written with relaxed order.
   virtual tl::expected<RenderedUnit, UnitFailure> render_marked(const LocalJob& job, const LeaseUnit& unit,
                                                                 const std::atomic<bool>& stop,
                                                                 render::Breadcrumb* where) = 0;

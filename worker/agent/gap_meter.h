@@ -15,7 +15,8 @@ namespace ls::worker {
 
 class GapMeter {
  public:
-  // `seconds` is a difference of times from two clocks and may be slightly negative.
+  // Adds a gap. `seconds` is the difference of times that were measured by two clocks, so it may be slightly
+  // negative; then it counts as 0.
   void add(double seconds) {
     seconds = std::max(seconds, 0.);
     const double step = seconds > kFirst ? kStepsPerOctave * std::log2(seconds / kFirst) : 0;
@@ -29,7 +30,7 @@ class GapMeter {
     if (count_ == 0) return 0;
     const auto wanted = static_cast<std::uint64_t>(std::ceil(q * static_cast<double>(count_)));
     std::uint64_t seen = 0;
-    for (int i = 0; i < kSteps - 1; ++i) {  // the last bucket is unbounded
+    for (int i = 0; i < kSteps - 1; ++i) {  // not the last step: it has no upper bound
       seen += counts_[static_cast<std::size_t>(i)];
       if (seen >= wanted) return std::min(longest_, kFirst * std::exp2((i + 1) / kStepsPerOctave));
     }
@@ -46,7 +47,7 @@ class GapMeter {
   static constexpr int kSteps = 8 * 32;
   std::array<std::uint64_t, kSteps> counts_{};
   std::uint64_t count_ = 0;
-  double longest_ = 0;  // seconds
+  double longest_ = 0;  // longest gap in seconds
 };
 
 }  // namespace ls::worker

@@ -31,11 +31,12 @@ class HeldLeases {
     State state = State::waiting;
     // The trace span of the unit's present lease; nullopt: the lease is not traced
     std::optional<trace::SpanContext> trace = std::nullopt;
-    std::int64_t since_unix_ns = 0;  // when this worker received the unit; 0: not recorded
+    std::int64_t since_unix_ns = 0;  // arrival of the unit, in ns since 1970; 0: not recorded
   };
 
   // Adds the units of a lease. `handed_in(key)` returns whether the outbox already has a result of that unit.
-  // `trace`: the lease's span, if it is traced; `unix_ns`: the current time.
+  // `trace` is the lease's trace span; nullopt: the lease is not traced. `unix_ns` is the current time in
+  // nanoseconds since 1970; 0: not recorded.
   void add(const Lease& lease, const std::function<bool(const UnitKey&)>& handed_in,
            const std::optional<trace::SpanContext>& trace = std::nullopt, std::int64_t unix_ns = 0);
   // Returns the first waiting unit for whose job `ready` returns true, and marks the unit as running;
@@ -44,15 +45,15 @@ class HeldLeases {
   // Removes a unit that was running and has been rendered. Returns its present lease; nullopt: the unit was
   // dropped meanwhile.
   std::optional<LeaseId> finish(const UnitKey& key);
-  // Removes a unit whose result the coordinator has acknowledged. If the coordinator rejected the result
-  // (`refused`), the unit waits to be rendered again.
+  // Call when the coordinator has acknowledged the result of this unit. Removes the unit if the result was
+  // accepted. If it was rejected (`refused`), the unit waits to be rendered again.
   void acknowledged(const UnitKey& key, bool refused);
 
   // Remove all units of a job or a lease, including running ones.
   void drop_job(const JobId& job);
   void drop_lease(const LeaseId& lease);
-  // Removes the waiting units (if `job` is given, only those of that job). Returns the messages that return
-  // them to the coordinator.
+  // Removes the waiting units; if `job` is given, only the waiting units of that job. Returns the messages
+  // that give these units back to the coordinator, one message per lease.
   std::vector<LeaseReturned> return_waiting(const JobId* job = nullptr);
 
   std::optional<Held> first_waiting(const JobId& job) const;
@@ -78,9 +79,10 @@ class HeldLeases {
   void drop_if(const std::function<bool(const Held&)>& goes);
 
   std::map<UnitKey, Entry> units_;
-  // The waiting units in the order of rendering (Entry::order).
+  // The waiting units by Entry::order, that is, in the order in which they will be rendered.
   std::map<std::uint64_t, UnitKey> queue_;
-  std::map<LeaseId, LeaseState> leases_;  // leases with units that are not finished yet
+  // Numbers of unfinished and of finished units, by lease; contains only leases with unfinished units.
+  std::map<LeaseId, LeaseState> leases_;
   std::uint64_t next_order_ = 0;
   std::size_t running_ = 0;
 };
@@ -91,7 +93,7 @@ class Outbox {
  public:
   void add(UnitResult result);
   void add(UnitFailure failure);
-  // Removes the oldest entry of this unit that was sent. False: there is no such entry.
+  // Removes the oldest entry of this unit among those that were sent. Returns false if there is none.
   bool acknowledge(const UnitKey& unit);
   void drop_job(const JobId& job);
 

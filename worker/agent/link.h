@@ -13,13 +13,13 @@
 
 namespace ls::worker {
 
-// Receives the bytes of a blob, piece by piece and in order.
+// Receives the bytes of a blob, piece by piece and in order. An error that it returns ends the transfer.
 using BlobSink = std::function<Result<void>(std::span<const std::byte>)>;
 
 class LinkObserver {
  public:
   virtual ~LinkObserver() = default;
-  virtual void received(ToWorker message) = 0;  // called from any thread, in order
+  virtual void received(ToWorker message) = 0;  // called in order, by any thread
   // Called once per connection. connect() and close() wait for it to return, so it must not call them.
   virtual void lost(Error why) = 0;
 };
@@ -40,11 +40,11 @@ class CoordinatorLink {
   // Opens a stream to the coordinator and sends the hello. The coordinator's messages, the first of which is
   // Welcome or Refused, are passed to the observer.
   virtual Result<void> connect(const WorkerHello& hello, std::shared_ptr<LinkObserver> observer) = 0;
-  // Queues the message; it is lost if the connection ends before it is sent
+  // Queues the message. It is lost if the connection ends before the message is sent.
   virtual void send(FromWorker message) = 0;
   virtual void close() = 0;
-  // Fetches the bytes and passes them to `sink` in order. The transfer ends if `sink` returns an error (disk
-  // full, wrong digest).
+  // Fetches the bytes of a blob and passes them to `sink` in order. If `sink` returns an error (because the
+  // disk is full or the digest is wrong), the transfer ends with that error.
   virtual Result<void> fetch_blob(const BlobRequest& wanted, const BlobSink& sink) = 0;
 };
 

@@ -5,8 +5,8 @@
 
 namespace ls::worker {
 
-// Forwards a stream's messages to the agent's observer. Updates the State from Welcome, leases and
-// acknowledgements, and reports the end of the stream only once.
+// Forwards a stream's messages to the agent's observer. Updates the ring's State from the messages
+// (Welcome, leases and acknowledgements), and reports the end of the stream only once.
 class LinkRing::Watch final : public LinkObserver {
  public:
   Watch(std::shared_ptr<State> state, std::shared_ptr<LinkObserver> agent)
@@ -45,7 +45,8 @@ Result<void> LinkRing::connect(const WorkerHello& hello, std::shared_ptr<LinkObs
   {
     const std::lock_guard lock(mutex_);
     const std::lock_guard state_lock(state_->mutex);
-    // A coordinator that has accepted this worker before is tried again first: it may only have restarted.
+    // If the coordinator had accepted this worker before the connection ended, it is tried again before the
+    // next one: it may only have restarted.
     if (go_on_ || (tried_ && !state_->welcomed)) current_ = (current_ + 1) % links_.size();
     tried_ = true;
     go_on_ = state_->welcomed = false;

@@ -31,9 +31,9 @@ class LockedFile final : public BlobFile {
   const Descriptor file_;
 };
 
-// Maps a transfer error to one after which the agent tries again: codes other than unavailable and
-// resource_exhausted become internal. At the coordinator, the blob may be missing, damaged or denied only for
-// a time.
+// Changes the code of a transfer error so that the agent tries again later: it does so after unavailable,
+// resource_exhausted and internal, so all other codes become internal. No transfer error is final, because a
+// blob that is missing, damaged or denied at the coordinator may be available there later.
 Error passing(Error error) {
   const bool temporary = error.code == Errc::unavailable || error.code == Errc::resource_exhausted;
   if (!temporary) error.code = Errc::internal;
@@ -76,8 +76,9 @@ Result<std::shared_ptr<const BlobFile>> BlobCache::acquire(const BlobRef& blob) 
   return fail(Errc::internal, fmt::format("'{}' arrived wrong {} times: {}", blob.name, kAttempts, reason));
 }
 
-// Returns the blob's file. Null: the blob is not in the cache, or its digest was wrong and the file has been
-// removed. Error: this machine cannot check the file, so fetching it again would not help.
+// Returns the blob's file. Returns null if the blob is not in the cache, or if the file's digest was wrong;
+// such a file is removed. Returns an error if this machine cannot check the file; then fetching the blob
+// again would not help.
 Result<std::shared_ptr<const BlobFile>> BlobCache::open_verified(const Digest& digest) {
   const std::shared_ptr<const BlobFile> none;
   const fs::path path = blob_path(folder_, digest);
@@ -107,7 +108,8 @@ Result<void> BlobCache::download(const BlobRef& blob, bool arrived_wrong) {
   auto partial = PartialFile::open(folder_ / kPartialFolder / blob.digest.hex());
   if (!partial) return tl::unexpected<Error>(partial.error());
   const auto received = receive(blob, arrived_wrong, *partial);
-  // Bytes of an interrupted transfer are kept; those of other failures are useless.
+  // After an interrupted transfer (unavailable) the received bytes are kept, so that it can be resumed. After
+  // any other error they are useless.
   if (!received && received.error().code != Errc::unavailable) partial->discard();
   if (!received) return received;
   const auto finished = partial->finish(blob.digest, blob_path(folder_, blob.digest));

@@ -30,8 +30,8 @@ class BlobCache final : public BlobFiles {
   // Fetches the bytes of a blob; the same as CoordinatorLink::fetch_blob
   using Fetch = std::function<Result<void>(const BlobRequest&, const BlobSink&)>;
 
-  // Creates the folder if it is missing. The cache keeps at most `limit_bytes` bytes; 0: no limit. It gets
-  // missing blobs by `fetch`.
+  // Opens the cache in `folder`, which is created if it is missing. The cache keeps at most `limit_bytes`
+  // bytes; 0: no limit. It calls `fetch` to get blobs that it does not have.
   static Result<std::unique_ptr<BlobCache>> open(std::filesystem::path folder, std::uint64_t limit_bytes,
                                                  Fetch fetch);
 
@@ -44,15 +44,15 @@ class BlobCache final : public BlobFiles {
   // Fetches a blob. `arrived_wrong`: an earlier transfer of the blob delivered wrong bytes.
   Result<void> download(const BlobRef& blob, bool arrived_wrong);
   Result<void> receive(const BlobRef& blob, bool arrived_wrong, PartialFile& partial);
-  // Removes blobs and abandoned transfers until `bytes` more bytes fit within the limit, but never the file
-  // `but`.
+  // Removes blobs and the files of abandoned transfers until `bytes` more bytes fit within the limit. Never
+  // removes the file `but`.
   Result<void> make_room(std::uint64_t bytes, const std::filesystem::path& but);
 
   const std::filesystem::path folder_;
   const std::uint64_t limit_;
   const Fetch fetch_;
-  std::mutex mutex_;           // held by acquire(), so that its calls run one after the other
-  std::set<Digest> verified_;  // digests verified by this process
+  std::mutex mutex_;           // held during acquire(), so that its calls run one at a time
+  std::set<Digest> verified_;  // blobs whose files this process has verified
 };
 
 }  // namespace ls::worker

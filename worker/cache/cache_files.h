@@ -36,8 +36,8 @@ std::vector<StoredFile> stored_partials(const std::filesystem::path& folder);
 // Removes the file unless another process has it locked.
 bool remove_unused(const std::filesystem::path& path);
 
-// Removes the files of transfers that cannot be resumed, because they were private to a process that has
-// ended.
+// Removes files of transfers that no process can resume: those with a random suffix (see
+// PartialFile::open()), which belonged to one process only, if that process has ended.
 void remove_orphans(const std::filesystem::path& folder);
 
 // Locks the file `fd`, which was opened at `path`, by flock(2) without waiting; `how` is LOCK_SH or LOCK_EX.
@@ -46,10 +46,11 @@ void remove_orphans(const std::filesystem::path& folder);
 enum class Lock { taken, lost, failed };
 Lock lock_at(int fd, const std::filesystem::path& path, int how);
 
-void write_cache_tag(const std::filesystem::path& folder);  // as specified at bford.info/cachedir
+// Writes CACHEDIR.TAG, which makes backups skip the folder (specified at bford.info/cachedir).
+void write_cache_tag(const std::filesystem::path& folder);
 
-// Makes an error from errno after an operation on `path` failed: resource_exhausted if the disk is full, else
-// internal.
+// Returns the error for an operation on `path` that has just failed and set errno. Its code is
+// resource_exhausted if the disk is full, else internal.
 tl::unexpected<Error> io_error(const std::string& what, const std::filesystem::path& path);
 
 // The file of a blob in transfer (a partial file): bytes are appended to it while their digest is computed. A
@@ -61,7 +62,7 @@ tl::unexpected<Error> io_error(const std::string& what, const std::filesystem::p
 class PartialFile {
  public:
   // Opens or creates the file at `path` and reads the bytes that are in it already, to compute their digest.
-  // If another process is writing that file, creates a different file for this transfer.
+  // If another process is writing that file, creates a file with a random suffix for this transfer instead.
   static Result<PartialFile> open(const std::filesystem::path& path);
   PartialFile(PartialFile&&) noexcept;
   PartialFile& operator=(PartialFile&&) = delete;

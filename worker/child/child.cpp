@@ -22,10 +22,10 @@ using child::Reply;
 using child::Request;
 using child::Slot;
 
-// If a child dies because of another unit, the next child renders this unit again. After this many such
-// deaths in a row the unit is reported as failed. Each death also fails the unit that caused it, and after
-// three failures of a job the farm gives this worker no more of its units. The limit is so high that the farm
-// does so before an innocent unit reaches it.
+// A unit is innocent of the death of its child if another unit caused the death. The next child then renders
+// it again. After this many such deaths in a row the unit is reported as failed all the same. Normally that
+// does not happen: each death is reported as a failure of the unit that caused it, and after three failures
+// in a job the coordinator gives this worker no more units of that job.
 constexpr int kInnocentDeaths = 64;
 
 std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {
@@ -37,10 +37,12 @@ constexpr int kUnreadyChildren = 5;
 // Longest time from a child's start to its hello. This includes the computations that determine the numeric
 // class (machines of one class render the same bits).
 constexpr Duration kStartLimit = std::chrono::minutes(2);
-// Time after setting the stop flag within which the child must answer; otherwise it is killed
+// Longest time that the child may take to answer after the agent has set a slot's stop flag; then it is
+// killed
 constexpr Duration kStopLimit = std::chrono::seconds(10);
 
-// Copies the sample that the slot is rendering, if it has begun one, to the failure.
+// Copies the pixel and number of the sample that the slot was rendering to the failure; copies nothing if the
+// slot had not begun a sample.
 void note_place(const Slot& slot, UnitFailure& failure) {
   if (slot.where.x < 0) return;
   failure.pixel = {slot.where.x, slot.where.y};
@@ -93,11 +95,14 @@ class ChildBackend final : public RenderBackend {
   const SystemClock clock_;
   Digest numeric_class_;
   std::string platform_;
-  std::mutex control_mutex_;  // allows one request at a time on the control channel; also guards respawning
+  // Held during each request on the control channel and while a new child is started, so that only one thread
+  // at a time does either.
+  std::mutex control_mutex_;
   mutable std::mutex mutex_;
   std::shared_ptr<Process> process_;  // guarded by mutex_, as are all members below
   std::map<WorldKey, std::uint64_t> numbers_;
-  // Numbers of jobs whose worlds the child should free, to be sent before the next world is built
+  // Numbers of the jobs whose worlds the child should free. They are sent to the child before it builds its
+  // next world.
   std::vector<std::uint64_t> forgotten_;
   std::uint64_t next_number_ = 1;
   std::vector<int> free_slots_;
@@ -140,8 +145,8 @@ Result<std::shared_ptr<Process>> ChildBackend::spawn_greeted() {
   }
 }
 
-// Waits for the child's hello. unavailable: the child exited before its hello, not by a signal, and an
-// earlier child was ready; so another attempt may succeed.
+// Waits for the child's hello. Returns unavailable if another child may succeed: this one exited before its
+// hello and did not die of a signal, and an earlier child did send its hello.
 Result<void> ChildBackend::greet(Process& process) {
   const TimePoint deadline = clock_.now() + kStartLimit;
   const auto answer = process.ask(process.control_fd(), Request{.kind = Kind::hello}, {}, [&] {
@@ -211,7 +216,7 @@ tl::expected<std::shared_ptr<Process>, UnitFailure> ChildBackend::ready_process(
   if (current && knows(*current) && current->alive()) return current;
   const std::lock_guard control(control_mutex_);
   auto process = living_process();
-  // If the child dies while freeing worlds, its replacement has none to free.
+  // If the child dies while it frees worlds, a new child is started, which has no worlds to free.
   if (process && !send_forgotten(**process)) process = living_process();
   if (!process) return unit_failure(process.error().message);
   if (knows(**process)) return *process;
@@ -219,7 +224,7 @@ tl::expected<std::shared_ptr<Process>, UnitFailure> ChildBackend::ready_process(
   return *process;
 }
 
-// Makes the child free the worlds of the jobs in `forgotten_`. False: the child is dead.
+// Makes the child free the worlds of the jobs in `forgotten_`. Returns false if the child has died.
 bool ChildBackend::send_forgotten(Process& process) {
   std::vector<std::uint64_t> forgotten;
   {

@@ -23,13 +23,16 @@ inline constexpr int kMostChildThreads = 256;
 struct ChildOptions {
   // The child's program. The default is this same program, even if its file was replaced after the start.
   std::filesystem::path executable = "/proc/self/exe";
-  std::vector<std::string> arguments;  // arguments with which the child calls serve(): see worker/main.cpp
-  // Number of units rendered at the same time: the caller's number of threads
+  // Command line of the child. It must make main() (worker/main.cpp) call serve().
+  std::vector<std::string> arguments;
+  // Number of units that the child can render at the same time; it must be the number of the caller's render
+  // threads.
   int slots = 1;
   Duration hang_limit = std::chrono::minutes(5);      // longest time that a thread may take for one sample
   Duration prepare_limit = std::chrono::minutes(30);  // longest time to make a scene ready to render
-  Duration forget_limit = std::chrono::minutes(1);    // longest time to free such a scene
-  // Pause before the replacement of a child that exited before it was ready; doubles each time.
+  Duration forget_limit = std::chrono::minutes(1);    // longest time to free a scene
+  // Pause before a new child is started after one that exited before it was ready. The pause doubles with
+  // each further child that does so.
   Duration respawn_pause = std::chrono::seconds(1);
 };
 

@@ -25,8 +25,9 @@ tl::unexpected<Error> system_error(const char* what, int error = errno) {
               fmt::format("cannot start the render child: {}: {}{}", what, std::strerror(error), help));
 }
 
-// True for environment variables that are passed to the child: only those that its libraries use. Others may
-// contain secrets of the agent (the join token, cloud keys), and the renderer reads untrusted files.
+// Returns true for environment variables that the child gets: only those that its libraries use. The others
+// are withheld, because they may contain secrets of the agent (the join token, cloud keys), and an untrusted
+// scene file may take over the renderer.
 bool may_see(std::string_view variable) {
   constexpr std::array kNames{"PATH=", "HOME=", "USER=", "TMPDIR=", "TZ=", "LANG=", "LANGUAGE="};
   constexpr std::array kFamilies{"LC_", "LD_", "MALLOC_", "GLIBC_TUNABLES=", "TBB_", "LIGHTSHAFT_LOG="};
@@ -63,7 +64,8 @@ Result<std::shared_ptr<Process>> Process::spawn(const ChildOptions& options) {
 }
 
 Result<void> Process::start(const ChildOptions& options, const std::list<Descriptor>& theirs) {
-  std::error_code no_link;  // the process list should show the name behind /proc/self/exe
+  // The process list should show the name of the program's file, not that of the link /proc/self/exe
+  std::error_code no_link;
   const std::filesystem::path behind = std::filesystem::read_symlink(options.executable, no_link);
   Program program{.path = options.executable.string(),
                   .arguments = {no_link ? options.executable.string() : behind.string()},
@@ -91,8 +93,8 @@ void Process::kill() {
 }
 
 Process::End Process::end() {
-  // Waits without the lock, which kill() needs. WNOWAIT leaves the ended process unreaped, so its id is not
-  // reused.
+  // The wait is done without the lock, so that kill(), which needs the lock, can be called meanwhile. WNOWAIT
+  // leaves the ended process as a zombie, so kill() cannot hit another process that has got its id.
   if (alive()) {
     siginfo_t info{};
     while (::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT) < 0 && errno == EINTR) {
@@ -134,7 +136,8 @@ std::optional<Process::Answer> Process::ask(int fd, Request request, const std::
                                             const Watch& watch) {
   request.text_bytes = static_cast<std::uint32_t>(text.size());
   auto answer = exchange(fd, request, text, watch);
-  // The child may have closed its end but still run. Without the kill, end() would wait forever.
+  // Without an answer the child is not always dead: it may only have closed its end of the channel. It is
+  // killed, because otherwise end() could wait forever.
   if (!answer) kill();
   return answer;
 }

@@ -23,7 +23,7 @@ namespace ls::worker::child {
 class Process {
  public:
   static Result<std::shared_ptr<Process>> spawn(const ChildOptions& options);
-  ~Process();  // kills the process
+  ~Process();  // kills the process and waits for its end
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
@@ -31,9 +31,9 @@ class Process {
     Reply reply;
     std::string text;
   };
-  // Sends a request, followed by `text`, to the child on the channel `fd` and waits for the answer. Meanwhile
-  // it calls `watch` about every 50 ms; `watch` may kill() the child. nullopt: the child died, or was killed
-  // for a malformed answer.
+  // Sends a request, followed by `text`, to the child on the channel `fd` and waits for the answer. While it
+  // waits, it calls `watch` about every 50 ms; `watch` may call kill(). Returns nullopt if the child died, or
+  // if it gave a malformed answer, for which it is killed.
   std::optional<Answer> ask(int fd, Request request, const std::string& text, const Watch& watch);
 
   void kill();
@@ -53,10 +53,11 @@ class Process {
   int slots() const { return static_cast<int>(slot_fds_.size()); }
   bool some_slot_crashed() const;
 
-  // Slot (render thread) whose lack of progress made the agent kill the child; -1: none
+  // Number of the slot (render thread) without progress, for which the agent killed the child; -1: none
   std::atomic<int> hung_slot{-1};
-  std::atomic<bool> garbled{false};    // true if the child was killed for a malformed answer
-  std::atomic<bool> preparing{false};  // true while the child builds a scene; stays true if it dies then
+  std::atomic<bool> garbled{false};  // true if the child was killed for a malformed answer
+  // True while the child builds a scene. If the child dies meanwhile, it stays true.
+  std::atomic<bool> preparing{false};
   std::mutex prepared_mutex;
   // Numbers of the jobs whose scenes the child has built; guarded by prepared_mutex.
   std::set<std::uint64_t> prepared;

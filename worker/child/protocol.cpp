@@ -12,8 +12,9 @@ namespace {
 
 constexpr int kPollMs = 50;
 
-// Transfers all bytes by calls of `move(p, bytes)`, a send or receive that does not block. Between the calls
-// it waits for the event `ready` of poll(2).
+// Sends or receives all bytes by calls of `move(p, bytes)`, a send or receive that does not block. When
+// `move` can transfer nothing, waits with poll(2) for the event `ready`, and calls `watch` meanwhile. Returns
+// false if the other side has closed the channel.
 template <class Move, class Byte>
 bool move_all(int fd, short ready, Byte* p, std::size_t bytes, const Watch& watch, Move move) {
   while (bytes > 0) {
@@ -75,7 +76,8 @@ Result<LocalJob> from_text(std::string_view text) {
     job.brief.needs = json.at("needs").get<std::string>();
     job.scene = json.at("scene_file").get<std::string>();
     for (const auto& blob : json.at("blobs")) {
-      // nlohmann::json would convert any number without an error, also 1e20, which fits no integer type.
+      // The type is checked because nlohmann::json converts every number without an error, even one such as
+      // 1e20, which does not fit into an integer.
       if (!blob.at(1).is_number_unsigned()) throw std::invalid_argument("the size of a file is no count");
       job.brief.assets.push_back({digest(blob.at(0)), blob.at(1), blob.at(2)});
     }

@@ -29,26 +29,30 @@ inline constexpr int kControlFd = 4;
 inline constexpr int kFirstSlotFd = 5;
 inline constexpr int kMostSlots = kMostChildThreads;
 
-// Upper limit for the bytes of one asset in the text of a job (to_text()): its digest, size and name,
-// then the digest again with the path. Escapes may double the bytes of names and paths.
+// Upper limit for the bytes that one asset takes in the text of a job (to_text()). The text has the asset's
+// digest (64 bytes), size (up to 20) and name, and then the digest again and the path. JSON escapes may
+// double the bytes of names and paths. The last 64 bytes are for punctuation.
 inline constexpr std::size_t kAssetTextBytes = 2 * 64 + 20 + 2 * limits::kNameBytes + 2 * PATH_MAX + 64;
-// Upper limit for the bytes of the whole text: the settings as a JSON string, all assets and the scene's
-// file.
+// Upper limit for the bytes of the whole text of a job. The settings are a JSON string, whose escapes may
+// double its bytes. Besides all assets there are the path of the scene file and small members; the room of
+// two assets is enough for them.
 inline constexpr std::size_t kTextBytes =
     2 * limits::kSettingsBytes + (limits::kAssetsPerJob + 2) * kAssetTextBytes;
-inline constexpr std::size_t kReasonBytes = 64 << 10;  // upper limit for the text of a reply
+inline constexpr std::size_t kReasonBytes = 64 << 10;  // upper limit for the bytes of a reply's text
 
-// Number of floats in the largest partial (the pixel sums of one unit) that fits into a message: a tile of
-// 202 x 202 pixels without AOVs.
+// Number of floats in the largest partial (the pixel sums of one unit) that fits into a message: that of a
+// tile of 202 x 202 pixels with 6 floats each, without AOVs.
 inline constexpr std::size_t kSlotFloats = 202 * 202 * 6;
 
 enum class Kind : std::uint32_t { hello, prepare, forget, render };
 
-// A request of the agent, followed by `text_bytes` bytes of text.
+// A request of the agent to the child, followed by `text_bytes` bytes of text. The members after `job` are
+// the unit, for `render` only.
 struct Request {
   Kind kind{};
-  std::uint32_t text_bytes = 0;  // for `prepare`: length of the text of the job (to_text())
-  std::uint64_t job = 0;         // number of the job, assigned by the agent
+  // Length of the text that follows: for `prepare` the text of the job (to_text()); for other kinds 0
+  std::uint32_t text_bytes = 0;
+  std::uint64_t job = 0;  // number that the agent has given the job
   std::uint32_t tile = 0, round = 0;
   PixelRect rect;
   SampleRange samples;
@@ -70,7 +74,7 @@ static_assert(std::is_trivially_copyable_v<Request> && std::is_trivially_copyabl
 // The data of one render thread that agent and child share. The shared memory is an array of these.
 struct Slot {
   render::Breadcrumb where;
-  std::atomic<bool> stop{false};     // set by the agent
+  std::atomic<bool> stop{false};     // set by the agent to make the child abandon the unit
   std::atomic<bool> crashed{false};  // set by the child's signal handler if this thread crashed
   float sums[kSlotFloats];
 };

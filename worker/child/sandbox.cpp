@@ -24,10 +24,11 @@
 namespace ls::worker::child {
 namespace {
 
-// System calls.
+// The first part of this file restricts system calls by a seccomp filter. kDeny is the filter's result for a
+// denied call: the call fails with EPERM.
 constexpr std::uint32_t kDeny = SECCOMP_RET_ERRNO | EPERM;
-// System calls that are always denied, by their numbers on this platform. io_uring is among them because it
-// could open sockets without the other calls.
+// Numbers of the system calls that are always denied. io_uring is among them because it can open sockets
+// without the call `socket`.
 constexpr std::uint32_t kDenied[] = {
     SYS_socket,
     SYS_ptrace,
@@ -82,33 +83,38 @@ constexpr std::uint32_t kDenied[] = {
     SYS_msgget,
     SYS_mq_open,
 };
-constexpr std::uint32_t kX32 = 0x40000000;  // added to the numbers of the same calls in x86-64's x32 ABI
+// On x86-64 each system call has a second number, its own plus kX32, in the x32 ABI (32-bit pointers). The
+// filter denies all of these.
+constexpr std::uint32_t kX32 = 0x40000000;
 #ifdef __x86_64__
 constexpr std::uint32_t kPlatform = AUDIT_ARCH_X86_64;
 #else
 constexpr std::uint32_t kPlatform = AUDIT_ARCH_AARCH64;
 #endif
 
-// A system call that is allowed or denied by the value of one of its arguments. The filter compares only the
-// lower 32 bits of the argument; the kernel ignores the others for these calls. Each call is listed once.
+// A rule for a system call whose permission depends on the value of one argument. The filter compares only
+// the lower 32 bits of the argument, since the kernel ignores its upper 32 bits for the calls in decided().
+// Each call has at most one rule.
 struct Decided {
   std::uint32_t call;
   unsigned argument;
-  bool allowed;  // true: allowed with these values only; false: allowed with all others
+  bool allowed;  // true: allowed only with one of `values`; false: denied with one of `values`, else allowed
   std::vector<std::uint32_t> values;
 };
 std::vector<Decided> decided() {
-  // tgkill is allowed for signals to this process itself, which raise and abort send.
+  // tgkill may send signals to this process only: raise() and abort() need that.
   return {{SYS_tgkill, 0, true, {static_cast<std::uint32_t>(::getpid())}},
           {SYS_prlimit64, 0, true, {0}},
           {SYS_sched_setaffinity, 0, true, {0}},
-          // These would choose a process that the kernel signals when a descriptor becomes ready.
+          // These commands are denied, because with them the kernel would send signals to a chosen process
+          // when a descriptor becomes ready.
           {SYS_fcntl, 1, false, {F_SETOWN, F_SETOWN_EX, F_SETSIG}},
           {SYS_ioctl, 1, false, {FIOSETOWN, SIOCSPGRP}}};
 }
 
-// Appends the test of one call to the filter program. If the number of the system call matches, the argument
-// decides. Otherwise the program continues after the test, with the number still in the accumulator.
+// Appends one rule to the filter program. Before the rule, the accumulator contains the number of the system
+// call. If it is not the rule's call, the program continues after the rule, with the accumulator unchanged.
+// Otherwise the argument decides, and the program ends.
 void put(const Decided& d, std::vector<sock_filter>& program) {
   const auto n = static_cast<std::uint8_t>(d.values.size());
   program.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, d.call, 0, static_cast<std::uint8_t>(n + 3)));
@@ -142,20 +148,20 @@ bool filter_calls() {
          ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &whole, 0, 0) == 0;
 }
 
-// Files.
-//
-// Access rights known to Landlock since Linux 5.13 (its ABI 1); later ABIs add more.
+// The rest of this file restricts access to files by Landlock. kRead and kWrite are access rights of its ABI
+// 1 (Linux 5.13); later ABIs have more.
 constexpr std::uint64_t kRead = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
 constexpr std::uint64_t kWrite = LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_REMOVE_DIR |
                                  LANDLOCK_ACCESS_FS_REMOVE_FILE | LANDLOCK_ACCESS_FS_MAKE_CHAR |
                                  LANDLOCK_ACCESS_FS_MAKE_DIR | LANDLOCK_ACCESS_FS_MAKE_REG |
                                  LANDLOCK_ACCESS_FS_MAKE_SOCK | LANDLOCK_ACCESS_FS_MAKE_FIFO |
                                  LANDLOCK_ACCESS_FS_MAKE_BLOCK | LANDLOCK_ACCESS_FS_MAKE_SYM;
-constexpr std::uint64_t kTruncate = std::uint64_t{1} << 14;  // ABI 3, Linux 6.2
+constexpr std::uint64_t kTruncate = std::uint64_t{1} << 14;  // truncate a file: since ABI 3 (Linux 6.2)
 constexpr std::uint64_t kFileRights =  // rights that apply to files; the rest apply to folders
     LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_EXECUTE | kTruncate;
 
-// Adds a rule that allows `rights` below `path`. A path that does not exist needs no rule.
+// Adds a rule that allows `rights` for the file `path`, or for everything in the folder `path`. A path that
+// does not exist needs no rule; then it returns true.
 bool allow(int rules, const std::filesystem::path& path, std::uint64_t rights) {
   const Descriptor place{::open(path.c_str(), O_PATH | O_CLOEXEC)};
   struct stat info {};
@@ -167,12 +173,12 @@ bool allow(int rules, const std::filesystem::path& path, std::uint64_t rights) {
 
 // The kernel's landlock_ruleset_attr, including fields that are newer than the kernel headers of the build.
 struct Ruleset {
-  std::uint64_t files = 0;    // ABI 1
-  std::uint64_t network = 0;  // ABI 4
-  std::uint64_t scoped = 0;   // ABI 6
+  std::uint64_t files = 0;    // file rights that are denied unless a rule allows them; since ABI 1
+  std::uint64_t network = 0;  // the same for network rights, none here; since ABI 4
+  std::uint64_t scoped = 0;   // actions limited to processes in the sandbox; since ABI 6
 };
-// Restricts signals of the sandboxed process, including those that the kernel sends for it (fcntl), to
-// processes within the sandbox
+// A bit of Ruleset::scoped: the process can send signals only to processes within the sandbox. This also
+// holds for signals that the kernel sends on its behalf (fcntl with F_SETOWN).
 constexpr std::uint64_t kScopeSignal = 2;
 
 bool bound_files(const std::vector<std::filesystem::path>& readable, long abi) {
@@ -191,8 +197,8 @@ bool bound_files(const std::vector<std::filesystem::path>& readable, long abi) {
   // This program and the OpenVDB reader beside it are allowed, but not the folder that contains them.
   done &= allow(rules.fd, own, kRun);
   done &= allow(rules.fd, own.parent_path() / "lightshaft-vdb", kRun);
-  // Files that the dynamic loader and the thread library read. They include no part of /proc about other
-  // processes.
+  // The dynamic loader and the thread library read these files and folders. Nothing in /proc about other
+  // processes is among them.
   for (const char* path : {"/etc/ld.so.cache", "/etc/ld.so.preload", "/sys", "/proc/self", "/proc/cpuinfo",
                            "/proc/meminfo", "/proc/sys/vm", "/dev/urandom", "/dev/random"})
     done &= allow(rules.fd, path, kRead);
@@ -207,13 +213,14 @@ bool bound_files(const std::vector<std::filesystem::path>& readable, long abi) {
 Sandboxed enter_sandbox(const std::vector<std::filesystem::path>& readable) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   (void)readable;
-  // No sandbox with sanitizers: they use ptrace, and write files wherever they are configured to
+  // Builds with sanitizers have no sandbox: sanitizers use ptrace and may write files anywhere.
   (void)filter_calls;
   (void)bound_files;
   return {};
 #else
   const long abi = ::syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
-  // Called before filter_calls(): the filter then need not allow the system calls of bound_files().
+  // bound_files() is called before filter_calls(), so that the filter need not allow the system calls that
+  // bound_files() makes.
   const bool files = bound_files(readable, abi);
   return {filter_calls(), files, files && abi >= 3};
 #endif

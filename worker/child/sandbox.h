@@ -8,11 +8,12 @@
 namespace ls::worker::child {
 
 struct Sandboxed {
-  // True if seccomp is in effect. It denies sockets; tracing, signalling and limiting other processes; new
-  // namespaces, kernel modules, io_uring, and memory that outlives the process.
+  // True if the seccomp filter is in effect. It denies opening sockets, tracing other processes, sending them
+  // signals or setting their limits, unshare(2) and setns(2), kernel modules, io_uring, and shared memory,
+  // semaphores and message queues that outlive the process.
   bool calls = false;
-  // True if Landlock is in effect. It denies writing files, and reading any but those in the given folders
-  // and those that the system's libraries need.
+  // True if Landlock is in effect. It denies writing all files except /dev/null, and reading all files except
+  // those in the folders `readable` and those that this program and the system's libraries need.
   bool files = false;
   // True if the process also cannot truncate files that it may read (needs the Landlock of Linux 6.2)
   bool sizes = false;

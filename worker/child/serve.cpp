@@ -87,7 +87,8 @@ class Server {
   }
 
  private:
-  // Calls `run` and returns the text for the reply. An exception from `run` becomes the outcome in the reply.
+  // Calls `run` and returns the text that it returns, for the reply. If `run` throws, sets the reply's
+  // outcome and returns the reason.
   template <class Run>
   static std::string guarded(Reply& reply, Run run) {
     try {
@@ -170,10 +171,11 @@ void confine(std::uint64_t memory_limit) {
   ::prctl(PR_SET_NAME, "ls-render-child");
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
-  // Only the agent reacts to Ctrl-C in a terminal.
+  // The child ignores these signals. A terminal sends them to the agent and the child alike (SIGINT for
+  // Ctrl-C), but only the agent should react: it ends the child when it no longer needs it.
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) ::signal(signal, SIG_IGN);
 #if !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)  // not with sanitizers: their shadow memory is larger than any limit
+    !defined(__SANITIZE_THREAD__)  // sanitizers reserve more memory than any limit allows
   if (memory_limit > 0) {
     const rlimit data{memory_limit, memory_limit};
     ::setrlimit(RLIMIT_DATA, &data);

@@ -10,13 +10,13 @@ namespace ls::worker::child {
 
 // Restricts the child process. Call it at the child's start, before any thread is started. It forbids new
 // privileges and core files, limits the private writable memory to `memory_limit` bytes (0: no limit), and
-// sets up the signals. Exactly these file descriptors must be open: standard input, output and error, and
-// those of child/protocol.h.
+// sets the actions for signals. Exactly these file descriptors must be open: standard input, output and
+// error, and those of child/protocol.h.
 void confine(std::uint64_t memory_limit);
 
-// Serves requests on the control channel and on `slots` render threads, each with its own channel, by calling
-// `backend`. Normally it does not return, but exits when the agent is gone; otherwise it returns the exit
-// code.
+// Serves requests by calling `backend`: on this thread those of the control channel, and on `slots` render
+// threads those of one channel each. When the agent is gone, it ends the process and does not return. It
+// returns only if it cannot start serving: the exit code, 1 or 2.
 int serve(LocalBackend& backend, int slots);
 
 }  // namespace ls::worker::child

@@ -80,9 +80,10 @@ class WorkCall final : public grpc::ClientBidiReactor<pb::FromWorker, pb::ToWork
   struct State {
     std::deque<pb::FromWorker> queue;
     bool writing = false, closing = false, writes_done = false, held = true, done = false;
-    std::optional<Error> broken;  // error of a message that could not be parsed
+    std::optional<Error> broken;  // why a message could not be parsed; nullopt: all could
   };
-  void pump(State& state);  // starts the next write, or ends the writes
+  // Starts the next write. If no message is left and the stream is closing, tells gRPC that no more follow.
+  void pump(State& state);
   void release_hold(State& state);
 
   std::shared_ptr<LinkObserver> observer_;                     // null once the stream has ended
@@ -141,7 +142,7 @@ void WorkCall::close(Duration at_most) {
   if (done_changed_.wait_for(state, at_most, done)) return;
   context_->TryCancel();
   release_hold(*state);
-  done_changed_.wait(state, done);  // short: a cancelled call ends here, whatever the network does
+  done_changed_.wait(state, done);  // short: gRPC ends a cancelled call without waiting for the network
 }
 
 void WorkCall::OnReadDone(bool ok) {
@@ -151,7 +152,8 @@ void WorkCall::OnReadDone(bool ok) {
     if (!state->writing) release_hold(*state);
     return;
   }
-  // A message of an unknown type, which only newer coordinators send, is ignored: they must not rely on it.
+  // A message of an unknown type is ignored. Only coordinators newer than this worker send one, and they must
+  // not rely on an effect of it.
   if (!wire::known(incoming_)) {
     StartRead(&incoming_);
     return;
@@ -189,8 +191,9 @@ void WorkCall::OnDone(const grpc::Status& status) {
   observer_.reset();
   const std::shared_ptr<WorkCall> self = std::move(self_);
   const auto state = state_.lock();
-  // The context shares ownership of the channel. When the last channel of a process ends, gRPC joins its
-  // threads, and this may be one of them. So only the link may own the channel once `done` is true.
+  // The context shares ownership of the channel. When the last channel of a process is destroyed, gRPC joins
+  // its own threads. This may be one of them, and a thread must not join itself. So this object gives up the
+  // channel before it sets `done`, after which the link may destroy the channel.
   context_.reset();
   state->done = true;
   done_changed_.notify_all();
@@ -213,7 +216,7 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address, const st
   args.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, limits::kKeepaliveTimeoutMs);
   args.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   args.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  // The agent has its own back-off between attempts to connect; the back-off of gRPC must not be longer.
+  // gRPC's pauses between attempts to connect must not be longer than those that the agent makes itself.
   args.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
   args.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kConnectMs);
   args.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);

@@ -15,9 +15,9 @@ struct LinkTls {
   std::string cert, key;  // certificate and key of this worker
 };
 
-// Makes a link to the coordinator at `address`, "host:port", without connecting yet. `join_token` is sent
-// with requests for blobs; the token for joining is in the hello. Without `tls` the connection is not
-// encrypted.
+// Makes a link to the coordinator at `address`, "host:port", without connecting yet. `join_token`, with which
+// workers join the farm, is sent with each request for a blob; the hello has its own copy
+// (WorkerHello::join_token). Without `tls` the connection is not encrypted.
 std::unique_ptr<CoordinatorLink> make_grpc_link(const std::string& address, const std::string& join_token,
                                                 const std::optional<LinkTls>& tls = {});
 

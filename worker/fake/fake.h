@@ -16,21 +16,23 @@ namespace ls::worker {
 // A fault injected into chosen units, for tests.
 struct FakeFault {
   enum class Kind { none, crash, hang, memory, wrong, unhealthy } kind = Kind::none;
-  // Selects the units with this job's seed, this tile and this round (the number of the unit's range of
-  // samples). A negative value matches every unit.
+  // The fault is injected into units whose job has this seed, whose tile has this index, and whose round (the
+  // number of the unit's range of samples) is this one. A negative value matches all units.
   std::int64_t seed = -1, tile = -1, round = -1;
 };
 // Parses "KIND[,seed=S][,tile=T][,round=R]" with KIND one of crash, hang, memory, wrong, unwell; empty: no
-// fault. `unwell`: the pixels are right, but two infinite samples are reported at the tile's first pixel.
+// fault. `unwell` is Kind::unhealthy: the pixels are right, but the unit reports two infinite samples at the
+// tile's first pixel.
 Result<FakeFault> parse_fake_fault(std::string_view text);
 
 Digest fake_numeric_class();  // returns the SHA-256 of "fake"
 
 struct FakeOptions {
   Duration delay{};           // how long the renderer sleeps for each unit
-  double sample_seconds = 0;  // additional time per sample of a pixel, which is reported as CPU time
+  double sample_seconds = 0;  // sleeps this much more per sample of a pixel; counted as CPU time
   FakeFault fault;
-  Digest numeric_class = fake_numeric_class();  // set to another value to simulate another class of machine
+  // Identifies machines that render the same bits. Tests set another value to simulate a different machine.
+  Digest numeric_class = fake_numeric_class();
   std::string platform = "fake";
 };
 

@@ -32,8 +32,8 @@ inline std::uint64_t fake_mix(std::uint64_t x) {  // the finaliser of splitmix64
   return x ^ (x >> 31);
 }
 
-// Returns a seed of a unit's pixels that is independent of tile and samples: from the first 8 bytes of the
-// digests of scene and settings.
+// Returns the seed from which the seeds of all pixels of a job are computed. It is computed from the first 8
+// bytes of the digest of the scene and of the digest of the settings.
 inline std::uint64_t fake_seed(const UnitHeader& header) {
   std::uint64_t scene = 0, settings = 0;
   std::memcpy(&scene, header.scene.bytes.data(), sizeof scene);
@@ -44,7 +44,7 @@ inline std::uint64_t fake_seed(const UnitHeader& header) {
 inline constexpr std::uint64_t kFakeMarkerEvery = 32;  // one in this many pixels is a marker
 inline constexpr RoundIndex kFakeMarkerRounds = 8;
 
-// Returns the seed of a pixel's samples.
+// Returns the seed of the samples of the pixel (x, y); `seed` is fake_seed() of the unit.
 inline std::uint64_t fake_pixel_seed(std::uint64_t seed, int x, int y) {
   const auto place =
       static_cast<std::uint64_t>(static_cast<std::uint32_t>(y)) << 32 | static_cast<std::uint32_t>(x);

@@ -37,45 +37,48 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
 // built. If several such objects live, the lowest limit applies.
 std::shared_ptr<void> limit_threads(int threads);
 
-// The pixel and index of the sample that a thread renders, for crash reports. With path reuse (path_reuse.h)
-// the thread renders a square of 16 x 16 pixels together, and the pixel is one of these. The thread writes
-// with relaxed stores.
+// The sample that a thread is rendering, for crash reports: its pixel (-1: none yet) and its index among the
+// pixel's samples. With path reuse (path_reuse.h) a thread renders squares of 16 x 16 pixels as a whole, and
+// the pixel is one of the square. The thread writes with relaxed atomic stores.
 struct Breadcrumb {
   std::atomic<std::int32_t> x{-1}, y{-1};
   std::atomic<std::uint64_t> sample{0};
 };
 
 struct TileResult {
-  std::vector<float> sums;  // planes as in common/image/film/partial.h: six, plus those of the requested AOVs
-  // The number of bad samples by cause, and where they are; corrected inputs of the scene are not included
+  // The tile's planes, as in Partial::sums (common/image/film/partial.h): six of colour, then those of the
+  // requested AOVs
+  std::vector<float> sums;
+  // Number and places of the bad samples, by cause. Corrected inputs of the scene are not included.
   Health health;
-  bool stopped = false;  // true if render_tile() stopped early: the sums are then not valid
+  bool stopped = false;  // true if `stop` ended render_tile() early: `sums` is then not valid
 };
 
 // Renders the samples with the indices `samples` of each pixel of `tile` on the calling thread. The result is
-// a pure function of (world, tile, samples), unless `stop` becomes true. `breadcrumb` receives the sample
-// that is being rendered.
+// a pure function of (world, tile, samples), unless `*stop` becomes true, which ends rendering early.
+// `breadcrumb` receives the sample that is being rendered.
 TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, const std::atomic<bool>* stop,
                        Breadcrumb* breadcrumb);
 
-// Returns the side, in pixels, of the squares of pixels that share the tails of their paths (path_reuse.h),
-// or 1 if the world does not use path reuse. A tile that consists of whole squares traces no paths of pixels
-// of other tiles.
+// Returns the side, in pixels, of the squares of pixels whose paths share their tails (path_reuse.h), or 1 if
+// the world does not use path reuse. If a tile consists of whole squares, rendering it traces paths of its
+// own pixels only.
 int tile_alignment(const World& world);
 
 // Returns the names of the integrator variants that can render this world, cheapest first. A variant is the
 // integrator compiled for one set of features (features.h). render_tile_as() renders with one of them; all
 // give the same bits.
 std::vector<std::string> covering_variants(const World& world);
-std::vector<std::string> all_variants(const World& world);  // all variants of the world's integrator
+// Names of all variants of the world's integrator, including those that cannot render this world
+std::vector<std::string> all_variants(const World& world);
 TileResult render_tile_as(const World& world, const std::string& variant, PixelRect tile,
                           SampleRange samples);
 
-// The result of render_sample(), which renders a single sample of a pixel, so that a sample of an image can
-// be rendered again.
+// The result of render_sample(), which renders one sample of a pixel on its own, so that a sample of an
+// earlier image can be rendered again and examined.
 struct SampleValue {
   double rgb[3];
-  bool finite;    // false if the sample is rejected
+  bool finite;    // false if the sample is rejected (for the causes see HealthCause)
   Health health;  // the problems of this sample, by cause
 };
 SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample);
@@ -93,8 +96,8 @@ struct WorldReport {
   };
   std::vector<std::string> used, left_out;
   std::vector<Structure> structures;
-  std::string variant;  // name of the chosen variant, out of `variants` compiled ones
-  std::size_t variants = 0;
+  std::string variant;       // name of the integrator variant that renders this world
+  std::size_t variants = 0;  // number of variants of the world's integrator
   // The number of inputs that were corrected: negative densities and texels set to 0, degenerate triangles
   // dropped, and so on.
   std::uint64_t clamped_inputs = 0;
@@ -107,8 +110,8 @@ WorldReport describe(const World& world);
 // battery of test computations. These run once, at the first call. Machines of the same class produce the
 // same bits.
 const Digest& numeric_class();
-// Describes the machine and build of the class for people: "armv8-a:gcc-14.2.0:embree-4.3.3". Different
-// classes may have the same description.
+// Describes, for people, what this build is made for and with, as in "armv8-a:gcc-14.2.0:embree-4.3.3".
+// Different numeric classes may have the same description.
 const std::string& platform();
 
 }  // namespace ls::render

@@ -1,7 +1,8 @@
 // lightshaft-denoise LIBRARY THREADS SECONDS: denoises the images in the inherited file kHelperFd
-// (exchange.h) with Intel Open Image Denoise 2 and exits; after SECONDS it is ended by SIGALRM. LIBRARY is
-// passed to dlopen(). The library is found at run time and not needed to build: the functions of its C API
-// are declared here according to its documentation (https://www.openimagedenoise.org/documentation.html).
+// (exchange.h) with Intel Open Image Denoise 2 and exits; after SECONDS it is killed by SIGALRM. LIBRARY is
+// passed to dlopen(). Since the library is found at run time, it is not needed to build: the functions of its
+// C API are declared here according to its documentation
+// (https://www.openimagedenoise.org/documentation.html).
 #include <dlfcn.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -24,7 +25,7 @@ namespace {
 using ls::denoise::Header;
 using ls::denoise::Outcome;
 
-// Limit of the library's own memory: images that need more are denoised in parts
+// Limit of the library's own memory, in MB; the library denoises images that need more in parts.
 constexpr int kMaxMemoryMegabytes = 2048;
 
 // Limits this process: it is killed when its parent ends, or after `most_seconds` of wall-clock time. (A
@@ -42,7 +43,7 @@ void set_error(Header& header, const char* what, const char* why) {
   std::snprintf(header.error, sizeof header.error, "%s: %s", what, why ? why : "no reason given");
 }
 
-// The functions of Open Image Denoise. If one is missing, ok() is false.
+// The functions of Open Image Denoise, loaded by dlopen(). If one is missing, ok() is false.
 class Library {
  public:
   Library(const char* path, Header& header)
@@ -113,7 +114,8 @@ class Run {
   Run(const Run&) = delete;
   Run& operator=(const Run&) = delete;
 
-  // Guides are denoised first, each by its own filter, so that the colour's filter may rely on them.
+  // Denoises one image; the result replaces `color`. The guides (albedo and normal) are denoised first, each
+  // by a filter of its own, so that the filter of the colour may treat them as free of noise.
   bool denoise(float* color, float* albedo, float* normal) {
     if (!ready_) return false;
     const std::size_t floats = ls::denoise::plane_floats(header_.width, header_.height);

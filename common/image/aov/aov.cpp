@@ -51,7 +51,7 @@ constexpr Alias kAliases[] = {
     {"shading_normal", Aov::normal},    {"shape", Aov::shape_id},
     {"single_scattering", Aov::single},
 };
-// Layers that every image has.
+// Names of the two layers that every image has, and other names for them.
 constexpr std::string_view kAlways[] = {"spp", "stderr", "sample_count", "standard_error"};
 
 constexpr std::size_t kMostShown = 64;  // a message shows at most this many characters of a wrong name
@@ -63,7 +63,7 @@ std::string plain(std::string_view name) {
   return out;
 }
 
-// Returns the text in ASCII, for a message.
+// Returns the beginning of a wrong name for a message; characters that are not printable ASCII become '?'.
 std::string shown(std::string_view name) {
   std::string out(name.substr(0, kMostShown));
   for (char& c : out)

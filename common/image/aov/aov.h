@@ -1,9 +1,11 @@
-// Additional outputs of an image (AOVs): their names, sizes, and planes in a partial (the pixel sums of one
-// tile and range of samples). docs/reference/aovs.md defines each.
+// Additional outputs of an image (AOVs): their names, sizes, and planes in a partial. A partial has the pixel
+// sums of one tile over one range of samples; the film is the sum of all partials. docs/reference/aovs.md
+// defines each AOV.
 //
-// After its six colour planes (A.R A.G A.B B.R B.G B.B) a partial has the planes of sums of the requested
-// AOVs, sorted by channel name, then the planes of identifiers (identifiers.h), sorted by the AOV's name. The
-// partial's EXR file has these planes in the same order; only the colours differ (B before G before R).
+// After its six colour planes (A.R A.G A.B B.R B.G B.B, where A and B are the halves of the samples) a
+// partial has the planes of sums of the requested AOVs, sorted by channel name, then the planes of
+// identifiers (identifiers.h), sorted by the AOV's name. The partial's EXR file has these planes in the same
+// order, except that its colour planes are B before G before R.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +19,7 @@
 
 namespace ls {
 
-// The colour planes of a partial, A.R A.G A.B B.R B.G B.B: the sums of the two halves of the samples.
+// Number of colour planes of a partial, A.R A.G A.B B.R B.G B.B: sums over each half of the samples.
 inline constexpr int kPartialChannels = 6;
 
 enum class Aov : std::uint8_t {
@@ -45,7 +47,7 @@ inline constexpr std::size_t kAovs = 18;
 // The type of an AOV's values, and by what number of samples its sums are divided.
 enum class AovKind {
   of_hits,  // sums over the samples that hit a surface, divided by the number of these samples
-  // Sums over the samples that hit a surface, divided by the number of all samples: a miss counts as 0
+  // sums over the samples that hit a surface, divided by the number of all samples: a miss counts as 0
   of_all,
   light,  // components of the radiance, divided by the number of all samples
   guide,  // for a denoiser: sums over all samples, separately for the two halves of the samples
@@ -54,10 +56,11 @@ enum class AovKind {
 
 struct AovRow {
   Aov aov;
-  std::string_view name;  // name in requests, and of the layer
+  // name of the AOV in requests, and of its layer in the image (except for identifiers)
+  std::string_view name;
   AovKind kind;
-  std::string_view components;  // channels of the layer, one letter each
-  bool half;                    // stored as half floats, unless float output is requested
+  std::string_view components;  // names of the layer's channels, one letter each
+  bool half;                    // true: stored as half floats, unless float output is requested
 };
 std::span<const AovRow> aov_rows();  // all AOVs, sorted by name
 const AovRow& row_of(Aov aov);
@@ -78,8 +81,8 @@ class AovSet {
 };
 AovSet aovs_of(AovKind kind);  // returns all AOVs of a kind
 
-// Parses names of AOVs. Names in common use ("normal", "sh_normal", "crypto_object") are accepted; case is
-// ignored, and '-' stands for '_'. "spp" and "stderr", which every image has, are accepted and add nothing.
+// Parses names of AOVs. Common other names ("sh_normal", "crypto_object") are accepted; case is ignored, and
+// '-' stands for '_'. "spp" and "stderr" are accepted and add nothing, since every image has these layers.
 // invalid_argument: an unknown name; the message lists the known ones.
 Result<AovSet> parse_aovs(std::span<const std::string> names);
 std::vector<std::string> names_of(AovSet set);  // returns the names, sorted
@@ -87,26 +90,28 @@ std::string known_aovs();                       // returns "albedo, coverage, ..
 
 // One plane of sums: a component of an AOV, or the number of samples that hit a surface.
 struct AovPlane {
-  // Channel in the partial's file: "aov.albedo.B", "aov.denoising_albedo.A.B", "aov.hits"
+  // name of its channel in the partial's file: "aov.albedo.B", "aov.denoising_albedo.A.B", "aov.hits"
   std::string name;
-  Aov aov = Aov::depth;  // not used for hits
-  int component = 0;     // index among the AOV's components
-  int half = 0;          // for a guide: 0 for half A, 1 for half B; otherwise 0, for both together
+  Aov aov = Aov::depth;  // not used in the plane of hits
+  int component = 0;     // index in AovRow::components
+  // half of the samples, for a guide: 0 is A, 1 is B; for other AOVs 0, and the plane is for all samples
+  int half = 0;
   bool hits = false;
 };
 struct AovPlanes {
   std::vector<AovPlane> sums;
-  std::vector<Aov> ids;            // each has kIdPlanes planes
-  std::vector<std::string> names;  // names of all planes, in the order within a partial
+  std::vector<Aov> ids;  // the AOVs of identifiers; each has kIdPlanes planes
+  // names of all planes (sums, then identifiers), in the order within a partial
+  std::vector<std::string> names;
   std::size_t count() const { return names.size(); }
-  std::size_t hits = SIZE_MAX;  // index of the hits plane in sums, if present
+  std::size_t hits = SIZE_MAX;  // index in `sums` of the plane of hits; SIZE_MAX: there is none
 };
 AovPlanes planes_of(AovSet set);
 
-// Returns the bytes per pixel of a partial. The film stores the last round of a tile in the same form if it
-// is truncated.
+// Returns the bytes per pixel of a partial. The film keeps the last round (range of samples) of a tile in the
+// same form, if that round is truncated.
 std::size_t partial_bytes_per_pixel(AovSet set);
-// Returns the bytes per pixel of the sums in a film.
+// Returns the bytes per pixel of the sums that a film holds.
 std::size_t film_bytes_per_pixel(AovSet set);
 
 }  // namespace ls

@@ -1,4 +1,4 @@
-// Identifiers of objects in AOVs: the slots of a pixel, and names and headers as in Cryptomatte.
+// Identifiers of objects in AOVs: their slots in a pixel, and names and header strings as in Cryptomatte.
 #pragma once
 
 #include <array>
@@ -12,17 +12,18 @@
 namespace ls {
 
 inline constexpr int kIdSlots = 8;
-inline constexpr std::size_t kIdPlanes = 2 * kIdSlots + 1;  // identifier and count of each slot, and `more`
+// planes per pixel: identifier and count of each slot, and IdSlots::more
+inline constexpr std::size_t kIdPlanes = 2 * kIdSlots + 1;
 
 struct IdSlot {
   float id = 0;
-  float n = 0;  // number of samples: an integer, at most 2^24
+  float n = 0;  // number of samples that hit the object: an integer, at most 2^24
   bool operator==(const IdSlot&) const = default;
 };
-// IdSlots has the identifiers of the objects that are visible in a pixel, with their numbers of samples: a
-// fixed number of slots (identifier, count), and the number of samples that found no slot. An identifier is a
-// float made from a name as in Cryptomatte: normal, never 0. Slots have one canonical order: by count,
-// largest first, then by the bits of the identifier; unused slots are 0, 0.
+// The identifiers of the objects that are visible in a pixel, with the number of samples that hit each: a
+// fixed number of slots (identifier, count), and the number `more` of samples that found no slot. An
+// identifier is a float made from a name as in Cryptomatte; it is a normal float, never 0. Slots have one
+// canonical order: by count, largest first, then by the bits of the identifier; unused slots are 0, 0.
 //
 // Adding two IdSlots keeps the slots with the largest counts; the other counts are added to `more`. If the
 // samples of a pixel hit at most kIdSlots objects, every count is exact, whatever the order of additions.
@@ -40,29 +41,32 @@ bool is_identifier(float id);
 IdSlots ranked(std::vector<IdSlot> seen);
 IdSlots operator+(const IdSlots& a, const IdSlots& b);
 
-// Checks slots against the number of samples; returns a description of the fault, or an empty text.
+// Checks whether slots are possible for this number of samples. Returns a description of the fault, or an
+// empty text if there is none.
 std::string wrong_with(const IdSlots& slots, std::uint64_t samples);
 
-// Convert between slots and the kIdPlanes planes of one pixel; `stride` is the distance between planes in
-// floats.
+// load_slots() reads the slots of one pixel from its kIdPlanes planes, and store_slots() writes them.
+// `stride` is the distance between planes in floats.
 IdSlots load_slots(const float* planes, std::size_t stride);
 void store_slots(const IdSlots& slots, float* planes, std::size_t stride);
 
-// Cryptomatte 1.2.0: J. Friedman, A. Jones, "Fully automatic ID mattes with support for motion blur and
-// transparency", SIGGRAPH 2015 posters, and its specification.
+// The functions below follow Cryptomatte 1.2.0: J. Friedman, A. Jones, "Fully automatic ID mattes with
+// support for motion blur and transparency", SIGGRAPH 2015 posters, and its specification.
 
 // Returns the hash MurmurHash3_x86_32 (A. Appleby, public domain) with seed 0.
 std::uint32_t murmur3_32(std::string_view text);
 
-// Returns the identifier of a name: its hash, whose bits are taken as a float. If this float were 0,
-// denormal, infinite or NaN, one exponent bit is flipped, since some programs would change such floats.
+// Returns the identifier of a name: its hash, whose bits are taken as those of a float. If the float were 0,
+// denormal, infinite or NaN, one bit of its exponent is flipped, since some programs would change such
+// floats.
 float cryptomatte_id(std::string_view name);
 
-// Returns {"name":"8 hexadecimal digits of its id", ...}, sorted by name, without duplicates.
+// Returns a Cryptomatte manifest: {"name":"8 hexadecimal digits of its identifier", ...}, sorted by name,
+// without duplicates.
 std::string cryptomatte_manifest(std::vector<std::string> names);
 
-// Returns the header strings of layer `layer`: cryptomatte/KEY/name, hash, conversion and manifest (omitted
-// if empty).
+// Returns the header strings of the layer named `layer`: cryptomatte/KEY/name, /hash, /conversion and
+// /manifest, where KEY is made from the layer's name. The manifest string is omitted if `manifest` is empty.
 std::map<std::string, std::string> cryptomatte_header(std::string_view layer, const std::string& manifest);
 
 }  // namespace ls

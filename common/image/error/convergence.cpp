@@ -13,18 +13,21 @@ namespace ls {
 namespace {
 
 constexpr double kNormal95 = 1.959964;
-// With fewer samples per pixel, a half has only one or two samples and is too noisy.
+// Points with fewer samples per pixel are not used: each half of the samples would have only one or two per
+// pixel and be too noisy.
 constexpr double kLeastSpp = 8;
 constexpr double kPriorSpread = .15;
-// For forecasts: the standard deviation by which the slope changes per square root of log time (b in
-// convergence.h).
+// The standard deviation of the slope's change per square root of log time, for forecasts; it is b in
+// convergence.h.
 constexpr double kBend = .06;
-constexpr double kSlow = .85, kFast = 1.1;  // the verdict is slow below kSlow and fast above kFast
-constexpr std::size_t kMostPoints = 32;     // at most this many doublings of the sample count are used
+// The verdict is "slower" if the slope's interval is below kSlow, and "faster" if it is above kFast.
+constexpr double kSlow = .85, kFast = 1.1;
+// The line is fitted to at most this many points, at doubling sample counts.
+constexpr std::size_t kMostPoints = 32;
 
 struct Log {
   double time = 0, error = 0, spp = 0;
-  double sigma = 0;  // standard deviation of `error`
+  double sigma = 0;  // standard deviation of `error`, which is log(relMSE)
 };
 
 bool usable(const ErrorPoint& p) {
@@ -37,8 +40,9 @@ Log log_of(const ErrorPoint& p) {
   return {std::log(p.core_seconds), std::log(p.relmse), p.spp, interval * std::sqrt(.5)};
 }
 
-// Returns the last point, and before it points with at most half the samples of the next one, in order of
-// samples.
+// Selects the usable points at doubling sample counts, and returns their logarithms in order of samples: the
+// last usable point, and before it always the latest point that has at most half the samples of its
+// successor.
 std::vector<Log> doublings(std::span<const ErrorPoint> points) {
   std::vector<Log> out;
   for (std::size_t i = points.size(); i-- > 0 && out.size() < kMostPoints;) {
@@ -53,18 +57,19 @@ double covariance(const Log& a, const Log& b) {
   return a.sigma * b.sigma * std::min(a.spp, b.spp) / std::max(a.spp, b.spp);
 }
 
-// Returns the covariance that a varying slope adds to the errors at the log times u and v, measured from a
-// reference point of the line. The slope follows a Brownian motion of variance 1 per unit of log time.
-// Deviations on different sides of the reference point are independent.
+// Returns the covariance that a varying slope adds to the errors at the log times u and v. u and v are
+// measured from a reference point of the line. The slope follows a Brownian motion of variance 1 per unit of
+// log time. Errors on different sides of the reference point are independent.
 double bend_covariance(double u, double v) {
   if (u * v <= 0) return 0;
   const double near = std::min(std::abs(u), std::abs(v)), far = std::max(std::abs(u), std::abs(v));
   return near * near * (3 * far - near) / 6;
 }
 
-// Returns the lower Cholesky factor of the points' covariance, including that of a varying slope: bend^2
-// bend_covariance() about the last point. `bend` is the standard deviation of the slope's change per square
-// root of log time, like kBend; 0: the slope is constant. nullopt: the covariance is not positive definite.
+// Returns L, the lower Cholesky factor of the covariance of the points' errors. This covariance includes that
+// of a varying slope, which is bend^2 times bend_covariance() with the last point as the reference point.
+// `bend` is the standard deviation of the slope's change per square root of log time, like kBend; 0: the
+// slope is constant. nullopt: the covariance is not positive definite.
 using Matrix = std::array<std::array<double, kMostPoints>, kMostPoints>;
 std::optional<Matrix> factor(const std::vector<Log>& y, double bend) {
   Matrix l{};
@@ -80,8 +85,8 @@ std::optional<Matrix> factor(const std::vector<Log>& y, double bend) {
   return l;
 }
 
-// Returns L^-1 times the vector that has value(p) for each point p. In these coordinates the errors of the
-// points are independent and have the variance 1.
+// Returns L^-1 times the vector that has the component value(p) for each point p, where `l` is L, the result
+// of factor(). After this transformation the errors of the points are independent and have the variance 1.
 template <class Value>
 std::vector<double> whitened(const Matrix& l, const std::vector<Log>& y, const Value& value) {
   std::vector<double> out(y.size());
@@ -99,10 +104,10 @@ double product(const std::vector<double>& a, const std::vector<double>& b) {
   return sum;
 }
 
-// The line log(relMSE) = a - slope * log(core seconds), fitted by generalised least squares; `l` is the
-// Cholesky factor of the points' covariance. The slope has a Gaussian prior of mean 1 and variance
-// 1 / prior_weight; 0: no prior. Times are relative to the last point, which makes a and slope nearly
-// independent.
+// The line log(relMSE) = level - slope * log(core seconds), fitted by generalised least squares; `l` is the
+// Cholesky factor of the points' covariance. The slope has a Gaussian prior of mean 1 and variance 1 /
+// prior_weight; prior_weight 0 means no prior. Log times are measured from the last point, which makes level
+// and slope nearly independent.
 class Line {
  public:
   Line(const std::vector<Log>& points, const Matrix& l, double prior_weight, double bend)
@@ -117,7 +122,7 @@ class Line {
     determinant_ = m11 * m22 - m12 * m12;
     v11_ = m22 / determinant_, v12_ = -m12 / determinant_, v22_ = m11 / determinant_;
     const double r1 = product(one_, error_),
-                 r2 = product(time_, error_) + prior_weight;  // the prior's mean slope is 1
+                 r2 = product(time_, error_) + prior_weight;  // prior_weight times the prior's mean, 1
     level_ = v11_ * r1 + v12_ * r2;
     slope_ = v12_ * r1 + v22_ * r2;
   }
@@ -128,9 +133,10 @@ class Line {
   struct Value {
     double mean = 0, sigma = 0;
   };
-  // Predicts the logarithm of the estimate when the number of samples is exp(later) times that of the last
-  // point: the value of the line, plus the part of the points' deviations from the line that persists because
-  // later checkpoints contain their samples (Rasmussen and Williams 2006, section 2.7).
+  // Predicts the logarithm of the estimated error when the number of samples is exp(later) times that of the
+  // last point. The prediction is the value of the line, plus a part of the points' deviations from the line:
+  // this part persists because later checkpoints contain the samples of the earlier ones (Rasmussen and
+  // Williams 2006, section 2.7).
   Value at(double later) const {
     const Log then{0, 0, y_.back().spp * std::exp(later), y_.back().sigma};
     const auto shared = whitened(l_, y_, [&](const Log& p) { return covariance(p, then); });
@@ -178,11 +184,11 @@ bool stands_on_a_floor(std::span<const ErrorPoint> points) {
   return false;
 }
 
-// Returns the log time, measured from the last point and at least 0, at which value(log time) has fallen to
-// `wanted`.
+// Returns the log time at which value(log time) has fallen to `wanted`. Log time is measured from the last
+// point; the result is at least 0.
 template <class Curve>
 double when(const Curve& value, double wanted) {
-  constexpr double kMost = 60;  // times beyond e^60 times the time so far count as never
+  constexpr double kMost = 60;  // log times beyond this, e^60 times the time so far, count as never
   double lo = 0, hi = 1;
   while (hi < kMost && value(hi) > wanted) lo = hi, hi *= 2;
   for (int i = 0; i < 60; ++i) {
@@ -199,9 +205,9 @@ double end_of_round(double spp) {
   return static_cast<double>(round_range(round_count(samples) - 1).s1);
 }
 
-// Returns how much the cost of a sample varies: the root mean square of relative differences. For each of the
-// last few doublings of the number of samples, the cost of its samples is compared with the mean cost of all
-// samples so far. 0: there are too few points.
+// Returns how much the cost of a sample (CPU time per sample) varies: the root mean square of relative
+// differences. For each of the last few doublings of the number of samples, the cost of the samples in this
+// doubling is compared with the mean cost of all samples so far. 0: there are too few points.
 double cost_spread(std::span<const ErrorPoint> points) {
   constexpr int kDoublings = 4;
   const ErrorPoint& now = points.back();

@@ -16,26 +16,28 @@ namespace {
 
 constexpr int kReach = 2;                  // radius of the 5 x 5 window
 constexpr double k95 = 1.959963984540054;  // two-sided 95 % point of the normal distribution
-// The figures are not trusted if fewer than kFewPixels pixels carry the error: with 100 Gaussian pixels the
-// sum has a standard deviation of sqrt(4/3/100) = 12 %. In small images 1 / kPartOfSmall of the pixels
-// suffices, because object edges alone sometimes carry the error of a 32 x 32 image.
+// The figures are not trusted if fewer than kFewPixels pixels carry the error: with 100 equal pixels of
+// Gaussian noise, the estimated sum of squared errors differs from the realised one with a relative standard
+// deviation of sqrt(4/3/100) = 12 %. In a small image 1 / kPartOfSmall of its pixels suffices, because object
+// edges alone sometimes carry the error of a 32 x 32 image.
 constexpr double kFewPixels = 100, kPartOfSmall = 48;
-constexpr double kLargeShare = 0.1;  // in images with many pixels: largest share of the error in one pixel
+// In images with many pixels the figures are not trusted if one pixel has a larger share of the error.
+constexpr double kLargeShare = 0.1;
 // In smooth parts of the image tr(V^2) is estimated in two ways, from fourth powers of D and from pairs of
 // neighbours. The figures are not trusted if the first estimate is more than this factor times the second.
 // The ratio is 1 for Gaussian noise, and up to 6 for low-discrepancy points on a smooth image
 // (tests/coverage).
 constexpr double kHeavy = 10;
-// A pixel has few hits if one half has at least this many times the light of the other.
+// A pixel has few hits if one half of the samples has more than this many times the light of the other half.
 constexpr double kOneSided = 19;
 // The interval is computed from the last round (range of samples) only if this round has at least this many
-// samples per pixel, and the rounds before it as well. With 8 samples per half, a single sample that finds
-// rare light would dominate.
+// samples per pixel and all earlier rounds together have, too. With fewer, such as 8 in each half, a single
+// sample that finds rare light would dominate.
 constexpr std::uint64_t kTellingSamples = 16;
 
-// Returns the expected amount by which skewed noise lowers the sum of squared relative errors (derived in
-// error_estimate.h), as a negative number. The sum is accumulated per column, so that the compiler vectorises
-// the loop.
+// Returns the expected amount by which skewed noise lowers the sum of squared relative errors, as a negative
+// number. error_estimate.h derives it. The sum is accumulated per column, so that the compiler vectorises the
+// loop.
 double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earlier,
                const RelativeWeights& w) {
   const double before = static_cast<double>(earlier.spp) / static_cast<double>(spp), last = 1 - before;
@@ -47,8 +49,9 @@ double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earl
                  *b1 = &earlier.halves.b[row];
     const double *roots = &w.roots[row], *leans = &w.leans[row];
     for (std::size_t x = 0; x < width; ++x) {
-      // The mean of each half consists of the part of the last round and that of earlier rounds: a = last *
-      // a_n + before * a_o.
+      // The mean of a half is the sum of a part from the last round and a part from earlier rounds. For half
+      // A these parts are `an` and `ao`, for half B `bn` and `bo`. Each part is the mean of its samples times
+      // their share of all samples, which is `last` or `before`.
       const double ao = before * a1[x], bo = before * b1[x], an = a[x] - ao, bn = b[x] - bo;
       const double of_before = 0.25 * (ao - bo) * (ao - bo), of_last = 0.25 * (an - bn) * (an - bn);
       const double apart = 0.5 * ((an + bn) / last - (ao + bo) / before);
@@ -65,8 +68,8 @@ double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earl
   return std::accumulate(columns.begin(), columns.end(), 0.0);
 }
 
-// Returns the sum over pixels of tr(V^2), from fourth powers and, for a trusted image, also from pairs of
-// neighbours (derived in the header).
+// Returns the sum over pixels of tr(V^2), estimated from fourth powers and, for a trusted image, also from
+// pairs of neighbours. error_estimate.h derives both and defines V.
 double trace_of_moments(const NoiseSums& s, bool trusted) {
   const double r2 = s.pair_variance > 0 ? std::clamp(s.pair_covariance / s.pair_variance, 0.0, 1.0) : 1.0;
   const double channel = trusted ? s.edge_channel_fourth : s.channel_fourth,
@@ -83,8 +86,8 @@ double relative_spread(const NoiseSums& s, bool trusted) {
                  : 2 * std::sqrt(trace_of_moments(s, false)) / s.squares;
 }
 
-// Returns the sums from which the interval is computed. `a` and `b` are the changes of the two halves' means,
-// three planes each; `scale` is a factor on their squares.
+// Returns the sums from which the interval is computed. `a` and `b` are the changes of the means of half A
+// and half B since the earlier rounds, three planes each; `scale` is a factor on their squares.
 ChangeSums change_sums(const std::vector<double>& a, const std::vector<double>& b, double scale) {
   const std::size_t n = a.size() / 3;
   ChangeSums out;
@@ -99,8 +102,8 @@ ChangeSums change_sums(const std::vector<double>& a, const std::vector<double>& 
   return out;
 }
 
-// Returns the ratio of the two estimates that kHeavy limits. Returns 0 if smooth parts have at most the share
-// kPart of the fourth powers.
+// Returns the ratio of the two estimates of tr(V^2) that kHeavy limits. Returns 0 if the smooth parts of the
+// image have at most the share kPart of the fourth powers.
 double heaviness(const NoiseSums& s) {
   constexpr double kPart = .25;
   const double flat = s.pixel_fourth - s.edge_pixel_fourth;
@@ -215,7 +218,8 @@ void count_hits(const HalfMeans& h, TileError& out) {
 
 namespace {
 
-// Sets the sums of changes from the last round, if that round and the part before it have enough samples.
+// Sets the sums of changes from the last round, if this round and the earlier rounds together have enough
+// samples.
 void send_changes(const HalfMeans& h, std::uint64_t spp, const EarlierMeans& earlier,
                   const std::vector<double>& roots, TileError& out) {
   if (std::min(earlier.spp, spp - earlier.spp) < kTellingSamples) return;
@@ -252,8 +256,9 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMea
             earlier->spp < spp,
         "{} and {} values of {} samples before {} of {}", earlier->halves.a.size(), earlier->halves.b.size(),
         earlier->spp, 3 * n, spp);
-  // The correction is limited: it is estimated from the errors of the last round and of the samples before
-  // it, and with low-discrepancy points the error of all samples together is smaller than these two suggest.
+  // The correction is limited to half of the estimated error. It is computed from the errors of the last
+  // round and of the earlier samples. With low-discrepancy points the error of all samples together is
+  // smaller than these two suggest, so the correction might be too large.
   const double all = out.relative.squares;
   out.subtract_skew(std::clamp(skew_of(h, spp, *earlier, w), -all / 2, all / 2));
   send_changes(h, spp, *earlier, w.roots, out);
@@ -267,9 +272,9 @@ namespace {
 // Student's t, to first order in 1 / degrees of freedom (Abramowitz and Stegun 26.7.5).
 //
 // Degrees of freedom: let x be the sum of D^2 over the channels of a pixel, and e = (sum x)^2 / (sum of x^2),
-// which is n / 3 for n equal Gaussian pixels.
-// - If the spread is from fourth powers, their sum has a relative variance of 96 / (9 n), as a chi square
-//   with e / 2 degrees of freedom.
+// which is n / 3 for n equal grey pixels with Gaussian noise.
+// - If the spread is from fourth powers, the sum of these has a relative variance of 96 / (9 n), about that
+//   of a chi square with e / 2 degrees of freedom.
 // - If it is from the last round, 4 products / squares^2 has a relative variance of (8 + 4 - 8) / n (from the
 //   products, the squares and their covariance), hence 3 e / 2 degrees. Uneven noise has fewer, but at least
 //   e / 2 in the scenes of tests/coverage.
@@ -321,8 +326,8 @@ void Checkpoints::change(TileIndex index, const std::function<void(Tile&)>& edit
 void Checkpoints::folded(TileIndex index, RoundIndex round, const TileError& error) {
   change(index, [&](Tile& tile) {
     if (round >= complete()) {
-      // Replaces the figures of the tile from this round on. If the tile had stopped and skipped rounds,
-      // these get the figures of its previous round.
+      // Replaces the figures of the tile from this round on. If the tile had stopped and its rounds before
+      // this one are missing, each missing round gets the figures of the tile's previous round.
       tile.pending.resize(round - complete(), tile.last);
       tile.pending.push_back(error);
     } else {

@@ -82,26 +82,28 @@
 
 namespace ls {
 
-// Sums of the changes of the half means in the last round (range of samples); alpha and beta as in the
-// derivation above.
+// Sums of the changes of the half means in the last round (range of samples). alpha and beta are defined in
+// the derivation above.
 struct ChangeSums {
   double squares = 0;   // sum over pixels of (alpha . alpha + beta . beta) / 2
   double products = 0;  // sum over pixels of (alpha . beta)^2
   bool operator==(const ChangeSums&) const = default;
 };
 
-// Sums over the pixels of one tile (or of several: they are additive).
+// Sums over the pixels of one tile. The sums of several tiles can be added. r, g, D and V are defined in the
+// derivation above.
 struct NoiseSums {
   double squares = 0;                             // sum over pixels and channels of D^2
   double channel_fourth = 0;                      // sum over pixels and channels of D^4
   double pixel_fourth = 0;                        // sum over pixels of (sum over channels of D^2)^2
   double pair_covariance = 0, pair_variance = 0;  // numerator and denominator of r^2
-  // channel_fourth and pixel_fourth, but with each pixel weighted by g^2
+  // like channel_fourth and pixel_fourth, but with the weight g^2 for each pixel
   double edge_channel_fourth = 0, edge_pixel_fourth = 0;
   double flat_pairs = 0;  // sum over pixels p: (1 - g^2) times the mean over neighbours q of (D(p) . D(q))^2
   double largest = 0;     // largest value of any pixel of (sum over channels of D^2)
-  // The sums for the interval of a trusted image. If the last round has too few samples, `squares` here is
-  // that of NoiseSums, and `products` the sum of tr(V^2) estimated from the sums above.
+  // The sums from which the interval of a trusted image is computed. If the last round has too few samples,
+  // changes.squares is equal to NoiseSums::squares, and changes.products is the sum of tr(V^2) estimated from
+  // the sums above.
   ChangeSums changes;
   void add(const NoiseSums& other);
   bool operator==(const NoiseSums&) const = default;
@@ -109,70 +111,77 @@ struct NoiseSums {
 
 struct TileError {
   std::uint64_t pixels = 0;
-  std::uint64_t samples = 0;  // total of all pixels
-  // Number of pixels with few hits: at least one half has almost no light although the pixel, or its
-  // surroundings, have some. The pixel's light came from very few samples, so neither its value nor the
-  // difference of its halves is reliable. A pixel counts if one half has 19 times as much light as the other,
-  // or if both have none and more than half of the neighbours in its window have some. (k equal hits all fall
-  // into one half with probability 2^-(k-1): of pixels with 2 hits half are found, with 5 one in 16, with 10
-  // one in 500.)
+  std::uint64_t samples = 0;  // total number of samples of all pixels
+  // Number of pixels with few hits, where a hit is a sample that found light. The light of such a pixel came
+  // from very few samples, so neither its value nor the difference of its halves is reliable. A pixel is
+  // counted if one half of its samples has more than 19 times as much light as the other, or if both halves
+  // have none and more than half of the neighbours in its window have some. (k equal hits all fall into one
+  // half with probability 2^-(k-1). So half of the pixels with 2 hits are counted, one in 16 of those with 5,
+  // and one in 500 of those with 10.)
   std::uint64_t few_hits = 0;
   std::uint64_t lit = 0;  // number of pixels in which some sample found light
-  NoiseSums plain;        // sums of D
-  NoiseSums relative;     // sums of sqrt(w) D, w = 1 / (m^2 + 0.01)
-  double skew = 0;        // amount subtracted from relative.squares because the noise is skewed
+  NoiseSums plain;        // sums of D, the noise in linear values
+  // the same sums with sqrt(w) D in place of D, w = 1 / (m^2 + 0.01)
+  NoiseSums relative;
+  // amount that was subtracted from relative.squares because the noise is skewed; it is negative if skewed
+  // noise made the sum too low
+  double skew = 0;
   void add(const TileError& other);
   void subtract_skew(double part);
   bool operator==(const TileError&) const = default;
 };
 
-// Half means of a tile: R, G, B planes of width * height values each, row by row.
+// The means of the two halves (A and B) of a tile's samples: for each half the planes R, G, B of width *
+// height values, row by row.
 struct HalfMeans {
   int width = 0, height = 0;
   std::span<const double> a, b;
   std::size_t pixels() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
 };
-// The half means of the same tile after an earlier round, from a part of the same samples.
+// The half means of the tile after an earlier round, that is, from the first part of its samples.
 struct EarlierMeans {
   HalfMeans halves;
-  std::uint64_t spp = 0;  // samples per pixel: at least 2, and fewer than now
+  // samples per pixel after that round: at least 2, and fewer than in the later half means
+  std::uint64_t spp = 0;
 };
-// Estimates the error of a tile. `spp` is the number of samples per pixel in `halves`, both halves together.
-// Without `earlier`, skewed noise is not corrected and the interval assumes Gaussian noise.
+// Estimates the error of a tile. `spp` is the number of samples per pixel of both halves together. Without
+// `earlier`, skewed noise is not corrected, and the interval assumes Gaussian noise.
 TileError estimate_error(const HalfMeans& halves, std::uint64_t spp, const EarlierMeans* earlier = nullptr);
-// Returns 1 / (m^2 + 0.01), minus the bias that noise of variance s2 in m causes.
+// Returns 1 / (m^2 + 0.01), minus the bias that noise in m of variance s2 causes.
 double relative_weight(double m, double s2);
-// True if pixel (x, y) is counted in TileError::few_hits.
+// Returns true if TileError::few_hits counts the pixel (x, y).
 bool has_few_hits(const HalfMeans& halves, int x, int y);
 
 // The error figures shown to the user.
 struct ImageError {
-  double rmse = 0, rmse_lo = 0, rmse_hi = 0;  // 95 % interval for the realised error of this image
+  // root mean squared error, and the 95 % interval of this image's realised error
+  double rmse = 0, rmse_lo = 0, rmse_hi = 0;
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;
-  double spp = 0;  // samples per pixel, mean over all pixels
+  double spp = 0;  // samples per pixel, averaged over all pixels
   // The number of pixels that carry the error: (sum of x)^2 / (sum of x^2), where x is the squared relative
   // error of a pixel.
   double effective_pixels = 0;
-  double top_share = 0;        // share of the relative error in the worst pixel
-  std::uint64_t few_hits = 0;  // number of pixels with few hits
-  // False if the figures and their intervals are unreliable. This is so if no sample has found light; if the
-  // halves are equal and have fewer than 64 samples per pixel; if few pixels carry the error; or if single
-  // pixels differ far more than their neighbours.
+  double top_share = 0;        // share of the squared relative error that is in the worst pixel
+  std::uint64_t few_hits = 0;  // as TileError::few_hits, over the whole image
+  // False if the figures and their intervals are unreliable. This is so in four cases: no sample has found
+  // light; the halves are equal and have fewer than 64 samples per pixel; few pixels carry the error; or
+  // single pixels have far more noise than their neighbours.
   bool trusted = false;
   std::string verdict;  // why the figures are not trusted, in words; empty when trusted
 };
 ImageError image_error(const TileError& sums);
 
-// Collects the error figures of all tiles after each round (range of samples). A checkpoint has the image's
-// figures after one round. It is the sum over all tiles in tile order, so it does not depend on the order in
-// which results arrive. A tile that stopped early counts with its last figures.
+// Collects the error figures of all tiles after each round (range of samples). A checkpoint has the figures
+// of the whole image after one round. It is the sum over all tiles in tile order, so it does not depend on
+// the order in which results arrive. A tile that stopped before this round counts with its last figures.
 class Checkpoints {
  public:
   explicit Checkpoints(TileIndex tiles) : tiles_(tiles), waiting_(tiles) {}
 
-  // Records a tile's figures. Call it after each fold (addition of a round's sums to the film). If a round is
-  // repeated, because the full round replaces a truncated one or the tile was restarted, the figures replace
-  // those of the tile from that round on. Complete checkpoints are final.
+  // Records a tile's figures. Call it after each fold (addition of the sums of one round to the film). A
+  // round is repeated if the full round replaces a truncated one, or if the tile was restarted. In this case
+  // the figures replace those of the tile from that round on, except in checkpoints that are already
+  // complete: these are final.
   void folded(TileIndex tile, RoundIndex round, const TileError& error);
   // Declares that no more rounds will follow for this tile, unless folded() is called for it again.
   void stopped(TileIndex tile);
@@ -184,17 +193,17 @@ class Checkpoints {
 
  private:
   struct Tile {
-    std::vector<TileError> pending;  // figures of the rounds from complete() on
+    std::vector<TileError> pending;  // figures of the rounds complete(), complete() + 1, ...
     TileError last;
-    RoundIndex reached = 0;  // one more than the last folded round
+    RoundIndex reached = 0;  // the last folded round, plus 1
     bool stopped = false;
   };
-  bool ready(const Tile& tile) const;  // true if the tile has its figures for the next checkpoint
+  bool ready(const Tile& tile) const;  // returns true if the next checkpoint can have the tile's figures
   void change(TileIndex index, const std::function<void(Tile&)>& edit);
   void settle();
 
   std::vector<Tile> tiles_;
-  TileIndex waiting_ = 0;  // number of tiles that are not ready
+  TileIndex waiting_ = 0;  // number of tiles for which ready() is false
   std::vector<TileError> done_;
 };
 

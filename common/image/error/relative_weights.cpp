@@ -11,10 +11,11 @@ namespace ls {
 namespace {
 
 constexpr std::size_t kWindowReach = 2;  // radius of the 5 x 5 window
-constexpr double kSignificant = 9;       // square of three standard deviations
+// limit of a squared deviation in variances: the square of three standard deviations
+constexpr double kSignificant = 9;
 
-// Uninitialised memory. It is written before it is read, and initialising it would take as long as computing
-// the sums.
+// Memory for doubles that is not initialised. Every value is written before it is read, and initialising
+// would take as long as computing the sums.
 class Room {
  public:
   explicit Room(std::size_t size) : values_(std::make_unique_for_overwrite<double[]>(size)) {}
@@ -29,8 +30,8 @@ class Room {
 inline double larger(double a, double b) { return a < b ? b : a; }
 inline double smaller(double a, double b) { return b < a ? b : a; }
 
-// Sums over 5 x 5 windows, clipped to the tile, first along rows and then along columns. Both passes access
-// memory sequentially.
+// Computes sums over 5 x 5 windows, clipped to the tile: first along rows, then along columns. Both passes
+// access memory sequentially.
 class Windows {
  public:
   Windows(std::size_t width, std::size_t height)
@@ -63,12 +64,14 @@ double span_of(std::size_t i, std::size_t count) {
                              (i > kWindowReach ? i - kWindowReach : 0) + 1);
 }
 
-// Returns f = 1 / (m^2 + c) minus f" s2 / 2, limited to [f/2, 2f], where f" = (6 m^2 - 2 c) / (m^2 + c)^3.
+// Returns f = 1 / (m^2 + c) minus f" s2 / 2, limited to [f/2, 2f]. Here c is kRelMseDenominator, and f" is
+// the second derivative of f:
+//   f" = (6 m^2 - 2 c) / (m^2 + c)^3.
 inline double corrected(double m, double f, double s2) {
   return smaller(larger(f - s2 * (3 * m * m - kRelMseDenominator) * f * f * f, f / 2), 2 * f);
 }
 
-// One channel of one tile: S, S^2, D^2 of its pixels, and their window sums.
+// One channel of a tile: S, S^2 and D^2 of each pixel (error_estimate.h), and the sums of each over windows.
 struct Channel {
   std::size_t size;
   Room own, square, noise, own_sum, square_sum, noise_sum;
@@ -89,8 +92,8 @@ struct Channel {
   }
 };
 
-// Computes the weights of one row of pixels, which starts at `at`. `spans` are the widths of the windows in
-// pixels, `rows` is their height.
+// Computes the weights of one row of pixels, which starts at the index `at` of the channel. spans[x] is the
+// width of the window of pixel x, in pixels; `rows` is the height of all these windows.
 void weigh_row(const Channel& c, std::size_t at, const std::vector<double>& spans, double rows,
                double* __restrict roots, double* __restrict leans, double* __restrict edges) {
   const double *__restrict own = c.own.at(at), *__restrict square = c.square.at(at), *__restrict noise = c.noise.at(at);
@@ -112,7 +115,7 @@ void weigh_row(const Channel& c, std::size_t at, const std::vector<double>& span
   }
 }
 
-// A tile of one pixel has no neighbours, so its own value is used.
+// Computes the weights of a tile of one pixel: it has no neighbours, so its own value is used.
 void weigh_alone(const HalfMeans& h, RelativeWeights& out) {
   for (std::size_t c = 0; c < 3; ++c) {
     const double m = 0.5 * (h.a[c] + h.b[c]), f = 1 / (m * m + kRelMseDenominator);
@@ -213,9 +216,10 @@ struct Columns {
     }
   }
 
-  // Adds, for each pixel p, the mean of (D(p) . D(q))^2 over its neighbours q, times 1 - g^2. `beside` has
-  // these squares for neighbours in the row (beside[x]: with the previous pixel, beside[x + 1]: with the
-  // next), `above` and `below` for the rows above and below. They are 0 where there is no neighbour.
+  // Adds to flat_pairs, for each pixel p of a row, 1 - g^2 times the mean of (D(p) . D(q))^2 over its
+  // neighbours q. These squares are given: beside[x] is for the pixels x - 1 and x of the row, above[x] for
+  // pixel x and the one above it, below[x] for pixel x and the one below it. They are 0 where there is no
+  // neighbour. `first` and `last` are true in the first and last row of the tile.
   void add_flat(const double* edges, const Scanline& beside, const Scanline& above, const Scanline& below,
                 bool first, bool last) {
     const std::size_t width = squares.size();
@@ -255,7 +259,7 @@ NoiseSums noise_sums(const std::vector<double>& values, const std::vector<double
     return Values{at, at + n, at + 2 * n, &edges[y * w]};
   };
   Columns columns(w);
-  Scanline beside(w + 1), above(w), below(w);  // beside[x] is the pair of the pixels x - 1 and x
+  Scanline beside(w + 1), above(w), below(w);  // beside[x] is for the pixels x - 1 and x
   for (std::size_t y = 0; y < h; ++y) {
     const Values v = row(y), right{v.r + 1, v.g + 1, v.b + 1, nullptr};
     columns.add_pixels(v);

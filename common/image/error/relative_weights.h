@@ -12,15 +12,16 @@ namespace ls {
 // relMSE is a squared error divided by the sum of the squared true value and this constant.
 inline constexpr double kRelMseDenominator = 0.01;
 
-// The weights of the pixels of a tile. `roots` is the square root of the weight in each channel, `leans` the
-// derivative of the weight with respect to the pixel's own value; both have three planes. `edges` has one
-// plane: the square of the mean of g over the channels.
+// The weights w of the pixels of a tile, for relMSE. `roots` is the square root of the weight in each
+// channel, and `leans` the derivative of the weight with respect to the pixel's own value; both have three
+// planes. `edges` has one plane: the square of the mean of g (error_estimate.h) over the channels.
 struct RelativeWeights {
   std::vector<double> roots, leans, edges;
 };
 RelativeWeights relative_weights(const HalfMeans& halves);
 
-// Returns sums over one tile. `values` has three planes of width x height values, `edges` one plane.
+// Returns sums over one tile. `values` has three planes of width x height values: D, or sqrt(w) D. `edges`
+// has one plane, as in RelativeWeights.
 NoiseSums noise_sums(const std::vector<double>& values, const std::vector<double>& edges, int width,
                      int height);
 

@@ -1,5 +1,6 @@
-// The interface to OpenEXR: reads external images and writes our own. Partials have their own functions
-// (partial_exr.cpp). No type of the library appears here, and none of its exceptions escapes.
+// The interface to OpenEXR: reads external images and writes our own. Partials (files with the pixel sums of
+// one tile and range of samples) have functions of their own (partial_exr.cpp). No type of the library
+// appears here, and none of its exceptions escapes.
 #pragma once
 
 #include <cstddef>
@@ -19,14 +20,14 @@
 namespace ls {
 
 struct RgbImage {
-  FrameSize size;  // size of the data window
+  FrameSize size;  // size of the image's data window, in pixels
   // R, G, B of each pixel, row by row from the top; values as stored (may be NaN or infinite)
   std::vector<float> rgb;
 };
 
 struct ExrLimits {
-  std::uint64_t max_bytes = std::uint64_t{1} << 30;   // largest file, in bytes
-  std::uint64_t max_pixels = std::uint64_t{1} << 28;  // largest data window, in pixels
+  std::uint64_t max_bytes = std::uint64_t{1} << 30;   // largest file, in bytes (default 1 GiB)
+  std::uint64_t max_pixels = std::uint64_t{1} << 28;  // largest data window, in pixels (default 2^28)
   int max_side = 65536;
 };
 
@@ -36,26 +37,29 @@ struct ExrLimits {
 // allocated.
 Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::string& name,
                               const ExrLimits& limits = {});
-// Reads a whole file. Errors: not_found, unavailable; resource_exhausted if the file has more than
-// limits.max_bytes.
+// Reads a whole file. not_found: the file cannot be opened; unavailable: it cannot be read;
+// resource_exhausted: it has more than limits.max_bytes bytes.
 Result<std::vector<std::byte>> read_exr_bytes(const std::filesystem::path& path,
                                               const ExrLimits& limits = {});
 Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits& limits = {});
 
-// An image with the standard error of each value, if the part has layers stderr.R, stderr.G and stderr.B at
-// full resolution; otherwise `error` is empty.
+// An image, and the standard error of each of its values. These come from the layers stderr.R, stderr.G and
+// stderr.B at full resolution; if the part of the image lacks any of these layers, `error` is empty.
 struct RgbWithError {
   RgbImage image;
-  std::vector<float> error;                    // in the order of image.rgb
-  std::map<std::string, std::string> strings;  // header strings
+  // standard errors of the values of image.rgb, in the same order
+  std::vector<float> error;
+  // values of the part's header attributes of type string, by name
+  std::map<std::string, std::string> strings;
 };
 Result<RgbWithError> read_exr_with_error(std::span<const std::byte> bytes, const std::string& name,
                                          const ExrLimits& limits = {});
 
 inline constexpr float kLargestHalf = 65504;
 
-// An image of several planes of the same size. The type of a plane is the type of its values in the file. The
-// caller must clamp the values of ExrHalf to at most kLargestHalf in magnitude.
+// ExrPicture is an image of several planes of the same size. A plane is an ExrHalf, ExrFloat or ExrUint,
+// according to the type of its values in the file. The caller must clamp the values of ExrHalf to at most
+// kLargestHalf in magnitude.
 struct ExrHalf {
   std::vector<float> values;
 };
@@ -69,24 +73,24 @@ struct ExrPicture {
   FrameSize size;
   // The planes, by the names of their channels: "R", "stderr.R", "spp", ...
   std::map<std::string, std::variant<ExrHalf, ExrFloat, ExrUint>> channels;
-  std::map<std::string, std::string> strings;  // header attributes
+  std::map<std::string, std::string> strings;  // values of the header attributes of type string, by name
 };
 // Encodes an image as a scanline EXR with ZIP compression. The bytes depend only on the image.
 Result<std::vector<std::byte>> write_exr(const ExrPicture& picture);
 
-// Destination for files that are too large for memory.
+// The destination of a file that is too large for memory. write() writes the bytes at the offset `at`.
 class ByteSink {
  public:
   virtual ~ByteSink() = default;
   virtual Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) = 0;
 };
 // An image that is delivered in bands of whole rows, from the top. Each band is an ExrPicture of its rows;
-// all bands have the same channels. The strings of the first band are added to the header.
+// all bands have the same channels. The header gets the strings below and the strings of the first band.
 struct ExrBands {
   FrameSize size;
   std::map<std::string, std::string> strings;
-  // Returns the next band, until all rows are delivered. The image is written in two passes, so this is
-  // called twice for each of the bands 0, 1, 2, ...
+  // Returns the band with this number, counted from 0. The bands are requested in order until they contain
+  // all rows. The image is written in two passes, so each band is requested twice.
   std::function<ExrPicture(int band)> band;
 };
 // Writes the image to `sink` as one EXR file with a seal (digests of all layers and headers, seal.h) in its

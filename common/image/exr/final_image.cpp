@@ -14,7 +14,7 @@ namespace ls {
 
 namespace {
 
-// The addition turns -0 into +0 and changes no other value (in the rounding mode to nearest).
+// Adding 0 turns -0 into +0 and changes no other value (in the rounding mode to nearest).
 float pixel_value(double mean) { return static_cast<float>(mean) + 0.0f; }
 
 struct Gathered {
@@ -30,7 +30,7 @@ Gathered gather(const Film& film) {
   for (TileIndex t = 0; t < film.grid().count(); ++t) {
     if (film.spp(t) == 0) continue;
     const TilePixels tile = film.pixels(t);
-    // A UINT layer cannot exceed 2^32 - 1; job limits are below that.
+    // Values of a UINT layer are at most 2^32 - 1. The limits of jobs are lower, so nothing is lost.
     const auto spp = static_cast<std::uint32_t>(
         std::min<std::uint64_t>(tile.spp, std::numeric_limits<std::uint32_t>::max()));
     each_pixel(tile.rect, frame, [&](std::size_t to, std::size_t from) {
@@ -44,10 +44,10 @@ Gathered gather(const Film& film) {
   return out;
 }
 
-constexpr int kCryptomatteRanks = 6;  // identifiers per pixel, those with the largest coverage
+constexpr int kCryptomatteRanks = 6;  // identifiers stored per pixel: those with the largest coverage
 
-// Adds a layer of half floats or of floats. Returns the number of values that were clamped, because their
-// magnitude exceeds the largest half.
+// Adds a layer of half floats or of floats. Returns the number of values that were clamped because their
+// magnitude exceeded the largest half.
 std::uint64_t add_layer(ExrPicture& picture, const std::string& name, std::vector<float> values,
                         bool halves) {
   if (!halves) {
@@ -118,7 +118,7 @@ class Layers {
       each_pixel(tile.rect, frame_, [&](std::size_t to, std::size_t from) {
         const double count = by_hits ? hits[from] : static_cast<double>(tile.spp);
         const double sum = tile.sums[p * n + from] + (other ? other[from] : 0);
-        // The addition maps -0 to +0; all other values stay the same.
+        // Adding 0 turns -0 into +0 and changes no other value.
         if (count > 0) sums_[p][to] = static_cast<float>(sum / count) + 0.f;
       });
     }
@@ -248,7 +248,8 @@ std::map<std::string, std::string> strings_of(const Film& film, const Provenance
                                                 {"lightshaft:class", from.numeric_class.hex()},
                                                 {"lightshaft:tiles", tile_digests(film)}};
   strings.merge(error_strings(film.error(), film.pixels_without_samples()));
-  // The convergence of the error over time may show problems that the film alone does not show.
+  // The error over time may show problems that the film alone does not show. In this case the words about the
+  // convergence replace the verdict "trusted".
   if (auto verdict = strings.find("lightshaft:verdict");
       verdict != strings.end() && verdict->second == "trusted" && from.convergence_status &&
       !from.convergence_status->trusted)
@@ -295,7 +296,8 @@ Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& from, 
                                       ByteSink& sink, std::span<const float> denoised) {
   std::uint64_t clamped = 0;
   const ExrBands bands{film.grid().frame, strings_of(film, from), [&](int row) {
-                         // The bands are requested twice, but clamped values are counted once
+                         // each band is requested in two passes, so the count of clamped values restarts at
+                         // the first band
                          if (row == 0) clamped = 0;
                          ExrPicture band =
                              final_layers(film.row(row), from.manifests, float_output, &clamped);

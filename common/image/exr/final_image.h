@@ -18,66 +18,72 @@
 
 namespace ls {
 
-// Returns the SHA-256 of the pixels: float32((sumA + sumB) / (nA + nB)), where sums and counts are those of
-// the two halves of the samples. The division is in double, and -0 is replaced by +0. The order is R, G, B of
-// each pixel, row by row, little endian. Pixels without samples are zero.
+// Returns the SHA-256 of the pixels. A value is float32((sumA + sumB) / (nA + nB)), with the sums and the
+// numbers of samples of the two halves A and B of the samples. The division is in double, and -0 is replaced
+// by +0. The order is R, G, B of each pixel, row by row, little endian. Pixels without samples are zero.
 Digest pixels_sha256(const Film& film);
 
-// Cryptomatte manifests of the identifier layers (cryptomatte.h); empty: no manifest.
+// Cryptomatte manifests of the two identifier layers (cryptomatte_manifest() in identifiers.h). An empty text
+// means that the layer gets no manifest.
 struct CryptomatteManifests {
   std::string shapes, materials;
 };
 
-// A fake worker (--fake, for tests) sends generated pixels. This is the text of the note `fake`
-// (Provenance::notes) in an image that contains such pixels.
+// A fake worker (--fake, for tests) sends generated pixels instead of rendering. An image with such pixels
+// has this text as the note `fake` in Provenance::notes.
 inline constexpr const char* kFakePixels = "the pixels are made up by fake workers (--fake), not rendered";
 
-// The values of the header strings `lightshaft:...` of the final EXR that do not come from the film.
-// docs/design/error.md lists all of these strings. From the film come `:relmse`, `:relmse_ci95` ("LOW
-// HIGH"), `:rmse`, `:rmse_ci95`, `:few_hits` (pixels), `:verdict` ("trusted", or the reason why not) and
-// `:tiles`. If the film has no samples, `:tiles` is the only one of these that is written.
+// The values of those header strings `lightshaft:...` of the final EXR that do not come from the film.
+// docs/design/error.md lists all header strings. From the film come `:relmse`, `:relmse_ci95` ("LOW HIGH"),
+// `:rmse`, `:rmse_ci95`, `:few_hits` (pixels), `:verdict` ("trusted", or the reason why not),
+// `:pixels_without_samples` and `:tiles`. If the film has no samples, only the last two of these are written.
 // `:pixels_without_samples` is written only if there are such pixels.
 struct Provenance {
   Digest scene;
-  std::string settings_json;  // canonical RenderSettings
+  std::string settings_json;  // canonical JSON of the RenderSettings
   std::string build;
   Digest numeric_class;
-  // In the following, nullopt means unknown. Unknown values are not written.
+  // In the members below, nullopt means that the value is unknown and not written.
   std::optional<std::uint64_t> seed = {};
-  std::optional<double> seconds = {};  // render time
-  // "clean", or canonical_json() of the Health; empty: unknown, and not written.
+  std::optional<double> seconds = {};  // render time in seconds
+  // "clean", or canonical_json() of the Health (numeric problems found); empty: unknown, and not written
   std::string health;
   CryptomatteManifests manifests = {};
-  double core_seconds = 0;  // CPU seconds of all units; 0: unknown, and not written
-  // Why sampling stopped before the requested samples, and the consequences; empty: not written
+  double core_seconds = 0;  // CPU seconds of all rendering; 0: unknown, and not written
+  // why sampling stopped before the requested number of samples, and the consequences; empty: not written
   std::string stopped = {};
-  // A judgement from the error over time, which the film does not have. If it says not to trust the figures,
-  // `:verdict` does, too.
+  // A judgement based on the error over time, which the film does not contain. If the film's own verdict is
+  // "trusted" but this judgement is not trusted, `:verdict` becomes the `words` of the judgement.
   std::optional<ConvergenceStatus> convergence_status = {};
-  std::map<std::string, double> figures = {};     // further numbers, by the name after "lightshaft:"
-  std::map<std::string, std::string> notes = {};  // further texts, by the name after "lightshaft:"
+  // further numbers, by header string name without "lightshaft:"
+  std::map<std::string, double> figures = {};
+  // further texts, by header string name without "lightshaft:"
+  std::map<std::string, std::string> notes = {};
 };
 struct FinalImage {
   std::vector<std::byte> exr;
-  std::uint64_t clamped = 0;  // number of values whose magnitude exceeds 65504, the largest half
+  // number of values that were clamped because their magnitude exceeds 65504, the largest half
+  std::uint64_t clamped = 0;
 };
-// Returns the layers of the final EXR of a film, or of one row of its tiles, with their header strings. Adds
-// the number of clamped values to `clamped`.
+// Returns the layers of the final EXR with their header strings. `film` is a whole film or one row of its
+// tiles. Adds the number of clamped values to `clamped` unless it is null.
 ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
                         std::uint64_t* clamped = nullptr);
-// Returns the name of a layer: that of the AOV, or "crypto_object", "crypto_material".
+// Returns the name of the layer of an AOV: the AOV's name, or for identifiers "crypto_object" or
+// "crypto_material".
 std::string layer_of(Aov aov);
 
 // Adds the film's AOVs to `picture`: channels NAME.R, NAME.X, ... and, for identifiers, NAME00.R to NAME02.A
-// with their header strings. Pixels without a surface are 0 in the AOVs of surfaces (AovKind::of_hits,
-// of_all and ids). Returns the number of values whose magnitude exceeded 65504, the largest half.
+// with their header strings. Pixels without a surface are 0 in the AOVs of surfaces (AovKind::of_hits, of_all
+// and ids). Returns the number of values that were clamped because their magnitude exceeded 65504, the
+// largest half.
 std::uint64_t add_aov_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
                              ExrPicture& picture);
 
-// Makes the final EXR; the film may be unfinished. Its layers are half (or with `float_output` float) R, G,
-// B, FLOAT stderr.R, stderr.G, stderr.B, UINT spp, the film's AOVs, and denoised.R, denoised.G, denoised.B if
-// `denoised` is not empty: the denoised image, R, G, B of each pixel of the whole frame, row by row. All are
-// sealed in `lightshaft:seal` (seal.h).
+// Makes the final EXR; the film may be unfinished. The layers are R, G, B (half, or float if `float_output`),
+// stderr.R, stderr.G, stderr.B (FLOAT), spp (UINT), the film's AOVs, and denoised.R, denoised.G, denoised.B
+// if `denoised` is not empty. `denoised` has R, G, B of each pixel of the whole denoised image, row by row.
+// The header string `lightshaft:seal` has digests of all layers (seal.h).
 Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output,
                              std::span<const float> denoised = {});
 // Writes the bytes that final_exr() returns to `sink`, one row of tiles at a time, so that a large image is
@@ -85,19 +91,22 @@ Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, boo
 Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& provenance, bool float_output,
                                       ByteSink& sink, std::span<const float> denoised = {});
 
-// Returns the header strings about the error of an image, by full name. `sums` are those of its tiles.
-// `lightshaft:verdict` is based on the pixels only. If there are no samples, there are no such strings.
+// Returns the header strings about the error of an image; the keys are their full names. `sums` are the sums
+// over all tiles of the image. `lightshaft:verdict` is based on the pixels only, not on the convergence over
+// time. If there are no samples, only `lightshaft:pixels_without_samples` is returned. It is left out if
+// `pixels_without_samples` is 0.
 std::map<std::string, std::string> error_strings(const TileError& sums, std::uint64_t pixels_without_samples);
 
-// Returns the number of values of R, G and B that a half image would clamp.
+// Returns the number of values of R, G and B that would be clamped in an image of half floats.
 std::uint64_t values_above_half(const Film& film);
 
 // The content of a final EXR, read from an untrusted file: all layers and header strings. The layers that
 // every final EXR has are required. Sizes are limited.
 inline constexpr std::uint64_t kMaxFinalBytes = std::uint64_t{1} << 32;
 struct FinalPicture : ExrPicture {
-  bool half = false;  // true if colours are stored as halves
-  // Names of the layers and headers that do not match the seal ("layer depth.Z"); nullopt: there is no seal.
+  bool half = false;  // true if R, G and B are stored as half floats
+  // names of the layers and header attributes that do not match the seal ("layer depth.Z"); nullopt: there is
+  // no seal
   std::optional<std::vector<std::string>> changed;
 };
 // Reads a final EXR. invalid_argument: something is missing or wrong; the message says what. `name` is the
@@ -112,9 +121,9 @@ std::array<std::uint8_t, 3> srgb8(const double* rgb, double scale);
 // Encodes an image as a PNG. `rgb` has 8 bits per channel, row by row.
 Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::uint8_t> rgb);
 
-// Returns a PNG of the film's means times 2^exposure_stops in 8-bit sRGB. NaN is magenta; tiles without
-// samples show a dark checkerboard. If `denoised` is not empty (as for final_exr), its pixels are shown
-// instead of the film's.
+// Returns the film as a PNG in 8-bit sRGB: its means, multiplied by 2^exposure_stops. Pixels with NaN are
+// magenta; tiles without samples show a dark checkerboard. If `denoised` is not empty (format as for
+// final_exr()), its pixels are shown instead of the film's.
 Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops,
                                            std::span<const float> denoised = {});
 
@@ -128,10 +137,12 @@ Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_sto
 //   samples: 2 samples per pixel have the lowest colour, 2^14 the highest: thirteen doublings.
 // Magenta in the error map: pixels with too few hits (error_estimate.h). Tiles without samples are grey. The
 // maps have the image's size, so that they can be overlaid on it.
-inline constexpr double kMapLeastError = 1e-3, kMapMostError = 1;       // relative standard error
-inline constexpr double kMapLeastSamples = 2, kMapMostSamples = 16384;  // per pixel
+// range of the colours: relative standard errors
+inline constexpr double kMapLeastError = 1e-3, kMapMostError = 1;
+// range of the colours: samples per pixel
+inline constexpr double kMapLeastSamples = 2, kMapMostSamples = 16384;
 
-// Maps t from 0 to 1 to a colour. Lightness increases with t, so that the map can be read without seeing
+// Maps t from 0 to 1 to a colour. Lightness increases with t, so the map can be read without distinguishing
 // hues.
 std::array<std::uint8_t, 3> map_colour(double t);
 inline constexpr std::array<std::uint8_t, 3> kFewHitsColour = {255, 0, 255}, kNoSampleColour = {96, 96, 96};

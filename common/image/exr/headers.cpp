@@ -17,9 +17,9 @@ constexpr std::uint32_t kMagic = 20000630, kTiledFlag = 0x200, kMultiPartFlag = 
 constexpr std::size_t kMaxNameBytes = 255;
 constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 30;
 constexpr int kMaxParts = 256;
-// The library allocates a chunk's buffers before it reads the chunk. For chunks above kFreeChunkBytes the
-// file must therefore be long enough to contain them if they are compressed by kMostPacking. The best
-// compression in the format is a few thousand to one (deflate: 1032).
+// The library allocates the buffers of a chunk (a tile or a block of lines) before it reads the chunk. So for
+// a chunk of more than kFreeChunkBytes the file must be long enough: at least the chunk's size divided by
+// kMostPacking. No compression of the format packs more than a few thousand bytes into one (deflate: 1032).
 constexpr std::uint64_t kFreeChunkBytes = std::uint64_t{64} << 20;
 constexpr double kMostPacking = 4096;
 // Size of the smallest entry of a channel list: a name of one letter, the terminating zero, four int32.
@@ -28,13 +28,13 @@ constexpr std::size_t kLeastChannelBytes = 18;
 struct Part {
   std::optional<std::int64_t> width, height;
   std::int64_t lines_per_chunk = 1;
-  std::size_t channels = 0;  // an upper bound of their number
+  std::size_t channels = 0;  // upper bound of the number of channels
   std::uint32_t tile_width = 0, tile_height = 0;
   std::int32_t chunk_count = 0;
 };
 
-// Lines per chunk for each compression, by its number in the format: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44,
-// B44A, DWAA, DWAB.
+// Lines per chunk for each compression. The index is the number of the compression in the format: none, RLE,
+// ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
 constexpr std::int64_t kLines[] = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
 
 void note(std::string_view name, std::span<const std::byte> raw, Part& part) {
@@ -86,7 +86,7 @@ constexpr Fixed kFixed[] = {{"box2i", 16},
                             {"v3f", 12},
                             {"v3d", 24}};
 
-// Checks a list of channels: each a name followed by 16 bytes, and an empty name at the end.
+// Checks a list of channels. Each channel is a name followed by 16 bytes; an empty name ends the list.
 bool channel_list(ByteReader in) {
   while (const auto name = in.name(kMaxNameBytes)) {
     if (name->empty()) return in.left() == 0;
@@ -104,17 +104,17 @@ bool strings(ByteReader in) {
   return true;
 }
 
-// Checks a preview: width, height, and four bytes per pixel.
+// Checks a preview image: width, height, and four bytes per pixel.
 bool preview(ByteReader in) {
   const auto width = in.take<std::uint32_t>(), height = in.take<std::uint32_t>();
   return width && height && std::uint64_t{*width} * *height <= in.left() / 4 &&
          std::uint64_t{*width} * *height * 4 == in.left();
 }
 
-// Checks the size of an attribute's value against its type. For most types the library ignores the size in
-// the header and reads as many bytes as the type or the contents require. If the two disagree, it continues
-// at a wrong position, where any four bytes may become the size of a buffer to allocate. Unknown types are
-// always accepted, since the library keeps their bytes as they are.
+// Checks whether an attribute's value has the size that its type requires. For most types the library ignores
+// the size in the header and reads as many bytes as the type or the contents require. If the two sizes
+// disagree, the library continues at a wrong position, where any four bytes may become the size of a buffer
+// to allocate. Unknown types are always accepted, since the library only copies their bytes.
 bool fills_its_size(std::string_view type, std::span<const std::byte> value) {
   const auto* fixed =
       std::find_if(std::begin(kFixed), std::end(kFixed), [&](const Fixed& f) { return f.type == type; });
@@ -140,7 +140,7 @@ class Scan {
       if (p > kMaxParts) return refuse(fmt::format("more than {} parts", kMaxParts));
       const auto part = read_part(many);
       if (!part) return tl::unexpected(part.error());
-      if (!*part) return {};  // the empty header after the last part
+      if (!*part) return {};  // an empty header follows the last part
       if (const auto ok = check(**part); !ok) return ok;
       if (!many) return {};
     }
@@ -187,7 +187,8 @@ class Scan {
     };
     const std::uint64_t chunks =
         tiles ? up(w, part.tile_width) * up(h, part.tile_height) : up(h, part.lines_per_chunk);
-    // The chunk table has 8 bytes per chunk. Further mip levels make it longer, not shorter.
+    // The chunk table has 8 bytes per chunk. Only the chunks of the full resolution are counted; if the file
+    // has further mip levels, the table is even longer.
     if (chunks > in_.left() / 8 || part.chunk_count < 0 ||
         static_cast<std::uint64_t>(part.chunk_count) > in_.left() / 8)
       return refuse(fmt::format("the file ends too early for {} x {} pixels", w, h));

@@ -1,4 +1,5 @@
-// OpenEXR over memory, and checks of what it reads. Used by the files of this folder only.
+// Lets OpenEXR read from memory and write to memory, and checks the headers of a file before OpenEXR reads
+// it. Used by the files of this folder only.
 #pragma once
 
 #include <ImfIO.h>
@@ -73,8 +74,8 @@ inline void set_up_library() {
   std::call_once(once, [] { Imf::setGlobalThreadCount(0); });
 }
 
-// Calls f, which returns a Result<T>. An exception of the library becomes an error with the given code and
-// the message `what: reason`.
+// Calls f, which returns a Result<T>. If the library throws an exception, returns an error with the code
+// `code` and the message `what: reason`.
 template <class F>
 auto guarded(Errc code, const std::string& what, F&& f) -> decltype(f()) {
   try {
@@ -90,10 +91,10 @@ auto guarded(Errc code, const std::string& what, F&& f) -> decltype(f()) {
 }
 
 // Checks an EXR's headers before the library reads the file. The library allocates tables, buffers and
-// strings of the sizes that the headers claim, and a file of a few hundred bytes can claim terabytes. Checked
-// are that every part's size is within `limits`, that every attribute lies inside the file and is as long as
-// its type requires, that every chunk table fits into the file, and that the buffer of one chunk has at most
-// 2^30 bytes. The library checks everything else.
+// strings of the sizes that the headers claim, and a file of a few hundred bytes can claim terabytes. The
+// function checks that the size of every part is within `limits`, that every attribute lies inside the file
+// and is as long as its type requires, that every chunk table fits into the file, and that the buffer of one
+// chunk has at most 2^30 bytes. The library checks everything else.
 Result<void> check_headers(std::span<const std::byte> file, const std::string& name, const ExrLimits& limits);
 
 }  // namespace ls::exr

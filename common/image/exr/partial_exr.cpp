@@ -1,8 +1,8 @@
-// Encodes partials (files with the pixel sums of one tile and range of samples) with OpenEXR, and decodes
-// them without it: they are untrusted, and have exactly one form, uncompressed scanlines of known float
-// channels under a known header. So they are parsed byte by byte against that form, instead of by a library
-// that accepts every EXR. Memory is allocated only after the sizes in the file have been compared with those
-// of the tile.
+// Encodes and decodes partials: EXR files with the pixel sums of one tile and range of samples. They are
+// encoded with OpenEXR, but decoded without it. Partials come from untrusted workers and have exactly one
+// form: uncompressed scanlines of known float channels under a known header. So they are parsed byte by byte
+// against that form, instead of by a library that accepts every EXR. Memory is allocated only after the sizes
+// in the file have been compared with those of the tile.
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -28,18 +28,19 @@ namespace ls {
 namespace {
 
 constexpr char kUnitAttribute[] = "lightshaft:unit";
-// The names of the colour channels in the order of the planes in memory. A file has its channels sorted by
-// name: kFileOrder[i] is the plane of the file's i-th channel. The AOV channels follow the colour channels,
-// in memory and in the file in the same order.
+// The names of the colour channels, in the order of the planes in memory. In a file the channels are sorted
+// by name: the file's channel i is plane kFileOrder[i] in memory. The AOV channels follow the colour
+// channels; their order is the same in memory and in the file.
 constexpr std::array<const char*, kPartialChannels> kPartialChannelNames = {"A.R", "A.G", "A.B",
                                                                             "B.R", "B.G", "B.B"};
 constexpr std::array<int, kPartialChannels> kFileOrder = {2, 1, 0, 5, 4, 3};
-constexpr std::int64_t kMaxPartialPixels = 256 * 256;  // pixels of the largest tile
+constexpr std::int64_t kMaxPartialPixels = 256 * 256;  // number of pixels of the largest tile
 
 constexpr std::int32_t kMaxUnitJson = 1024;
-// Upper limit of the size of the channel list; all AOVs together need about 2700 bytes
+// upper limit of the size of the channel list, in bytes; all AOVs together need about 2700
 constexpr std::int32_t kMaxChannelList = 8192;
-constexpr std::size_t kMaxNameBytes = 31;  // longest name in the format without the long-names flag
+// longest name, unless the file has the flag for long names, which partials never have
+constexpr std::size_t kMaxNameBytes = 31;
 
 tl::unexpected<Error> refuse_partial(std::string what) {
   return bad_argument("partial EXR: " + std::move(what));
@@ -48,13 +49,13 @@ tl::unexpected<Error> refuse_partial(std::string what) {
 struct Shape {
   std::optional<PixelRect> data, display;
   std::optional<std::string_view> unit;
-  std::size_t pixels_at = 0;  // byte offset of the line table
+  std::size_t pixels_at = 0;  // offset in the file of the table of line offsets, in bytes
   AovSet aovs;                // AOVs of which the file has at least one channel
 };
 
 struct Attribute {
   std::string_view name, type;
-  std::int32_t size;  // size of the value; 0: any size
+  std::int32_t size;  // size of the value in bytes; 0: any size is allowed
 };
 constexpr Attribute kAttributes[] = {
     {"channels", "chlist", 0},        {"compression", "compression", 1}, {"dataWindow", "box2i", 16},
@@ -83,7 +84,7 @@ std::vector<std::string> file_channels(AovSet aovs) {
   return names;
 }
 
-// Returns the names of all channels. Each must be FLOAT and not subsampled.
+// Returns the names of all channels, or an error unless each is of type FLOAT and not subsampled.
 Result<std::vector<std::string_view>> channel_names(std::span<const std::byte> raw) {
   ByteReader in(raw);
   std::vector<std::string_view> names;
@@ -131,7 +132,7 @@ Result<AovSet> check_channels(std::span<const std::byte> raw) {
 }
 
 Result<PixelRect> read_window(std::string_view name, std::span<const std::byte> raw) {
-  std::int32_t v[4];  // bounds of the window, inclusive
+  std::int32_t v[4];  // bounds of the window in pixels, inclusive: x0, y0, x1, y1
   std::memcpy(v, raw.data(), sizeof v);
   for (const std::int32_t x : v)
     if (x < 0 || x >= kMaxFrameSide)
@@ -232,7 +233,7 @@ Result<std::vector<float>> read_pixels(std::span<const std::byte> exr, const Sha
       return refuse_partial(fmt::format("line {}: wrong number or size", y));
     for (std::size_t c = 0; c < channels; ++c) {
       const std::size_t plane = c < kFileOrder.size() ? static_cast<std::size_t>(kFileOrder[c]) : c;
-      // The size of the file was checked, so the bytes exist.
+      // The size of the file was checked, so the bytes of this row exist and bytes() does not fail.
       const auto row = lines.bytes(width * sizeof(float));
       std::memcpy(sums.data() + (plane * height + y) * width, row->data(), row->size());
     }
@@ -268,7 +269,8 @@ Result<void> check_unit(const UnitHeader& got, const UnitHeader& want) {
   return {};
 }
 
-// Returns an error if a value is not finite. It names the first such pixel and channel, and the value.
+// Returns an error if a value is not finite. The message names the first such pixel and channel, and contains
+// the value.
 Result<void> all_finite(const Partial& partial) {
   const PixelRect& t = partial.header.tile;
   const auto pixels = static_cast<std::size_t>(t.pixels());
@@ -284,7 +286,8 @@ Result<void> all_finite(const Partial& partial) {
   return {};
 }
 
-// Returns an error if counts or identifiers are impossible. It names the first such pixel and AOV.
+// Returns an error if numbers of samples or identifiers are impossible. The message names the first such
+// pixel and AOV.
 Result<void> counts_possible(const Partial& partial) {
   if (partial.aovs.empty()) return {};
   const AovPlanes planes = planes_of(partial.aovs);

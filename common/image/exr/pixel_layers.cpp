@@ -18,7 +18,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little);
 
-// Number of identifiers shown per pixel, those with the largest coverage
+// number of identifiers shown per pixel: those with the largest coverage
 constexpr std::size_t kShownRanks = 3;
 
 PixelLayer layer_of_aov(Aov aov) {
@@ -55,8 +55,8 @@ std::vector<float> means(const TileAovs& tile, const AovPlanes& planes, const Ao
   for (std::size_t plane = 0; plane < planes.sums.size(); ++plane) {
     const AovPlane& p = planes.sums[plane];
     if (p.hits || p.aov != row.aov || p.half != 0) continue;
-    // A guide (an AOV for the denoiser) has planes for half A of the samples, then planes for half B. The two
-    // are added.
+    // A guide (an AOV for the denoiser) has its planes for half A of the samples, then those for half B, at
+    // an offset of `channels` planes. The sums of the two halves are added.
     const double* other = row.kind == AovKind::guide ? &tile.sums[(plane + channels) * n] : nullptr;
     for (std::size_t i = 0; i < n; ++i) {
       const double count = row.kind == AovKind::of_hits ? hits[i] : static_cast<double>(tile.spp);
@@ -177,12 +177,13 @@ void LayerMosaic::add(int level, const PixelRect& rect, std::span<const float> v
       const auto from = static_cast<std::size_t>(y - rect.y0) * static_cast<std::size_t>(rect.width()) +
                         static_cast<std::size_t>(x - rect.x0);
       const float* value = &values[from * channels];
-      if (std::isnan(value[0])) continue;  // the block has no samples
+      if (std::isnan(value[0])) continue;  // the added block has no samples
       const auto to =
           static_cast<std::size_t>((y >> shift) - rect_.y0) * static_cast<std::size_t>(rect_.width()) +
           static_cast<std::size_t>((x >> shift) - rect_.x0);
       if (layer_.rule == BlockRule::first && weights_[to] > 0) continue;
-      // A block at the edge of the image has fewer pixels, so its weight is smaller.
+      // The weight of a block is its number of pixels in the image, which is smaller at the edge of the
+      // image.
       const auto weight = static_cast<double>(rect_in_image(frame_, level, {x, y, x + 1, y + 1}).pixels());
       weights_[to] += weight;
       for (std::size_t c = 0; c < channels; ++c) {
@@ -219,7 +220,7 @@ std::vector<std::byte> LayerMosaic::bytes() const {
   }
   std::vector<std::byte> bytes(out.size() * sizeof(half));
   for (std::size_t i = 0; i < out.size(); ++i) {
-    const half value(std::clamp(out[i], -kLargestHalf, kLargestHalf));  // clamp() keeps NaN
+    const half value(std::clamp(out[i], -kLargestHalf, kLargestHalf));  // clamp() returns NaN for NaN
     std::memcpy(&bytes[i * sizeof(half)], &value, sizeof value);
   }
   return bytes;

@@ -2,8 +2,8 @@
 // part.
 //
 // Level 0 is the image. A pixel of level L represents a block of 2^L x 2^L pixels of the image (fewer at the
-// right and bottom edges). Pixels without samples are left out. If no pixel of the block has samples, the
-// value is NaN, or 0 for identifiers.
+// right and bottom edges). Its value is computed from those pixels of the block that have samples. If no
+// pixel of the block has samples, the value is NaN, or 0 for identifiers.
 #pragma once
 
 #include <cstddef>
@@ -18,12 +18,13 @@
 
 namespace ls {
 
-// How the pixels of a block are combined.
+// How the value of a block is computed from the values of its pixels.
 enum class BlockRule {
-  mean,              // for values
-  error_of_mean,     // for standard errors: the standard error of the mean of the block
-  root_mean_square,  // for relative errors
-  first              // for identifiers, which have no mean: the first pixel's, row by row
+  mean,              // mean of the values; used for most layers
+  error_of_mean,     // standard error of the mean of the block; used for standard errors
+  root_mean_square,  // root of the mean of the squares; used for relative errors
+  // value of the block's first pixel, row by row; used for identifiers, which have no mean
+  first
 };
 std::string_view to_string(BlockRule rule);
 
@@ -31,36 +32,38 @@ struct PixelLayer {
   std::string name;
   std::vector<std::string> channels;
   BlockRule rule = BlockRule::mean;
-  bool half = true;        // true if values are half floats; identifiers are floats
-  std::optional<Aov> aov;  // nullopt: the layer is computed from the colour
+  bool half = true;        // true: values are sent as half floats; false: as floats, which identifiers need
+  std::optional<Aov> aov;  // the AOV of this layer; nullopt: the layer is computed from the colour
 };
-// Returns the layers: "rgb", "stderr" (the standard error of each value of rgb), "error" (the relative
-// standard error of the pixel: the square root of the mean over channels of stderr^2 / (rgb^2 + 0.01)),
-// "spp", and the AOVs by the names of their layers in the final EXR.
+// Returns the layers of a film with these AOVs: "rgb", "stderr" (the standard error of each value of rgb),
+// "error" (the relative standard error of the pixel: the square root of the mean over channels of stderr^2 /
+// (rgb^2 + 0.01)), "spp", and each AOV under the name of its layer in the final EXR.
 std::vector<PixelLayer> pixel_layers(AovSet aovs);
 // Returns the layer of this name. invalid_argument: there is no such layer; the message lists the layers.
 Result<PixelLayer> pixel_layer(AovSet aovs, std::string_view name);
 
-// Limits of one request: pixels per side of the answer, and pixels of the image that the answer represents.
+// Limits of one request: kMaxLayerSide is the largest width and height of the answer, in its pixels.
+// kMaxLayerPixels is the largest number of pixels of the image that the answer may represent.
 inline constexpr int kMaxLayerSide = 512;
 inline constexpr std::int64_t kMaxLayerPixels = std::int64_t{1} << 20;
 inline constexpr int kMaxLayerLevel =
-    10;  // at this level one pixel represents kMaxLayerPixels pixels of the image
+    10;  // at this level one pixel represents kMaxLayerPixels pixels of the image: (2^10)^2 = 2^20
 
 FrameSize level_size(FrameSize frame, int level);
 // Returns the pixels of the image that a rectangle of a mip level represents.
 PixelRect rect_in_image(FrameSize frame, int level, const PixelRect& rect);
-// Returns invalid_argument if the rectangle is empty, not inside the level or too large. The message contains
-// the bounds.
+// Checks a rectangle of a mip level. Returns invalid_argument if it is empty, not inside the level or too
+// large. The message contains the bounds.
 Result<void> check_layer_rect(FrameSize frame, int level, const PixelRect& rect);
 
-// The values of one tile, layer by layer.
+// The values of all layers in one tile.
 class TileLayers {
  public:
-  // `aovs`: true if layers of AOVs will be requested
+  // `aovs` must be true if values() will be called for layers of AOVs
   TileLayers(const Film& film, TileIndex tile, bool aovs);
   const PixelRect& rect() const { return colour_.rect; }
-  // Returns the channels of each pixel, row by row; empty if the tile has no samples.
+  // Returns the values of one layer: all channels of each pixel, row by row; empty if the tile has no
+  // samples.
   std::vector<float> values(const PixelLayer& layer) const;
 
  private:
@@ -69,16 +72,16 @@ class TileLayers {
   AovPlanes planes_;
 };
 
-// A rectangle of a layer at one mip level, assembled from tiles.
+// A rectangle of one layer at one mip level, to which tiles add their values.
 class LayerMosaic {
  public:
   LayerMosaic(PixelLayer layer, FrameSize frame, int level, PixelRect rect);
-  // Adds pixels of mip level `level`, which must not be above that of the mosaic. Pixels outside the mosaic
-  // are ignored. `values`: the channels of each pixel of `rect`, row by row; if it is empty, nothing is
-  // added.
+  // Adds the pixels `rect` of mip level `level`, which must be at most the level of the mosaic. Pixels
+  // outside the mosaic are ignored. `values` has the channels of each pixel of `rect`, row by row; if it is
+  // empty, nothing is added.
   void add(int level, const PixelRect& rect, std::span<const float> values);
-  // Returns the channels of each pixel, row by row, as half floats or floats, little endian. Values above
-  // 65504 in magnitude, the largest half, are clamped to it.
+  // Returns the channels of each pixel, row by row, as half floats or floats (PixelLayer::half), little
+  // endian. In half floats, values above 65504 in magnitude, the largest half, are clamped to 65504.
   std::vector<std::byte> bytes() const;
 
  private:
@@ -89,7 +92,7 @@ class LayerMosaic {
   std::vector<double> sums_, weights_;
 };
 
-// Reads the result of LayerMosaic::bytes().
+// Decodes the result of LayerMosaic::bytes() to the channels of each pixel, row by row.
 std::vector<float> layer_floats(const PixelLayer& layer, std::span<const std::byte> bytes);
 
 }  // namespace ls

@@ -21,8 +21,8 @@ constexpr double kMaxStops = 60;
 constexpr std::size_t kChecker = 8;  // side of a square of the checkerboard, in pixels
 constexpr Colour kEmpty[2] = {{24, 24, 27}, {31, 31, 35}};
 
-// Returns the thresholds between 8-bit sRGB codes: the i-th is the smallest linear value that is rounded to
-// the code i + 1 (IEC 61966-2-1).
+// Returns the thresholds between 8-bit sRGB codes (IEC 61966-2-1): element i is the smallest linear value
+// that is rounded to the code i + 1.
 std::array<double, 255> srgb_steps() {
   std::array<double, 255> out;
   for (std::size_t i = 0; i < out.size(); ++i) {
@@ -61,7 +61,7 @@ Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::ui
 
 namespace {
 
-// Draws one tile: returns one colour per pixel, row by row.
+// A function that draws one tile: it returns one colour per pixel, row by row.
 using DrawTile = std::function<std::vector<Colour>(TileIndex, const TilePixels&)>;
 Result<std::vector<std::byte>> drawn(const Film& film, const DrawTile& draw) {
   const FrameSize frame = film.grid().frame;
@@ -103,7 +103,7 @@ Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_sto
 
 namespace {
 
-// Draws a map, in which tiles without samples are grey.
+// Draws a map of the film: `draw` draws the tiles that have samples, all other tiles are grey.
 Result<std::vector<std::byte>> map_png(const Film& film, const DrawTile& draw) {
   return drawn(film, [&](TileIndex t, const TilePixels& tile) {
     return tile.spp == 0 ? std::vector<Colour>(tile.mean.size() / 3, kNoSampleColour) : draw(t, tile);
@@ -114,7 +114,7 @@ double ramp(double value, double least, double most) {
   return value > least ? std::log(value / least) / std::log(most / least) : 0;
 }
 
-// For each pixel, the mean over channels of its squared relative error, and whether it has few hits.
+// For each pixel, the mean over channels of the squared relative error, and whether the pixel has few hits.
 struct PixelErrors {
   std::vector<double> squared;
   std::vector<char> few_hits;

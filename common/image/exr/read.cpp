@@ -26,7 +26,7 @@ namespace {
 
 struct Source {
   int part = 0;
-  std::vector<const char*> channels;  // one channel or three
+  std::vector<const char*> channels;  // names of the channels to read: three colours, or one grey channel
 };
 
 Result<Source> find_colour(const Imf::MultiPartInputFile& file, const std::string& name) {
@@ -85,7 +85,7 @@ Result<RgbImage> read_part(Imf::MultiPartInputFile& file, const Source& source) 
 
 constexpr const char* kErrors[3] = {"stderr.R", "stderr.G", "stderr.B"};
 
-// Returns the channel if it is not subsampled and has one of the types, otherwise null.
+// Returns the channel `name` if it is not subsampled and has one of the types `types`, otherwise null.
 const Imf::Channel* channel_of(const Imf::ChannelList& list, const char* name,
                                std::initializer_list<Imf::PixelType> types) {
   const Imf::Channel* c = list.findChannel(name);
@@ -94,7 +94,8 @@ const Imf::Channel* channel_of(const Imf::ChannelList& list, const char* name,
   return found ? c : nullptr;
 }
 
-// Returns the part's layers of standard errors; nullopt unless it has all of them.
+// Returns the three layers of standard errors in the part that has the colours; nullopt: one or more are
+// missing.
 std::optional<Source> find_error(const Imf::MultiPartInputFile& file, const Source& colour) {
   const Imf::ChannelList& list = file.header(colour.part).channels();
   for (const char* c : kErrors)
@@ -171,7 +172,8 @@ Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits
 namespace {
 
 constexpr const char* kColours[3] = {"R", "G", "B"};
-constexpr std::size_t kMaxLayers = 128;  // all AOVs together have 74 layers, denoising adds 3
+// limit of the layers of a final EXR: all AOVs together have 74, denoising adds 3
+constexpr std::size_t kMaxLayers = 128;
 
 tl::unexpected<Error> bad(const std::string& name, const std::string& what) {
   return bad_argument(fmt::format("{}: {}", name, what));
@@ -202,7 +204,7 @@ std::variant<ExrHalf, ExrFloat, ExrUint> empty_channel(Imf::PixelType type, std:
   return ExrFloat{std::vector<float>(pixels)};
 }
 
-// Reads some rows of every layer.
+// Reads the rows y0 to y0 + rows - 1 of every layer.
 ExrPicture read_rows(Imf::InputFile& file, int width, int y0, int rows) {
   ExrPicture band{{width, rows}, {}, {}};
   Imf::FrameBuffer buffer;

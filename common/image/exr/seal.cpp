@@ -19,8 +19,8 @@ namespace {
 // Attributes that the seal does not cover: two that describe how the pixels are stored, and the seal itself.
 constexpr std::array<std::string_view, 3> kLeftOut = {"compression", "lineOrder", kSealName};
 
-// Returns the digests in a seal, keyed by the layer or header that they cover. A line of unknown form is its
-// own key.
+// Parses a seal. Returns the digest of each line by the name of what it covers, such as "layer R". A line
+// that is too short to have a digest and a name is stored with the whole line as its name.
 std::map<std::string, std::string> lines_of(const std::string& seal) {
   constexpr std::size_t kDigits = 64;
   std::map<std::string, std::string> lines;
@@ -75,7 +75,8 @@ std::vector<std::string> differences(const std::string& sealed, const std::strin
       if (found == theirs->end() || found->second != digest) names.insert(name);
     }
   std::vector<std::string> out(names.begin(), names.end());
-  // The texts differ, but have the same digests for the same names: the seal itself was changed.
+  // Both seals have the same names and digests, but their texts differ, for example in the order of lines. So
+  // somebody edited the seal; it is reported as the header that differs.
   if (out.empty() && sealed != now) out.emplace_back(fmt::format("header {}", kSealName));
   return out;
 }

@@ -15,7 +15,8 @@
 namespace ls {
 namespace {
 
-// A low level: higher levels hardly compress noise better, and users wait for the image.
+// Compression level of zlib, from 1 (fast) to 9. It is low because users wait for the image, and higher
+// levels hardly make noisy pixels smaller.
 constexpr int kZipLevel = 2;
 
 std::vector<half> to_half(const std::vector<float>& values) {
@@ -43,8 +44,8 @@ Result<void> check(const ExrPicture& picture) {
 // Writes rows to the file; the first of them is the file's row y0.
 void write_rows(Imf::OutputFile& file, const ExrPicture& rows, int y0) {
   Imf::FrameBuffer buffer;
-  // If the outer vector grows, it moves the inner ones without copying their values. So the pointers in the
-  // slices stay valid.
+  // The values of the half layers, to which slices of the frame buffer point. When the outer vector grows, it
+  // moves the inner vectors without copying their values, so the pointers stay valid.
   std::vector<std::vector<half>> halves;
   const auto add = [&](const std::string& name, Imf::PixelType type, const void* data) {
     buffer.insert(name, Imf::Slice::Make(type, data, {0, y0}, rows.size.width, rows.size.height));
@@ -72,7 +73,7 @@ Imf::Header header_of(FrameSize size, const ExrPicture& like,
   return header;
 }
 
-// Calls take(rows, y) for each band, where y is its first row in the file.
+// Calls take(rows, y) for each band, where y is the band's first row in the file.
 template <class Take>
 Result<void> each_band(const ExrBands& bands, Take take) {
   for (int band = 0, y = 0; y < bands.size.height; ++band) {
@@ -86,8 +87,9 @@ Result<void> each_band(const ExrBands& bands, Take take) {
   return {};
 }
 
-// The seal is in the header, which the file has before the data that the seal covers. So the bands are
-// generated twice: for the seal, and for the file.
+// Writes the bands as an EXR file with a seal. The seal covers the pixels, but it is in the header, which
+// comes before the pixels in the file. So the bands are generated twice: first to compute the seal, then to
+// write the file.
 Result<void> write_bands(Imf::OStream& out, const ExrBands& bands) {
   if (bands.size.width < 1 || bands.size.height < 1)
     return bad_argument("writing an EXR: the image is empty");

@@ -21,7 +21,7 @@ Digest chained(const Digest& chain, const Digest& unit) {
 }
 
 // Adds the identifiers of `from` to those of `to`. Both have kIdPlanes planes of `pixels` values for every
-// AOV of identifiers.
+// AOV whose values are identifiers.
 void add_ids(std::vector<float>& to, std::span<const float> from, std::size_t pixels) {
   for (std::size_t first = 0; first < to.size(); first += kIdPlanes * pixels)
     for (std::size_t i = first; i < first + pixels; ++i)
@@ -114,7 +114,8 @@ std::array<std::vector<double>, 2> Film::halves(const Tile& tile, std::size_t pi
 
 std::array<std::vector<double>, 2> Film::means(const Tile& tile, std::size_t pixels, bool with_tail) {
   auto out = halves(tile, pixels, with_tail);
-  // Samples of each half; the number of all samples is even.
+  // Number of samples per pixel in each half. Both halves have the same number, since a film has an even
+  // number of samples per pixel.
   const double samples = static_cast<double>((with_tail ? tile.spp() : tile.full_spp()) / 2);
   for (auto& half : out) {
     double* values = half.data();

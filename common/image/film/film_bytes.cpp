@@ -1,9 +1,15 @@
-// A tile of the film as little-endian bytes, for restarts: "LSTILE03"; u32 index of the tile; u32 number of
-// full rounds; 32 bytes digest chain; u64 s0, s1 of the tail (0, 0: no tail); 32 bytes digest of the tail;
-// f64 TileError::skew; 2 f64 plain.changes; 2 f64 relative.changes; the full rounds: 6 colour planes and the
-// planes of AOV sums as doubles, then the planes of identifiers as floats; the tail, if there is one: the
-// same planes, all as floats; SHA-256 of all bytes before it. The stored figures of TileError are those that
-// depend on the tile before its last round; the others are computed again.
+// Writes and reads a tile of the film as bytes, from which the coordinator restores the film after a restart.
+// A round is a range of samples; the tail is a last round with fewer samples than its full range (film.h).
+// The bytes are, little-endian:
+// - "LSTILE03"; u32 index of the tile; u32 number of full rounds; 32 bytes: digest chain of the full rounds;
+// - u64 s0, u64 s1: range of the tail's samples (0, 0: no tail); 32 bytes: digest of the tail;
+// - f64 skew; 2 f64 plain.changes; 2 f64 relative.changes: members of TileError. Only these members are
+// stored, since they depend on the tile as it was before its last round. The others are computed again from
+// the sums;
+// - the full rounds: 6 colour planes and the planes of AOV sums as doubles, then the planes of identifiers as
+// floats;
+// - the tail, if there is one: the same planes, all as floats;
+// - SHA-256 of all bytes before it.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -87,7 +93,8 @@ Result<std::shared_ptr<const Film::Tile>> Film::parse_tile(TileIndex index,
   auto opened = open_saved(bytes, kTileMagic);
   if (!opened) return tl::unexpected(opened.error());
   ByteReader& in = *opened;
-  // Sets the numbers. Those after the end of the bytes become zero; then the sums cannot be read either.
+  // Reads the next bytes into the given variables, one after the other. If the bytes end early, the remaining
+  // variables become zero. This needs no error here, because reading the sums will then fail as well.
   const auto read = [&]<class... T>(T&... to) { ((to = in.take<T>().value_or(T{})), ...); };
   TileIndex stored = 0;
   auto tile = std::make_shared<Tile>();

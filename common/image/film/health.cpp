@@ -77,7 +77,8 @@ HealthCause cause_named(std::string_view word) {
   return HealthCause::unnamed;
 }
 
-// Returns the sum, or the largest number if the sum overflows, since another process may send any counts.
+// Returns a + b, or the largest number if the sum overflows. Counts come from other processes, so they may
+// have any value.
 std::uint64_t sum(std::uint64_t a, std::uint64_t b) {
   return a > std::numeric_limits<std::uint64_t>::max() - b ? std::numeric_limits<std::uint64_t>::max()
                                                            : a + b;
@@ -163,8 +164,8 @@ std::string canonical_json(const Health& health) {
 Result<Health> parse_health(std::string_view text) {
   constexpr std::size_t kMostBytes = 64 << 10, kMostCauses = 64;
   if (text.size() > kMostBytes) return bad_health("the text is too long");
-  // The texts of canonical_json() have four nested levels. The callback drops deeper ones before they need
-  // stack or memory.
+  // The texts of canonical_json() have four levels of nesting. The callback discards deeper levels while the
+  // text is parsed, so that a hostile text cannot use up the stack or the memory.
   bool deep = false;
   const auto shallow = [&](int depth, json::parse_event_t, json&) {
     deep = deep || depth > 4;

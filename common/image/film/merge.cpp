@@ -17,7 +17,7 @@ struct Entry {
   SampleRange samples;
   Digest digest;
 };
-// Orders rectangles by position, so that tiles come row by row.
+// Orders rectangles by position: row by row from the top, and from left to right in a row.
 struct ByPlace {
   bool operator()(const PixelRect& a, const PixelRect& b) const {
     return std::tie(a.y0, a.x0, a.y1, a.x1) < std::tie(b.y0, b.x0, b.y1, b.x1);
@@ -57,8 +57,8 @@ class Merger {
     return file;
   }
 
-  // The first pass reads the headers of the partials and checks that they belong together. It does not keep
-  // pixels.
+  // First pass, for partial number i: reads its file and checks that it belongs to the same image as the
+  // partials before it. It keeps the header and the digest, but not the pixels.
   Result<void> index(std::size_t i) {
     const auto file = read(i);
     if (!file) return tl::unexpected(file.error());
@@ -82,7 +82,8 @@ class Merger {
     return {};
   }
 
-  // Returns the tiling. Its tiles have the side of the largest partial, and every partial must fit it.
+  // Returns the tiling of the frame. The side of its tiles is the largest width or height of any partial. It
+  // is an error if the rectangle of a partial is not a tile of this tiling.
   Result<TileGrid> tiling() const {
     const TileGrid grid{frame_, tile_side_};
     const std::uint64_t tiles = std::uint64_t(grid.columns()) * std::uint64_t(grid.rows());
@@ -102,8 +103,9 @@ class Merger {
 
   const std::string& name(const Entry& e) const { return sources_[e.source].name; }
 
-  // Chooses the partials of one tile to fold. Partials with the same range of samples must be equal. Of the
-  // partials that begin at the same sample, the one with the longest range is kept.
+  // Chooses which partials of a tile are folded; `entries` are all partials of the tile. Of the partials that
+  // begin at the same sample, the one with the longest range is chosen. It is an error if two partials have
+  // the same range of samples but different contents.
   Result<std::vector<Entry>> choose(std::vector<Entry> entries) {
     std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
       return std::tie(a.samples.s0, b.samples.s1) < std::tie(b.samples.s0, a.samples.s1);

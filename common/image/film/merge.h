@@ -1,5 +1,5 @@
-// Folds the partials of an image (files with the pixel sums of one tile and range of samples) into a film,
-// exactly as the coordinator does; for `lightshaft merge`.
+// Adds partials to a film, exactly as the coordinator does; for `lightshaft merge`. A partial is a file with
+// the pixel sums of one tile and one round (a range of samples).
 #pragma once
 
 #include <cstddef>
@@ -15,22 +15,22 @@
 namespace ls {
 
 struct PartialSource {
-  std::string name;                                      // name for messages
+  std::string name;                                      // name of the file, for messages
   std::function<Result<std::vector<std::byte>>()> read;  // reads the file; may be called twice
 };
 
 struct Merged {
   Film film;
   Digest scene, settings, numeric_class;
-  std::uint64_t duplicates = 0;  // number of equal partials that were dropped
+  std::uint64_t duplicates = 0;  // number of partials that were dropped because an equal one was given
 };
 
-// Groups the partials by tile and folds those of a tile in the order of their first sample (s0). If a tile
-// has both a full and a truncated version of a round (range of samples), the full one is used. Only the
-// pixels of one partial are in memory at a time. These are errors, which name the files: partials of
-// different scenes, settings or numeric classes (machines of one class compute the same bits); frames or AOVs
-// that differ; tiles that do not fit one tiling; gaps and overlaps in a tile's samples; different partials of
-// the same range; tiles of the frame without a partial.
+// Groups the partials by tile. The partials of a tile are added in the order of their first samples. If there
+// are several versions of a round, the longest one is used. Besides the film, only the pixels of one partial
+// are in memory at a time. Errors, whose messages name the files: the partials have different scenes,
+// settings, frame sizes, AOVs or numeric classes (machines of one class compute the same bits); their
+// rectangles are not tiles of one tiling; the samples of a tile have gaps or overlaps; two partials of the
+// same tile and range differ; a tile of the frame has no partial.
 Result<Merged> merge_partials(const std::vector<PartialSource>& sources);
 
 }  // namespace ls

@@ -1,5 +1,6 @@
-// A partial, the result of a unit (one tile and one range of samples): float32 sums of the samples of each
-// pixel, separately for the two halves of the samples, with all data that identify the unit.
+// A partial is the result of rendering a unit (one tile and one range of samples): for each pixel the sums of
+// its samples in float32, separately for the two halves of the samples (A: even sample indices, B: odd ones),
+// and a header with all data that identify the unit.
 #pragma once
 
 #include <cstddef>
@@ -16,48 +17,53 @@
 
 namespace ls {
 
-// Everything that determines a unit's pixels.
+// All data that determine the pixels of a unit.
 struct UnitHeader {
-  Digest scene;          // digest of the canonical scene
-  Digest settings;       // digest of the canonical RenderSettings (common/job/settings.h)
-  Digest numeric_class;  // class of the machine that rendered it; machines of one class compute the same bits
+  Digest scene;     // digest of the canonical scene
+  Digest settings;  // digest of the canonical RenderSettings (common/job/settings.h)
+  // Digest of the numeric class of the machine that rendered the unit. Machines of one class compute the same
+  // bits.
+  Digest numeric_class;
   PixelRect tile;
   SampleRange samples;
   bool operator==(const UnitHeader&) const = default;
 };
 
-// Returns {"class":..,"s0":..,"s1":..,"scene":..,"settings":..,"tile":[x0,y0,x1,y1]}: keys sorted, no spaces.
+// Returns the JSON text {"class":..,"s0":..,"s1":..,"scene":..,"settings":..,"tile":[x0,y0,x1,y1]}: keys
+// sorted, no spaces.
 std::string canonical_json(const UnitHeader& header);
 Result<UnitHeader> parse_unit_header(std::string_view json);
 
 struct Partial {
   UnitHeader header;
-  // Six colour planes of tile.pixels() floats each, row by row, followed by those of planes_of(aovs). Values
-  // are sums, not averages; the number of samples of each half follows from the range. AOVs are sums over
-  // both halves, except for guides (aov.h). Every value is finite (a non-finite sample is counted and
-  // contributes zero).
+  // Six colour planes of tile.pixels() floats each, row by row (R, G, B of half A, then of half B), followed
+  // by the planes of AOVs, which planes_of(aovs) lists. Values are sums, not means; each half has
+  // header.samples.count() / 2 samples per pixel. The sums of an AOV are over both halves, except for AOVs of
+  // the kind AovKind::guide, which have sums of each half. Every value is finite: non-finite samples are
+  // counted in the health (health.h) and add zero here.
   std::vector<float> sums;
-  AovSet aovs;  // as requested in the settings
+  AovSet aovs;  // the AOVs of the planes; those that the settings request
   bool operator==(const Partial&) const = default;
 };
 
-// Returns the SHA-256 over the header's canonical JSON and all planes (little endian). It does not depend on
-// the encoding in a file.
+// Returns the SHA-256 over the header's canonical JSON followed by all planes as little-endian floats. So it
+// does not depend on how an EXR file stores the planes.
 Digest unit_digest(const Partial& partial);
 
-// Encodes a partial as an EXR file: scanline, uncompressed, FLOAT; the dataWindow is the tile, the
-// displayWindow the frame. Without AOVs it has exactly the six channels; with AOVs also those of
-// planes_of(aovs).
+// Encodes a partial as an EXR file with uncompressed scanlines and FLOAT channels. The dataWindow is the
+// tile, the displayWindow the frame. There is one channel for each of the six colour planes and each AOV
+// plane of planes_of(aovs), and no other.
 Result<std::vector<std::byte>> encode_partial(const Partial& partial, FrameSize frame);
 
 // Decodes a file made by encode_partial() for the unit `expected`, which must equal the header in the file.
-// `aovs` determines the required channels. All other files are errors, whose message names the fault: other
-// windows, channels, compression, part counts or sizes, non-finite sums, impossible identifiers and counts,
-// trailing data.
+// `aovs` determines the required channels. Every other file is rejected with an error that names the fault:
+// other windows, channels or compression; several EXR parts; a wrong size; sums that are not finite;
+// impossible identifiers or counts; data after the end of the image.
 Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader& expected, FrameSize frame,
                                AovSet aovs = {});
 
-// A partial whose header and AOVs are read from its file; for `lightshaft merge`.
+// A partial and its frame size as found in a file. decode_partial_file() takes the header and the AOVs from
+// the file, without expected values; for `lightshaft merge`.
 struct PartialFile {
   Partial partial;
   FrameSize frame;

@@ -9,7 +9,8 @@
 namespace ls {
 namespace {
 
-constexpr std::size_t kMaxHeaderJson = 1024;  // in bytes; our own headers have about 320
+// Largest size in bytes; the texts of canonical_json() have about 320.
+constexpr std::size_t kMaxHeaderJson = 1024;
 
 tl::unexpected<Error> bad(std::string_view what) {
   return bad_argument(fmt::format("unit header: {}", what));
@@ -74,7 +75,7 @@ Result<UnitHeader> parse_unit_header(std::string_view text) {
   if (!tile) return tl::unexpected(tile.error());
 
   const UnitHeader header{*scene, *settings, *numeric, *tile, {*s0, *s1}};
-  // The unit digest covers these bytes, so the same header must always have the same bytes.
+  // unit_digest() covers the text of the header. So a header must have only one valid text.
   if (canonical_json(header) != text)
     return bad(
         "not in canonical form (sorted keys class, s0, s1, scene, settings, tile; no spaces; nothing else)");

@@ -63,8 +63,8 @@ inline std::vector<TileIndex> tiles_over(const TileGrid& grid, const PixelRect& 
   return out;
 }
 
-// Calls put(to, from) for each pixel of the tile, row by row. `to` is its index in the frame, `from` its
-// index in the tile.
+// Calls put(to, from) for each pixel of the tile, row by row. `to` is the index of the pixel in the frame,
+// `from` its index in the tile `rect`; both count pixels row by row.
 template <class Put>
 void each_pixel(const PixelRect& rect, FrameSize frame, Put put) {
   std::size_t from = 0;

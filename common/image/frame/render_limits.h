@@ -7,11 +7,12 @@
 namespace ls {
 
 inline constexpr int kMaxFrameSide = 32768;  // pixels
-// 67 million pixels; the film's sums then take 3.2 GB.
+// 67 million pixels. The colour sums of the film then take 3.2 GB: six doubles (48 bytes) per pixel.
 inline constexpr std::int64_t kMaxFramePixels = std::int64_t{1} << 26;
 inline constexpr std::uint32_t kMaxTiles = std::uint32_t{1} << 22;
 inline constexpr std::uint64_t kMaxSpp = std::uint64_t{1} << 24;
-inline constexpr int kMaxDepthSetting = 1 << 20;  // limit of max_depth and rr_depth
-inline constexpr int kMaxCameraPoints = 64;       // limit of camera_points
+// Largest value of the integrator settings max_depth and rr_depth.
+inline constexpr int kMaxDepthSetting = 1 << 20;
+inline constexpr int kMaxCameraPoints = 64;  // largest value of the integrator setting camera_points
 
 }  // namespace ls

@@ -1,6 +1,7 @@
-// A round is a range of a tile's sample indices. The rounds have 2, 2, 4, 8, 16, 32 samples per pixel, then
-// 64 each. This grouping is fixed: it does not depend on the number of samples, cost or timing. So any two
-// jobs add up the same samples in the same groups, and their sums in double are equal bit for bit.
+// A round is a range of the sample indices of a tile. The first rounds have 2, 2, 4, 8, 16, 32 samples per
+// pixel, all later ones 64. This division is fixed: it does not depend on the number of samples of a job, on
+// cost or on timing. So two renders of a tile with the same samples add them in the same groups, and their
+// sums in double are equal bit for bit.
 #pragma once
 
 #include <algorithm>
@@ -10,22 +11,23 @@ namespace ls {
 
 using RoundIndex = std::uint32_t;
 
-// A half-open range of sample indices [s0, s1). Both ends are even: even samples are half A, odd ones half B.
+// A half-open range of sample indices [s0, s1). Samples with even indices form half A, those with odd indices
+// half B. Both ends are even, so that both halves have the same number of samples.
 struct SampleRange {
   std::uint64_t s0 = 0, s1 = 0;
   std::uint64_t count() const { return s1 - s0; }
   bool operator==(const SampleRange&) const = default;
 };
 
-// Returns the full range of round k.
+// Returns the range of samples of round k (counted from 0), not truncated.
 constexpr SampleRange round_range(RoundIndex k) {
   if (k == 0) return {0, 2};
   if (k <= 5) return {std::uint64_t{1} << k, std::uint64_t{2} << k};
   return {64 * static_cast<std::uint64_t>(k - 5), 64 * static_cast<std::uint64_t>(k - 4)};
 }
 
-// Returns the number of samples per pixel that is rendered for a requested number: the next even number, at
-// least 2.
+// Rounds a requested number of samples per pixel up to the number that is rendered: an even number, at least
+// 2.
 constexpr std::uint64_t even_spp(std::uint64_t spp) { return std::max<std::uint64_t>(2, spp + (spp & 1)); }
 
 // Returns the number of rounds of an image with `spp` samples; its last round may be truncated.

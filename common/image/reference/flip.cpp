@@ -10,7 +10,7 @@
 namespace ls {
 namespace {
 
-// ---- spatial filters: each a sum of separable filters ----
+// ---- spatial filters: each is a sum of separable filters ----
 
 class Planes {  // three planes: Y, Cx, Cz
  public:
@@ -28,7 +28,8 @@ class Planes {  // three planes: Y, Cx, Cz
 };
 
 using Plane = std::vector<float>;
-using Kernel = std::vector<float>;  // of odd length; the middle element is the weight of the pixel itself
+// The weights of a filter. Their number is odd; the middle one is the weight of the pixel itself.
+using Kernel = std::vector<float>;
 
 constexpr double kPi = std::numbers::pi;
 
@@ -63,8 +64,8 @@ Plane along_columns(const Plane& in, FrameSize size, const Kernel& kernel) {
   return out;
 }
 
-// A term of the contrast sensitivity filter, a sqrt(pi / b) exp(-pi^2 x^2 / b) with x in degrees; it is
-// applied along both axes.
+// A term of the contrast sensitivity filter, a sqrt(pi / b) exp(-pi^2 x^2 / b), where x is the distance in
+// degrees. The Gaussian is applied along both axes of the image.
 struct Sensitivity {
   double a, b;
 };
@@ -105,11 +106,13 @@ Plane filtered(const Plane& in, FrameSize size, const std::array<Sensitivity, 2>
   return sum;
 }
 
-// Filters for features: a Gaussian of a feature's width, and its derivatives ([LDR] section 4.2). The
-// derivatives are normalised over the window, so that positive weights sum to 1 and negative ones to -1.
+// Filters that detect features, namely edges and points ([LDR] section 4.2): a Gaussian of the width of a
+// feature, and its derivatives. The weights of the derivatives are normalised, so that the positive ones sum
+// to 1 and the negative ones to -1.
 struct FeatureKernels {
-  Kernel across;       // the Gaussian, for the axis across the derivative; sums to 1
-  Kernel edge, point;  // first and second derivative
+  // The Gaussian, applied along the axis at right angles to a derivative. Its weights sum to 1.
+  Kernel across;
+  Kernel edge, point;  // the first and the second derivative of the Gaussian
 };
 
 void balance(Kernel& kernel) {
@@ -153,8 +156,9 @@ Planes contrast_filtered(const Planes& image, float pixels_per_degree) {
   return out;
 }
 
-// Returns max(|edge_r - edge_t|, |point_r - point_t|) of each pixel, from the first plane of the reference
-// (r) and of the image (t) ([LDR] equations (10) to (12)).
+// Returns the difference in features for each pixel, max(|edge_r - edge_t|, |point_r - point_t|): the
+// strengths of edges and points in the reference (r) and in the image (t), found in the first plane (Y) of
+// each ([LDR] equations (10) to (12)).
 std::vector<float> feature_difference(const Planes& reference, const Planes& image, float pixels_per_degree) {
   const FeatureKernels kernels = feature_kernels(pixels_per_degree);
   const auto grey = [](const Planes& planes) {
@@ -174,7 +178,7 @@ std::vector<float> feature_difference(const Planes& reference, const Planes& ima
 
 // ---- colours ----
 
-// Conversions between linear RGB (Rec. 709 primaries, D65 white) and CIE XYZ, and this white in XYZ.
+// Matrices between linear RGB (Rec. 709 primaries, D65 white) and CIE XYZ, and the white point D65 in XYZ.
 constexpr float kToXyz[3][3] = {{10135552.F / 24577794.F, 8788810.F / 24577794.F, 4435075.F / 24577794.F},
                                 {2613072.F / 12288897.F, 8788810.F / 12288897.F, 887015.F / 12288897.F},
                                 {1425312.F / 73733382.F, 8788810.F / 73733382.F, 70074185.F / 73733382.F}};
@@ -183,7 +187,8 @@ constexpr float kToRgb[3][3] = {{3.241003275F, -1.537398934F, -0.498615861F},
                                 {0.055639423F, -0.204011202F, 1.057148933F}};
 constexpr float kWhite[3] = {0.950428545F, 1.F, 1.088900371F};
 
-// Constants of [LDR] section 4.1: exponents, and the knee of the redistribution of colour errors.
+// Constants of [LDR]: the exponents q_c of colour differences and q_f of feature differences, and the knee of
+// the mapping in redistributed(): the fraction kPc of the largest difference becomes the error kPt.
 constexpr float kQc = .7F, kPc = .4F, kPt = .95F, kQf = .5F;
 
 using Triple = std::array<float, 3>;
@@ -194,7 +199,7 @@ Triple times(const float (&m)[3][3], const Triple& v) {
   return out;
 }
 
-float shown(float v) { return v > 0 ? std::min(v, 1.F) : 0.F; }  // NaN becomes 0, too
+float shown(float v) { return v > 0 ? std::min(v, 1.F) : 0.F; }  // clamps to [0, 1]; NaN becomes 0
 
 // Returns the colour in linearised CIELAB, the space in which contrast sensitivity is defined ([LDR] equation
 // (2)).
@@ -219,19 +224,22 @@ Triple lab(const Triple& rgb) {
   return {116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])};
 }
 
-// Adjusts colours by [LDR] equation (6): in darker colours differences of hue are less visible (Hunt 1952).
+// Adjusts a CIELAB colour for the Hunt effect (Hunt 1952): differences in hue are less visible in dark
+// colours, so a and b are scaled in proportion to the lightness ([LDR] equation (6)).
 Triple hunt(Triple v) {
   v[1] *= .01F * v[0];
   v[2] *= .01F * v[0];
   return v;
 }
 
-float hyab(const Triple& a, const Triple& b) {  // Abasi, Tehran and Fairchild 2020; [LDR] equation (7)
+// Returns the HyAB distance of two CIELAB colours: the difference in lightness plus the Euclidean distance in
+// a and b (Abasi, Tehran and Fairchild 2020; [LDR] equation (7)).
+float hyab(const Triple& a, const Triple& b) {
   return std::abs(a[0] - b[0]) + std::hypot(a[1] - b[1], a[2] - b[2]);
 }
 
-// Maps a colour difference to [0, 1]: large differences are compressed into the range above kPt ([LDR]
-// equations (8), (9)).
+// Maps a colour difference to an error in [0, 1]. Large differences are compressed into the range above kPt
+// ([LDR] equations (8), (9)). `largest` is the largest possible value of difference^kQc.
 float redistributed(float difference, float largest) {
   const float e = std::pow(difference, kQc), bend = kPc * largest;
   return e < bend ? kPt / bend * e : kPt + (e - bend) / (largest - bend) * (1 - kPt);
@@ -247,22 +255,23 @@ Planes opponents(const FlipImage& image) {
   return out;
 }
 
-// Returns the colour of a pixel as it appears at the viewing distance, in CIELAB adjusted by hunt().
+// Returns the colour of pixel number `i` as it appears at the viewing distance: in CIELAB, adjusted by
+// hunt(). `filtered` is the result of contrast_filtered().
 Triple seen(const Planes& filtered, std::size_t i) {
   Triple rgb = rgb_of({filtered[0][i], filtered[1][i], filtered[2][i]});
   for (float& v : rgb) v = shown(v);
   return hunt(lab(rgb));
 }
 
-// The coefficients of the tone curve of [HDR] section 3: the fit of Narkowicz 2015 to the ACES curve,
-// including its exposure bias of 0.6.
+// Coefficients k of the tone curve (k0 v^2 + k1 v + k2) / (k3 v^2 + k4 v + k5) of [HDR] section 3. It is the
+// fit of Narkowicz 2015 to the ACES curve, with its factor of 0.6 on v included.
 constexpr float kTone[6] = {.6F * .6F * 2.51F, .6F * .03F, 0, .6F * .6F * 2.43F, .6F * .59F, .14F};
 
 float tone_mapped(float v) {
   if (!(v > 0)) return 0;
   if (!std::isfinite(v)) return 1;
-  // Larger values would overflow when they are squared. The curve is constant there, above 1, so they are
-  // limited.
+  // Limits v, since the squares of larger values would overflow. This does not change the result: for all
+  // such v the curve is above 1, and shown() makes it 1.
   v = std::min(v, 1e15F);
   return shown((kTone[0] * v * v + kTone[1] * v + kTone[2]) / (kTone[3] * v * v + kTone[4] * v + kTone[5]));
 }
@@ -308,13 +317,15 @@ FlipExposures flip_exposures(std::span<const float> rgb) {
   const auto middle = light.begin() + static_cast<std::ptrdiff_t>(light.size() / 2);
   std::nth_element(light.begin(), middle, light.end());
   const float median = *middle, most = *std::max_element(light.begin(), light.end());
-  // x is the luminance that the tone curve maps to kLevel: the larger solution of a quadratic equation.
+  // Computes x, the luminance that the tone curve maps to kLevel, the level used in [HDR]. It is the larger
+  // solution of the equation a x^2 + b x + c = 0.
   constexpr float kLevel = .85F;
   const float a = kTone[0] - kLevel * kTone[3], b = kTone[1] - kLevel * kTone[4],
               c = kTone[2] - kLevel * kTone[5];
   const float x = (-b + std::sqrt(b * b - 4 * a * c)) / (2 * a);
   FlipExposures out{std::log2(x / most), std::log2(x / median), 2};
-  constexpr int kMost = 64;  // largest number of exposures: no sensible image has a range of 64 stops
+  // Largest number of exposures, about one per stop: more than the range of any sensible image.
+  constexpr int kMost = 64;
   out.count = std::clamp(static_cast<int>(std::ceil(out.last - out.first)), 2, kMost);
   return out;
 }

@@ -1,5 +1,5 @@
-// FLIP: visibility of the difference of two images to a viewer who flips between them, from 0 (invisible) to
-// 1.
+// FLIP is an error metric: how visible the difference of two images is to a viewer who flips between them,
+// from 0 (invisible) to 1.
 //
 //   [LDR] Andersson, Nilsson, Akenine-Moeller, Oskarsson, Astrom, Fairchild 2020, "FLIP: A Difference
 //         Evaluator for Alternating Images", HPG (equations (1) to (14) there).
@@ -8,9 +8,9 @@
 //         exposures; each pixel keeps the largest of these errors; the exposures follow from the reference
 //         alone.
 //
-// Pixels are linear with Rec. 709 primaries, R, G, B interleaved, row by row. Beyond the edge the nearest
-// pixel is repeated. Values are single precision; sums have a fixed order, so that the same images give the
-// same number.
+// Pixels are linear with Rec. 709 primaries, R, G, B interleaved, row by row. Filters repeat the nearest
+// pixel beyond the edge of the image. Computations are in single precision, and sums have a fixed order, so
+// that the same images always give the same number.
 #pragma once
 
 #include <cstddef>
@@ -29,13 +29,14 @@ struct FlipImage {
   std::span<const float> rgb;
 };
 
-// Returns the error of each pixel on a display that shows `rgb`, clamped to 0..1. Both images must have the
-// same size.
+// Returns the LDR-FLIP error of each pixel. The values of `rgb` are clamped to [0, 1], as by a display. Both
+// images must have the same size.
 std::vector<float> ldr_flip(const FlipImage& reference, const FlipImage& image,
                             float pixels_per_degree = kFlipPixelsPerDegree);
 
-// The exposures of HDR-FLIP in stops ([HDR] section 4): `count` evenly spaced ones from `first`, which maps
-// the brightest pixel of the reference to 0.85, to `last`, which maps the median to 0.85.
+// The exposures of HDR-FLIP ([HDR] section 4): `count` evenly spaced values from `first` to `last`, in stops.
+// `first` is the exposure at which the tone curve maps the brightest pixel of the reference to 0.85, `last`
+// the one at which it maps the median luminance (of the pixels that are not black) to 0.85.
 struct FlipExposures {
   float first = 0, last = 0;
   int count = 2;
@@ -45,11 +46,13 @@ struct FlipExposures {
 };
 FlipExposures flip_exposures(std::span<const float> reference_rgb);
 
-// Returns the error of each pixel, the maximum over all exposures. Negative and non-finite values count as 0.
+// Returns the HDR-FLIP error of each pixel: the maximum of its LDR-FLIP errors at all exposures. Negative and
+// non-finite values in `rgb` count as 0.
 std::vector<float> hdr_flip(const FlipImage& reference, const FlipImage& image,
                             float pixels_per_degree = kFlipPixelsPerDegree);
 
-// Returns the mean over pixels, which is usually quoted as the error
+// Returns the mean over all pixels, which is usually quoted as the FLIP error of an image; 0 if there are no
+// values.
 double mean_of(std::span<const float> values);
 
 }  // namespace ls

@@ -15,7 +15,8 @@ tl::unexpected<Error> refuse(const std::string& name, std::string why) {
   return bad_argument(fmt::format("{}: {}", name, why));
 }
 
-// Returns the mean of s^2 (the squared standard error of the reference) over the eight neighbours of value i.
+// Returns the mean of s^2 (the squared standard error of the reference) over the up to eight neighbouring
+// pixels of value number i, in the same channel.
 double noise_around(const Reference& r, std::size_t i) {
   const auto width = static_cast<std::size_t>(r.size.width), height = static_cast<std::size_t>(r.size.height);
   const std::size_t channel = i % 3, x = i / 3 % width, y = i / 3 / width;
@@ -31,7 +32,7 @@ double noise_around(const Reference& r, std::size_t i) {
   return count > 0 ? sum / count : 0;
 }
 
-// Returns the weight h, which is defined in reference.h.
+// Returns the weight h (reference.h) of value number i.
 double weight(const Reference& r, std::size_t i) {
   const double value = r.rgb[i];
   if (r.error.empty()) return relative_weight(value, 0);
@@ -81,7 +82,8 @@ TrueError true_error(const Reference& reference, std::span<const float> rgb) {
   const bool known = !reference.error.empty();
   double squares = 0, relative = 0, squares_variance = 0, relative_variance = 0;
   for (std::size_t pixel = 0; pixel < rgb.size(); pixel += 3) {
-    double product = 0, weighted = 0;  // sums over the channels of |x - ref| s and of h |x - ref| s
+    // Sums over the channels of |x - ref| s and of h |x - ref| s (reference.h).
+    double product = 0, weighted = 0;
     for (std::size_t i = pixel; i < pixel + 3; ++i) {
       const double d = double{rgb[i]} - reference.rgb[i], s = known ? reference.error[i] : 0;
       const double h = weight(reference, i);

@@ -49,7 +49,7 @@ class Analyst {
   void lights();
   void files();
   void file(AssetIndex i, const std::string& use) {
-    if (i.value >= n_.files.size()) return;  // indices of unused volumes are not checked
+    if (i.value >= n_.files.size()) return;  // not a valid index; consistent scenes have none
     auto& uses = n_.files[i.value].uses;
     const auto at = std::lower_bound(uses.begin(), uses.end(), use);
     if (at == uses.end() || *at != use) uses.insert(at, use);
@@ -152,7 +152,7 @@ std::string listed(const std::map<std::string, std::uint32_t>& kinds) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-// Formats, for a message, a value that another process has sent: short, and on one line.
+// Formats a JSON value that another process has sent, for a message: on one line, truncated to 80 characters.
 std::string shown(const json& j) {
   std::string text = j.dump(-1, ' ', true, json::error_handler_t::replace);
   if (text.size() > 80) text = text.substr(0, 77) + "...";

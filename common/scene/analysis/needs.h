@@ -34,17 +34,19 @@ struct Needs {
   // through which a part of the light passes without a change of direction.
   bool boundaries = false, null_transmission = false;
   bool lens = false, crop = false;
-  // Number of objects of each type, by the type's name in describe.h. Types without objects are left out.
+  // Number of objects of each type. The key is the name of the type (describe.h). Types without objects are
+  // left out.
   std::map<std::string, std::uint32_t> shapes, materials, textures, lights, media_kinds;
   std::uint32_t area_lights = 0, instances = 0;
-  std::uint32_t compensated = 0;  // number of rough materials with multiple_scattering
+  std::uint32_t compensated = 0;  // number of rough materials whose setting multiple_scattering is on
   // True if the density of a heterogeneous medium is in a file. The file may have three channels, which makes
   // the medium chromatic; this is known only after reading it.
   bool density_files = false;
   // True if the scene has lights and none of them has an extent, so that no ray can hit one: they are
   // points, spots, projectors or directions.
   bool only_delta_lights = false;
-  std::vector<FileNeed> files;  // files in the scene's order
+  // The files that the scene needs, in the order of Scene::assets.
+  std::vector<FileNeed> files;
   bool operator==(const Needs&) const = default;
 
   // Returns the number of lights that next-event estimation samples: all but a constant environment.
@@ -56,8 +58,8 @@ struct Needs {
 Needs needs_of(const Scene& scene, bool sees_media);
 
 // Returns the needs as JSON with sorted keys and without spaces, so that equal needs give equal texts. The
-// files are left out, because the scene's digest covers them; so the text has a few hundred bytes for any
-// scene.
+// member `files` is left out, because the digest of the scene covers the files. So the text has only a few
+// hundred bytes, however large the scene is.
 std::string canonical_json(const Needs& needs);
 
 // Returns the first difference between two texts of canonical_json(), for a message, such as "lights.point: 2

@@ -63,14 +63,14 @@ class Pruner {
   void invisible();
   void files(const std::vector<Asset>& after);
 
-  const std::vector<Asset> assets_;  // the assets before pruning
+  const std::vector<Asset> assets_;  // the files of the scene before pruning
   Scene s_;
   const PrunedFor whom_;
   std::vector<LeftOut> left_out_;
   std::uint32_t blends_ = 0, masks_ = 0;
 };
 
-// Removes emission of strength 0, so that its grid is not needed.
+// Removes the emission of media whose emission_scale is 0, so that the grids of the emission are not needed.
 void Pruner::drop_dark_sources() {
   std::uint32_t dark = 0;
   for (Medium& medium : s_.media) {
@@ -92,8 +92,9 @@ std::vector<bool> Pruner::named_media() const {
   return named;
 }
 
-// Removes media without effect. A medium without effect is kept if it displaces media of lower priority where
-// it overlaps them.
+// Removes media without effect, which neither absorb nor scatter nor emit. Where media overlap, the one of
+// the highest priority displaces the others. So a medium without effect is kept if its priority is above that
+// of some medium with an effect.
 std::uint32_t Pruner::drop_idle_media() {
   const std::vector<bool> named = named_media();
   const auto idle = [&](const Medium& m) {
@@ -138,7 +139,8 @@ std::uint32_t Pruner::drop_unreachable_media() {
   return static_cast<std::uint32_t>(std::count(dropped.begin(), dropped.end(), true));
 }
 
-// Removes media, repeatedly until nothing changes: a removed medium may have been the reason to keep another.
+// Removes media. It repeats until nothing changes, because a removed medium may have been the reason to keep
+// another one.
 void Pruner::media() {
   drop_dark_sources();
   std::uint32_t dead = 0, hidden = 0;
@@ -148,7 +150,7 @@ void Pruner::media() {
     hidden += unreachable;
     more = idle + unreachable > 0;
   }
-  // Without media no surface is a boundary of media.
+  // If no media are left, no surface is a boundary of a medium.
   const std::vector<bool> named = named_media();
   if (std::none_of(named.begin(), named.end(), [](bool n) { return n; }))
     for (Shape& s : s_.shapes) s.is_medium_transition = false;
@@ -174,9 +176,9 @@ void Pruner::phases() {
   note("phase function", "its medium scatters no light", unasked);
 }
 
-// Replaces a blend or a mask whose weight or opacity is 0 or 1 everywhere by the only bsdf that has an
-// effect in it, which may again be a blend or a mask. Returns false for all other bsdfs, and leaves them
-// unchanged.
+// Simplifies a blend whose weight is 0 or 1 everywhere, or a mask whose opacity is 0 or 1 everywhere:
+// replaces it by its only part that has an effect. This part may again be a blend or a mask. Returns false
+// for all other bsdfs, which it leaves unchanged.
 bool Pruner::simplify(Bsdf& b) {
   if (const auto* blend = std::get_if<BlendBsdf>(&b)) {
     const bool first = everywhere(blend->weight, 0);
@@ -195,14 +197,15 @@ bool Pruner::simplify(Bsdf& b) {
   return false;
 }
 
-// Simplifies each bsdf as far as possible. Each step removes one level of nesting, and the depth of nesting
-// is bounded.
+// Simplifies each bsdf as far as possible. Each step removes one level of nesting, so kMaxBsdfNesting steps
+// are enough.
 void Pruner::materials() {
   for (Bsdf& b : s_.bsdfs)
     for (int step = 0; step < kMaxBsdfNesting && simplify(b); ++step) {
     }
-  // After a blend was replaced by one of its branches, a side of a two-sided material may itself be
-  // two-sided. Such a side shows the front of the inner material, whichever side it is.
+  // After a blend was replaced by one of its parts, the front or the back of a two-sided material may itself
+  // be two-sided. Both the front and the back then show the front of that inner material, so the inner
+  // two-sided material is replaced by its front.
   for (Bsdf& b : s_.bsdfs)
     if (auto* two = std::get_if<TwoSidedBsdf>(&b))
       for (BsdfIndex* side : {&two->front, &two->back})
@@ -224,7 +227,8 @@ void Pruner::lights() {
   note("light", "it is black", dark);
 }
 
-// Erases the elements for which `gone` is true, and their labels if there are any. Returns their number.
+// Erases the elements for which `gone` returns true, and their labels (`labels` is empty or has one label per
+// element). Returns the number of erased elements.
 template <class T, class Gone>
 std::uint32_t erase_labelled(std::vector<T>& all, std::vector<Label>& labels, const Gone& gone) {
   std::size_t kept = 0;
@@ -242,8 +246,8 @@ std::uint32_t erase_labelled(std::vector<T>& all, std::vector<Label>& labels, co
   return erased;
 }
 
-// Removes null surfaces that neither bound media nor emit. A group left without shapes is removed, with its
-// instances.
+// Removes surfaces that light passes unchanged (bsdf "null") if they neither bound a medium nor emit. Then
+// removes the instances of groups that have no shapes left.
 void Pruner::invisible() {
   const auto unseen = [&](const Shape& s) {
     return !whom_.passing_counts && std::holds_alternative<NullBsdf>(s_.bsdfs[s.bsdf.value]) &&

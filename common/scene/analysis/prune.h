@@ -1,9 +1,10 @@
 // Removes parts of a scene that cannot affect any pixel, before the scene is stored, sent or loaded. They are
 // dead branches of materials, lights without power, media without effect or that no light enters
-// (unreachable.h), phase functions of media that do not scatter, and invisible surfaces; also the files that
-// only these refer to. The image stays the same. Its bits stay the same too, unless one of the removed parts
-// took part in sampling: rays hit a removed surface, next-event estimation sampled a removed light, or a
-// removed medium (one that no light enters) was the reason for equi-angular sampling in the remaining media.
+// (unreachable.h), phase functions of media that do not scatter, and invisible surfaces; it also removes the
+// files that only these parts refer to. The expected value of every pixel stays the same. The bits of the
+// image stay the same too, unless one of the removed parts took part in sampling: rays hit a removed surface,
+// next-event estimation sampled a removed light, or a removed medium (one that no light enters) was the
+// reason for equi-angular sampling in the remaining media.
 #pragma once
 
 #include <string>
@@ -14,17 +15,17 @@
 
 namespace ls::scene {
 
-// A kind of removed objects, their number, and the reason.
+// Objects of one kind that were removed: what they are, why, and how many.
 struct LeftOut {
   std::string what, why;
   std::uint32_t count = 1;
-  std::uint64_t bytes = 0;  // bytes of removed files; 0 for other objects
+  std::uint64_t bytes = 0;  // size, if the object is a removed file; 0 for all other objects
   bool operator==(const LeftOut&) const = default;
 };
 
 struct Pruned {
   Scene scene;                    // the remaining scene, compacted (validate.h)
-  std::vector<LeftOut> left_out;  // removed objects, in a fixed order
+  std::vector<LeftOut> left_out;  // the removed parts, in a fixed order
 };
 
 // Properties of the integrator that pruning depends on. `media` is false for integrators that ignore media

@@ -10,7 +10,7 @@
 namespace ls::scene {
 namespace {
 
-// Returns the image of p under the inverse of t (Cramer's rule); t must be invertible.
+// Transforms the point p by the inverse of t, which is computed by Cramer's rule; t must be invertible.
 Vec3 local_point(const Transform& t, const Vec3& p) {
   const Vec3 q = minus(p, origin_of(t));
   Vec3 local;

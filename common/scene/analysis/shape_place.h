@@ -1,5 +1,5 @@
-// Bounding boxes of shapes, computed from the scene description alone. Meshes have none, since their files
-// would have to be read.
+// Bounding boxes of shapes, computed from the scene description alone. Meshes have no bounding box here,
+// since this code does not read their files.
 #pragma once
 
 #include <optional>
@@ -12,8 +12,8 @@ struct Box {  // a box parallel to the scene's axes
   Vec3 lo, hi;
   bool operator==(const Box&) const = default;
 };
-Vec3 corner(const Box& b, int k);  // k is from 0 to 7
-Box grown(Box b, double by);       // enlarged on all sides
+Vec3 corner(const Box& b, int k);  // returns corner number k, from 0 to 7
+Box grown(Box b, double by);       // returns the box enlarged by `by` on all sides
 bool touch(const Box& a, const Box& b);
 double largest_coordinate(const Box& b);
 

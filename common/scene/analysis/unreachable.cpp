@@ -18,7 +18,8 @@ Box with_margin(const Box& b, const Box& beside) {
   return grown(b, kApart * std::max(largest_coordinate(b), largest_coordinate(beside)));
 }
 
-// True if the camera and its near plane, where rays begin, are completely outside the box.
+// True if the box `tight`, with a margin, contains no point of the camera or of its near plane. Rays begin on
+// the near plane.
 bool camera_is_outside(const Sensor& s, const Box& tight) {
   const Vec3 camera = origin_of(s.to_world);
   const Box box = with_margin(tight, {camera, camera});
@@ -54,7 +55,7 @@ class Search {
  private:
   struct Entrance {
     std::size_t shape;
-    std::optional<Box> box;  // nullopt: the position is unknown
+    std::optional<Box> box;  // bounding box in the scene; nullopt: unknown
   };
   bool emits(MediumIndex m) const { return traits_of(s_.media[m.value], s_.volumes).emits; }
   static std::optional<Box> place_in_scene(const Shape& s) { return s.group ? std::nullopt : box_of(s); }
@@ -68,17 +69,18 @@ class Search {
     return traits_[s.bsdf.value].transmits && !nothing;
   }
 
-  // True if the interior is behind the shape's normals. False if the shape is mirrored, or if normals in a
-  // mesh's file may swap its sides (worker/render/geometry/geometry_build.cpp).
+  // True if the normals of the shape point away from its interior medium, as usual. False if the shape is
+  // mirrored, or if it is a mesh whose file may have normals that swap its sides
+  // (worker/render/geometry/geometry_build.cpp).
   static bool has_interior_behind(const Shape& s) {
     const auto* mesh = std::get_if<MeshShape>(&s.geometry);
     return invertible(s.to_world) && determinant3(s.to_world) > 0 && (!mesh || mesh->face_normals);
   }
 
-  // True if the shape is a sphere or cube and no light reaches the medium inside it. Light must not pass its
-  // surface, and neither the surface nor the medium may emit. No emitter and no other entrance (a surface
-  // through or from which light may come) may touch the shape or be inside it. False if flipped normals put
-  // the interior medium on the outside.
+  // True if no light reaches the medium inside the shape. All of these conditions must hold: the shape is a
+  // sphere or a cube; light does not pass its surface; neither the surface nor the medium emits; no emitter
+  // and no other entrance (a surface through or from which light may come) touches the shape or is inside it;
+  // its normals are not flipped, since flipped normals put the interior medium on the outside.
   bool sealed(const Shape& s, std::size_t i, const Box& box) {
     const bool closed =
         std::holds_alternative<SphereShape>(s.geometry) || std::holds_alternative<CubeShape>(s.geometry);
@@ -94,7 +96,7 @@ class Search {
                        [&](const Entrance& e) { return e.shape != i && e.box && apart(box, e); });
   }
 
-  // True if the entrance does not touch the shape whose box is `tight`: it is beside the shape or encloses
+  // True if the surface of the entrance `e` is apart from the box `tight`: `e` is beside the box, or encloses
   // it.
   bool apart(const Box& tight, const Entrance& e) const {
     const Box box = with_margin(tight, *e.box);

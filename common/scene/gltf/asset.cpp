@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::string_view kMagic = "glTF";
 constexpr std::size_t kHeaderBytes = 12, kChunkBytes = 8;
-constexpr double kFramesPerSecond = 24;  // the rate of a sequence of frames, unless -D fps sets another
+constexpr double kFramesPerSecond = 24;  // frame rate of a sequence, unless -D fps sets another
 constexpr std::uint32_t kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
 
 std::uint32_t word(std::string_view bytes, std::size_t at) {
@@ -28,13 +28,14 @@ std::uint32_t word(std::string_view bytes, std::size_t at) {
   return x;
 }
 
-// The parts of a file: its JSON and, in a .glb, the binary chunk behind it.
+// The parts of a glTF file: the JSON text and, in a .glb file, the binary chunk that follows it (nullopt:
+// none).
 struct Pieces {
   std::string_view json;
   std::optional<std::string_view> chunk;
 };
 
-// Returns the parts. Error: a message about the fault of the file.
+// Splits a file into its parts. On error, returns a message that describes what is wrong with the file.
 tl::expected<Pieces, std::string> taken_apart(std::string_view file) {
   if (!file.starts_with(kMagic)) return Pieces{file, std::nullopt};
   if (file.size() < kHeaderBytes + kChunkBytes)
@@ -58,21 +59,24 @@ tl::expected<Pieces, std::string> taken_apart(std::string_view file) {
     if (is_first != (kind == kJsonChunk))
       return tl::unexpected(fmt::format("the first chunk of a .glb, and no other, is JSON"));
     if (is_first)
-      pieces.json = content.substr(0, content.find_last_not_of('\0') + 1);  // some writers pad it with zeros
+      // Some programs pad the JSON with zero bytes, which are removed here.
+      pieces.json = content.substr(0, content.find_last_not_of('\0') + 1);
     if (kind == kBinaryChunk && !pieces.chunk) pieces.chunk = content;
     at += kChunkBytes + bytes;
   }
   return pieces;
 }
 
-// The options that -D of the command line, or the defines of a job, set.
+// Options for reading a glTF file. They are set by -D NAME=VALUE on the command line or by the `defines` of a
+// job.
 struct Choices {
   std::string camera;
   std::optional<double> environment;
   Moment moment;
 };
 
-// Parses the value of an option -D, a number in [least, most].
+// Parses the value of an option -D that must be a number in [least, most]. For any other value, reports an
+// error and returns `least`.
 double number_of(const std::string& name, const std::string& value, double least, double most,
                  const Item& root) {
   if (const auto x = ls::parse_number<double>(value); x && *x >= least && *x <= most) return *x;

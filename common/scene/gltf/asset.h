@@ -1,5 +1,5 @@
-// Reads a file of glTF 2.0 and translates it to a Document in Mitsuba's format, the common form of all
-// readers.
+// Reads a file of glTF 2.0 and translates it to a Document, a tree of elements in Mitsuba's format. The
+// readers of all scene formats produce such a tree.
 #pragma once
 
 #include <string>
@@ -9,10 +9,11 @@
 
 namespace ls::scene::gltf {
 
-bool is_gltf(std::string_view file_name);  // by its ending, .gltf or .glb
-std::string too_large(std::size_t bytes);  // message for a file that is too large
+bool is_gltf(std::string_view file_name);  // true if the name ends in .gltf or .glb
+// Returns the error message for a file of `bytes` bytes, which is too large.
+std::string too_large(std::size_t bytes);
 
-// nullopt: the file cannot be read, which has been reported.
+// Translates the text (content) of a file. nullopt: the file cannot be read; the reason is in `report`.
 std::optional<Document> load_document(std::string_view file_name, std::string_view text, AssetSource& assets,
                                       const ReadOptions& options, Report& report);
 

@@ -75,7 +75,7 @@ std::optional<Uri> read_uri(const Item& uri) {
 
 namespace {
 
-// Largest length, offset and count in a file, by glTF's limit of 32 bits.
+// Largest length, offset or count that is accepted; in glTF they have at most 32 bits.
 constexpr std::size_t kMost = (std::size_t{1} << 32) - 1;
 
 struct Component {
@@ -94,7 +94,8 @@ Stored stored(const char* at) {
   return x;
 }
 
-// Returns the value of a component. A normalised integer is divided by the largest value of its type.
+// Reads a component (one number of an element) at `at`. `code` is the componentType of glTF. If `normalised`,
+// an integer is divided by the largest value of its type.
 double component(const char* at, std::size_t code, bool normalised) {
   const auto scaled = [&](double x, double most) { return normalised ? std::max(x / most, -1.) : x; };
   switch (code) {
@@ -115,11 +116,15 @@ double component(const char* at, std::size_t code, bool normalised) {
 
 }  // namespace
 
-// The position of an accessor's elements in a buffer, and their type.
+// The type of the elements of an accessor, and their position in a buffer: the component type of glTF
+// (`code`), the bytes of a component (`bytes`), the components per element (`width`), the number of elements
+// (`count`), and the bytes from one element to the next (`stride`).
 struct Buffers::Layout {
   std::size_t code = kFloat, bytes = 4, width = 1, count = 0, stride = 0;
   bool normalised = false;
-  std::string_view data;  // empty: all elements are 0
+  // The bytes of the buffer view from the first element on. Empty: there is no buffer view, and all elements
+  // are 0.
+  std::string_view data;
   std::size_t element() const { return bytes * width; }
 };
 
@@ -176,9 +181,10 @@ std::optional<std::string_view> Buffers::view(const Item& index) {
                                  offset + length, bytes->size()));
 }
 
-// Returns where the `count` elements of `owner` (an accessor, or a part of a sparse one) are in its buffer
-// view. `like` gives their type. If `strided`, the buffer view may set the distance between elements
-// (byteStride). nullopt: the view is wrong, or too short for the elements, which has been reported.
+// Returns the layout of `count` elements in the buffer view of `owner`, which is an accessor, or the indices
+// or values of a sparse accessor. The type of the elements is taken from `like`. If `strided`, the distance
+// between elements is the byteStride of the buffer view, if it has one. nullopt: the buffer view is wrong or
+// too short for the elements; an error has been reported.
 std::optional<Buffers::Layout> Buffers::layout_in(const Item& owner, Layout like, std::size_t count,
                                                   bool strided) {
   const auto bytes = view(owner["bufferView"]);

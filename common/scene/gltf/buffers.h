@@ -15,16 +15,17 @@
 
 namespace ls::scene::gltf {
 
-// A "uri": the name of a file beside the glTF file, or a data URI, which contains the bytes.
+// The value of a "uri" in a glTF file: the name of a file beside the glTF file, or a data URI, which contains
+// the data itself.
 struct Uri {
   bool is_data = false;
-  std::string text;  // the bytes of a data URI; otherwise the name of the file
+  std::string text;  // if is_data: the decoded bytes of the data URI; otherwise the name of the file
 };
 
-// nullopt: the text is neither, which has been reported.
+// Parses a "uri". nullopt: it is neither a valid file name nor a valid data URI; an error has been reported.
 std::optional<Uri> read_uri(const Item& uri);
 
-// The numbers of an accessor, `width` of them for each element.
+// The numbers of an accessor, which is a list of elements (such as vectors) of `width` numbers each.
 template <class T>
 struct Numbers {
   std::size_t width = 1;
@@ -38,9 +39,9 @@ class Buffers {
   Buffers(const Item& root, AssetSource& assets, std::optional<std::string_view> chunk)
       : root_(root), assets_(assets), chunk_(chunk) {}
 
-  // Each reads from the buffers. nullopt: bytes are missing or have another type, which has been reported.
-  // `view` is the index of a buffer view, `accessor` that of an accessor; `types` lists the accepted types,
-  // such as "VEC3".
+  // These functions read from the buffers. `view` is the index of a buffer view, `accessor` the index of an
+  // accessor, both as items of the JSON. `types` lists the accepted types of elements, such as "VEC3".
+  // nullopt: bytes are missing, or the elements have another type; an error has been reported.
   std::optional<std::string_view> view(const Item& view);
   std::optional<Numbers<float>> floats(const Item& accessor, std::initializer_list<std::string_view> types);
   std::optional<std::vector<std::uint32_t>> indices(const Item& accessor);
@@ -58,7 +59,9 @@ class Buffers {
   Item root_;
   AssetSource& assets_;
   std::optional<std::string_view> chunk_;
-  std::map<const Value*, std::optional<std::string>> read_;  // the buffers read so far, by their JSON values
+  // The content of the buffers read so far. The key is the JSON value of the buffer. nullopt: the buffer
+  // could not be read.
+  std::map<const Value*, std::optional<std::string>> read_;
   std::size_t total_bytes_ = 0, empty_elements_ = 0, read_numbers_ = 0;
 };
 

@@ -1,4 +1,4 @@
-// The camera, the film and the integrator.
+// Translates the camera of a glTF file, and adds a film and an integrator, which glTF does not have.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,14 +12,16 @@
 namespace ls::scene::gltf {
 namespace {
 
-constexpr int kHeight = 720, kWidth = 1280;  // pixels; glTF does not specify the frame's size
+// Size of the image in pixels, which glTF does not specify. A camera with an aspect ratio changes the width.
+constexpr int kHeight = 720, kWidth = 1280;
 constexpr int kSamples = 64;
-constexpr double kFarthest = 1e7;  // far clip plane of a camera without zfar
-// A scene without cameras gets one that frames the bounding sphere of its meshes. kFrom is the direction from
-// the sphere's centre to this camera: in front, to the right and above.
+constexpr double kFarthest = 1e7;  // distance of the far clip plane of a camera without zfar
+// A scene without cameras gets one that shows the whole bounding sphere of its meshes. kFrom is the direction
+// from the centre of the sphere to this camera: in front (+z), to the right (+x) and above (+y).
 constexpr Vec3 kFrom{{{.5, .35, 1}}};
-constexpr double kFov = 40;       // degrees, along the shorter side
-constexpr double kMargin = 1.05;  // factor on the distance from which the sphere just fits the frame
+constexpr double kFov = 40;  // field of view of this camera in degrees, along the shorter side of the image
+// Distance of this camera from the centre, relative to the distance at which the sphere just fits the image.
+constexpr double kMargin = 1.05;
 
 std::string name_of(const Translation& t, const Standing& camera) {
   const std::string own = camera.node["camera"].in(t.root["cameras"])["name"].text("");
@@ -100,7 +102,8 @@ class CameraTranslator {
     add(out, "far_clip", lens["zfar"].number(kFarthest), out.at);
   }
 
-  // Our orthographic camera covers [-1, 1] across the frame's width, so its transform is scaled by xmag.
+  // Translates an orthographic camera. In Mitsuba's format it covers [-1, 1] across the width of the image;
+  // in glTF xmag is half the width. So the transform is scaled by xmag.
   Element orthographic(const Item& lens, const Transform& to_world, const Span& at) {
     const double x = std::abs(lens["xmag"].number(0)), y = std::abs(lens["ymag"].number(0));
     Element out = made("sensor", "orthographic", at);

@@ -1,4 +1,4 @@
-// Lights that have no surface (KHR_lights_punctual).
+// Translates lights that have no surface: the directional, point and spot lights of KHR_lights_punctual.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 namespace ls::scene::gltf {
 namespace {
 
-// Adds the two angles of a spot light, measured from its axis: full intensity within innerConeAngle, no
-// light beyond outerConeAngle.
+// Adds the two angles of a spot light to `out`. Both are measured from the axis: the intensity is full within
+// innerConeAngle and 0 beyond outerConeAngle.
 void add_cone(Translation& t, const Item& spot, Element& out) {
   const double outer = spot["outerConeAngle"].number(std::numbers::pi / 4);
   const double inner = spot["innerConeAngle"].number(0);
@@ -27,8 +27,8 @@ void add_cone(Translation& t, const Item& spot, Element& out) {
 
 }  // namespace
 
-// glTF gives directional lights in lux (irradiance) and other lights in candela (intensity). The numbers are
-// used unchanged.
+// Translates a light. In glTF the value of a directional light is an illuminance in lux, that of other lights
+// an intensity in candela. The numbers are used unchanged as irradiance and as radiant intensity.
 void add_light(Translation& t, const Standing& light) {
   const Item index = light.node.extension("KHR_lights_punctual")["light"];
   if (!index.given()) return light.node.error("KHR_lights_punctual needs the index of a light");

@@ -1,5 +1,6 @@
-// Materials. The choice of bsdfs is that of the Blender add-on for a Principled BSDF (blender/lightshaft/
-// materials.py), so that a scene renders alike as glTF and through the add-on.
+// Translates materials. The bsdfs are chosen as in our Blender add-on for a Principled BSDF (file
+// blender/lightshaft/materials.py), so that a scene looks the same whether it comes as glTF or through the
+// add-on.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,9 +11,10 @@
 namespace ls::scene::gltf {
 namespace {
 
-// Below this alpha a surface is smooth, as in the add-on.
+// A surface whose roughness alpha is below this is treated as perfectly smooth, as in the add-on.
 constexpr double kSmooth = 1e-3;
-// Lower bound of attenuationColor: for a transmittance of 0 the extinction would be infinite.
+// Lower bound of the components of attenuationColor, since for a transmittance of 0 the extinction would be
+// infinite.
 constexpr double kLeastPassed = 1e-6;
 
 Element two_sided(Element inner, const Span& at) {
@@ -61,8 +63,9 @@ class MaterialTranslator {
     read_specular();
   }
 
-  // Computes seen_ior_, the index of refraction whose reflectance at normal incidence is that of ior_ times
-  // specularFactor and the largest component of specularColorFactor, at most 0.99.
+  // Computes seen_ior_ from ior_ and KHR_materials_specular. Its reflectance at normal incidence is the one
+  // of ior_, multiplied by specularFactor and by the largest component of specularColorFactor, and at most
+  // 0.99.
   void read_specular() {
     const Item specular = m_.extension("KHR_materials_specular");
     for (const char* name : {"specularTexture", "specularColorTexture"})
@@ -77,10 +80,11 @@ class MaterialTranslator {
     seen_ior_ = factor == 1 ? ior_ : std::max((1 + std::sqrt(f0)) / (1 - std::sqrt(f0)), 1.001);
   }
 
-  // True if the glass is a solid body, not a thin sheet.
+  // True if the transmitting material is the surface of a solid body; false if it is a thin sheet.
   bool has_volume() const { return m_.extension("KHR_materials_volume")["thicknessFactor"].number(0) > 0; }
 
-  // An unlit material (KHR_materials_unlit) emits its colour and reflects nothing.
+  // Returns the bsdf of an unlit material (KHR_materials_unlit), which reflects nothing, and makes the
+  // surface emit the base colour.
   Element unlit(Material& out) {
     out.light = shining(base_);
     Element black = made("bsdf", "diffuse", at_);
@@ -128,7 +132,8 @@ class MaterialTranslator {
     return out;
   }
 
-  // Adds a clear coat. The coat of Burley's model has an alpha from 0.1 (gloss 0) to 0.001 (gloss 1).
+  // Adds a clear coat to a "principled" bsdf (Burley's model), whose coat has a roughness alpha from 0.1
+  // (clearcoat_gloss 0) to 0.001 (clearcoat_gloss 1).
   void add_coat(Element& out) {
     const Item coat = m_.extension("KHR_materials_clearcoat");
     const double roughness = coat["clearcoatRoughnessFactor"].number(0), alpha = roughness * roughness;
@@ -140,7 +145,8 @@ class MaterialTranslator {
       if (coat[name].given()) t_.warn_once(coat[name], fmt::format("{} has no effect here", name));
   }
 
-  // Returns the surface of a solid body of glass, and adds the medium inside the body.
+  // Returns the bsdf of the surface of a solid body of glass, and adds the medium inside the body to the
+  // scene.
   Element body(Material& out) {
     out.interior = interior();
     const bool plain =
@@ -151,8 +157,8 @@ class MaterialTranslator {
     Element glass = made("bsdf", smooth ? "dielectric" : "roughdielectric", at_);
     add(glass, "int_ior", ior_, at_);
     add(glass, "ext_ior", 1., at_);
-    // A ray through a body crosses its surface twice, so each crossing multiplies by the square root of the
-    // colour.
+    // Light that passes through a body crosses its surface twice. So each crossing multiplies it by the
+    // square root of the base colour, and both together by the base colour.
     Rgb passed{};
     for (std::size_t i = 0; i < 3; ++i) passed[i] = std::sqrt(std::max(base_.factor[i], 0.));
     add(glass, "specular_transmittance", passed, at_);
@@ -164,8 +170,8 @@ class MaterialTranslator {
     return glass;
   }
 
-  // Adds the absorbing medium whose transmittance over attenuationDistance is attenuationColor. Returns its
-  // id; empty: it absorbs nothing.
+  // Adds the absorbing medium inside a body. Its transmittance over attenuationDistance is attenuationColor.
+  // Returns the id of the medium; empty: it would absorb nothing, so none was added.
   std::string interior() {
     const Item volume = m_.extension("KHR_materials_volume");
     const auto colour = volume["attenuationColor"].numbers<3>({1, 1, 1});
@@ -187,7 +193,8 @@ class MaterialTranslator {
     return id;
   }
 
-  // A transmitting surface without a volume is a thin sheet. Metal does not transmit.
+  // Returns the bsdf of a transmitting surface without a volume, which is a thin sheet of glass. Its metallic
+  // part is opaque.
   Element sheet(Material& out) {
     if (!coat_.is(0) && transmission_.is(1))
       t_.warn_once(m_.extension("KHR_materials_clearcoat"), "a clear coat has no effect on a sheet of glass");
@@ -276,7 +283,8 @@ class MaterialTranslator {
   double ior_ = 1.5, seen_ior_ = 1.5;
 };
 
-// Returns the textures of a material that this reader uses; some may be missing.
+// Returns all textures of the material that this reader uses. An item is not given (Item::given()) if the
+// material lacks that texture.
 std::vector<Item> textures_of(const Item& m) {
   const Item pbr = m["pbrMetallicRoughness"];
   return {pbr["baseColorTexture"],

@@ -1,4 +1,5 @@
-// Meshes: files of triangles, and the shapes and instances that show them.
+// Translates meshes: writes their triangles to mesh files, and adds the shapes and instances that use these
+// files to the scene.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,7 +16,9 @@ namespace {
 
 constexpr std::size_t kTriangles = 4, kStrip = 5, kFan = 6;
 
-// Returns the corner indices of all triangles. In a strip, every second triangle has the opposite winding.
+// Returns the vertex indices of all triangles, three for each. `order` are the indices of the primitive,
+// `mode` says how they form triangles (list, strip or fan). In a strip, two indices of every second triangle
+// are swapped, so that all triangles have the same winding.
 std::vector<std::uint32_t> triangles(const std::vector<std::uint32_t>& order, std::size_t mode) {
   std::vector<std::uint32_t> out;
   const std::size_t count =
@@ -31,7 +34,8 @@ std::vector<std::uint32_t> triangles(const std::vector<std::uint32_t>& order, st
   return out;
 }
 
-// True if some triangle is mirrored in texture space: its winding there is the opposite of that in space.
+// True if some triangle is mirrored in texture space, that is if its winding by texture coordinates is the
+// opposite of its winding in space.
 bool has_mirrored_uvs(const MadeMesh& mesh) {
   for (std::size_t i = 0; !mesh.uvs.empty() && i < mesh.indices.size(); i += 3) {
     const auto at = [&](std::size_t k, std::size_t axis) {
@@ -39,7 +43,8 @@ bool has_mirrored_uvs(const MadeMesh& mesh) {
     };
     const double area =
         (at(1, 0) - at(0, 0)) * (at(2, 1) - at(0, 1)) - (at(2, 0) - at(0, 0)) * (at(1, 1) - at(0, 1));
-    if (area > 0) return true;  // v points down, so the area of a triangle that is not mirrored is negative
+    // In glTF v points down. So the signed area of a triangle that is not mirrored is negative.
+    if (area > 0) return true;
   }
   return false;
 }
@@ -171,7 +176,8 @@ Element Meshes::shape(const Surface& s) {
   return out;
 }
 
-// Meshes that emit light cannot be instanced, so they are added once for each use.
+// Adds the meshes for all their uses. A mesh with several uses becomes a group with instances. But surfaces
+// that emit light cannot be instanced, so they are added once for each use.
 void Meshes::add(const std::vector<Use>& uses) {
   using Form = std::tuple<const Value*, const std::vector<double>*, const std::vector<Transform>*>;
   const auto form_of = [](const Use& use) { return Form{use.mesh.identity(), use.weights, use.joints}; };
@@ -191,7 +197,8 @@ void Meshes::add(const std::vector<Use>& uses) {
     const auto placed = [&](const Surface& s, const Use& use) {
       Element e = shape(s);
       place(e, use.to_world, s.at);
-      // A mirroring transform reverses the winding of triangles. In glTF their front stays the front.
+      // A mirroring transform reverses the winding of the triangles, and so would swap front and back. In
+      // glTF the front stays the front, so the normals are flipped.
       if (determinant3(use.to_world) < 0) scene::add(e, "boolean", "flip_normals", "true", s.at);
       if (s.material.light) scene::add(e, *s.material.light);
       t_.add(std::move(e));

@@ -23,8 +23,8 @@ Values turned(const Values& a, Values b, double s) {
   if (cosine < 0)
     for (double& x : b) x = -x;
   const double angle = std::acos(std::min(std::abs(cosine), 1.)), sine = std::sin(angle);
-  // For quaternions that are nearly equal, the difference of linear interpolation from slerp is below the
-  // rounding of a double.
+  // If the quaternions are nearly equal, they are interpolated linearly. The difference from slerp is then
+  // smaller than the rounding error of a double.
   const double of_a = sine > 1e-6 ? std::sin((1 - s) * angle) / sine : 1 - s,
                of_b = sine > 1e-6 ? std::sin(s * angle) / sine : s;
   for (std::size_t i = 0; i < 4; ++i) b[i] = of_a * a[i] + of_b * b[i];
@@ -35,15 +35,16 @@ class Sampler {
  public:
   Sampler(Translation& t, double seconds) : t_(t), seconds_(seconds) {}
 
-  // Returns the value of a sampler, an item of an animation's "samplers", at the moment. All nodes that the
-  // sampler animates share this value. `is_rotation`: the value is a quaternion. Empty: the sampler is wrong,
-  // which has been reported.
+  // Returns the value of `sampler`, an item of an animation's "samplers", at the time `seconds_`. All nodes
+  // that the sampler animates share this value. `is_rotation`: the value is a quaternion. The result is empty
+  // if the sampler is wrong; an error has been reported.
   std::shared_ptr<const Values> at(const Item& sampler, bool is_rotation) {
     const auto [known, is_new] = known_.try_emplace({sampler.identity(), is_rotation});
     if (!is_new) return known->second;
     Values values = read(sampler, is_rotation);
     numbers_ += values.size();
-    // The values of the file's JSON have the same limit.
+    // The number of animated values is limited, as is the number of values in the JSON of the file, by
+    // kMaxGltfValues.
     if (numbers_ > kMaxGltfValues)
       values = wrong(sampler, fmt::format("animations give more than {} numbers at a time: split the scene",
                                           kMaxGltfValues));
@@ -87,7 +88,8 @@ class Sampler {
     const double s = (seconds_ - from) / step;
     if (way == "STEP") return part(next - 1, 0);
     if (is_cubic) {
-      // Cubic Hermite spline; its tangents are per second.
+      // Evaluates a cubic Hermite spline. Its tangents are per second, so they are multiplied by the seconds
+      // between the keys (`step`).
       const Values a = part(next - 1, 1), leaving = part(next - 1, 2), arriving = part(next, 0);
       Values b = part(next, 1);
       const double s2 = s * s, s3 = s2 * s;
@@ -111,10 +113,11 @@ class Sampler {
   Translation& t_;
   const double seconds_;
   std::map<std::pair<const Value*, bool>, std::shared_ptr<const Values>> known_;
-  std::size_t numbers_ = 0;  // number of all numbers in known_
+  std::size_t numbers_ = 0;  // how many numbers the values in known_ have together
 };
 
-// Returns the animations that `-D animation` chooses.
+// Returns the animations to apply: those that the option `-D animation` chooses, or else the first one if a
+// time is given.
 std::vector<Item> chosen_of(const Translation& t, const Moment& moment) {
   const std::vector<Item> all = t.root["animations"].list();
   if (all.empty()) {
@@ -162,7 +165,7 @@ Poses read_poses(Translation& t, const Moment& moment) {
     for (const Item& channel : animation["channels"].list()) {
       if (t.report.full()) return out;
       const Item target = channel["target"], node = target["node"].in(t.root["nodes"]);
-      if (!node.given()) continue;  // the channel animates an extension's target, not a node
+      if (!node.given()) continue;  // The channel animates no node, but something that an extension defines.
       const Item sampler = channel["sampler"].in(animation["samplers"]);
       if (!sampler.given()) {
         if (!channel["sampler"].given()) channel.error("a channel needs its sampler");
@@ -205,9 +208,10 @@ void put_unit(float* out, const Vec3& v) {
   for (std::size_t k = 0; k < 3; ++k) out[k] = static_cast<float>(length > 0 ? v[k] / length : v[k]);
 }
 
-// Transforms the normal n by m, and normalises it. A normal transforms by the inverse transpose of m's linear
-// part. This is the cofactor matrix, whose columns are cross products of the linear part's columns, divided
-// by the determinant. Of the determinant only the sign is applied, since the result is normalised.
+// Transforms the normal n by m, and normalises it. A normal transforms by the inverse transpose of the linear
+// part of m. This matrix is the cofactor matrix divided by the determinant. The columns of the cofactor
+// matrix are cross products of the columns of the linear part. Only the sign of the determinant is applied,
+// since the result is normalised anyway.
 void turn_normal(const Transform& m, float* n) {
   const auto column = [&](std::size_t i) { return Vec3{{m.m[i], m.m[4 + i], m.m[8 + i]}}; };
   const Vec3 x = column(0), y = column(1), z = column(2);
@@ -248,7 +252,8 @@ bool add_targets(Translation& t, const Item& primitive, const std::vector<double
 
 bool add_skin(Translation& t, const Item& primitive, const std::vector<Transform>& joints, MadeMesh& mesh) {
   const Item attributes = primitive["attributes"];
-  std::vector<std::pair<std::vector<float>, std::vector<float>>> sets;  // four joints and weights per corner
+  // For each set of joints: four joint indices and four weights per vertex.
+  std::vector<std::pair<std::vector<float>, std::vector<float>>> sets;
   for (;;) {
     const Item which = attributes[fmt::format("JOINTS_{}", sets.size())],
                shares = attributes[fmt::format("WEIGHTS_{}", sets.size())];
@@ -286,7 +291,7 @@ bool add_skin(Translation& t, const Item& primitive, const std::vector<Transform
         const Transform& joint = joints[static_cast<std::size_t>(index[k])];
         for (std::size_t e = 0; e < 16; ++e) blended.m[e] += double{weight[k]} * joint.m[e];
       }
-    if (total == 0) continue;  // no joint moves this corner
+    if (total == 0) continue;  // No joint moves this vertex.
     for (double& x : blended.m) x /= total;
     mirrored[i] = determinant3(blended) < 0;
     float* p = &mesh.positions[3 * i];

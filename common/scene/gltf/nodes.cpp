@@ -1,4 +1,5 @@
-// The hierarchy of nodes.
+// Walks the hierarchy of a glTF file's nodes. Collects the uses of meshes, the cameras and the lights, each
+// with its transform to the world.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -43,8 +44,8 @@ class NodeReader {
     return {};
   }
 
-  // `hidden`: an ancestor is invisible (KHR_node_visibility), so this node is invisible too. It still gets
-  // its transform, since it may be a joint of a visible mesh.
+  // `hidden`: an ancestor is invisible (KHR_node_visibility), so this node is invisible too. The transform of
+  // an invisible node is recorded all the same, since the node may be a joint of a visible mesh.
   void visit(const Item& index, const Transform& outer, std::size_t depth, bool hidden) {
     const Item node = index.in(nodes_);
     if (!node.given() || t_.report.full()) return;
@@ -77,7 +78,8 @@ class NodeReader {
     Meshes::Use use{mesh, node, to_world, weights_of(mesh, node)};
     const Item instancing = node.extension("EXT_mesh_gpu_instancing");
     if (node["skin"].given()) {
-      // A skin places each corner in the world, and ignores the transform of the node itself.
+      // The joints of the skin alone place the vertices in the world. The transform of the mesh's own node
+      // has no effect.
       use.to_world = {};
       stage_.meshes.push_back(use);
     } else if (instancing.given()) {
@@ -131,8 +133,8 @@ class NodeReader {
     return found == poses_.end() ? kStill : found->second;
   }
 
-  // Returns the weights of morph targets. nullptr: there are no targets, all weights are 0, or their number
-  // is wrong, which has been reported.
+  // Returns the weights of the mesh's morph targets. nullptr: no weights are given, all are 0, or their
+  // number is wrong, which has been reported.
   const std::vector<double>* weights_of(const Item& mesh, const Item& node) {
     const auto& moved = pose_of(node).weights;
     const Item given = node["weights"].given() ? node["weights"] : mesh["weights"];
@@ -203,9 +205,11 @@ class NodeReader {
   Translation& t_;
   const Poses& poses_;
   const Item nodes_;
-  std::map<const Value*, Transform> to_world_;                 // of the scene's nodes
-  std::map<const void*, const std::vector<double>*> weights_;  // by source: a list, or an animation's sampler
-  std::map<const Value*, std::size_t> targets_;                // of meshes
+  std::map<const Value*, Transform> to_world_;  // transform of each node of the scene
+  // Weights of morph targets that were read so far; nullptr: all are 0. The key is their source: the member
+  // "weights" of a node or mesh, or the list in a Pose.
+  std::map<const void*, const std::vector<double>*> weights_;
+  std::map<const Value*, std::size_t> targets_;  // number of morph targets of each mesh
   Stage stage_;
   std::vector<Item> top_;
   std::set<const Value*> visited_;

@@ -1,4 +1,4 @@
-// Transforms of nodes, cameras and lights.
+// Computes the transforms of nodes, cameras and lights.
 #include <algorithm>
 #include <cmath>
 
@@ -8,7 +8,9 @@
 namespace ls::scene::gltf {
 namespace {
 
-// Returns the transform of a camera at `at` that looks along `along`. Our cameras have +x on the left.
+// Returns the transform to the world of a camera at the point `at` that looks in the direction `along`. As in
+// Mitsuba, +x of a camera points to the left of its image. nullopt: `along` or `up` is 0, or they are
+// parallel.
 std::optional<Transform> upright(const Vec3& at, const Vec3& along, const Vec3& up) {
   const auto ahead = unit(along);
   const auto left = ahead ? unit(cross(up, *ahead)) : std::nullopt;
@@ -18,7 +20,8 @@ std::optional<Transform> upright(const Vec3& at, const Vec3& along, const Vec3& 
 
 }  // namespace
 
-// The rotation is a quaternion x, y, z, w of any length but 0.
+// Returns the transform that scales, then rotates, then moves by `move`. `rotation`: a quaternion x, y, z, w
+// of any length but 0.
 Transform composed(const Vec3& move, const std::array<double, 4>& rotation, const Vec3& scale) {
   auto [x, y, z, w] = rotation;
   const double length = std::sqrt(x * x + y * y + z * z + w * w);
@@ -40,7 +43,9 @@ Transform matrix_of(const std::array<double, 16>& by_columns) {
   return out;
 }
 
-// A node has either a matrix, or a translation, a rotation and a scale, which animations change.
+// Returns the transform of a node relative to its parent. It is the node's matrix if it has one. Otherwise it
+// is composed of the node's translation, rotation and scale; `pose` has the values that an animation puts in
+// place of these.
 Transform local_transform(const Item& node, const Pose& pose) {
   if (node["matrix"].given())
     return matrix_of(node["matrix"].numbers<16>({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}));

@@ -9,9 +9,12 @@ namespace ls::scene::gltf {
 
 enum class Use { read, ignored, refused };
 struct Row {
-  std::string_view where, name;  // the object and its member; for an extension "" and its name
+  // `where`: an object of glTF; `name`: a member of it. For an extension `where` is "", and `name` is the
+  // name of the extension.
+  std::string_view where, name;
   Use use;
-  std::string_view meaning;  // how it is translated; if it is not, the reason and what to do
+  // How the member or extension is translated; if it is not translated, why not, and what to do instead.
+  std::string_view meaning;
 };
 
 std::span<const Row> objects();

@@ -1,4 +1,4 @@
-// Textures, and factors times textures.
+// Translates textures, and values that are the product of a factor and textures.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,7 +15,8 @@ namespace {
 
 constexpr std::string_view kPng = "\x89PNG", kJpeg = "\xff\xd8\xff";
 
-// Returns the file name extension for these bytes; empty: they are not an image of a supported format.
+// Returns the file name extension for an image file with these bytes. Empty: they are neither a PNG nor a
+// JPEG file.
 std::string_view ending_of(std::string_view bytes) {
   return bytes.starts_with(kPng) ? ".png" : bytes.starts_with(kJpeg) ? ".jpg" : "";
 }
@@ -84,7 +85,8 @@ void add_sampler(Translation& t, const Item& sampler, Element& out) {
   if (sampler["magFilter"].number(9729) == 9728) add(out, "string", "filter_type", "nearest", out.at);
 }
 
-// KHR_texture_transform: scales, rotates counter-clockwise (v points down), then translates.
+// Adds the transform of (u, v) that the extension KHR_texture_transform gives: it scales, then rotates
+// counter-clockwise (as seen with v pointing down), then translates.
 void add_to_uv(const Item& transform, Element& out) {
   if (!transform.given()) return;
   const auto move = transform["offset"].numbers<2>({0, 0}), scale = transform["scale"].numbers<2>({1, 1});
@@ -147,7 +149,9 @@ Source colour_source(Translation& t, const std::array<double, 3>& factor, const 
   return out;
 }
 
-// Several images, or an image and a factor, become nested textures "product"; the last image is innermost.
+// A product of several images, or of images and a factor, becomes nested textures "product" of two members
+// each. From the outermost to the innermost their members are the factor (if it is not 1), then the images
+// from the last to the first.
 void give(Element& parent, std::string_view name, const Source& source, const Span& at, double threshold) {
   if (source.is_constant()) {
     const Rgb& c = source.factor;

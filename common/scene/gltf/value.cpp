@@ -12,7 +12,7 @@
 namespace ls::scene::gltf {
 namespace {
 
-// An input iterator that records how far the parser has read.
+// An input iterator over the JSON text. It stores the position up to which the parser has read in *reached.
 class Reading {
  public:
   using iterator_category = std::input_iterator_tag;
@@ -35,7 +35,7 @@ class Reading {
   const char** reached_;
 };
 
-// Builds the tree from the events of nlohmann's parser, and stops the parser at the limits.
+// Builds the tree from the events of nlohmann's parser, and stops the parser at the limits of limits.h.
 class Builder {
  public:
   Builder(const char* begin, const char* const* reached) : begin_(begin), reached_(reached) {}
@@ -67,7 +67,7 @@ class Builder {
  private:
   struct Open {
     Value value;
-    std::string name;  // of the member whose value comes next
+    std::string name;  // name of the member whose value is parsed next
     std::size_t named_at = 0;
   };
 

@@ -19,8 +19,9 @@ namespace ls::scene::gltf {
 struct Member;
 struct Value {
   using List = std::vector<Value>;
-  using Members = std::vector<Member>;  // sorted by name, for binary search: a file may have a million
-  std::size_t offset = 0;               // place in the text; for a member of an object, the place of its name
+  // Members of an object, sorted by name for binary search, since there may be a million.
+  using Members = std::vector<Member>;
+  std::size_t offset = 0;  // place in the text; for a member of an object, the place of its name
   std::variant<std::monostate, bool, double, std::string, List, Members> is;
 };
 struct Member {
@@ -44,7 +45,8 @@ class Item {
   Item(const Value& value, Report& report) : value_(&value), near_(&value), report_(&report) {}
 
   bool given() const { return value_ != nullptr; }
-  // Returns a member of an object; a value that is not given has members that are not given.
+  // Returns the member of that name. It is not given if the object lacks it, or if this value is itself not
+  // given.
   Item operator[](std::string_view name) const;
   Item extension(std::string_view name) const { return (*this)["extensions"][name]; }
   std::vector<Item> list() const;  // the values of a list
@@ -61,8 +63,8 @@ class Item {
   // Returns a whole number from `least` to `most`. nullopt: it is not given, or it is wrong, which is
   // reported.
   std::optional<std::size_t> whole(std::size_t least, std::size_t most) const;
-  // Returns the value in the list `all` that this value is the index of. If this value is not given, neither
-  // is the result.
+  // Returns the value of the list `all` whose index is this value. The result is not given if this value is
+  // not given, or if it is no valid index, which is reported.
   Item in(const Item& all) const;
 
   Span at() const { return {0, near_->offset, 1}; }
@@ -78,7 +80,9 @@ class Item {
   void read_numbers(std::vector<double>& all) const;
 
   const Value* value_;
-  const Value* near_;  // for at(): the value, or the nearest object or list around the missing value
+  // The value whose place at() returns: this value, or if it is missing, the nearest object or list around
+  // it.
+  const Value* near_;
   Report* report_;
 };
 

@@ -36,7 +36,8 @@ class ObjectReader {
     const auto it = json_.find(std::string(f.name));
     if (it == json_.end()) return f.elided ? void() : fail(f.name, "is missing");
     read(f, *it, value);
-    // Equal scenes have only one form: a default that the writer omits must not be present.
+    // Each scene has exactly one canonical form. So a field must be absent if it has the default that the
+    // writer leaves out.
     if (wrong_.empty() && f.leaves_out(value)) fail(f.name, "has the value that is left out");
   }
 

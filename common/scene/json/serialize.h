@@ -1,6 +1,6 @@
-// The canonical form of a Scene: JSON with sorted keys, all fields (except some that have their default,
-// Field::elided), doubles in the shortest form that reads back to the same bits. Its SHA-256 is the scene's
-// digest. The coordinator sends this form to workers.
+// The canonical form of a Scene: JSON with sorted keys, all fields (except fields marked Field::elided that
+// have their default), doubles in the shortest form that reads back to the same bits. Its SHA-256 is the
+// scene's digest. The coordinator sends this form to workers.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@
 namespace ls {
 
 std::string serialize(const Scene& scene);
-// Untrusted input: sizes, indices and ranges are checked.
+// Parses the canonical form. The input is untrusted: sizes, indices and ranges are checked.
 Result<Scene> deserialize_scene(std::string_view json);
 Digest digest_of(const Scene& scene);
 

@@ -1,4 +1,4 @@
-// Translates Nori's camera, with filter and sampler, and its integrators.
+// Translates Nori's camera with its filter and sampler, and Nori's integrators.
 #include <fmt/format.h>
 
 #include "common/base/suggest.h"
@@ -11,7 +11,8 @@
 namespace ls::scene::nori {
 namespace {
 
-// Returns the parameters of a Nori integrator: the parameters of the integrator to which it is translated.
+// Returns the parameters that a Nori integrator may have here. They depend on the integrator that it is
+// translated to (row.ours).
 std::vector<Parameter> parameters_of(const IntegratorRow& row) {
   std::vector<Parameter> p;
   if (row.ours == "volpath_distant_mis") {
@@ -112,7 +113,7 @@ std::optional<Element> camera(const Element& e, const Element* sampler_given, Re
 std::optional<Integrator> integrator(const Element& e, Report& report) {
   const IntegratorRow* row = integrator_row(e.get("type"));
   if (!row) {
-    known_plugin(e, report);  // reports the reason
+    known_plugin(e, report);  // reports an unknown or unsupported type
     return std::nullopt;
   }
   const Plugin plugin{"integrator", row->name, "", parameters_of(*row)};

@@ -61,7 +61,8 @@ Element disk(Object& o, Report& report) {
             "{} has an angle thetaA of {}: it can be 90 at most, or 180, which is light from everywhere",
             o.title(), angle));
   Element out = light("directional", o), mirror = made("scale", "", o.element().at);
-  // A directional emitter's direction is that in which its light travels, away from the disk: z is mirrored.
+  // In Nori +z points to the disk. The direction of a directional emitter is that in which its light travels,
+  // away from the disk. So z is mirrored.
   set(mirror, "value", "1 1 -1", o.element().at);
   add_transform(out, to_world, "to_world", {std::move(mirror)});
   const double sine = std::sin(angle * kDegree);

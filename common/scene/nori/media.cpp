@@ -56,7 +56,7 @@ class Reader {
 
 // Returns the value of a constant volume; nullopt for a grid.
 std::optional<Rgb> constant_of(const Element& e, Report& report) {
-  if (e.tag != "volume") return rgb_of(*parse_numbers(e.get("value"), 3));  // already checked
+  if (e.tag != "volume") return rgb_of(*parse_numbers(e.get("value"), 3));  // the text was checked before
   if (e.get("type") != "constvolume") return std::nullopt;
   Object o(e, *find_plugin("volume", "constvolume"), report);
   const Rgb value = o.color("value", kBlack);

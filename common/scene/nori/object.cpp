@@ -104,7 +104,7 @@ class NoriChecker {
   }
 
   void numbers(const Element& e, std::string_view attribute, std::size_t count) {
-    if (!e.find(attribute)) return;  // already reported
+    if (!e.find(attribute)) return;  // the missing attribute was reported
     const auto given = parse_numbers(e.get(attribute), count);
     if (given && given->size() == count) return;
     report_.error(value_place(e, attribute),

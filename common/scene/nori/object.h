@@ -1,4 +1,4 @@
-// Translates the objects of a Nori file to Mitsuba.
+// Translates the objects of a Nori file to elements of Mitsuba's format.
 #pragma once
 
 #include <optional>
@@ -45,13 +45,13 @@ class Object {
   // True if both parameters are given; this is reported as an error.
   bool both(std::string_view one, std::string_view other);
 
-  // Returns the nested objects with this tag, except those that are values of parameters.
+  // Returns the nested objects with this tag that have not been taken yet, and marks them as taken.
   std::vector<const Element*> nested(std::string_view tag);
   // Returns the nested object with this tag, or nullptr if there is none; a second one is reported.
   const Element* only(std::string_view tag);
   void finish();
-  // Replaces finish() for an object of an unsupported type: reports only parameters that this type does not
-  // have.
+  // To be called instead of finish() for an object of an unsupported type: reports only the parameters that
+  // this type does not have.
   void finish_refused();
 
  private:
@@ -70,22 +70,24 @@ class Object {
   std::vector<Child> children_;
 };
 
-// The functions below translate the kinds of objects. nullopt: the object cannot be translated, which has
-// been reported.
+// Each of the functions below translates one kind of object. It returns nullopt if the object cannot be
+// translated, which has been reported.
 
 // Properties of a mesh on which its nested objects may depend.
 struct Mesh {
   bool sphere = false;
-  std::optional<Vec3> low, high;  // its bounding box, if known without reading files
+  // Corners of the mesh's bounding box; nullopt: the box is unknown, since the mesh is in a file.
+  std::optional<Vec3> low, high;
 };
 
 std::optional<Element> bsdf(const Element& e, const Mesh& mesh, Report& report);
-// Translates a colour or a <texture> to a property or object called `name` of a bsdf.
+// Translates a parameter of a bsdf that is a colour or a <texture>. The result is an element called `name`.
 std::optional<Element> texture(const Element& given, std::string name, const Mesh& mesh, Report& report);
 
 std::optional<Element> medium(const Element& e, const Mesh& mesh, Report& report);
 
-// Translate an emitter of the scene, and an emitter of a mesh.
+// emitter() translates an emitter that is a child of the scene; mesh_emitter() translates one that is nested
+// in a mesh.
 std::optional<Element> emitter(const Element& e, Report& report);
 std::optional<Element> mesh_emitter(const Element& e, Report& report);
 
@@ -94,7 +96,8 @@ std::optional<Element> camera(const Element& e, const Element* sampler, Report& 
 
 struct Integrator {
   Element element;
-  // An option of Kombu, a descendant of Nori: the camera is in the medium of the mesh that surrounds it.
+  // An option of Kombu, a descendant of Nori: true if the camera is in the medium of the mesh that surrounds
+  // the camera.
   bool inmedium = false;
 };
 std::optional<Integrator> integrator(const Element& e, Report& report);

@@ -38,7 +38,7 @@ Element checkerboard(Object& o, const Mesh& mesh) {
   add(out, "color0", o.color("value1", {0, 0, 0}), o.element().at);
   add(out, "color1", o.color("value2", {1, 1, 1}), o.element().at);
   const auto scale = pair(o, "scale", 1), delta = pair(o, "delta", 0);
-  // Mitsuba's checkerboard has two squares per unit of u and of v, Nori's has one per `scale`.
+  // Along u and v Mitsuba's checkerboard has two squares per unit; Nori's squares are `scale` units wide.
   add_placement(out, {1 / (2 * scale[0]), (half_turn(mesh) / scale[0] - delta[0]) / 2, -1 / (2 * scale[1]),
                       (1 / scale[1] - delta[1]) / 2});
   return out;
@@ -165,7 +165,7 @@ Element principled(Object& o, const Mesh& mesh, Report& report) {
                            "sheen_tint", "spec_tint", "spec_trans"})
     add_as(out, o.take(name), name);
   const double specular = o.number("specular", .5);
-  // the same value as in Kombu, a descendant of Nori
+  // For glass without specular reflection Kombu, a descendant of Nori, uses 0.001, too.
   add(out, "specular", glass && specular == 0 ? 1e-3 : specular, o.element().at);
   return out;
 }

@@ -33,7 +33,7 @@ class SceneTranslator {
 
  private:
   void child(const Element& e) {
-    if (e.tag == "medium") return;  // media were read before
+    if (e.tag == "medium") return;  // run() has translated the media already
     if (e.tag == "mesh") return mesh(e);
     if (e.tag == "emitter") {
       if (auto light = emitter(e, report_)) add(out_, std::move(*light));
@@ -173,7 +173,8 @@ class SceneTranslator {
   const Element* camera_ = nullptr;
   const Element* sampler_ = nullptr;
   const Element* integrator_ = nullptr;
-  std::vector<std::pair<std::string, Mesh>> bounded_;  // meshes that bound media, by the medium's id
+  // The meshes that bound media, each with the id of its medium.
+  std::vector<std::pair<std::string, Mesh>> bounded_;
 };
 
 }  // namespace

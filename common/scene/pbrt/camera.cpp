@@ -167,8 +167,8 @@ class SettingsTranslator {
     Element out = made("sensor", radius > 0 ? "thinlens" : "perspective", p.at());
     add(out, "fov", p.number("fov", 90), p.at());
     add(out, "string", "fov_axis", "smaller", p.at());
-    // A uniform scale of the camera only changes its lens radius and its focus distance, so it is applied to
-    // these.
+    // Here a perspective camera must have no scale. A uniform scale changes only the sizes of the lens radius
+    // and the focus distance in the world, so these two are multiplied by it instead.
     const auto [world, scale] = without_scale(s_.camera_ctm.from);
     const double focus = p.number("focaldistance", 1e6);
     if (radius > 0) {

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kPeriod = 256;
 
-// The permutation of Perlin's paper.
+// The permutation of Perlin's noise (see noise() in cloud.h).
 constexpr std::array<std::uint8_t, kPeriod> kPermutation{
     151, 160, 137, 91,  90,  15,  131, 13,  201, 95,  96,  53,  194, 233, 7,   225, 140, 36,  103, 30,
     69,  142, 8,   99,  37,  240, 21,  10,  23,  190, 6,   148, 247, 120, 234, 75,  0,   26,  197, 62,
@@ -84,8 +84,8 @@ Vec3 noise_slope(const Vec3& p) {
 
 namespace {
 
-// pbrt's constants. Each octave of noise has half the strength of the one before and this many times its
-// frequency.
+// Constants of pbrt's formula. Each octave of noise has half the strength and kFiner times the frequency of
+// the octave before.
 constexpr double kFiner = 1.99;
 constexpr int kOctaves = 5;
 // Number of times that a point is moved by the gradient of noise, and the frequency of the first such noise.
@@ -105,8 +105,8 @@ double cells_per_unit(const Cloud& cloud) {
          (cloud.wispiness > 0 ? std::max(octaves, kWarpFrequency * kFiner) : octaves);
 }
 
-// Least number of nodes per unit of height. They resolve the thinning of the density with height, which is
-// piecewise linear with corners at 0, 1/2 and 1.
+// Least number of grid nodes per unit of height (y). The density decreases with height, piecewise linearly
+// with corners at the heights 0, 1/2 and 1; so many nodes resolve this.
 constexpr double kLeastPerHeight = 64;
 
 // Returns the sides of a grid that samples the cloud's density with `per_cell` nodes along an axis per cell
@@ -131,7 +131,7 @@ std::optional<CloudNodes> nodes_of(const Cloud& cloud, double per_cell, std::siz
 }  // namespace
 
 double density_at(const Cloud& cloud, const Vec3& p) {
-  if (p[1] <= 0) return 1;  // the clamped sum below is 1 for any noise
+  if (p[1] <= 0) return 1;  // for any noise the sum below is at least 1, and is clamped to 1
   Vec3 q = times(cloud.frequency, p);
   if (cloud.wispiness > 0) {
     double strength = 0.05 * cloud.wispiness, frequency = kWarpFrequency;
@@ -188,9 +188,9 @@ namespace {
 // Largest number of nodes of one grid, and of all grids of clouds in a file.
 constexpr std::size_t kMaxNodes = std::size_t{1} << 24, kMaxNodesOfAll = std::size_t{1} << 25;
 
-// Returns the name of the grid's file. It is a digest of the formula's parameters and the grid's size, so
-// that a grid that exists already, such as one sent to a coordinator, is found without computing it, which
-// would take seconds.
+// Returns the name of the grid's file. The name contains a digest of the formula's parameters and the grid's
+// size, not of the grid's values, whose computation takes seconds. So a grid that exists already, such as one
+// that was sent to a coordinator, is found without computing it again.
 std::string name_of(const Cloud& c, const CloudNodes& nodes) {
   const std::string formula =
       fmt::format("cloud {} {} {} {} {} {}", c.density, c.wispiness, c.frequency, fmt::join(c.low, " "),

@@ -12,9 +12,9 @@
 namespace ls::scene::pbrt {
 namespace {
 
-// Returns the luminance Y of a linear sRGB colour, a weighted sum of its channels. The vector w of the
-// weights follows from linear_srgb(), which converts (X, Y, Z) to sRGB: its dot product is 0 with the sRGB
-// colours of (1, 0, 0) and (0, 0, 1), and 1 with that of (0, 1, 0).
+// Returns the luminance Y of a linear sRGB colour, a weighted sum of its channels. The weights, a vector w,
+// follow from linear_srgb(), which converts (X, Y, Z) to sRGB: the dot product of w with the result must be
+// Y. So it is 0 for the sRGB colours of (1, 0, 0) and (0, 0, 1), and 1 for that of (0, 1, 0).
 double luminance(const Rgb& c) {
   static const Vec3 weights = [] {
     const auto column = [](const std::array<double, 3>& xyz) {
@@ -29,7 +29,7 @@ double luminance(const Rgb& c) {
   return weights[0] * c[0] + weights[1] * c[1] + weights[2] * c[2];
 }
 
-// Clips colours that sRGB cannot represent.
+// Sets negative channels to 0, with a warning: sRGB cannot represent such a colour.
 Rgb within_srgb(Translation& t, const Param& p, Rgb c) {
   if (std::any_of(c.begin(), c.end(), [](double x) { return x < 0; }) && t.report.takes_warnings())
     t.report.warning(p.at, fmt::format("'{}' is a colour that sRGB can't hold: it is cut off", p.name));

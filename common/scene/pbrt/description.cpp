@@ -86,8 +86,9 @@ class Loader {
     tokens_ = outer;
   }
 
-  // Limits the number of elements as in an XML file (kMaxElements). Elements within a group are counted one
-  // by one.
+  // Counts the elements of the translated scene, and reports if there are more than kMaxElements, the limit
+  // for an XML file, too. The elements in a group are not counted here: each was counted when it was added to
+  // the group.
   bool count_elements(const Token& token) {
     for (; counted_ < t_.scene.children.size(); ++counted_)
       if (t_.scene.children[counted_].get("type") != "shapegroup")
@@ -185,7 +186,8 @@ class Loader {
                                                 suggestion(type, types_of(directive))));
   }
 
-  // Reads the parameters of a named object, whose type is one of the parameters.
+  // Reads the parameters of a named object, such as a MakeNamedMaterial. The object's type is the parameter
+  // "type".
   std::optional<Params> named(std::string_view directive, const Span& at) {
     auto params = parameters();
     if (!params) return std::nullopt;
@@ -501,8 +503,8 @@ class Loader {
   Settings settings_;
   Attributes now_;
   std::vector<Saved> saved_;
-  // While an imported file is read: the number of entries of saved_ that were begun before it. The file
-  // cannot end these.
+  // While an imported file is read: the size of saved_ when the file began. Entries of saved_ are blocks that
+  // are still open, such as AttributeBegin; the file cannot end the blocks that began before it.
   std::size_t floor_ = 0;
   std::map<std::string, Placed> systems_;
   std::optional<Element> group_;

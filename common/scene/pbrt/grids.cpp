@@ -12,13 +12,14 @@ namespace ls::scene::pbrt {
 namespace {
 
 constexpr int kMaxSide = 4096;
-constexpr std::size_t kMaxVoxels = std::size_t{1} << 24;  // includes the layer of zeros around the grid
+constexpr std::size_t kMaxVoxels = std::size_t{1} << 24;  // with the layer that is added around the grid
 
 std::size_t product(const std::array<int, 3>& sides) {
   return std::size_t(sides[0]) * std::size_t(sides[1]) * std::size_t(sides[2]);
 }
 
-// Returns false if the grid is wrong, which was reported.
+// Reads nx, ny and nz, the numbers of voxels along each axis. Returns false if they are out of range, which
+// was reported.
 bool read_sides(MediumSource& m, std::array<int, 3>& sides) {
   for (std::size_t i = 0; i < 3; ++i) {
     sides[i] = m.p.integer(std::array{"nx", "ny", "nz"}[i], 1);
@@ -49,9 +50,9 @@ bool fits(MediumSource& m, const Param* p, int channels, const std::array<int, 3
                                     p->numbers.size(), channels == 1 ? "" : "3 * ", wanted));
 }
 
-// Returns the grid with a layer of voxels of the value `beyond` around it. In pbrt values are at the centres
-// of voxels and 0 outside the grid, so interpolated values fall towards 0 over the last half voxel within the
-// box. This layer, as the grid's border, has the same effect. value(voxel, channel) is the value in the grid.
+// Returns a grid with the values value(voxel, channel), and around it one more layer of voxels of the value
+// `beyond`. In pbrt values are at the centres of voxels and 0 outside the grid, so interpolated values fall
+// towards 0 over the last half voxel within the box. The added layer has the same effect here.
 template <class F>
 MadeGrid padded(const std::array<int, 3>& sides, int channels, F value, float beyond = 0) {
   MadeGrid g{{sides[0] + 2, sides[1] + 2, sides[2] + 2}, channels, {}};
@@ -135,8 +136,9 @@ class Colours {
     for (std::size_t i = 0; i < sum.values.size(); ++i) sum.values[i] += scattering_.values[i];
     return sum;
   }
-  // Returns the albedo of each channel if it is the same in all voxels that extinguish. The comparison allows
-  // for the rounding of numbers in the text, which may be products of density and colour.
+  // Returns the albedo of each channel if it is the same in all voxels whose extinction is above 0. The
+  // comparison allows for rounding: the numbers in the file may be rounded products of a density and a
+  // colour.
   std::optional<Rgb> one_albedo() const {
     constexpr double kRounding = 1e-5;
     Rgb all{};

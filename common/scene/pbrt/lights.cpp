@@ -34,13 +34,14 @@ class LightTranslator {
     return times(light_colour(t_, p_, name), p_.number("scale", 1) * t_.exposure());
   }
 
-  // pbrt ignores a value of 0 or less.
+  // Returns the parameter if it is above 0, otherwise the fallback: pbrt ignores values of 0 or less.
   double above_zero(std::string_view name, double fallback) {
     const double x = p_.number(name, fallback);
     return x > 0 ? x : fallback;
   }
 
-  // Returns the intensity. `emitted` is the power of a light of intensity 1.
+  // Returns the light's intensity I, scaled so that the light has the power that the file gives, if any.
+  // `emitted`: the power that the light would have at intensity 1.
   Rgb intensity(double emitted) {
     const Rgb c = colour("I");
     const double power = above_zero("power", 0);
@@ -105,7 +106,7 @@ class LightTranslator {
 
   Element goniometric() {
     Element out = made("emitter", "goniometric", p_.at());
-    // The middle of pbrt's image is the light's +y axis; that of ours is +z.
+    // The middle of the image is in the direction of the light's +y axis in pbrt, and of its +z axis here.
     const Transform axes{{1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 1}};
     place(out, multiply(ctm_.to, axes), p_.at());
     add(out, "intensity", colour("I"), p_.at());
@@ -141,7 +142,8 @@ class LightTranslator {
       p_.error(p_.at(), fmt::format("{} has an illuminance, which depends on its image's pixels: give scale",
                                     p_.title()));
     // In pbrt-v3 the image is called mapname, and is multiplied by L. In pbrt-v4 it is called filename, and L
-    // is an error. So with a filename neither L nor mapname is taken here, and finish() rejects both.
+    // is an error. So if there is a filename, L and mapname are not taken here, and finish() reports them as
+    // errors.
     const bool is_square = p_.has("filename");
     const Rgb c = is_square ? times({1, 1, 1}, p_.number("scale", 1) * t_.exposure()) : colour("L");
     add(out, "string", "filename", p_.text(is_square ? "filename" : "mapname", ""), p_.at());
@@ -160,7 +162,8 @@ class LightTranslator {
     return out;
   }
 
-  // +x of our projector points to the left, like our camera's, so x is mirrored.
+  // As for our cameras, +x of our projector points to the left of the image, in pbrt to the right. So x is
+  // mirrored.
   Element projection() {
     Element out = made("emitter", "projector", p_.at());
     add(out, image_texture("irradiance"));

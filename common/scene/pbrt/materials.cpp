@@ -10,7 +10,7 @@
 namespace ls::scene::pbrt {
 namespace {
 
-// pbrt treats a surface as smooth if both roughnesses are below this.
+// pbrt treats a surface as smooth if its roughness alpha is below this value along both u and v.
 constexpr double kSmooth = 1e-3;
 
 struct Glass {
@@ -100,8 +100,8 @@ class MaterialTranslator {
     add(out, "coat_alpha", is_smooth(coat) ? 0. : coat.first, p_.at());
     add(out, "alpha_u", is_smooth(metal) ? 0. : metal.first, p_.at());
     add(out, "alpha_v", is_smooth(metal) ? 0. : metal.second, p_.at());
-    // pbrt divides eta and k by the coat's index of refraction, also if it computes them from a reflectance.
-    // Our bsdf does the same, so they are passed on undivided.
+    // pbrt divides eta and k by the coat's index of refraction, even if it computes them from a reflectance.
+    // Our bsdf divides them, too, so it gets the undivided values.
     if (p_.has("reflectance"))
       by_reflectance(out);
     else
@@ -187,7 +187,8 @@ class MaterialTranslator {
   using Alpha = std::pair<double, double>;
   static bool is_smooth(const Alpha& a) { return a.first < kSmooth && a.second < kSmooth; }
 
-  // `layer` is a prefix of the parameters' names, such as "interface.".
+  // Returns the roughness alpha along u and v. `layer` is a prefix of the parameters' names, such as
+  // "interface.".
   Alpha roughness(std::string_view layer = "") {
     const auto one = [&](std::string_view what, double fallback) {
       const std::string name = fmt::format("{}{}", layer, what);
@@ -212,7 +213,7 @@ class MaterialTranslator {
 
   void add_alpha(Element& out, const Alpha& a) {
     add(out, "string", "distribution", "ggx", p_.at());
-    // The lower bound applies if one direction is smooth and the other is rough.
+    // The lower bound is for a surface that is smooth along one of u and v and rough along the other.
     add(out, "alpha_u", std::max(a.first, 1e-4), p_.at());
     add(out, "alpha_v", std::max(a.second, 1e-4), p_.at());
   }

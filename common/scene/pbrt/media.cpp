@@ -167,7 +167,7 @@ void add_albedo(MediumSource& m, Element& out, const Rgb& albedo) { add(out, "al
 
 void add_extinction(MediumSource& m, Element& out, const Rgb& extinction) {
   const bool grey = is_grey(extinction);
-  // A cloud has no scale.
+  // The medium "cloud" has no parameter "scale".
   const double scale = m.p.row().find("scale") ? m.p.number("scale", 1) : 1;
   add(out, "scale", grey ? scale * extinction[0] : scale, m.p.at());
   if (!grey) add(out, "tint", extinction, m.p.at());

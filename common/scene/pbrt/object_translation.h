@@ -15,8 +15,8 @@
 
 namespace ls::scene::pbrt {
 
-// A transform and its inverse. Both are updated by each step, so the inverse is as exact as the inverses of
-// the steps.
+// A transform `to` and its inverse `from`. Each step, such as a translation, updates both, so `from` is as
+// exact as the inverses of the steps.
 struct Placed {
   Transform to, from;
 };
@@ -25,16 +25,17 @@ Placed moved(const Vec3& by);
 Placed scaled(const Vec3& by);
 Placed turned(double degrees, const Vec3& axis);
 std::optional<Placed> looking(const Vec3& eye, const Vec3& target, const Vec3& up);
-std::optional<Placed> of_columns(const std::vector<double>& m);  // from 16 numbers, column by column
-// A transform split into a rigid part and its scale. If the scale differs between axes, `rigid` is the whole
-// transform and `scale` is 1.
+std::optional<Placed> of_columns(const std::vector<double>& m);  // 16 numbers of a matrix, column by column
+// A transform split into a rigid part and a uniform scale. If the transform scales axes differently or
+// shears, `rigid` is the whole transform and `scale` is 1.
 struct Unscaled {
   Transform rigid;
   double scale = 1;
 };
 Unscaled without_scale(const Transform& t);
 
-// A named texture: a constant, or a reference to the element with that id.
+// A named texture. `value`: the colour of a constant texture; nullopt: the texture is the element with this
+// `id`.
 struct Texture {
   std::optional<Rgb> value;
   std::string id;
@@ -42,11 +43,12 @@ struct Texture {
 struct Material {
   std::string id;
   bool transmits = false, null = false;
-  bool has_texture = false;  // an image or a pattern depends on the uv of the shape
+  // True if the material has an image or a pattern, which depends on the shape's uv.
+  bool has_texture = false;
 };
 struct AreaLight {
-  // With `power`, the radiance of a shape is this times power / (pi A), where A is the area of its shining
-  // sides.
+  // The radiance of a shape, if `power` is nullopt. Otherwise the radiance is this colour times power / (pi
+  // A), where A is the area of the shape's emitting sides.
   Rgb radiance;
   std::optional<double> power;
   bool two_sided = false;
@@ -59,10 +61,10 @@ struct Attributes {
   bool reversed = false;
   Material material;
   std::optional<AreaLight> light;
-  std::string inside, outside;  // names of media; empty: none
+  std::string inside, outside;  // media on the surface's two sides, by name; empty: none
 };
 
-// The grid file that was made from a cloud; `nodes` is its number of nodes.
+// A cloud, the grid file that was made from it, and the number of nodes of this grid.
 struct MadeCloud {
   Cloud cloud;
   std::size_t nodes;
@@ -74,8 +76,8 @@ struct Translation {
   AssetSource& assets;
   Report& report;
   Element scene;
-  // exposure_factor: the film's settings and the camera's shutter multiply all light by this. `lit`: true
-  // once a light has been multiplied by it.
+  // exposure_factor: all light is multiplied by this number, which follows from the film's settings and the
+  // camera's shutter. lit: true once a light has been multiplied by it.
   double exposure_factor = 1;
   bool lit = false;
   double exposure() {
@@ -85,16 +87,17 @@ struct Translation {
   std::map<std::string, Texture> textures;
   std::map<std::string, Material> materials;
   std::vector<MadeCloud> clouds;
-  std::vector<std::string> warned;  // warnings that are given only once per file
+  std::vector<std::string> warned;  // texts of warnings that are given only once per file
 
   void warn_once(const Span& at, std::string text);
 };
 
-// In colours.cpp. nullopt: the value was reported as wrong. light_colour() gives lights the luminance that
-// they have in pbrt: an rgb is relative to the white of sRGB, all other notations are scaled to luminance 1.
+// In colours.cpp: functions that return the colour that a parameter gives. nullopt: the value was reported as
+// wrong. light_colour() gives lights the luminance that they have in pbrt: an rgb is relative to the white of
+// sRGB, all other notations are scaled to luminance 1.
 std::optional<Rgb> light_colour(Translation& t, const Param& p);
 std::optional<Rgb> surface_colour(Translation& t, const Param& p);
-// Returns white if the parameter is not given.
+// Takes the parameter `name`, the colour of a light. Returns white if it is not given or is wrong.
 Rgb light_colour(Translation& t, Params& params, std::string_view name);
 
 // textures.cpp
@@ -102,14 +105,16 @@ void add_texture(Translation& t, const std::string& name, Params& p);
 struct Names {
   std::string_view theirs, ours;
 };
-// Adds the parameter to `parent`, as a value or as a reference to a texture.
+// Adds a parameter to `parent`, as a value or as a reference to a texture. `names`: its name in pbrt and in
+// Mitsuba.
 void add_value(Translation& t, Element& parent, Params& p, Names names, const Rgb& fallback);
-// The same, with the value multiplied by `scale`; the parameter has the same name in pbrt and in Mitsuba.
+// Like add_value(), but multiplies the value by `scale`. The parameter has the name `name` both in pbrt and
+// in Mitsuba.
 void add_scaled_value(Translation& t, Element& parent, Params& p, std::string_view name, const Rgb& fallback,
                       double scale);
 void refer(Element& parent, std::string_view name, std::string id, const Span& at);
 
-// In materials.cpp. Adds the material under this id.
+// In materials.cpp. Adds the material to the scene under this id. nullopt: it was reported as wrong.
 std::optional<Material> add_material(Translation& t, const std::string& id, Params& p);
 
 // lights.cpp
@@ -123,13 +128,13 @@ std::string medium_id(const std::string& name);
 // In shapes.cpp. nullopt: the shape was reported as wrong.
 std::optional<Element> shape(Translation& t, Params& p, const Attributes& attributes);
 
-// In camera.cpp: the directives before WorldBegin, each at most once.
+// In camera.cpp: the directives that stand before WorldBegin. nullopt: the file does not have the directive.
 struct Settings {
   std::optional<Params> film, camera, filter, sampler, integrator;
   Placed camera_ctm;
   std::string camera_medium;
 };
-double exposure_of(Settings& s);  // returns Translation::exposure_factor
+double exposure_of(Settings& s);  // returns the value for Translation::exposure_factor
 void add_settings(Translation& t, Settings& s, const Span& file);
 
 }  // namespace ls::scene::pbrt

@@ -100,7 +100,7 @@ bool is_among(std::string_view type, std::string_view types) {
   }
 }
 
-// Returns the number of numbers in one value of the type.
+// Returns how many numbers one value of this type has.
 std::size_t stride(std::string_view type) {
   if (type == "point2" || type == "vector2") return 2;
   return type == "point3" || type == "vector3" || type == "normal" || type == "rgb" || type == "xyz" ? 3 : 1;
@@ -127,7 +127,7 @@ class ParamReader {
   }
 
  private:
-  // Parses a declaration "type name".
+  // Parses the declaration of a parameter: a quoted text "type name".
   std::optional<Param> declared(const Token& token) {
     const std::string& text = token.text;
     const std::size_t begin = text.find_first_not_of(" \t"), blank = text.find_first_of(" \t", begin);

@@ -82,7 +82,8 @@ std::optional<Placed> looking(const Vec3& eye, const Vec3& target, const Vec3& u
   const auto above = unit(up);
   const auto right = ahead && above ? unit(cross(*above, *ahead)) : std::nullopt;
   if (!right) return std::nullopt;
-  // `from` is the inverse: it places the camera in the world.
+  // As in pbrt, the transform maps the world to the camera. `from` is its inverse, which places the camera in
+  // the world.
   const Transform from = scene::of_columns(*right, cross(*ahead, *right), *ahead, eye);
   const auto to = inverse(from);
   return to ? std::optional(Placed{*to, from}) : std::nullopt;

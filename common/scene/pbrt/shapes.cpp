@@ -12,8 +12,8 @@ namespace ls::scene::pbrt {
 namespace {
 
 struct Mesh {
-  std::vector<double> positions, normals, uvs;  // per corner: three, three and two numbers
-  std::vector<double> indices;                  // three per triangle; integers in range
+  std::vector<double> positions, normals, uvs;  // per corner (vertex): 3, 3 and 2 numbers
+  std::vector<double> indices;                  // three corners per triangle; whole numbers in range
 };
 
 class ShapeTranslator {
@@ -107,8 +107,9 @@ class ShapeTranslator {
     return out;
   }
 
-  // Returns the parameter `indices`, which has `each` indices per face. If it is not given and the shape has
-  // only `each` corners, returns 0, 1, ... Empty: it is wrong or missing, which was reported.
+  // Returns the parameter `indices`, which has `each` (3 or 4) indices per face. If it is not given and the
+  // shape has exactly `each` corners, returns 0, 1, ..., each - 1. Empty: the parameter is wrong or missing,
+  // which was reported.
   std::vector<double> indices(std::size_t corners, std::size_t each) {
     const Param* p = p_.take("indices");
     if (!p) {
@@ -130,8 +131,8 @@ class ShapeTranslator {
            std::vector<double>{};
   }
 
-  // pbrt makes a separate light of each face, which is `size` triangles here. Measures the area of each face
-  // in the world.
+  // Measures the area of each face in the world, since pbrt makes a separate light of each face. A face is
+  // `size` triangles of the mesh.
   void measure(const Mesh& mesh, std::size_t size) {
     const auto corner = [&](std::size_t i) {
       const std::size_t at = 3 * static_cast<std::size_t>(mesh.indices[i]);
@@ -157,7 +158,7 @@ class ShapeTranslator {
     return file ? std::optional(ply(*file)) : p_.refuse(p_.at(), file.error().message);
   }
 
-  const Param* take_corners() {  // null: there are none, which has been reported
+  const Param* take_corners() {  // nullptr: there are none, which has been reported
     const Param* corners = p_.take("P");
     if (!corners) p_.missing("P");
     if (!corners || !corners->numbers.empty()) return corners;
@@ -189,7 +190,8 @@ class ShapeTranslator {
   }
 
   // Largest number of corners that are made from a shape's list of indices. An index takes as little as 2
-  // bytes of text, but its corner up to 200 bytes of memory until the file is written.
+  // bytes of text, but the corner that is made from it takes up to 200 bytes of memory until the mesh's file
+  // is written.
   static constexpr std::size_t kMaxOwnCorners = std::size_t{1} << 22;
   std::optional<Element> too_many_corners() {
     return p_.refuse(
@@ -218,7 +220,7 @@ class ShapeTranslator {
     const std::vector<double> four = indices(x.size() / 3, 4);
     if (four.empty()) return std::nullopt;
     if (four.size() > kMaxOwnCorners) return too_many_corners();
-    // Each patch has corners of its own, as its u and v go from 0 to 1.
+    // Patches share no corners, since u and v go from 0 to 1 on each patch.
     Mesh mesh;
     for (std::size_t i = 0; i < four.size(); i += 4) {
       std::array<Vec3, 3> side;  // vectors from corner 0 to the corners 1, 2 and 3
@@ -227,7 +229,8 @@ class ShapeTranslator {
           side[k][axis] = x[3 * std::size_t(four[i + k + 1]) + axis] - x[3 * std::size_t(four[i]) + axis];
       const Vec3 normal = cross(side[0], side[1]);
       const double size = std::sqrt(dot(normal, normal)) * std::sqrt(dot(side[2], side[2]));
-      // The tolerance allows for corners in single precision, which are rounded to 2^-24 of their distance.
+      // The tolerance allows for the coordinates' rounding to single precision, by up to 2^-24 of their
+      // value.
       if (std::abs(dot(normal, side[2])) > 1e-5 * size)
         return p_.refuse(
             p_.at(), fmt::format("{} is bent, and only flat patches are read: give a plymesh", p_.title()));
@@ -244,7 +247,7 @@ class ShapeTranslator {
 
   // In pbrt ReverseOrientation flips the normal, and mirroring a mesh leaves its normal on the original side.
   // The normals of our meshes without vertex normals follow the order of corners, which mirroring reverses,
-  // and our mirrored spheres are inside out.
+  // and the normals of our mirrored spheres point inwards.
   void orient(Element& out) {
     const bool mirrored = determinant3(a_.ctm.to) < 0;
     const std::string_view type = p_.row().type;
@@ -287,8 +290,8 @@ class ShapeTranslator {
       add(out, std::move(area));
     }
     if (a_.inside == a_.outside) return;
-    // A mirrored sphere of ours keeps its interior inside, whichever way its normals point. In pbrt the
-    // inside is the side that the normals point away from.
+    // Here the interior medium of a mirrored sphere is always within the sphere. In pbrt the inside medium is
+    // on the side that the normals point away from, which may be outside of the sphere.
     const bool swapped = a_.reversed && determinant3(a_.ctm.to) * determinant3(to_world_.to) < 0;
     const std::string &inside = swapped ? a_.outside : a_.inside, &outside = swapped ? a_.inside : a_.outside;
     if (!inside.empty()) refer(out, "interior", medium_id(inside), p_.at());
@@ -299,7 +302,7 @@ class ShapeTranslator {
   Rgb radiance(const AreaLight& light) {
     if (!light.power) return light.radiance;
     const auto [least, most] = std::minmax_element(areas_.begin(), areas_.end());
-    // The tolerance allows for corners in single precision, as in patches().
+    // The tolerance allows for the coordinates' rounding to single precision, as in patches().
     if (areas_.empty() || !(*least > 0) || *most > *least * (1 + 1e-4)) {
       p_.error(light.at,
                fmt::format(
@@ -316,7 +319,7 @@ class ShapeTranslator {
   const Attributes& a_;
   Placed to_world_;
   bool has_normals_ = false;
-  std::vector<double> areas_;  // of the separate lights, see measure(); empty if unknown
+  std::vector<double> areas_;  // areas of the separate lights (see measure()); empty: unknown
 };
 
 }  // namespace

@@ -60,7 +60,7 @@ Element image(Params& p) {
   const std::string wrap = p.text("wrap", "repeat");
   if (wrap != "repeat") add(out, "string", "wrap_mode", wrap, p.at());
   const std::string encoding = p.text("encoding", "sRGB");
-  // pbrt decodes all other 8-bit files as sRGB, whatever `encoding` is.
+  // In pbrt `encoding` applies to PNG files only: all other 8-bit files are decoded as sRGB.
   if (encoding == "linear" && has_ending(file, {".png"})) add(out, "boolean", "raw", "true", p.at());
   if (encoding != "linear" && encoding != "sRGB")
     p.error(p.at(),

@@ -13,16 +13,18 @@ namespace ls::scene::pbrt {
 struct Word {
   enum class Use { read, ignored, refused };
   std::string_view name;
-  std::string_view types;  // type in the file, written before the name; several are separated by "|"
+  // The types that the parameter may have, separated by "|". In a file the type is written before the name.
+  std::string_view types;
   std::string_view fallback;
-  std::string_view meaning;  // the meaning; for a parameter that is not read, the reason
+  std::string_view meaning;  // what the parameter means; if it is not read, why not
   Use use = Use::read;
 };
 
 struct Row {
   std::string_view directive, type;
   bool is_read;
-  std::string_view meaning;  // how it is translated; for a rejected type, the reason and what to do
+  // How the type is translated; if it is not read, why not, and what to do instead.
+  std::string_view meaning;
   std::vector<Word> words;
   const Word* find(std::string_view name) const;
 };
@@ -31,7 +33,7 @@ std::span<const Row> rows();
 const Row* find_row(std::string_view directive, std::string_view type);
 std::vector<std::string> types_of(std::string_view directive);  // returns the types that are read
 
-// Directives without types, with their meanings.
+// A directive that has no types, and its meaning.
 struct Plain {
   std::string_view name, meaning;
 };

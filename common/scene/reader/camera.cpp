@@ -30,7 +30,7 @@ void Reader::read_sensor(const Element& e) {
   p.finish();
 }
 
-// Reads the parameters that are specific to each camera plugin.
+// Reads the parameters that depend on the type of the camera.
 void Reader::read_projection(const Element& e, Params& p, Sensor& s) {
   Binder binder(p);
   if (e.get("type") == "spherical") {
@@ -62,8 +62,8 @@ void Reader::read_projection(const Element& e, Params& p, Sensor& s) {
   }
 }
 
-// Reads the sensor's medium. Its name is "medium" or absent; any other name is an error, since only shapes
-// have an interior and an exterior medium.
+// Reads the sensor's medium. Its name is "medium" or absent; any other name is an error, since "interior" and
+// "exterior" are names for the media of shapes.
 void Reader::read_sensor_medium(Params& p, Sensor& s) {
   const Element* use = p.take("medium");
   if (const Element* object = use ? resolve(*use) : nullptr) s.medium = medium(*object, *use);
@@ -123,7 +123,7 @@ void Reader::read_film(const Element& e) {
 }
 
 // Checks the crop. If its width or height is missing, the frame's is used. A crop of the whole frame is
-// stored as no crop, so that both scenes are equal.
+// stored as no crop, so that the scene equals the one without a crop.
 void Reader::check_crop(const Element& e, Params& p, bool has_width, bool has_height) {
   FilmSettings& f = scene_.film;
   if (!has_width) f.crop_size.width = f.size.width;
@@ -154,7 +154,7 @@ ReconstructionFilter Reader::read_filter(const Element& e) {
   return filter;
 }
 
-// Reads only the number of samples: the sampler itself is always this program's own.
+// Reads only the number of samples. The renderer uses its own sampler, whatever type the file gives.
 void Reader::read_sampler(const Element& e) {
   used_parts_.insert(&e);
   if (!is_read_plugin("sampler", e.get("type"))) return unknown_plugin(e, report_);
@@ -170,7 +170,7 @@ void Reader::read_sampler(const Element& e) {
 
 namespace {
 
-// Rejects the parameters that only other integrators have.
+// Rejects parameters that other integrators have but `integrator` does not.
 struct OthersParameters {
   Params& params;
   Report& report;

@@ -31,9 +31,10 @@ std::optional<Rgb> Params::colour(const Field& f, const Element& e, std::string_
   return in_range(f, e, *c) ? c : std::nullopt;
 }
 
-// Converts spectra as the RGB modes of Mitsuba do. Version 3: curves of reflectances are multiplied by D65,
-// curves of light are not, so light of equal power at all wavelengths is not white. Version 0.x: no curve is
-// multiplied by an illuminant, and a single number is grey.
+// Converts spectra to colours as the RGB modes of Mitsuba do. In version 3 the curve of a reflectance is
+// multiplied by the illuminant D65, but the curve of a light is not; so light of equal power at all
+// wavelengths is not white. In version 0.x no curve is multiplied by an illuminant, and a single number is a
+// grey.
 std::optional<Rgb> Params::spectrum(const Field& f, const Element& e, std::string_view wanted) {
   const SpectrumText text = parse_spectrum(e.get("value"));
   const bool emits = object_.tag == "emitter";
@@ -90,10 +91,11 @@ std::optional<Rgb> Params::colour_of_object(const Field& f, const Element& e, co
   return c && in_range(f, e, *c) ? c : std::nullopt;
 }
 
-// Clamps values outside sRGB, or above 1 for a reflectance, as Mitsuba does.
+// Clamps a colour to the values that the parameter may have, as Mitsuba does: no channel is below 0, and for
+// a reflectance none is above 1. Warns of changes that are larger than rounding errors.
 Rgb Params::shown(const Field& f, const Element& e, const Rgb& seen) {
-  // The tables and the matrix have at least four digits. A white that deviates from 1 by their rounding
-  // causes no warning.
+  // The tables of spectra and the matrix that converts to sRGB have at least four digits. Their rounding
+  // errors, which make a white deviate from 1, cause no warning.
   constexpr double kSlack = 1e-3;
   Rgb c = seen;
   double most = 0;
@@ -111,7 +113,7 @@ Rgb Params::shown(const Field& f, const Element& e, const Rgb& seen) {
 
 namespace {
 
-constexpr std::size_t kMaxCurvePoints = 4096;  // of one curve
+constexpr std::size_t kMaxCurvePoints = 4096;  // largest number of points of one spectral curve
 
 // Reads the numbers of a required <string>. Empty: it is missing or wrong, which has been reported.
 std::vector<double> curve_numbers(Params& p, std::string_view name, Report& report) {
@@ -167,7 +169,7 @@ std::optional<Reader::Spectrum> Reader::read_spectrum(const Element& e) {
         needed_number(p, "temperature", {.min = 0, .max = kMaxTemperature, .open_min = true});
     if (report_.has_errors()) return std::nullopt;
     Rgb colour = linear_srgb(black_body_xyz(kelvin));
-    for (double& x : colour) x = std::max(x, 0.0);  // a red outside of sRGB has negative components
+    for (double& x : colour) x = std::max(x, 0.0);  // a deep red outside sRGB has negative components
     s = LightColour{colour};
   } else {
     SpectralCurve curve;

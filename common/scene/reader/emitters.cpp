@@ -6,8 +6,8 @@
 
 namespace ls::scene {
 
-// Reads an emitter whose parameters all have rows in describe(). Kinds of emitters that need more have
-// specialisations below.
+// Reads an emitter whose parameters are all listed by describe() (common/scene/schema). Kinds of emitters
+// that need more have specialisations below.
 template <class Kind>
 void Reader::read_emitter_as(const Element& e) {
   if constexpr (std::is_same_v<Kind, ConstantEmitter>) check_only_environment(e);

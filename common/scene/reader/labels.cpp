@@ -29,8 +29,8 @@ std::string given_name(const Element& e) {
   return {};
 }
 
-// Returns a material's name. A material without an id may be a wrapper (twosided, bumpmap) of one that has an
-// id.
+// Returns a material's name. It is the material's id; or the id of the bsdf within it, if the material only
+// wraps one (twosided, bumpmap); or else its type and index.
 std::string material_name(const Element& e, std::size_t index) {
   if (const auto id = e.get("id"); !id.empty()) return std::string(id.substr(0, kMaxLabelBytes));
   for (const Element& child : e.children)
@@ -51,12 +51,13 @@ std::string no_channel(std::string_view name, const ChannelRow* row) {
 
 }  // namespace
 
-// Returns the name, followed by a number if an earlier object has the name: the object's index in its list,
-// or the next number that is free. An empty name becomes the type and the index.
+// Returns the name, or if an earlier object has it, the name with a number appended: the object's index in
+// its list, or the next larger number that is free. If `name` is empty, the name is made of the type and the
+// index.
 std::string Reader::fresh_label(std::string name, std::string_view type, std::size_t index) {
   if (name.empty()) name = fmt::format("{}_{}", type, index);
   if (labels_.insert(name).second) return name;
-  std::size_t& number = label_numbers_[name];  // names with smaller numbers are taken
+  std::size_t& number = label_numbers_[name];  // least number to try for this name
   number = std::max(number, index);
   while (true)
     if (auto numbered = fmt::format("{}_{}", name, number++); labels_.insert(numbered).second)

@@ -20,8 +20,8 @@ constexpr std::string_view kFrameParameter = "frame";
 
 bool is_name_char(char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; }
 
-// The values of parameters `$name`. Substituted text is not substituted again, which excludes recursion and
-// exponential growth.
+// The values of the scene's parameters, which attributes refer to as $name. A `$name` within a substituted
+// value is not substituted again, which excludes recursion and exponential growth.
 class Parameters {
  public:
   Parameters(const ReadOptions& options, Report& report)
@@ -30,7 +30,8 @@ class Parameters {
       unused_.insert(name);
       note_length(name);
     }
-    if (!options.frame) return;  // the scene does not have to use $frame
+    // $frame is not added to unused_: it causes no warning if the scene does not use it.
+    if (!options.frame) return;
     values_.insert_or_assign(std::string(kFrameParameter), std::to_string(*options.frame));
     note_length(std::string(kFrameParameter));
   }
@@ -55,7 +56,7 @@ class Parameters {
     if (values_.size() >= kMaxParameters)
       return complain(e.at, fmt::format("more than {} parameters", kMaxParameters));
     note_length(name);
-    values_.emplace(std::move(name), std::move(value));  // -D and earlier defaults take precedence
+    values_.emplace(std::move(name), std::move(value));  // keeps a value of -D or an earlier <default>
     return true;
   }
 
@@ -127,7 +128,7 @@ class Parameters {
   }
 
   Values values_;
-  std::set<std::string> unused_;  // parameters from outside that have not been used so far
+  std::set<std::string> unused_;  // parameters of -D that have not been used so far
   Report& report_;
   std::size_t longest_ = 0;  // length of the longest parameter name
   std::size_t total_ = 0;

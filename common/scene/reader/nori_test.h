@@ -15,9 +15,9 @@ enum class NoriTestKind { t_test, chi2_test };
 
 struct NoriTest {
   NoriTestKind kind = NoriTestKind::t_test;
-  double significance_level = .01;  // significance level of the whole file, in (0, 1)
-  // Number of paths or directions drawn per scene or bsdf. For chi2_test, 0 means 5,000 per cell of the
-  // table.
+  double significance_level = .01;  // in (0, 1); for all tests of the file together
+  // Number of paths or directions drawn per scene or bsdf. For chi2_test, 0 means 5,000 per cell of the table
+  // of directions (see `resolution`).
   std::uint64_t sample_count = 100'000;
 
   // The tested scenes or bsdfs, in the order of the file. A bsdf is represented by a scene whose one shape is

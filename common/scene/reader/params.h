@@ -23,15 +23,16 @@ class Params {
   const Element& object() const { return object_; }
   std::string title() const;  // for example: bsdf "diffuse"
   bool has(std::string_view name) const;
-  // Returns the child of that name (a property, an object or a reference), and marks the name as known.
+  // Returns the child of that name (a property, an object or a reference), and marks it as taken. nullptr:
+  // there is none. The name becomes one that messages may suggest.
   const Element* take(std::string_view name);
-  // A nested object that was not taken by name, and the element that stands for it: the object, or a
+  // A nested object that was not taken by name. `use` is the element in the parent: the object itself, or a
   // reference to it.
   struct Nested {
     const Element* object;
     const Element* use;
   };
-  enum class Names { any, none };  // which nested objects: all, or only those without a name
+  enum class Names { any, none };  // which objects to take: all, or only those without a name
   std::vector<Nested> take_nested(std::string_view tag, Names names = Names::any);
   // Returns the only nested object with this tag; nullopt if there is none. A second one is reported as
   // "{owner} has a second {kind}".
@@ -39,13 +40,13 @@ class Params {
   // Reports the parameters that no reader took.
   void finish();
 
-  // Each returns the value of a parameter that is not an object. nullopt: the parameter is absent, or its
-  // type is wrong, which is reported.
+  // Each function returns the value of a parameter that is a string or a transform. nullopt: the parameter is
+  // absent, or it has another type, which is reported.
   std::optional<std::string> take_string(std::string_view name);
   std::optional<Transform> take_transform(std::string_view name);
 
-  // Reads the parameter into `value`. If it is not given, uses the field's fallback or, if it is required,
-  // reports this.
+  // Reads the parameter into `value`. If the parameter is not given, uses the field's fallback, or reports an
+  // error if the field is required.
   template <class T>
   void read(const Field& f, T& value) {
     if (const Element* e = take(f.name))
@@ -98,7 +99,9 @@ class Params {
  private:
   struct Child {
     const Element* element;
-    const Element* object = nullptr;  // for objects, and for references after they were resolved
+    // The nested object; for a reference, the object that it refers to (nullptr until the reference is
+    // resolved). nullptr for plain values.
+    const Element* object = nullptr;
     std::string_view name;
     bool taken = false;
   };
@@ -124,7 +127,8 @@ class Params {
   std::vector<std::string> known_;
 };
 
-// Reads an object, whose fields are listed by describe(), from its parameters.
+// Reads the fields of an object from its parameters. describe() (common/scene/schema) lists the fields of
+// each type and calls field() for each.
 class Binder {
  public:
   explicit Binder(Params& params) : params_(params) {}
@@ -138,7 +142,8 @@ class Binder {
   Params& params_;
 };
 
-// Reads all fields that the table has for T; the caller may take further parameters before params.finish().
+// Reads all fields that describe() lists for T. The caller may take further parameters before
+// params.finish().
 template <class T>
 void bind(Params& params, T& value) {
   Binder binder(params);

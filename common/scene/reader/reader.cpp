@@ -165,7 +165,7 @@ std::optional<MediumIndex> Reader::medium(const Element& object, const Element& 
 }
 
 const std::optional<Reader::Bounds>& Reader::bounds(TextureIndex texture) {
-  // A texture's inner textures precede it in the list.
+  // A texture's inner textures precede it in the list, so their bounds are known.
   for (std::size_t i = texture_bounds_.size(); i < scene_.textures.size(); ++i) {
     std::optional<Bounds> b;
     const auto include = [&](double low, double high) {

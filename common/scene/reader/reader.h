@@ -39,8 +39,9 @@ class Reader {
   std::optional<MediumIndex> medium(const Element& object, const Element& use);
 
   // A spectrum given as an object. Rgb: a colour for any use. LightColour: the colour of a light, allowed for
-  // emitters only. SpectralCurve: a curve whose colour depends on its use; an emitter's is converted as it
-  // is, any other is multiplied by D65 first.
+  // emitters only. SpectralCurve: a curve whose colour depends on its use; the curve of an emitter is
+  // converted to a colour as it is, any other curve is multiplied by the illuminant D65 first (in files of
+  // version 3).
   struct LightColour {
     Rgb value;
   };
@@ -55,8 +56,8 @@ class Reader {
     double low, high;
   };
   const std::optional<Bounds>& bounds(TextureIndex texture);
-  const Rgb* constant(VolumeIndex volume) const;    // nullptr: it is a grid
-  const Rgb* constant(TextureIndex texture) const;  // nullptr: it varies
+  const Rgb* constant(VolumeIndex volume) const;    // nullptr: the volume is a grid
+  const Rgb* constant(TextureIndex texture) const;  // nullptr: the texture varies
   std::optional<AssetIndex> asset(const std::string& name, const Span& at);
 
  private:
@@ -153,16 +154,18 @@ class Reader {
   const Element* integrator_ = nullptr;
   const Element* material_ = nullptr;  // material of the last shape read; nullptr: the default material
   std::unordered_set<std::string> labels_;
-  std::unordered_map<std::string, std::size_t> label_numbers_;  // name -> the next number to try
-  // parts_: the films, filters and samplers at the top level. used_parts_: those that a sensor refers to.
+  std::unordered_map<std::string, std::size_t> label_numbers_;  // next number to append to a name, by name
+  // parts_: the films, filters and samplers at the top level. used_parts_: the films, filters and samplers
+  // that have been read for a sensor.
   std::vector<const Element*> parts_;
   std::unordered_set<const Element*> used_parts_;
-  // texture_bounds_ and bsdf_traits_ begin with the first object of scene_, and are extended when needed.
+  // Entry i belongs to scene_.textures[i] or scene_.bsdfs[i]. bounds() and traits() add entries when they are
+  // needed.
   std::vector<std::optional<Bounds>> texture_bounds_;
   std::vector<BsdfTraits> bsdf_traits_;
 
   bool reads_attributes_ = false;  // true if some texture read so far is a mesh attribute
-  // Results of old_number() (textures with swapped colours), by the texture as it was read
+  // For each texture for which old_number() has made a texture with swapped colours: the made texture.
   std::map<TextureIndex, TextureIndex> old_numbers_;
   Memo<TextureIndex> textures_;
   Memo<Spectrum> spectra_;
@@ -172,7 +175,7 @@ class Reader {
   Memo<MediumIndex> media_;
   // The indices of the shape groups read so far; nullopt: the group has no shape, or is wrong.
   std::unordered_map<const Element*, std::optional<GroupIndex>> groups_;
-  std::optional<GroupIndex> group_;            // the group whose shapes are being read
+  std::optional<GroupIndex> group_;            // group whose shapes are being read; nullopt: none
   std::unordered_set<const Element*> merges_;  // the shapes "merge" that were read so far
   std::map<std::string, AssetIndex> assets_by_name_;
   std::unordered_set<const Element*> in_progress_;

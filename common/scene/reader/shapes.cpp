@@ -34,7 +34,7 @@ void Reader::refuse_in_group(const Element& use, std::string_view type) {
                                     type == "instance" ? "an instance" : "a shapegroup"));
 }
 
-// A group is read at its first use, which may be an instance before its definition.
+// A group is read at its first use, which may be an instance that precedes the group in the file.
 void Reader::read_shape_group(const Element& e) {
   if (groups_.contains(&e)) return;
   auto& index = groups_[&e];
@@ -61,8 +61,9 @@ void Reader::read_shape_group(const Element& e) {
   index = group;
 }
 
-// Reads the shapes in a shape "merge" one by one; the image is the same. A merge may be used only once, and
-// not within another: nested references could multiply its shapes until memory runs out.
+// Reads each shape in a shape "merge" as a shape of its own, which does not change the image. A merge may be
+// used only once and not within another merge: otherwise nested references could multiply its shapes until
+// memory runs out.
 void Reader::read_merge(const Element& e) {
   if (!merges_.insert(&e).second)
     return report_.error(
@@ -195,7 +196,8 @@ std::optional<AreaEmitter> Reader::read_area(const Element& e) {
   if (area.beam_width > area.cutoff_angle)
     report_.error(
         e.at, fmt::format("beam_width {} is wider than cutoff_angle {}", area.beam_width, area.cutoff_angle));
-  // If the two angles are equal, falloff has no effect, and its default is stored.
+  // If beam_width has its default, the largest angle (90 degrees), cutoff_angle has it, too. Then falloff,
+  // which acts between the two angles, has no effect, and its default is stored.
   if (area.beam_width == AreaEmitter{}.beam_width) area.falloff = AreaEmitter{}.falloff;
   return area;
 }
@@ -234,7 +236,7 @@ bool stays_cylinder(const CylinderShape& c, const Transform& t) {
 void Reader::check_attributes(const Element& e, const Shape& shape) {
   const auto* mesh = std::get_if<MeshShape>(&shape.geometry);
   if (!reads_attributes_ || (mesh && mesh->format == MeshFormat::ply)) return;
-  if (report_.has_errors()) return;  // after errors, materials may be missing
+  if (report_.has_errors()) return;  // after an error a material may be missing
   for (const AttributeUse& use : attribute_uses(scene_, shape))
     report_.error(
         e.at,

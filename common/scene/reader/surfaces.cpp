@@ -49,7 +49,7 @@ std::optional<TextureIndex> Reader::read_mesh_attribute(const Element& e) {
   return index;
 }
 
-// Rejects textures of mesh attributes for objects that are not meshes.
+// Rejects textures that read mesh attributes, for parameters of objects that have no mesh.
 void Reader::refuse_attributes(const Element& e, TextureIndex t, std::string_view parameter) {
   if (!reads_attributes_) return;
   for (const AttributeUse& use : attribute_uses(scene_, t))
@@ -68,7 +68,7 @@ std::optional<TextureIndex> Reader::read_uniform_texture(const Element& e, std::
   return add_constant_texture(value);
 }
 
-// Reads a texture "rawconstant": its value is one number, or the three of a <vector>.
+// Reads a texture "rawconstant". Its value is one number, or a <vector> or <point> of three numbers.
 std::optional<TextureIndex> Reader::read_raw_constant(const Element& e) {
   Params p(*this, e);
   Rgb value{};
@@ -94,7 +94,7 @@ std::optional<BsdfIndex> Reader::add_bsdf(const Element& e, const Bsdf& bsdf) {
 }
 
 const BsdfTraits& Reader::traits(BsdfIndex bsdf) {
-  // A bsdf's inner bsdfs precede it in the list.
+  // A bsdf's inner bsdfs precede it in the list, so their traits are known.
   for (std::size_t i = bsdf_traits_.size(); i < scene_.bsdfs.size(); ++i)
     bsdf_traits_.push_back(traits_of(scene_.bsdfs[i], bsdf_traits_, scene_.textures));
   return bsdf_traits_[bsdf.value];
@@ -117,7 +117,7 @@ void Reader::check_multiple_scattering(const Element& e, TextureIndex alpha_u, T
                               e.get("type")));
 }
 
-// Reads all fields that the table has for T; `alpha` sets alpha_u and alpha_v.
+// Reads all fields that describe() lists for T. The parameter `alpha` sets both alpha_u and alpha_v.
 template <class T>
 void Reader::bind_alphas(Params& p, T& b, const Range& range) {
   if (p.has("alpha") && (p.has("alpha_u") || p.has("alpha_v")))
@@ -129,13 +129,14 @@ void Reader::bind_alphas(Params& p, T& b, const Range& range) {
   }
 }
 
-// Checks that a sheet with two constant colours scatters no more light than it receives.
+// Checks that a bsdf with a constant reflectance and transmittance scatters no more light than it receives.
 void Reader::check_sum(const Element& e, const DiffuseTransmissionBsdf& b) {
-  // Two shares written with six digits add up to at most 1.000001, and slightly more in binary.
+  // A reflectance and a transmittance that are rounded to six digits add up to at most 1.000001, and to
+  // slightly more in binary.
   constexpr double kMost = 1 + 1.5e-6;
   const auto constant = [&](TextureIndex t) {
     return t.value < scene_.textures.size() ? std::get_if<ConstantTexture>(&scene_.textures[t.value])
-                                            : nullptr;  // nullptr: already reported
+                                            : nullptr;  // no such texture: an error was reported
   };
   const auto *back = constant(b.reflectance), *through = constant(b.transmittance);
   if (!back || !through) return;
@@ -147,7 +148,7 @@ void Reader::check_sum(const Element& e, const DiffuseTransmissionBsdf& b) {
                                     e.get("type"), most));
 }
 
-// Reads Mitsuba 0.6's `difftrans`, which reflects nothing.
+// Reads the bsdf `difftrans` of Mitsuba 0.6 as a diffuse transmission that reflects nothing.
 std::optional<BsdfIndex> Reader::read_difftrans(const Element& e) {
   Params p(*this, e);
   DiffuseTransmissionBsdf b;
@@ -176,9 +177,9 @@ void Reader::read_metal_preset(Params& p, Rgb& eta, Rgb& k) {
   k = metal->k;
 }
 
-// Reads a bsdf whose parameters have rows in describe(), and the other notations that several kinds share: a
-// metal by its name, and one roughness for both directions. Kinds of bsdfs that need more have
-// specialisations below.
+// Reads a bsdf whose parameters are all listed by describe() (common/scene/schema). Also reads two notations
+// that several kinds of bsdfs share: a metal given by its name, and one roughness `alpha` for both
+// directions. Kinds of bsdfs that need more have specialisations below.
 template <class Kind>
 std::optional<BsdfIndex> Reader::read_bsdf_as(const Element& e) {
   Params p(*this, e);
@@ -199,8 +200,8 @@ std::optional<BsdfIndex> Reader::read_bsdf_as(const Element& e) {
   return add_bsdf(e, b);
 }
 
-// Returns the nested bsdfs in the order of the file. Those of a blend are ordered by name if both have one,
-// as in Mitsuba.
+// Returns the nested bsdfs in the order of the file. As in Mitsuba, the two bsdfs of a blend are ordered by
+// their names instead if both have a name.
 std::optional<std::vector<BsdfIndex>> Reader::read_inner_bsdfs(Params& p, std::size_t at_least,
                                                                std::size_t at_most) {
   auto nested = p.take_nested("bsdf");
@@ -246,15 +247,15 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<TwoSidedBsdf>(const Element& e) {
   return add_bsdf(e, TwoSidedBsdf{sides->front(), sides->back()});
 }
 
-// In files of version 0.x a checkerboard shows the same squares as a scalar and as a colour, unlike in
-// version 3 (see CheckerboardTexture in scene.h). So if it is used as a scalar, it is replaced by another one
-// with the colours swapped.
+// In version 3 a checkerboard that is used as a scalar has its two values on other squares than one that is
+// used as a colour (see CheckerboardTexture in scene.h). In version 0.x both have the same squares. So in
+// files of version 0.x a checkerboard that is used as a scalar is replaced by one with swapped colours.
 TextureIndex Reader::old_number(const Element& e, TextureIndex t) {
   if (!e.old || t.value >= scene_.textures.size()) return t;
   const auto* given = std::get_if<CheckerboardTexture>(&scene_.textures[t.value]);
   if (!given) return t;
   if (const auto it = old_numbers_.find(t); it != old_numbers_.end()) return it->second;
-  const CheckerboardTexture as_colour = *given;  // a copy, because the list grows
+  const CheckerboardTexture as_colour = *given;  // a copy, since added() may move the list's elements
   // The depth of recursion is bounded, since nested textures were read within kMaxReferenceDepth.
   const CheckerboardTexture swapped{old_number(e, as_colour.color1), old_number(e, as_colour.color0),
                                     as_colour.to_uv};

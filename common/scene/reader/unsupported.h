@@ -20,6 +20,6 @@ struct MeaninglessRow {
   std::vector<std::string> parameters;
   std::string_view because;
 };
-const std::vector<MeaninglessRow>& meaningless_table();  // for the documentation
+const std::vector<MeaninglessRow>& meaningless_table();  // the whole table, for the documentation
 
 }  // namespace ls::scene

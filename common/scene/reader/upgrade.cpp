@@ -19,7 +19,7 @@ constexpr Renamed kRenamed[] = {
 };
 
 // Values that have new names. `trilinear` and `ewa` also filtered minified textures; `bilinear` does not, so
-// it needs more samples there.
+// minified textures need more samples.
 constexpr struct {
   std::string_view tag, plugin, parameter, before, now;
 } kValues[] = {
@@ -43,8 +43,8 @@ void erase_child(Element& e, std::string_view name) {
   std::erase_if(e.children, [&](const Element& c) { return c.get("name") == name; });
 }
 
-// Makes an element for a default that old files leave out. Messages about it refer to the place of the object
-// that it belongs to.
+// Makes an element that an old file does not have, such as one for an old default. Messages about the element
+// refer to `at`, the place of the object that it is added to.
 Element made(std::string tag, const Span& at) {
   Element e = made(std::move(tag), "", at);
   e.old = true;
@@ -96,8 +96,8 @@ void place_texture(Element& e) {
   e.children.push_back(std::move(transform));
 }
 
-// Upgrades a bitmap texture. A gamma of -1 means that of the image's file; 1 means linear, which is now
-// `raw`. If the wrap modes for u and v are equal, they become one for both.
+// Upgrades a bitmap texture. A gamma of -1 means the gamma of the image's file; a gamma of 1 means linear
+// values, which is now `raw`. If the wrap modes for u and v are equal, they become one for both.
 void upgrade_bitmap(Element& e) {
   if (const Element* gamma = child(e, "gamma")) {
     const auto value = parse_number(gamma->get("value"));
@@ -112,7 +112,8 @@ void upgrade_bitmap(Element& e) {
   }
 }
 
-// In old files <rgb> is linear, even in hexadecimal; <srgb> is not linear.
+// Makes colours linear. In old files <rgb> is linear, even if it is written in hexadecimal; <srgb> is encoded
+// as sRGB and is decoded here.
 void upgrade_colour(Element& e) {
   Attribute* value = find(e, "value");
   const bool encoded = e.tag == "srgb";

@@ -41,10 +41,10 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
-// A flag that Mitsuba 3 does not have: written only if it is set.
+// A boolean parameter that Mitsuba 3 does not have. It is written only if it is true.
 constexpr std::string_view kOurOwn = "node_centred";
 
-// Returns the name of the plugin for a value of this type.
+// Returns the name of the Mitsuba plugin for an object of this type: the XML attribute `type`.
 template <class T>
 std::string_view plugin(const T&) {
   const TypeInfo& info = kInfo<T>;
@@ -87,7 +87,7 @@ class Writer {
 
   template <class T>
   void field(const Field& f, const T& value) {
-    if (f.derived && f.given_as.empty()) return;  // the field is derived from others
+    if (f.derived && f.given_as.empty()) return;  // a derived field that files do not have
     if constexpr (std::equality_comparable<T>)
       if (f.leaves_out(value)) return;
     const std::string_view name = f.given_as.starts_with('<') ? "" : f.name;
@@ -111,7 +111,7 @@ class Writer {
     }
   }
 
-  // Elements.
+  // Functions that write XML elements.
   void line(std::string_view text) { out_ += fmt::format("{:{}}{}\n", "", 2 * depth_, text); }
   void open(std::string_view tag, std::string_view type, const std::string& id, std::string_view name) {
     line(fmt::format("<{} type=\"{}\"{}{}>", tag, type, id.empty() ? "" : fmt::format(" id=\"{}\"", id),
@@ -151,8 +151,8 @@ class Writer {
       ++index.value;
     }
   }
-  // Returns the value of a constant that only one object uses; it is written in that object. nullptr for
-  // others.
+  // Returns the value of a constant texture or volume that only one object uses: its value is written inside
+  // that object. nullptr: the texture or volume is written as an element of its own, with an id.
   const Rgb* inline_value(TextureIndex i) const {
     const auto* c = std::get_if<ConstantTexture>(&scene_.textures[i.value]);
     return c && texture_uses_[i.value] == 1 ? &c->value : nullptr;
@@ -172,7 +172,7 @@ class Writer {
   static std::string id_of(MediumIndex i) { return fmt::format("medium{}", i.value); }
   static std::string id_of(GroupIndex i) { return fmt::format("group{}", i.value); }
 
-  // Selects the fields that the plugin of a mesh has.
+  // Writes only the fields that the plugin of the shape has: "serialized" has no flip_tex_coords.
   struct GeometryFields {
     Writer& writer;
     const Geometry& geometry;
@@ -182,8 +182,8 @@ class Writer {
       if (!mesh || mesh->format != MeshFormat::serialized || f.name != "flip_tex_coords") writer.field(f, x);
     }
   };
-  // Writes the shapes, those of a group within the group's element. The shapes of a group are contiguous in
-  // the scene.
+  // Writes the shapes. The shapes of a group, which are contiguous in the scene, are written inside the
+  // group's element.
   void write_shapes() {
     std::optional<GroupIndex> group;
     const auto go_to = [&](std::optional<GroupIndex> next) {
@@ -210,7 +210,7 @@ class Writer {
     close("shape");
   }
 
-  // Leaves out the parameters of other integrators.
+  // Writes only the fields that are parameters of this integrator.
   struct OwnParameters {
     Writer& writer;
     std::string_view integrator;
@@ -232,7 +232,7 @@ class Writer {
     if (!scene_.aovs.empty()) close("integrator");
   }
 
-  // Selects the fields that the plugin of a camera has.
+  // Writes only the fields that the plugin of the camera has.
   struct SensorFields {
     Writer& writer;
     const Sensor& sensor;
@@ -258,7 +258,7 @@ class Writer {
     close("sensor");
   }
 
-  // Writes the members of an object, by type.
+  // Functions that write one member of an object: an overload for each type of member.
   template <class Tag>
   requires(!std::is_same_v<Tag, AssetTag>) void nested(std::string_view name, const Index<Tag>& i) {
     reference(name, id_of(i));
@@ -295,7 +295,7 @@ class Writer {
   template <class E>
   requires std::is_enum_v<E>
   void property(const Field& f, E e) { value("string", f.name, name_of(e)); }
-  void property(const Field& f, GridOrder o) {  // Mitsuba 3 has no such parameter
+  void property(const Field& f, GridOrder o) {  // not in Mitsuba 3: the default is left out
     if (o != GridOrder{}) value("string", f.name, name_of(o));
   }
   void property(const Field& f, const Vec3& x) {
@@ -330,7 +330,7 @@ class Writer {
   }
 
   const Scene& scene_;
-  std::vector<int> texture_uses_, volume_uses_;  // numbers of references to each texture and volume
+  std::vector<int> texture_uses_, volume_uses_;  // number of references to each texture or volume
   std::vector<std::string> asset_names_;         // names of assets as written to the file
   std::string out_;
   int depth_ = 1;

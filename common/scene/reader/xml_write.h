@@ -7,12 +7,12 @@
 
 namespace ls {
 
-// Writes the XML text. Reading it gives an equal scene with the same digest, if its files are found by their
-// names in scene.assets. Every value is written: numbers in the shortest form that reads back to the same
-// bits, transforms as matrices (none for the identity). Bsdfs, volumes, phase functions, media and textures
-// are at the top level and referred to by ids made of their kind and index, so that equal scenes give equal
-// text. Colours that only one object uses are nested in that object. `scene` must come from the reader, or be
-// consistent and compacted (validate.h).
+// Returns the XML text. Reading this text gives an equal scene with the same digest, provided that the reader
+// finds the scene's files under their names in scene.assets. Every value is written: numbers in the shortest
+// form that reads back to the same bits, transforms as matrices (none for the identity). Bsdfs, volumes,
+// phase functions, media and textures are at the top level and referred to by ids made of their kind and
+// index, so that equal scenes give equal text. Colours that only one object uses are nested in that object.
+// `scene` must come from the reader, or be consistent and compacted (validate.h).
 std::string write_xml(const Scene& scene);
 
 }  // namespace ls

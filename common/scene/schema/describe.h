@@ -32,7 +32,7 @@ struct Range {
   bool open_min = false, open_max = false;
   bool contains(double x) const { return (open_min ? x > min : x >= min) && (open_max ? x < max : x <= max); }
 };
-// Returns "0 < NAME <= 1", for example.
+// Returns the range as an inequality: "0 < NAME <= 1", for example.
 inline std::string range_text(std::string_view name, const Range& r) {
   const std::string low = std::isinf(r.min) ? "" : fmt::format("{} {} ", r.min, r.open_min ? "<" : "<=");
   const std::string high = std::isinf(r.max) ? "" : fmt::format(" {} {}", r.open_max ? "<" : "<=", r.max);
@@ -51,23 +51,25 @@ struct Field {
   std::string_view unit = "";
   Range range = kAny;        // range of a number, or of each component of a colour
   Rgb fallback{1, 1, 1};     // colour that replaces a missing texture or volume
-  bool derived = false;      // true: derived from other parts of the file; not a parameter
+  bool derived = false;      // true: taken from other parts of the file, not from a parameter of this name
   bool named_ior = false;    // true: names of materials ("water") are accepted too
-  bool constvolume = false;  // true: a colour that may be given as a <volume type="constvolume">
+  bool constvolume = false;  // true: this colour may also be given as a <volume type="constvolume">
   bool required = false;
-  // The type's name in the documentation, if the C++ type does not suffice: "point", "medium" (a nested one
-  // with the field's name), "<phase>" (a nested one without a name). Derived fields without such a name are
-  // not written in files.
+  // How files give the field, where its C++ type does not tell: as a "point"; as a nested object of the named
+  // kind that has the field's name ("medium"); or, in angle brackets, as a nested object without a name
+  // ("<phase>"). A derived field for which this is empty is not written in files.
   std::string_view given_as = "";
-  // For a number or colour that Mitsuba does not have: the value for which the field is not written in files.
+  // For a number or colour that Mitsuba does not have: if the field has this value, it is not written in
+  // files. NaN: there is no such value.
   double unwritten = std::numeric_limits<double>::quiet_NaN();
-  bool number = false;  // true: a texture that is read as a scalar, not as a colour
-  // True for fields that Mitsuba does not have or that older scenes lack. Such a field is written neither in
-  // files nor in JSON while it has its default, so scenes without it keep their files and digests. The
-  // default is `unwritten` for a colour that sets it, otherwise the type's initial value (false, 0, empty).
+  bool number = false;  // true: the field is a texture that is read as a scalar, not as a colour
+  // True for fields that Mitsuba does not have or that older scenes lack. If such a field has its default
+  // value, it is written neither in files nor in JSON, so that the files and digests of scenes that do not
+  // use it stay the same. The default is `unwritten` for a colour whose `unwritten` is a number; for all
+  // others it is the type's initial value (false, 0, empty).
   bool elided = false;
-  // The integrators that have this parameter: all of them if both names are empty, one if only the second is
-  // empty.
+  // The names of the one or two integrators that have this parameter; both are empty if all integrators have
+  // it.
   std::array<std::string_view, 2> only_of{};
 
   bool belongs_to(std::string_view integrator) const {
@@ -83,11 +85,11 @@ struct Field {
   }
 };
 
-// A nested object. `given_as` as in Field.
+// Returns the field of a nested object. The arguments are members of Field.
 inline Field nested_field(std::string_view name, std::string_view doc, std::string_view given_as) {
   return {.name = name, .doc = doc, .derived = true, .given_as = given_as};
 }
-// A texture that is read as a scalar.
+// Returns the field of a texture that is read as a scalar. `fallback` replaces a missing texture.
 inline Field number_field(std::string_view name, std::string_view doc, const Range& range, double fallback) {
   return {
       .name = name, .doc = doc, .range = range, .fallback = {fallback, fallback, fallback}, .number = true};
@@ -98,14 +100,14 @@ inline Field quantity(std::string_view name, std::string_view doc, std::string_v
 }
 
 struct TypeInfo {
-  std::string_view kind;     // the element's tag: bsdf, shape, ...
+  std::string_view kind;     // tag of the XML element: bsdf, shape, ...
   std::string_view name;     // name of the plugin, and "type" in JSON
-  std::string_view plugins;  // Mitsuba's plugins that are read as this type, if their names differ
+  std::string_view plugins;  // Mitsuba's plugins that are read as this type; empty: the one named `name`
   std::string_view doc;
 };
 
 template <class T>
-struct InfoOf;  // without a definition, so that a type without a row in the table does not compile
+struct InfoOf;  // not defined here, so that code that uses a type without a row in the table does not compile
 template <class T>
 inline constexpr TypeInfo kInfo = InfoOf<std::remove_const_t<T>>::value;
 
@@ -122,12 +124,12 @@ template <class... Kinds>
 struct KindsOf<std::variant<Kinds...>> {
   static constexpr std::array<std::string_view, sizeof...(Kinds)> names{kInfo<Kinds>.name...};
 };
-// The names of the kinds of a variant, such as Medium, in its order.
+// The names (TypeInfo::name) of the alternatives of a variant such as Medium, in the variant's order.
 template <class Variant>
 inline constexpr auto& kKindsOf = KindsOf<Variant>::names;
 
-// Calls f.template operator()<Kind>() for the kind of `Variant` with this name. Returns false if there is
-// none.
+// Calls f.template operator()<Kind>(), where Kind is the alternative of `Variant` whose TypeInfo::name is
+// `name`. Returns false, without a call, if no alternative has this name.
 template <class Variant, class F>
 bool with_kind_named(std::string_view name, F f) {
   return [&]<class... Kinds>(std::type_identity<std::variant<Kinds...>>) {
@@ -138,7 +140,7 @@ bool with_kind_named(std::string_view name, F f) {
 template <class T, class U>
 concept Of = std::same_as<std::remove_const_t<T>, U>;
 
-// NamesOf<E>::all has the enumerators of the enumeration E with their names.
+// NamesOf<E>::all lists the enumerators of the enumeration E, each with its name in files.
 template <class E>
 struct Named {
   std::string_view name;

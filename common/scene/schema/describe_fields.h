@@ -1,4 +1,5 @@
-// The whole table: all kinds of objects, and the scene that consists of them; see describe.h.
+// The whole table of the scene language: it describes all kinds of objects, and the scene that consists of
+// them, by describe() (describe.h).
 #pragma once
 
 #include "common/scene/schema/describe_emitters.h"
@@ -129,7 +130,7 @@ void describe(V& v, T& s) {
   v.field({.name = "instance_labels", .doc = "", .elided = true}, s.instance_labels);
 }
 
-// Accepts any type that the table describes as an object.
+// A visitor that does nothing; the concept Described uses it to find out whether a type has a describe().
 struct AnyVisitor {
   template <class T>
   void field(const Field&, T&) {}
@@ -139,7 +140,7 @@ concept Described = requires(AnyVisitor& v, T& t) {
   describe(v, t);
 };
 
-// Returns the list of the scene that an index refers to.
+// Returns that list of the scene s into which an index of this type points: s.textures for a TextureIndex.
 template <class S, class Tag>
 auto& pool(S& s, Index<Tag>) {
   if constexpr (std::is_same_v<Tag, AssetTag>)
@@ -158,7 +159,8 @@ auto& pool(S& s, Index<Tag>) {
     return (s.groups);
 }
 
-// Calls on_index for every index within a described value.
+// A visitor: walk(x) calls on_index for every index (TextureIndex, ...) that x contains at any depth. It does
+// not go on to the objects that the indices refer to.
 template <class F>
 class IndexWalker {
  public:

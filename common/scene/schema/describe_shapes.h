@@ -69,7 +69,7 @@ void describe(V& v, T& s) {
   v.field(nested_field("group", "the group", "<shapegroup>"), s.group);
   v.field({.name = "to_world", .doc = "places the group in the world"}, s.to_world);
 }
-// The fields of all shapes. Geometry, emitter, bsdf and media are nested objects.
+// Describes the fields that all kinds of shapes have. Geometry, emitter, bsdf and media are nested objects.
 template <class V, Of<Shape> T>
 void describe(V& v, T& s) {
   v.field({.name = "geometry", .doc = "the plugin", .derived = true}, s.geometry);

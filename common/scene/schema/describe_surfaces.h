@@ -323,7 +323,7 @@ void describe(V& v, T& b) {
   describe_map(v, b);
 }
 
-// A parameter from 0 to 1 that is 0 if it is not given.
+// Returns the field of a scalar texture from 0 to 1, which is 0 if it is not given.
 inline Field share_field(std::string_view name, std::string_view doc) {
   return number_field(name, doc, kUnit, 0);
 }

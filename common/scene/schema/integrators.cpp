@@ -10,7 +10,7 @@
 namespace ls::scene {
 namespace {
 
-// The default max_depth of Mitsuba 3's differentiable integrators; that of all others is -1.
+// The default max_depth of Mitsuba 3's differentiable integrators; all other integrators have -1 (no limit).
 constexpr int kDifferentiated = 6;
 
 constexpr IntegratorRow kIntegrators[] = {

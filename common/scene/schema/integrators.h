@@ -1,5 +1,7 @@
-// The integrators by their names in all versions of Mitsuba's format, for scenes and for --integrator, and
-// the channels of the integrator "aov".
+// Translates names of integrators: every name that a scene in any version of Mitsuba's format or the option
+// --integrator may use has a row that gives Lightshaft's integrator. Also translates the names of the
+// channels of Mitsuba's integrator "aov" and of Lightshaft's AOVs. In this file "ours" means Lightshaft's
+// name.
 #pragma once
 
 #include <optional>
@@ -10,44 +12,47 @@
 namespace ls::scene {
 
 inline constexpr std::string_view kDistantMis = "volpath_distant_mis";
-// Nori's integrator: direct light at the first surface that is neither a mirror nor clear glass, without
-// media.
+// Nori's integrator: it follows mirrors and clear glass to the first other surface and shows the direct light
+// there. It ignores media.
 inline constexpr std::string_view kWhitted = "whitted";
 
 struct IntegratorRow {
-  std::string_view name;         // Mitsuba's name, or ours
-  std::string_view ours;         // IntegratorSettings::name
-  std::optional<int> max_depth;  // maximum depth implied by the name
-  // True if the name belongs to another method that computes the same picture. `ours` renders it instead, and
-  // the scene gets a warning.
+  std::string_view name;         // a name in scenes: one of Mitsuba's integrators, or one of ours
+  std::string_view ours;         // our integrator that renders it, as in IntegratorSettings::name
+  std::optional<int> max_depth;  // maximum depth implied by the name ("direct": 2); nullopt: none
+  // True if `name` is a method that we do not have (bdpt, ...) but whose image is the same. Our integrator
+  // renders the scene instead, with a warning.
   bool other_method = false;
-  int default_depth = -1;  // max_depth if the scene gives none
+  int default_depth = -1;  // max_depth if neither the scene nor the name gives one; -1: no limit
 };
 
 std::span<const IntegratorRow> integrators();
 const IntegratorRow* integrator_row(std::string_view name);  // returns nullptr for an unknown name
 
-// True if the integrator renders media, or is unknown; false for `path`, `whitted` and those that are read as
-// one of them. `name` is Mitsuba's, ours or Nori's.
+// Returns whether the integrator renders media. `name` is Mitsuba's, ours or Nori's. False for our `path` and
+// `whitted` and for all names that are translated to one of them; true for an unknown name.
 bool sees_media(std::string_view name);
 
-// Integrators that contain another one and add something to its result; here the inner one is used alone.
+// An integrator of Mitsuba that contains another one and adds something to its result. The inner integrator
+// is rendered without the wrapper.
 struct WrapperRow {
   std::string_view name;
-  std::string_view lost;  // the function of the wrapper, which is not available here
+  std::string_view lost;  // what the wrapper would have added, as the text of a warning
 };
 std::span<const WrapperRow> integrator_wrappers();
 const WrapperRow* wrapper_row(std::string_view name);
 
-// A channel of Mitsuba's integrator "aov", and our AOV name (common/image/aov/aov.h).
+// A channel of Mitsuba's integrator "aov" and the AOV (extra output image, common/image/aov/aov.h) that we
+// render for it.
 struct ChannelRow {
   std::string_view theirs, ours;  // `ours` is empty if the channel is not supported
-  bool mitsuba = true;            // false: Mitsuba has no such channel, and `convert` writes our name
+  bool mitsuba = true;            // false: only Lightshaft has it; the command `convert` writes our name
 };
 std::span<const ChannelRow> channels();
 const ChannelRow* channel_row(std::string_view theirs);  // returns nullptr for an unknown name
 
-// Converts a list of our names to channels of Mitsuba: "depth,normal" becomes "depth:depth,normal:sh_normal".
+// Converts a list of our AOV names to the parameter `aovs` of Mitsuba's integrator "aov": "depth,normal"
+// becomes "depth:depth,normal:sh_normal".
 std::string mitsuba_channels(std::string_view aovs);
 
 }  // namespace ls::scene

@@ -1,4 +1,4 @@
-// Named indices of refraction and metals, by Mitsuba's names.
+// Indices of refraction of named materials ("water") and of metals, under the names that Mitsuba uses.
 #pragma once
 
 #include <optional>

@@ -9,19 +9,20 @@
 namespace ls::scene {
 
 struct AttributeUse {
-  // How many numbers the attribute must have. number: one. colour: three (a normal map). any: one or three; a
-  // single number is grey.
+  // How many numbers the attribute must have. number: one. colour: three (for a normal map). any: one or
+  // three, where one number means grey.
   enum class As { any, number, colour } as = As::any;
   TextureIndex texture;  // index of a MeshAttributeTexture
-  // True if the shape's emitter reads it, so that numbers above 1 are allowed.
+  // True if the shape's emitter reads the attribute as radiance, which may exceed 1. False: a BSDF reads it,
+  // and values that the file stores as bytes must not exceed 1 after scaling.
   bool in_light = false;
   auto operator<=>(const AttributeUse&) const = default;
 };
 
 // True if any texture of the scene reads an attribute; if not, the shapes need not be examined.
 bool any_attribute(const Scene& scene);
-// Each returns the attributes that a shape or a texture reads, sorted, without duplicates. Scenes may have
-// cycles of textures and indices out of range, which are ignored.
+// Both return the attributes that the shape or the texture reads, sorted, without duplicates. The scene need
+// not be consistent: cycles of textures and indices out of range are ignored.
 std::vector<AttributeUse> attribute_uses(const Scene& scene, const Shape& shape);
 std::vector<AttributeUse> attribute_uses(const Scene& scene, TextureIndex texture);
 

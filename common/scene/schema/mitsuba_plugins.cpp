@@ -239,11 +239,12 @@ bool has_row(const std::vector<PluginRow>& rows, std::string_view tag, std::stri
   return std::ranges::any_of(rows, [&](const PluginRow& r) { return r.tag == tag && r.name == name; });
 }
 
-// Adds the kinds of a variant that Mitsuba does not have, after the rows of the same element.
+// Adds a row for each alternative of the variant that Mitsuba does not have. The row is inserted after the
+// rows with the same tag.
 template <class... Kinds>
 void add_ours(std::vector<PluginRow>& rows, std::type_identity<std::variant<Kinds...>>) {
   for (const TypeInfo& kind : {kInfo<Kinds>...}) {
-    // A kind with `plugins` is read under these names only.
+    // A kind whose `plugins` is not empty is read under those names only, and Mitsuba has them all.
     if (!kind.plugins.empty() || has_row(rows, kind.kind, kind.name)) continue;
     const auto last =
         std::find_if(rows.rbegin(), rows.rend(), [&](const PluginRow& r) { return r.tag == kind.kind; });

@@ -90,7 +90,7 @@ std::vector<Parameter> parallel_light_parameters() {
           {"angularRadius", kNumber, "0", "degrees, of the disk that the light comes from", kRightAngle}};
 }
 
-// The parameters of Kombu's `principled`, which equals Mitsuba's.
+// The parameters of `principled` in Kombu, a descendant of Nori; they mean the same as Mitsuba's.
 std::vector<Parameter> principled_parameters() {
   std::vector<Parameter> p{
       {"base_color", kAnyColor | kTexture, "0.5", "the colour", kUnit},
@@ -251,7 +251,7 @@ constexpr IntegratorRow kIntegrators[] = {
     {"photonmapper", "path", {}, "light is followed exactly, without the blur of gathered photons"},
 };
 
-// The reason to reject integrators that show something other than light.
+// The reason for which integrators that show something other than light (normals, ...) are rejected.
 constexpr std::string_view kNoLight =
     "what it draws is not light: choose path_mis, or vol_path_mis if there are media";
 
@@ -294,7 +294,7 @@ std::string text_of(unsigned types) {
       {kColor, "color"},     {kFloat, "float"},   {kInteger, "integer"}, {kBoolean, "boolean"},
       {kString, "string"},   {kPoint, "point"},   {kVector, "vector"},   {kTransform, "transform"},
       {kTexture, "texture"}, {kVolume, "volume"}, {kBsdf, "bsdf"}};
-  // an integer is accepted wherever a float is
+  // Every parameter that accepts a float also accepts an integer, so <integer> is not named.
   if ((types & kNumber) == kNumber) types &= ~unsigned{kInteger};
   std::string out;
   for (const auto& [type, tag] : kTags)

@@ -1,5 +1,5 @@
-// The vocabulary of Nori's scene files: its objects with their parameters, and its integrators. Reading,
-// suggestions and docs/reference/scene-format.md use this one table.
+// The vocabulary of scene files of Nori and its descendants: their objects (plugins) with parameters, and
+// their integrators. The reader, its suggestions and docs/reference/scene-format.md use this one table.
 #pragma once
 
 #include <optional>
@@ -12,7 +12,7 @@
 
 namespace ls::scene::nori {
 
-// The element types that may set a parameter.
+// The XML elements (<float>, <color>, ...) that may set a parameter, as bits that are combined.
 enum Types : unsigned {
   kFloat = 1,
   kInteger = 2,
@@ -26,7 +26,7 @@ enum Types : unsigned {
   kVolume = 512,
   kBsdf = 1024
 };
-// Returns the names of these types, such as "<float> or <color>".
+// Returns the names of the elements whose bits are set in `types`, such as "<float> or <color>".
 std::string text_of(unsigned types);
 
 struct Parameter {
@@ -34,31 +34,31 @@ struct Parameter {
   unsigned types;
   std::string_view fallback;  // the default in words; "": the parameter is optional and has no default
   std::string_view meaning;
-  Range range = kAny;          // range of a number, or of each component
+  Range range = kAny;          // allowed range of a number, or of each component of a colour or vector
   std::string_view idle = "";  // why the parameter has no effect here, for a warning; empty: it has an effect
 };
 
 struct Plugin {
   std::string_view tag, type;
-  std::string_view becomes;  // the equivalent Mitsuba object, in words
+  std::string_view becomes;  // the equivalent object of Mitsuba, in words
   std::vector<Parameter> parameters;
 };
 std::span<const Plugin> plugins();
 const Plugin* find_plugin(std::string_view tag, std::string_view type);
 std::vector<std::string> plugin_names(std::string_view tag);
 
-// Objects of Nori or its descendants that are rejected.
+// An object of Nori or its descendants that is rejected, and the reason.
 struct Refused {
   std::string_view tag, type, because;
 };
 std::span<const Refused> refused_plugins();
-// returns the reason; empty: the object is not rejected
+// Returns the reason for which the object is rejected; empty: it is not in the table of rejected objects.
 std::string_view refused_because(std::string_view tag, std::string_view type);
 
 struct IntegratorRow {
   std::string_view name;
-  std::string_view ours;         // IntegratorSettings::name
-  std::optional<int> max_depth;  // maximum depth implied by the name
+  std::string_view ours;         // Lightshaft's integrator that renders it, as in IntegratorSettings::name
+  std::optional<int> max_depth;  // maximum depth implied by the name; nullopt: none
   std::string_view but = "";     // how the image differs from Nori's, for a warning
 };
 std::span<const IntegratorRow> integrators();

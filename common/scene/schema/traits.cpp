@@ -19,9 +19,9 @@ std::array<std::optional<BsdfIndex>, 2> nested_bsdfs(const Bsdf& bsdf) {
 
 namespace {
 
-// True if the roughness alpha, which is the mean of the texture's channels, may be kStraightAlpha or less at
-// some point. The test is conservative: it is true for every texture that is not constant, and for a constant
-// one if any channel is that small.
+// Returns whether the roughness alpha given by texture t, the mean of its channels, may be at most
+// kStraightAlpha at some point. The test is conservative: it returns true for every texture that is not
+// constant, and for a constant texture if any of its channels is at most kStraightAlpha.
 bool may_be_straight(TextureIndex t, const std::vector<Texture>& textures) {
   if (t.value >= textures.size()) return true;
   const auto* constant = std::get_if<ConstantTexture>(&textures[t.value]);
@@ -56,8 +56,9 @@ BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known,
   return t;
 }
 
-// Computes the traits by repeated passes over the list, which may be in any order, until none changes. A
-// chain of n nested bsdfs takes n passes. In a cycle the depth grows until it exceeds the limit.
+// Computes the traits by passes over the list of bsdfs, which may be in any order, until a pass changes
+// nothing. A chain of n nested bsdfs needs at most n passes and one that changes nothing. In a cycle the
+// depth grows until it exceeds the limit.
 std::optional<std::vector<BsdfTraits>> bsdf_traits(const Scene& scene) {
   for (const Bsdf& b : scene.bsdfs)
     for (const auto& inner : nested_bsdfs(b))

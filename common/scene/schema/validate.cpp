@@ -69,8 +69,9 @@ class ValueChecker {
           wrong_ = "scene.bsdfs: a twosided bsdf holds one that lets light through, or another twosided";
     }
   }
-  // Checks that the shapes of each group are contiguous in the list and do not emit, that every group has a
-  // shape, and that groups come in the order of their indices.
+  // Checks that the shapes of each group are contiguous in the scene's list of shapes and do not emit, that
+  // every group has a shape, and that in this list the groups follow each other in the order of their
+  // indices.
   void check_groups() {
     std::size_t seen = 0;
     const std::optional<GroupIndex>* last = nullptr;
@@ -101,8 +102,8 @@ class ValueChecker {
                   outside(f.crop_offset[1], f.crop_size.height, f.size.height)))
       wrong_ = "scene.film: the crop is not within the frame";
   }
-  // Computes the nesting depths of textures by repeated passes over the list, until none changes. Allowed
-  // scenes take at most kMaxReferenceDepth + 1 passes.
+  // Computes the nesting depths of the textures by passes over the list, until a pass changes nothing. In a
+  // scene that is allowed, this takes at most kMaxReferenceDepth + 1 passes.
   void check_texture_nesting() {
     std::vector<int> depth(s_.textures.size(), 0);
     for (int round = 0; round <= kMaxReferenceDepth; ++round) {
@@ -156,7 +157,8 @@ class Compactor {
   }
 
  private:
-  // The depth of recursion is bounded by kMaxReferenceDepth (checked before).
+  // Replaces the indices in the object by those of the new scene. The recursion is at most kMaxReferenceDepth
+  // deep, since the nesting of the scene's objects has been checked before.
   template <class T>
   void move(T& object) {
     IndexWalker walker([&](auto& i) { i = moved(i); });
@@ -167,7 +169,7 @@ class Compactor {
     auto& known = std::get<std::map<I, I>>(moved_);
     if (const auto it = known.find(old); it != known.end()) return it->second;
     auto object = pool(from_, old)[old.value];
-    move(object);  // contained objects come first
+    move(object);  // adds the objects that this one refers to before this one
     auto& list = pool(to_, old);
     const I fresh{static_cast<std::uint32_t>(list.size())};
     list.push_back(std::move(object));

@@ -13,10 +13,10 @@ namespace ls::scene {
 // frame that is too large. Empty if the scene is consistent.
 std::string find_inconsistency(const Scene& scene);
 
-// Returns the scene with only those objects that shapes, emitters and the sensor reach, directly or through
-// others. Its lists are in the order in which the objects are first reached. So scenes that differ only in
-// unused objects or in the order of definitions become equal. `scene` must be consistent, except that its
-// groups may be out of order.
+// Returns the scene without unused objects: it keeps the objects to which shapes, emitters and the sensor
+// refer, directly or through other objects. Its lists are in the order in which the objects are first
+// reached. So scenes that differ only in unused objects or in the order of definitions become equal. `scene`
+// must be consistent, except that its groups may be out of order.
 Scene compacted(const Scene& scene);
 
 }  // namespace ls::scene

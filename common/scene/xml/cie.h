@@ -1,5 +1,5 @@
 // The CIE 1931 2-degree standard colorimetric observer and illuminant D65 (ISO/CIE 11664-1 and -2; CIE 15),
-// every 5 nm from 360 to 830 nm.
+// every 5 nm from 360 to 830 nm. The comment beside each row of the table is its wavelength in nm.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@ namespace ls::scene {
 
 struct CieRow {
   std::array<double, 3> observer;  // the colour matching functions x, y and z
-  double d65;                      // relative power; 100 at 560 nm
+  double d65;                      // relative spectral power of D65; 100 at 560 nm
 };
 
 inline constexpr double kCieFirst = 360, kCieLast = 830, kCieStep = 5;  // wavelengths in nm

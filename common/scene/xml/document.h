@@ -1,5 +1,5 @@
-// A scene file as a tree of elements with their places in the text. Includes are inserted and $parameters
-// substituted, but elements and values are not interpreted yet.
+// A scene file as a tree of XML elements with their places in the text. Included files are inserted and
+// $parameters substituted, but elements and values are not interpreted yet.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ namespace ls::scene {
 
 struct Attribute {
   std::string name, value;  // value: with entities decoded and parameters substituted
-  Span name_at, value_at;   // value_at: the place of the text between the quotes
+  Span name_at, value_at;   // their places in the file; value_at: the text between the quotes
 };
 
 struct Element {
@@ -38,18 +38,20 @@ struct Document {
   bool labels = false;                    // ReadOptions::labels
 };
 
-// Parses XML text. nullopt: it is malformed, not UTF-8 or beyond the limits, which has been reported. Only
-// this function uses pugixml. `elements_left` is the number of elements still allowed; the number of elements
-// in the text is subtracted from it.
+// Parses the XML text of the report's file number `file`. nullopt: the text is malformed, not UTF-8 or beyond
+// the limits (common/scene/limits.h); this has been reported. `elements_left` is the number of elements that
+// the scene may still have; the number of elements in the text is subtracted from it. No other function uses
+// pugixml.
 std::optional<Element> parse_xml(std::uint32_t file, Report& report, std::size_t& elements_left);
 
-// Reads a scene file into a Document: parses it, follows <include>, applies <default> and the defines of
-// `options`. The elements <include>, <default> and <path> are not in the result.
+// Reads a scene file into a Document: parses it, inserts the files of <include>, and substitutes $parameters
+// by options.defines or the values of <default>. The elements <include>, <default> and <path> are not in the
+// result.
 std::optional<Document> load_document(std::string_view file_name, std::string_view text, AssetSource& assets,
                                       const ReadOptions& options, Report& report);
 
-// Returns `name` relative to `folder` (either may be absolute or empty), with "." and ".." resolved where
-// this is possible without looking at the disk.
+// Returns the path of the file `name` in `folder`, with "." and ".." resolved where this is possible without
+// looking at the disk. Either argument may be absolute or empty.
 std::string join_path(std::string_view folder, std::string_view name);
 
 // The functions below make elements in Mitsuba's format. Readers of other formats translate to these, and the
@@ -58,20 +60,21 @@ std::string join_path(std::string_view folder, std::string_view name);
 Element made(std::string tag, std::string_view type, const Span& at);
 void set(Element& e, std::string attribute, std::string value, const Span& at);
 void add(Element& parent, Element child);
-// Each adds a property. Numbers are written in the shortest form that reads back to the same bits.
+// Each adds a property element, such as <float name="..." value="..."/>. Numbers are written in the shortest
+// form that reads back to the same bits.
 void add(Element& parent, std::string tag, std::string name, std::string value, const Span& at);
 void add(Element& parent, std::string tag, std::string name, const Vec3& value, const Span& at);
 void add(Element& parent, std::string name, double value, const Span& at);
 void add(Element& parent, std::string name, const Rgb& value, const Span& at);
-// Adds a copy of the property under another name.
+// Adds a copy of the element `property` with another name.
 void add_as(Element& parent, const Element* property, std::string name);
-// Adds a <transform>: the steps `before`, followed by those of `transform`. Adds nothing if there are no
-// steps at all.
+// Adds a <transform> with the steps `before` (<translate>, <matrix>, ...) followed by the steps of
+// `transform`. Adds nothing if there are no steps at all.
 void add_transform(Element& parent, const Element* transform, std::string name,
                    std::vector<Element> before = {});
-// Adds the <transform> "to_world"; adds nothing if it is the identity.
+// Adds a <transform> named "to_world" with this matrix; adds nothing if the matrix is the identity.
 void place(Element& parent, const Transform& to_world, const Span& at);
-// Returns the number of elements: this one and all below it.
+// Returns the number of elements in the tree: e and all elements below it.
 std::size_t size_of(const Element& e);
 Element matrix_step(const std::array<double, 16>& m, const Span& at);
 

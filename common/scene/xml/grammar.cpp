@@ -108,7 +108,7 @@ class StructureChecker {
                                     report_.refer_to(it->second->at, at)));
   }
 
-  // Handles an <alias>. As in Mitsuba, the original must precede it.
+  // Handles an <alias>. As in Mitsuba, the object that it gives a second id must come before it in the file.
   void alias(const Element& e) {
     const auto it = ids.find(e.get("id"));
     if (it != ids.end()) return declare(std::string(e.get("as")), it->second, value_place(e, "as"));

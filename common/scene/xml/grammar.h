@@ -1,5 +1,6 @@
-// Checks which elements occur, their attributes and their nesting. This is done for a whole document before
-// anything is interpreted, so that the readers of objects can rely on a correct structure.
+// Checks the structure of a document: that its elements are known, have the right attributes and are nested
+// as allowed. This is done for a whole document before anything is interpreted, so that the readers of
+// objects can rely on a correct structure.
 #pragma once
 
 #include <map>
@@ -12,7 +13,7 @@ namespace ls::scene {
 
 enum class TagKind { object, property, transform, step, reference, alias, unknown };
 
-// An element of a format, its kind and its attributes.
+// A row of a format's table of elements: the tag, its kind, and the attributes that it must and may have.
 struct TagRow {
   std::string_view tag;
   TagKind kind;

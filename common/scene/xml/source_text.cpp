@@ -28,7 +28,7 @@ std::uint32_t count_lines(std::string_view text) {
   return static_cast<std::uint32_t>(std::count(text.begin(), text.end(), '\n'));
 }
 
-// Returns the length in bytes of the well-formed sequence at the start of `text`; 0 if there is none (RFC
+// Returns the length in bytes of the UTF-8 character at the start of `text`; 0 if it is not well-formed (RFC
 // 3629, table 3-7 of Unicode).
 std::size_t sequence_length(std::string_view text) {
   const auto at = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
@@ -46,7 +46,7 @@ std::size_t sequence_length(std::string_view text) {
   return overlong || out_of_range ? 0 : n;
 }
 
-// Returns the bytes of the characters [first, last).
+// Returns the part of `text` from character number `first` up to but excluding character number `last`.
 std::string_view characters(std::string_view text, std::size_t first, std::size_t last) {
   std::size_t begin = text.size(), end = text.size(), n = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -61,7 +61,8 @@ std::string_view characters(std::string_view text, std::size_t first, std::size_
   return begin < end ? text.substr(begin, end - begin) : std::string_view{};
 }
 
-// Returns the line with a caret under the error's position. Only the relevant part of a long line is shown.
+// Returns the source line of a diagnostic and, below it, a line with a caret under the diagnostic's position.
+// Of a long line only the part around this position is shown.
 std::string excerpt(const Diagnostic& d) {
   const std::size_t column = static_cast<std::size_t>(std::max(1, d.place.column)) - 1;
   const std::size_t first = column > kMaxExcerptBytes / 2 ? column - kMaxExcerptBytes / 2 : 0;
@@ -116,8 +117,8 @@ Diagnostic SourceText::diagnose(Diagnostic::Severity severity, std::size_t offse
   if (end > start && text_[end - 1] == '\r') --end;
   const std::size_t shown = std::min(length, end - std::min(offset, end));
   d.length = std::max(1, count_characters(std::string_view(text_).substr(std::min(offset, end), shown)));
-  // A line of megabytes is not shown. A line that is merely long is included as a whole, so that columns and
-  // carets are right.
+  // A very long line (more than 20 times what is shown) is left out, to save memory. Any other line is kept
+  // as a whole, so that columns count from its start.
   const std::string_view line = std::string_view(text_).substr(start, end - start);
   if (line.size() <= 20 * kMaxExcerptBytes && find_invalid_utf8(line) == std::string_view::npos)
     d.source_line = line;
@@ -159,8 +160,8 @@ void Report::warning(const Span& at, std::string text) {
 }
 
 void Report::add(Diagnostic::Severity severity, const Span& at, std::string text) {
-  // Errors and warnings are counted separately, so that warnings never displace an error. take() applies the
-  // common limit.
+  // Up to kMax errors and up to kMax warnings are kept, so that warnings never displace an error. take() then
+  // reduces them to kMax in all.
   std::size_t& count = severity == Diagnostic::Severity::error ? errors_ : warnings_;
   if (count++ >= kMax) return;
   Diagnostic d = files_[at.file].diagnose(severity, at.offset, at.length, std::move(text));

@@ -1,4 +1,5 @@
-// The texts of scene files, positions in them, and a report of diagnostics about them.
+// The texts of scene files, positions in them, and a report that collects diagnostics (errors and warnings)
+// about them.
 #pragma once
 
 #include <cstddef>
@@ -25,20 +26,20 @@ struct Span {
 
 class SourceText {
  public:
-  // Returns the path of the value at an offset in a JSON document. Messages about this place begin with the
-  // path. An empty function: the text is not JSON.
+  // Used if the text is JSON, otherwise empty. Returns the JSON path of the value at an offset in the text; a
+  // diagnostic about this offset begins with the path.
   using PathOf = std::function<std::string(std::size_t)>;
   SourceText(std::string name, std::string text, PathOf path_of = {});
 
   const std::string& name() const { return name_; }
   const std::string& text() const { return text_; }
-  // Returns line and column of a byte, both from 1. The column counts characters (UTF-8 code points), not
-  // bytes. This takes time proportional to the line's length.
+  // Returns line and column of the byte at `offset`, both counted from 1. The column counts characters (UTF-8
+  // code points), not bytes. The call takes time proportional to the length of the line.
   SourcePlace place(std::size_t offset) const;
   int line(std::size_t offset) const;  // returns the line only, in constant time
   std::size_t index_bytes() const { return lines_before_.size() * sizeof lines_before_[0]; }
-  // Makes a diagnostic about the bytes [offset, offset + length), with the line that they are in, unless this
-  // line is far too long to be shown.
+  // Makes a diagnostic about the bytes [offset, offset + length). It contains the source line of these bytes,
+  // unless the line is very long.
   Diagnostic diagnose(Diagnostic::Severity severity, std::size_t offset, std::size_t length,
                       std::string message) const;
 
@@ -46,8 +47,8 @@ class SourceText {
   std::size_t line_start(std::size_t offset) const;
   std::string name_, text_;
   PathOf path_of_;
-  // The number of line ends before each block of the text. (An entry for each line would make this many times
-  // the size of a text that consists of empty lines.)
+  // The number of line ends before each block of 4096 bytes of the text. (One entry for each line would take
+  // four times the memory of a text that consists of empty lines.)
   std::vector<std::uint32_t> lines_before_;
 };
 
@@ -57,12 +58,12 @@ std::size_t find_invalid_utf8(std::string_view text);
 // ends, U+007F to U+009F); npos if there is none.
 std::size_t find_control(std::string_view text);
 
-// Collects the diagnostics while a scene is read, up to kMaxDiagnostics.
+// Collects up to kMaxDiagnostics diagnostics while a scene is read.
 class Report {
  public:
   explicit Report(bool strict) : strict_(strict) {}
 
-  // Adds a file, which is kept as long as the report. Returns its index for Span::file.
+  // Adds a file, which is kept for the lifetime of the report. Returns its index for Span::file.
   std::uint32_t add_file(SourceText file);
   const SourceText& file(std::uint32_t index) const { return files_[index]; }
 
@@ -74,14 +75,15 @@ class Report {
   void warning(const Span& at, std::string text);  // becomes an error under --strict
 
   bool has_errors() const { return errors_ > 0; }
-  // True if further errors would not be shown, so that reading may stop
+  // True if further errors would be discarded, so that reading may stop.
   bool full() const { return errors_ >= kMax; }
-  // True if a further warning would be shown; check this before composing a warning that costs much time.
+  // True if a further warning would be kept. Check this before work that serves only to find a warning.
   bool takes_warnings() const { return (strict_ ? errors_ : warnings_) < kMax; }
-  // Returns text that refers to the place `there` in a message about `here`: "line 9", with the file's name
-  // if the two are in different files.
+  // Returns the words by which a message about the place `here` refers to another place, `there`: "line 9",
+  // or "FILE, line 9" if the two places are in different files.
   std::string refer_to(const Span& there, const Span& here) const;
-  // Returns the diagnostics in the order found; if there are too many, errors are kept before warnings
+  // Returns the diagnostics in the order in which they were found. If there are more than kMaxDiagnostics,
+  // the errors come first and the last warnings are dropped.
   std::vector<Diagnostic> take();
 
  private:

@@ -12,19 +12,19 @@ namespace {
 
 using Xyz = std::array<double, 3>;
 
-// The constants of Planck's law, 2 h c^2 and h c / k (CODATA 2018, exact), for wavelengths in nm: W nm^4 /
-// (m^2 sr), and nm K.
+// The two constants of Planck's law for wavelengths in nm (CODATA 2018, exact): 2 h c^2 in W nm^4 / (m^2 sr),
+// and h c / k in nm K.
 constexpr double kFirst = 1.191042972397188e-16 * 1e36, kSecond = 1.438776877503933e7;
 
-// Converts XYZ to linear sRGB by the inverse of the matrix of BT.709's primaries (x, y) = (.64, .33), (.30,
-// .60), (.15, .06) and its white (.3127, .3290), to six digits as is usual.
+// Converts XYZ to linear sRGB. The matrix follows from BT.709's primaries (x, y) = (.64, .33), (.30, .60),
+// (.15, .06) and its white (.3127, .3290); its numbers are rounded to six decimals, as is usual.
 Rgb srgb_of(const Xyz& c) {
   return {3.240479 * c[0] - 1.537150 * c[1] - .498535 * c[2],
           -.969256 * c[0] + 1.875991 * c[1] + .041556 * c[2],
           .055648 * c[0] - .204043 * c[1] + 1.057311 * c[2]};
 }
 
-// Observer and illuminant interpolated between their samples.
+// Observer and illuminant at one wavelength, interpolated between the rows of the table.
 struct Seen {
   Xyz observer;
   double light;
@@ -44,8 +44,9 @@ double on_line(const SpectralCurve& c, std::size_t segment, double nm) {
   return c.value[segment] * (1 - t) + c.value[segment + 1] * t;
 }
 
-// Between neighbouring samples of the curve or the tables the integrand is a product of three linear
-// functions, for which Simpson's rule is exact.
+// Returns the integral of curve * illuminant * observer over the wavelength in nm. Between neighbouring
+// samples of the curve or of the table, each of the three factors is linear, so that the product is a cubic
+// polynomial, for which Simpson's rule is exact.
 Xyz integral(const SpectralCurve& c, Illuminant illuminant) {
   Xyz sum{0, 0, 0};
   const double end = std::min(c.nm.back(), kCieLast);

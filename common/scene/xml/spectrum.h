@@ -16,22 +16,24 @@ struct SpectralCurve {
   bool operator==(const SpectralCurve&) const = default;
 };
 
-// The illuminant by which a curve is multiplied: d65 for a reflectance. Spectra of light, and all curves of
-// Mitsuba 0.x, use equal_energy, which has the same power at all wavelengths.
+// The spectrum of the light by which a curve is multiplied: d65 for reflectances. equal_energy has the same
+// power at all wavelengths; it is used for spectra of light, and for all curves in files of Mitsuba 0.x.
 enum class Illuminant { equal_energy, d65 };
 
-// Returns integral(curve * illuminant * observer) / integral(illuminant * y), from 360 to 830 nm, as linear
-// sRGB, where `y` is the observer's y. Components are negative for colours outside sRGB.
+// Returns X, Y, Z = integral(curve * illuminant * observer) / integral(illuminant * y), converted to linear
+// sRGB. The integrals are from 360 to 830 nm; `observer` is the colour matching functions x, y and z. For a
+// colour outside sRGB some components are negative.
 Rgb linear_srgb(const SpectralCurve& curve, Illuminant illuminant);
 
 // Converts CIE 1931 X, Y, Z to linear sRGB.
 Rgb linear_srgb(const std::array<double, 3>& xyz);
 
-// Returns X, Y, Z of a black body at `kelvin` > 0 by Planck's law [W/(m^2 sr nm)], in the units of
-// linear_srgb(): a radiance of 1 at all wavelengths gives X = Y = Z = 1.
+// Returns X, Y, Z of the light of a black body at `kelvin` > 0. Its spectral radiance [W/(m^2 sr nm)] is
+// given by Planck's law. X, Y, Z are normalised as in linear_srgb(): a spectral radiance of 1 at all
+// wavelengths would give X = Y = Z = 1.
 std::array<double, 3> black_body_xyz(double kelvin);
 
-// Returns the largest spectral radiance of a black body over all wavelengths [W/(m^2 sr nm)].
+// Returns the largest value, over all wavelengths, of a black body's spectral radiance [W/(m^2 sr nm)].
 double black_body_peak(double kelvin);
 
 // Returns the linear sRGB of light with the same power at all wavelengths and luminance 1: X = Y = Z = 1,

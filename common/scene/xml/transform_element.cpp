@@ -28,7 +28,8 @@ Transform of_columns(const Vec3& x, const Vec3& y, const Vec3& z, const Vec3& or
 
 namespace {
 
-constexpr double kUnitSlack = 1e-3;  // tolerance for an axis written with three digits
+// Tolerance of lengths that should be 1, so that files may give unit vectors with three decimals.
+constexpr double kUnitSlack = 1e-3;
 
 Vec3 normalized(const Vec3& v) {
   // The vector is scaled first, so that squares of tiny or huge components neither underflow nor overflow.
@@ -42,7 +43,7 @@ bool is_zero(const Vec3& v) { return v[0] == 0 && v[1] == 0 && v[2] == 0; }
 Transform translation(const Vec3& d) { return {{1, 0, 0, d[0], 0, 1, 0, d[1], 0, 0, 1, d[2], 0, 0, 0, 1}}; }
 Transform scaling(const Vec3& s) { return {{s[0], 0, 0, 0, 0, s[1], 0, 0, 0, 0, s[2], 0, 0, 0, 0, 1}}; }
 
-// Returns a rotation by Rodrigues' formula, right-handed.
+// Returns the right-handed rotation about `axis`, by Rodrigues' formula.
 Transform rotation(const Vec3& axis, double degrees) {
   const Vec3 a = normalized(axis);
   const double angle = degrees * (std::numbers::pi / 180), s = std::sin(angle), c = std::cos(angle),
@@ -52,8 +53,8 @@ Transform rotation(const Vec3& axis, double degrees) {
            t * a[0] * a[2] - s * a[1], t * a[1] * a[2] + s * a[0], t * a[2] * a[2] + c, 0, 0, 0, 0, 1}};
 }
 
-// Returns a vector perpendicular to the unit vector n (the first of the two that Duff et al. 2017 give,
-// "Building an Orthonormal Basis, Revisited").
+// Returns a unit vector perpendicular to the unit vector n: the first of the two in Duff et al. 2017,
+// "Building an Orthonormal Basis, Revisited".
 Vec3 some_up(const Vec3& n) {
   const double sign = std::copysign(1.0, n[2]), a = -1 / (sign + n[2]);
   return {1 + sign * n[0] * n[0] * a, sign * n[0] * n[1] * a, -sign * n[0]};
@@ -112,7 +113,7 @@ std::optional<Transform> read_rotate(const Element& e, Report& report) {
   if (!axis || !angle) return std::nullopt;
   if (is_zero(*axis))
     return report.refuse(e.at, "<rotate> needs an axis: x=\"1\", y=\"1\", z=\"1\" or a mixture");
-  // Mitsuba 3 uses the numbers unnormalised, which makes the step a shear; this is never intended.
+  // Mitsuba 3 does not normalise the axis, so that a length other than 1 gives a shear, which nobody intends.
   const double length = std::sqrt(dot(*axis, *axis));
   if (std::abs(length - 1) > kUnitSlack)
     report.warning(e.at, fmt::format("this axis has the length {:.4g}: only its direction is used. Mitsuba 3 "
@@ -160,11 +161,12 @@ double determinant3(const Transform& t) { return dot(column(t, 0), cross(column(
 
 bool invertible(const Transform& t) {
   const auto finite = [](double x) { return std::isfinite(x); };
-  // A subnormal determinant is refused: its reciprocal, the determinant of the inverse, may be infinite.
+  // A subnormal determinant is refused, since its reciprocal, the determinant of the inverse, may be
+  // infinite.
   const double d = determinant3(t);
   if (!std::all_of(t.m.begin(), t.m.end(), finite) || !std::isnormal(d)) return false;
-  // The inverse may overflow although the determinant is normal: the renderer, which computes it by these
-  // products too, would refuse the matrix only when it builds the world.
+  // Elements of the inverse may overflow although the determinant is normal. They are computed here by the
+  // same products as in the renderer, which would otherwise find the overflow only when it builds the world.
   const Vec3 a = column(t, 0), b = column(t, 1), c = column(t, 2), moved = origin_of(t);
   for (const Vec3& cofactors : {cross(b, c), cross(c, a), cross(a, b)}) {
     const Vec3 row{cofactors[0] * (1 / d), cofactors[1] * (1 / d), cofactors[2] * (1 / d)};
@@ -173,7 +175,7 @@ bool invertible(const Transform& t) {
   return true;
 }
 
-// Checks that M transpose(M) is the identity, where M is the linear part.
+// Checks that M transpose(M) is the identity, where M is the linear part (the upper left 3 x 3 matrix) of t.
 bool is_rigid(const Transform& t) {
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t j = i; j < 3; ++j) {
@@ -187,7 +189,7 @@ bool is_rigid(const Transform& t) {
 bool is_similarity(const Transform& t) {
   const Vec3 columns[3] = {column(t, 0), column(t, 1), column(t, 2)};
   const double size = dot(columns[0], columns[0]);
-  // Files often have six digits, so that squares differ by a few 1e-6.
+  // Files often give numbers with six digits, so that relative differences of squares are a few 1e-6.
   const double slack = 1e-5 * size;
   return std::abs(dot(columns[1], columns[1]) - size) <= slack &&
          std::abs(dot(columns[2], columns[2]) - size) <= slack &&

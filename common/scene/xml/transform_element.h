@@ -1,4 +1,5 @@
-// 4 x 4 matrices and the <transform> element.
+// Reads the <transform> element, and computes with the affine 4 x 4 matrices that it gives. The linear part
+// of such a matrix is its upper left 3 x 3 matrix.
 #pragma once
 
 #include "common/scene/scene.h"
@@ -9,37 +10,39 @@ namespace ls::scene {
 double dot(const Vec3& a, const Vec3& b);
 Vec3 cross(const Vec3& a, const Vec3& b);
 inline Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-std::optional<Vec3> unit(const Vec3& v);  // nullopt: v has no length, or one that is not finite
+// Returns v divided by its length; nullopt if the length is 0, subnormal or not finite.
+std::optional<Vec3> unit(const Vec3& v);
 
-// Returns a column of the matrix: 0 to 2 are the images of the axes, 3 is that of the origin.
+// Returns column i of the matrix. Columns 0 to 2 are the images of the axes, column 3 is the image of the
+// origin.
 inline Vec3 column(const Transform& t, std::size_t i) { return {t.m[i], t.m[4 + i], t.m[8 + i]}; }
 Transform of_columns(const Vec3& x, const Vec3& y, const Vec3& z, const Vec3& origin);
 Transform multiply(const Transform& a, const Transform& b);
-Vec3 transform_point(const Transform& t, const Vec3& p);  // uses the affine part only
+Vec3 transform_point(const Transform& t, const Vec3& p);  // without the last row, which is 0 0 0 1
 Vec3 transform_vector(const Transform& t, const Vec3& v);
-double determinant3(const Transform& t);  // determinant of the linear part
+double determinant3(const Transform& t);  // returns the determinant of the linear part
 
 // True if all elements of the matrix and of its inverse are finite, and the determinant of the linear part is
 // a normal number: not 0, subnormal or infinite.
 bool invertible(const Transform& t);
-// True if the matrix consists only of translation, rotation and reflection, up to 1e-3 as Mitsuba 3 requires
-// of sensors.
+// True if the matrix is composed of only translation, rotation and reflection, within the tolerance 1e-3.
+// Mitsuba 3 requires this of sensors, with the same tolerance.
 bool is_rigid(const Transform& t);
 
-// Reads a <transform>: the product of its steps, each applied after the previous ones. Reports and skips
-// wrong steps.
+// Reads a <transform> and returns the product of its steps, where each step is applied after the steps before
+// it. A wrong step is reported and skipped.
 Transform read_transform(const Element& e, Report& report);
-// True if the singular values of the linear part are equal within the rounding of single precision: the
-// matrix scales equally in all directions.
+// True if the matrix scales equally in all directions: the columns of its linear part are perpendicular and
+// equally long, up to a relative error of 1e-5 in their scalar products.
 bool is_similarity(const Transform& t);
-// Returns the part of a 4 x 4 matrix that maps x and y to x and y, with their translation. Mitsuba 3 uses
-// this part for textures.
+// Returns the 3 x 3 matrix for (u, v, 1) that consists of the first two rows of t without the column of z.
+// Mitsuba 3 uses this part of a <transform> for textures.
 UvTransform uv_part(const Transform& t);
 
-// Reads x, y, z or value="..." of <translate>, <rotate>, <scale>, <vector> or <point>; missing components
-// become `missing`.
+// Reads the attributes x, y and z, or the attribute value="...", of <translate>, <rotate>, <scale>, <vector>
+// or <point>. `missing` is used for each of x, y and z that is not given.
 std::optional<Vec3> read_xyz(const Element& e, double missing, Report& report);
-// Returns the place of the attribute's value, or of the element if it has no such attribute.
+// Returns the place of the attribute's value, or the place of the element if it has no such attribute.
 Span value_place(const Element& e, std::string_view attribute);
 
 }  // namespace ls::scene

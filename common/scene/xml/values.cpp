@@ -39,7 +39,7 @@ bool for_each_token(std::string_view text, F f) {
   return true;
 }
 
-// Parses a curve: at least two pairs, with increasing wavelengths.
+// Parses a spectral curve: at least two pairs wavelength:value, with increasing wavelengths in nm.
 std::optional<SpectralCurve> parse_curve(std::string_view text) {
   SpectralCurve curve;
   const bool ok = for_each_token(text, [&](std::string_view token) {

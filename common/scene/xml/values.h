@@ -1,4 +1,5 @@
-// Parses numbers, lists and colours in attributes.
+// Parses the values of XML attributes: numbers, lists and colours. nullopt means that the text is not such a
+// value.
 #pragma once
 
 #include <optional>
@@ -11,7 +12,7 @@
 
 namespace ls::scene {
 
-// Parse one finite number, which may have blanks around it.
+// These two parse one finite number, which may have blanks around it.
 std::optional<double> parse_number(std::string_view text);
 std::optional<long long> parse_integer(std::string_view text);
 std::optional<bool> parse_boolean(std::string_view text);  // parses true or false, in any letter case
@@ -22,7 +23,7 @@ std::optional<std::vector<double>> parse_numbers(std::string_view text, std::siz
 std::optional<Rgb> parse_rgb(std::string_view text);
 // Parses #rrggbb without decoding: 255 becomes 1.
 std::optional<Rgb> parse_hex(std::string_view text);
-double decode_srgb(double x);  // converts to linear (IEC 61966-2-1)
+double decode_srgb(double x);  // converts an sRGB value, 0 to 1, to a linear one (IEC 61966-2-1)
 // The value of a <spectrum>: one number, three numbers of linear sRGB (in files of Mitsuba 0.x), or
 // wavelength:value pairs in nm; std::monostate if the text is none of these.
 using SpectrumText = std::variant<std::monostate, double, Rgb, SpectralCurve>;

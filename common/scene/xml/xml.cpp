@@ -11,8 +11,8 @@ namespace {
 
 bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
-// Finds the positions of attributes in the text, which pugixml does not report; it reports only where a tag
-// begins. `at` is the offset of the tag's name in well-formed XML.
+// Finds the positions of the attributes of an element in the text: pugixml reports only where the tag begins.
+// `at` is the offset of the tag's name in well-formed XML.
 class AttributePlaces {
  public:
   AttributePlaces(std::uint32_t file, std::string_view text, std::size_t at)
@@ -45,12 +45,13 @@ class AttributePlaces {
   std::size_t at_;
 };
 
-// Returns what is wrong with a value after character numbers (&#0; ...) are decoded; empty if it is valid.
-// `raw` is the value as written in the file.
+// Returns what is wrong with an attribute's value, in which pugixml has decoded character numbers such as
+// &#65;; empty if it is valid. `raw` is the value as written in the file.
 std::string_view unprintable(const Attribute& a, std::string_view raw) {
   if (find_invalid_utf8(a.value) != std::string_view::npos) return "a number that is no character";
   if (find_control(a.value) != std::string_view::npos) return "a control character";
-  // A zero ends the decoded value, so it can only be found in the raw text.
+  // pugixml returns the decoded value as a C string, which ends before a zero byte (&#0;). So zero bytes are
+  // searched for in the raw text.
   for (std::size_t at = raw.find("&#"); at != std::string_view::npos; at = raw.find("&#", at + 2)) {
     std::size_t digit = at + 2;
     if (digit < raw.size() && raw[digit] == 'x') ++digit;
@@ -89,7 +90,7 @@ class TreeBuilder {
   bool read_attributes(pugi::xml_node node, Element& out) {
     AttributePlaces places(file_, text_, out.at.offset);
     for (const pugi::xml_attribute attribute : node.attributes()) {
-      // This limit also keeps the search for duplicate names short.
+      // The limit bounds the time of the search for duplicate names below, which is quadratic.
       if (out.attributes.size() == kMaxElementAttributes)
         return report_.error(out.at,
                              fmt::format("<{}> has more than {} attributes", out.tag, kMaxElementAttributes)),

@@ -28,11 +28,12 @@
 
 namespace ls::coordinator {
 
-// Returns an error for a plan that exceeds limits.h: too many units, no tile, or a target error or time that
-// is not positive.
+// Checks a plan. invalid_argument: it has no job id, no pixels, too many units (limits.h), a target error or
+// time that is not positive, a time that is too long, or a focus outside the frame.
 Result<void> check_plan(const JobPlan& plan);
 
-// Names a numeric class for people: "3f2a9c11d0e4 (armv8-a:gcc-14.2.0:embree-4.3.3)".
+// Returns a text that names a numeric class (a set of machines that compute the same bits) for people, such
+// as "3f2a9c11d0e4 (armv8-a:gcc-14.2.0:embree-4.3.3)".
 std::string class_in_words(const Digest& numeric_class, const std::string& platform);
 
 // How the service should handle a result that has arrived
@@ -47,14 +48,14 @@ struct Wanted {
   Verdict verdict = Verdict::no;
   SampleRange samples;  // the sample range that the job needs of this unit now
   PixelRect rect;
-  bool pinned = false;  // true if the job is pinned to a numeric class
+  bool pinned = false;  // true if only workers of one numeric class may render the job
 };
 
 struct JobFigures {
   JobState state = JobState::queued;
   std::optional<StopReason> stopped;
-  std::uint64_t spp = 0;           // samples per pixel requested, or the limit
-  std::uint64_t units_total = 0;   // units planned, as far as known: reaching a target error reduces them
+  std::uint64_t spp = 0;           // requested samples per pixel, or kMaxSppWithoutLimit (limits.h)
+  std::uint64_t units_total = 0;   // units planned so far; the number falls when a target error is reached
   std::uint64_t units_done = 0;    // units with an accepted result
   std::uint64_t units_leased = 0;  // units leased to workers, each counted once even if a copy is leased, too
   std::uint64_t units_queued = 0;  // units that wait for a worker: units_total - units_done - units_leased
@@ -63,13 +64,14 @@ struct JobFigures {
   // Predicted CPU seconds of the units that are not done, from measured cost. 0: nothing has been measured
   // yet, or the end of an adaptive job (one with a target error) is not predicted yet.
   double core_seconds_left = 0;
-  double core_seconds_to_limit = 0;  // the same if every tile gets its full samples
-  // Cores of the workers that hold its leases; each counts by the job's share of that worker's leases
+  double core_seconds_to_limit = 0;  // predicted CPU seconds if all tiles get all their samples
+  // Number of cores that work for the job. For each worker these are its cores times a fraction: the leases
+  // of this job, divided by all leases that the worker holds
   double cores = 0;
   double core_seconds_queued = 0;  // predicted CPU seconds of the units that wait for a worker
   std::optional<TimePoint> first_ray;
   std::optional<Digest> numeric_class;
-  std::optional<ClassShare> class_share;  // nullopt: the job is pinned to no class
+  std::optional<ClassShare> class_share;  // nullopt: the job has no numeric class yet
 };
 
 struct WorkerFigures {
@@ -78,7 +80,7 @@ struct WorkerFigures {
   std::uint32_t leases = 0;
   std::uint32_t units_out = 0;
   std::uint64_t units_done = 0;
-  JobId job;  // the job of its oldest lease; may be empty
+  JobId job;  // the job of its oldest lease; empty: it holds no lease
 };
 
 class Farm {
@@ -87,8 +89,8 @@ class Farm {
     // Leases are named PREFIX-1, PREFIX-2...; each start of the coordinator needs another prefix
     std::string lease_prefix = "l";
     ShareLimits limits = {};
-    double audit_rate = 0;         // fraction of the accepted results that another worker is to render again
-    std::uint64_t audit_seed = 0;  // decides which results are audited; secret from workers
+    double audit_rate = 0;  // fraction, 0 to 1, of accepted results that are rendered again to check them
+    std::uint64_t audit_seed = 0;  // decides which results are audited; must be secret from workers
   };
 
   Farm();
@@ -106,13 +108,14 @@ class Farm {
   // Returns the job's current plan, for storage: with changed priority and samples, and without a target
   // error or time limit that no longer applies.
   std::optional<JobPlan> plan(const JobId& id) const;
-  // Return an error, with the reason, if the farm would ignore the event JobRetargeted or JobExtended.
+  // Return an error, with the reason, if the farm would ignore the event JobRetargeted or JobExtended with
+  // this target error or number of samples.
   Result<void> may_retarget(const JobId& id, double target_error) const;
   Result<void> may_extend(const JobId& id, std::uint64_t spp) const;
   std::optional<WorkerFigures> worker(const WorkerId& id) const;
-  // Explains to the user why no worker may take units of a job that could run: each connected worker is of
-  // another class, lacks memory or a tag, is blocked or unhealthy, or the like. Empty if some worker may take
-  // them.
+  // Explains to the user why no worker may take units of a job that is queued or running: each connected
+  // worker is of another class, lacks memory or a tag, is blocked or unhealthy, or the like. Empty if some
+  // worker may take units, or if the job is in another state.
   std::string why_waiting(const JobId& id) const;
   AuditFigures audits() const;
   // Returns the job's open audits (units that are rendered again for comparison). The service must store
@@ -120,10 +123,10 @@ class Farm {
   std::vector<JobRestored::Audit> open_audits(const JobId& id) const;
   std::vector<JobId> take_changed_audits();  // jobs whose open audits may have changed since the last call
   bool quarantined(const WorkerId& worker) const;
-  // True if a job that has no numeric class yet may be pinned to that of this worker, so that only workers of
-  // this class render it.
+  // True if the job has a numeric class already, or may be pinned to that of this worker (then only workers
+  // of this class render it).
   bool may_pin(const JobId& id, const WorkerId& worker) const;
-  double cores_connected() const;  // sum over connected workers: threads times core share (CoreShare)
+  double cores_connected() const;  // sum over connected workers of threads times core share (CoreShare)
   int workers_connected() const;
 
  private:

@@ -33,7 +33,8 @@ void Farm::State::set_state(Job& job, JobState to) {
 
 void Farm::State::refresh(Job& job) {
   const bool units = job.leasable() && !job.queue.empty(job.units);
-  // Set even if FairShare lists the job already: it may do so for an audit that only some workers can render
+  // work_appeared is set even if FairShare lists the job already: it may be listed only for an audit, which
+  // few workers can render, whereas more workers can render these units.
   work_appeared |= units && !job.has_units;
   job.has_units = units;
   if (units || (job.leasable() && job.audit_waits()))
@@ -57,8 +58,8 @@ void Farm::State::on(const JobRestored& event) {
   if (job.state == JobState::paused || job.state == JobState::done) job.stand_still(now);
   if (is_closed(job.state)) return;
 
-  // If a done job has lost its film (the sums of its samples), the number of samples of each tile is lost,
-  // too. Then the film is summed up again from the job's results.
+  // If a done job has lost its film (the sums of its samples), it is unknown how many samples each tile had.
+  // Then the film is summed up again from the job's results, and the job ends anew.
   const bool with_film = event.folded.size() == job.units.tiles() &&
                          std::any_of(event.folded.begin(), event.folded.end(), [](auto r) { return r > 0; });
   if (job.state == JobState::done && with_film) {
@@ -108,7 +109,8 @@ void Farm::State::on(const JobPaused& event) {
   if (job == nullptr || !job->leasable()) return;
   set_state(*job, JobState::paused);
   // A worker finishes a lease that it has begun; leases that are not begun are taken back now. The newest
-  // lease goes first, since whether a lease has begun is derived from the worker's earlier leases.
+  // goes first: whether a lease has begun is derived from the worker's earlier leases, which must still
+  // exist.
   const std::vector<LeaseSeq> out = leases_of(*job);
   for (auto seq = out.rbegin(); seq != out.rend(); ++seq)
     if (untouched(*leases.find(*seq))) free_lease(*seq, FreedCause::paused, true);
@@ -119,7 +121,8 @@ void Farm::State::on(const JobResumed& event) {
   Job* job = find(event.job);
   if (job == nullptr || job->state != JobState::paused) return;
   set_state(*job, job->numeric_class ? JobState::running : JobState::queued);
-  // A failed check of the denoised layers' error may have paused the job: this repeats the check
+  // The job may have been paused because a check of its denoised layers failed. judge() then requests this
+  // check again
   job->checking_spp = 0;
   if (job->adaptive) judge(*job);
   refresh(*job);
@@ -150,8 +153,8 @@ void Farm::State::on(const JobFocused& event) {
   job->look_at_focus();
 }
 
-// Forgets the job, but keeps the failures of workers in it until they are forgiven. A worker that fails in
-// two jobs is unhealthy, even if the first job is gone.
+// Forgets the job. The record of workers' failures in it remains until the failures are forgiven: a worker
+// that fails in two jobs is unhealthy, even if the first job is gone.
 void Farm::State::on(const JobForgotten& event) {
   Job* job = find(event.job);
   if (job == nullptr || !job->ended()) return;
@@ -165,9 +168,10 @@ void Farm::State::on(const JobForgotten& event) {
 
 void Farm::State::freeze(Job& job, StopReason reason) {
   job.frozen = true;
-  work_appeared = true;  // the time limit no longer forbids leasing units that came back
+  // Units that workers gave back may be leased again: the time limit no longer forbids it
+  work_appeared = true;
   job.cut_off(job.begun(), reason);
-  // The stop rule of a target error no longer holds back accepted results: they are added to the image, too
+  // The stop rule of a target error no longer holds back accepted results: these are now added to the image
   issue_folds(job);
   finish_if_complete(job);
   refresh(job);
@@ -187,7 +191,7 @@ void Farm::State::finish_if_complete(Job& job) {
 void Farm::State::fail(Job& job, std::string error) {
   set_state(job, JobState::failed);
   effects.emplace_back(JobFailed{job.plan.brief.job, std::move(error)});
-  // The failed job is to blame, not its workers: their failures in it are erased.
+  // The job is to blame for its failure, not the workers: their failures in it are erased.
   for (const auto& [index, worker] : workers.all()) worker->failures.erase(job.seq);
   end(job);
 }
@@ -243,9 +247,8 @@ Result<void> Farm::State::may_extend(const Job& job, std::uint64_t spp) {
   if (is_closed(job.state))
     return ls::fail(Errc::failed_precondition,
                     fmt::format("job {} is {}: it cannot be extended", id, to_string(job.state)));
-  // now_spp is the job's current total of samples per pixel. It is the requested number, unless a target
-  // error, a time limit or the user ends the job early; then it is the number of the tile with the most
-  // rounds.
+  // now_spp is the job's current total of samples per pixel: the requested number, or, if a target error, a
+  // time limit or the user ends the job early, the number of samples in the tile with the most rounds.
   const RoundIndex rounds = job.queue.longest();
   const bool cut_short = job.stopping && *job.stopping != StopReason::spp;
   const std::uint64_t now_spp = !cut_short ? job.spp : rounds == 0 ? 0 : cut_range(rounds - 1, job.spp).s1;
@@ -315,8 +318,8 @@ void Farm::State::reopen(Job& job, RoundIndex last) {
 
 void Farm::State::take_up_again(Job& job) {
   work_appeared = true;
-  // While the job had ended, its image was final, so results of quarantined workers were kept. Now they are
-  // void.
+  // When a worker is quarantined, ended jobs keep its results, since their images are final. This job goes
+  // on, so such results become void now.
   for (const auto& [worker, why] : quarantined)
     if (const WorkerIndex faulty = workers.index_of(worker); !job.units.tiles_of(faulty).empty())
       void_results(job, faulty);

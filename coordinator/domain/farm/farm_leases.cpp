@@ -1,6 +1,6 @@
-// Leases units (rounds of tiles) to workers and takes them back; a lease is a list of units that is assigned
-// to one worker. Only these functions change which leases exist, which units they hold, and the amount of
-// work of each worker.
+// Leases units to workers and takes them back. A unit is one round (range of samples) of one tile; a lease is
+// a list of units that is assigned to one worker. Only these functions change which leases exist, which units
+// they hold, and how much leased work each worker has.
 #include <algorithm>
 #include <limits>
 

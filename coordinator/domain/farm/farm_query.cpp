@@ -1,4 +1,5 @@
-// The public functions of the farm: handling of events, and queries, which change nothing.
+// The public functions of the farm: handle(), which passes an event to the state, and queries, which change
+// nothing.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -49,7 +50,8 @@ Result<void> check_plan(const JobPlan& plan) {
   }
   const std::uint64_t tiles = std::uint64_t(grid.columns()) * std::uint64_t(grid.rows());
   const std::uint64_t spp = plan.spp.value_or(kMaxSppWithoutLimit);
-  // The samples are checked first: only then the number of rounds is sure to fit 32 bits.
+  // The samples are checked before round_count() is called: with too many samples, the number of rounds might
+  // not fit into 32 bits.
   if (tiles > kMaxTiles || spp > kMaxUnits * 64 || tiles * round_count(spp) > kMaxUnits) {
     return fail(Errc::invalid_argument,
                 fmt::format("{} tiles at {} spp are more than {} units; use larger tiles or fewer samples",
@@ -109,9 +111,10 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
   f.units_queued = job->queued();
   f.units_folded = job->units.folded_count();
   f.rounds_complete = job->units.rounds_complete();
-  const double per_sample = job->cost.per_sample();  // 0: nothing has been measured yet
-  // samples_of_last(n) estimates the number of pixel samples in n units that are not done, as if all tiles
-  // had the same size and only the last units in the order of rounds were missing.
+  const double per_sample = job->cost.per_sample();  // CPU seconds per pixel sample; 0: nothing measured yet
+  // samples_of_last(undone) estimates how many pixel samples are in this many units that are not done. It
+  // assumes that all tiles have the same size and that only the last units in the order of rounds are not
+  // done.
   const RoundIndex rounds = job->queue.longest();
   const double pixels = static_cast<double>(job->plan.grid.frame.width) * job->plan.grid.frame.height;
   const double left = static_cast<double>(job->units.tiles());

@@ -1,6 +1,8 @@
 // The state of the farm, and its reaction to each event. The functions are grouped by subject into the files
-// farm_jobs, farm_workers, farm_units, farm_leases, schedule, farm_stop and farm_trust. A unit
-// is one round (range of samples) of one tile; a lease is a list of units that is assigned to one worker.
+// farm_jobs, farm_workers, farm_units, farm_leases, schedule, farm_stop and farm_trust (.cpp). A unit is one
+// round (range of samples) of one tile; a lease is a list of units that is assigned to one worker. A job that
+// is pinned to a numeric class (machines that compute the same bits) is rendered only by workers of this
+// class.
 #pragma once
 
 #include <functional>
@@ -17,7 +19,7 @@
 
 namespace ls::coordinator {
 
-// Returns the smaller of two limits, where 0 means no limit
+// Returns the smaller of two limits, of which 0 means no limit.
 std::uint32_t tighter(std::uint32_t a, std::uint32_t b);
 
 struct Farm::State {
@@ -29,28 +31,29 @@ struct Farm::State {
   std::map<JobSeq, std::unique_ptr<Job>> jobs;
   std::unordered_map<JobId, Job*> by_id;
   JobSeq last_job = 0;
-  FairShare shares;                    // the jobs with units to lease, and their order
-  std::map<std::string, Load> users;   // leased units of each owner, except the administrator
-  std::map<std::string, Load> groups;  // leased units of each sequence (JobPlan::group)
+  FairShare shares;                    // the order in which jobs get workers
+  std::map<std::string, Load> users;   // leased units by owner of the jobs, without the administrator's
+  std::map<std::string, Load> groups;  // leased units by sequence (JobPlan::group)
   std::map<WorkerId, std::string> quarantined;
   AuditFigures audited;
   std::set<JobId> audits_changed;
 
-  // State of the event being handled
+  // Time of the event that is being handled
   TimePoint now{};
-  // Time of the latest Tick. Whether a worker is blocked from a job after failures is checked at this time,
-  // not `now`, because only a tick, which checks all workers, ends such blocks
+  // Time of the latest Tick. A worker that failed too often is blocked from a job for some time. Only a tick
+  // ends blocks, because it then considers all workers for work; so blocks are checked at this time, not at
+  // `now`
   TimePoint ticked{};
   std::vector<Effect> effects;
-  // True if units may have appeared that some worker can take: dispatch() then considers all workers that
-  // want work, not only those in `dirty`
+  // True if there may be new units that some worker can take: dispatch() then considers all workers that want
+  // work, not only those in `dirty`
   bool work_appeared = false;
-  // True if a job was just pinned to a numeric class and some workers of this class may not begin jobs: they
-  // can take its units from now on, so dispatch() considers all workers again
+  // True if a job was just pinned to a numeric class that has workers with may_begin == false. These can take
+  // units of the job from now on, so dispatch() considers all workers again
   bool pinned_for_others = false;
-  std::set<WorkerIndex> dirty;  // workers whose state has changed, so that they may want more work
+  std::set<WorkerIndex> dirty;  // workers that may want more work, since their state has changed
 
-  // farm_jobs.cpp
+  // Defined in farm_jobs.cpp
   void on(const JobSubmitted& event);
   void on(const JobRestored& event);
   void on(const JobCancelled& event);
@@ -64,8 +67,8 @@ struct Farm::State {
   void on(const JobForgotten& event);
   static Result<void> may_retarget(const Job& job, double target_error);
   static Result<void> may_extend(const Job& job, std::uint64_t spp);
-  void reopen(Job& job, RoundIndex last);  // renders the truncated last round again in full
-  void take_up_again(Job& job);            // resumes a job after its samples or its target were changed
+  void reopen(Job& job, RoundIndex last);  // queues round `last`, which was truncated, to be rendered in full
+  void take_up_again(Job& job);            // lets a job go on after its samples or its target were changed
   Job* find(const JobId& id) const;
   Job& add(JobPlan plan);
   void set_state(Job& job, JobState to);
@@ -76,9 +79,9 @@ struct Farm::State {
   void freeze(Job& job, StopReason reason);
   void finish_if_complete(Job& job);
   void fail(Job& job, std::string error);
-  void end(Job& job);  // takes back all leases of a job that has ended
+  void end(Job& job);  // takes back all leases of a job that has failed or was cancelled
 
-  // farm_workers.cpp
+  // Defined in farm_workers.cpp
   void on(const WorkerJoined& event);
   void on(const WorkerQuarantined& event);
   void on(const WorkerLost& event);
@@ -89,95 +92,100 @@ struct Farm::State {
   void on(const Tick& event);
   void lose(Worker& worker, FreedCause why);
   void touch(Worker& worker);
-  void note_progress(Worker& worker);  // the worker has finished a unit
+  void note_progress(Worker& worker);  // notes that the worker makes progress, so it is not stuck
   void expire_leases();
   void forgive_and_forget();
   void forget_names();  // forgets names of workers that are gone and that no job refers to
 
-  // farm_units.cpp
+  // Defined in farm_units.cpp
   void on(const ClassChosen& event);
   void on(const UnitAccepted& event);
   void on(const UnitFolded& event);
   void on(const DenoisedChecked& event);
   void on(const UnitFailed& event);
-  void charge(Job& job, double cpu_seconds);  // adds these seconds to the share of the job's owner
+  void charge(Job& job, double cpu_seconds);  // adds a result's CPU seconds to its user's and group's shares
   void issue_folds(Job& job, TileIndex tile);
   void issue_folds(Job& job) {
     for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
   }
   void checkpoint(Job& job, RoundIndex round);
 
-  // farm_trust.cpp: audits and faulty workers
+  // Defined in farm_trust.cpp: audits and faulty workers. In an audit another worker renders a unit that has
+  // an accepted result again, for comparison.
 
-  // Compares a further result of a unit with the accepted one
+  // Compares a further result of a unit with the accepted result
   void compare(Job& job, UnitCode code, const UnitAccepted& event);
   void restore_audits(Job& job, const JobRestored& event);
   void consider_audit(Job& job, UnitCode code, WorkerIndex first);
-  // Returns a unit of the job that this worker may render again for an audit; nullopt if there is none.
+  // Returns a unit of the job that waits for an audit and that this worker may render; nullopt: there is
+  // none.
   std::optional<UnitCode> audit_for(const Job& job, const Worker& worker) const;
   bool audit_from(Job& job, Worker& worker);
-  // True if this worker held or holds a lease on this unit, so that its result counts as a vote.
+  // True if this worker holds or held a lease on this unit. Only then its result counts as a vote.
   bool was_asked(const Job& job, UnitCode code, WorkerIndex worker) const;
   void agreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
   void disagreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
   void claimed(Job& job, UnitCode code, const UnitAccepted& by);
   void undecided(Job& job, UnitCode code);
-  // Whether any worker can render the unit for the audit. `none`: no connected worker; `away`: only workers
-  // that get no work at the moment; `there`: at least one that can render it now.
+  // Which workers can render the unit for the audit. `none`: no connected worker; `away`: only workers that
+  // get no work at the moment; `there`: at least one that can render it now.
   enum class Deciders { none, away, there };
   Deciders deciders(const Job& job, const Audit& audit) const;
   void settle_audits(Job& job);  // decides or drops the open audits that no worker can render
   void audit_failed(Job& job, UnitCode code, Worker& worker, LeaseRecord& lease);
   void close_audits(Job& job, const std::function<bool(UnitCode, const Audit&)>& which);
   void found_faulty(const UnitKey& unit, WorkerIndex faulty, std::string evidence);
-  // Takes the worker's leases back and voids its results; the caller has added it to `quarantined`
+  // Takes the worker's leases back and voids its results. The caller must have added the worker to
+  // `quarantined`
   void bar(const WorkerId& id, const std::string& why);
   void void_results(Job& job, WorkerIndex faulty);
   void void_tile(Job& job, TileIndex tile);
   static void steer_anew(Job& job);
 
-  // farm_stop.cpp. Levels, and groups of tiles that stop together, are those of the stop rule
-  // (adaptive_stop.h).
+  // Defined in farm_stop.cpp. The stop rule (adaptive_stop.h) of a target error stops tiles in groups. A
+  // level is its threshold for stopping, which falls step by step.
 
-  // Passes the tile's error after this round, which was just added to the image, to the stop rule, and
+  // Passes the tile's error after this round, which was just added to the image, to the stop rule. Then
   // applies the rule's decision on how many rounds the tiles get.
   void steer(Job& job, TileIndex tile, RoundIndex round);
-  // Judges the image at the present level of the stop rule once all groups have reached it. While it misses
-  // the target, goes to the next level and judges again; if it meets the target, ends the job.
+  // Once all groups have stopped at the present level, judges whether the image meets the target. If it does,
+  // ends the job. Otherwise goes to the next level, and repeats this as long as all groups have stopped.
   void judge(Job& job);
-  // Judges the image once, at the present level; requires that all groups have reached it
+  // Judges the image at the present level, at which all groups must have stopped
   AdaptiveStop::Verdict verdict_on(Job& job);
   AdaptiveStop::Verdict denoised_verdict(Job& job);
   void mark_level(Job& job, bool last);
-  void take_marks(Job& job);  // emits a Checkpoint for each mark (job.h) whose rounds are all in the image
+  void take_marks(Job& job);  // emits a Checkpoint for each LevelMark whose rounds are all in the image
   void stop_at_level(Job& job);
-  // Decides the last round of each tile from measured unit costs; called shortly before the job's time limit.
+  // Decides, from measured costs of units, the last round of each tile that is rendered before the job's time
+  // limit. Called shortly before the limit.
   void plan_end(Job& job, TimePoint limit);
-  void give_back_beyond(Job& job);  // takes back leased units beyond the tiles' last rounds
-  // Returns the lease under which the worker holds the unit; null: it does not
+  void give_back_beyond(Job& job);  // takes back leased units of rounds after the tiles' last ones
+  // Returns the lease under which the worker holds the unit; null: none. Defined in farm_units.cpp, as is
+  // count_failure()
   LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker);
   void count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure);
 
-  // farm_leases.cpp
+  // Defined in farm_leases.cpp
   void grant(Job& job, Worker& worker, std::vector<UnitCode> units, bool audit = false);
   void load(Job& job, const Worker& worker, std::uint32_t units);
   void unload(Job& job, std::uint32_t units);
-  // Counts one lease less that the worker holds of this job, its owner and its group
+  // Notes that the worker holds one lease less of this job, and so of the job's owner and group
   void leave_load(Job& job, const Worker& worker);
   // Returns how many more of the job's units may be leased to the worker under the limits on workers and
-  // units. Audits (second renderings, for comparison) are exempt: the farm orders them, not the user, and an
-  // audit that waited for the user's other work would delay the end of a finished job.
+  // units. The limits do not apply to audits: the farm orders them, not the user, and an audit that waited
+  // for the user's other work would delay the end of a job that is otherwise finished.
   std::uint32_t room(const Job& job, const Worker& worker) const;
   bool limited(const Job& job) const;
-  static bool has(const LeaseRecord& lease, UnitCode code);  // true if the unit is still leased under it
-  // Removes the unit from the lease without queueing it. Returns true if no lease holds the unit any more;
-  // always false for an audit.
+  static bool has(const LeaseRecord& lease, UnitCode code);  // true if the unit is still part of the lease
+  // Removes the unit from the lease without queueing it. Returns true if no other lease holds the unit;
+  // always false for the lease of an audit.
   bool detach(LeaseRecord& lease, UnitCode code);
-  // Removes the unit from all leases because its result arrived. `by` is the worker that delivered the
-  // result; null: unknown.
+  // Removes the unit from all leases because a result of it has arrived. `by` is the worker that delivered
+  // the result; null: unknown.
   void settle_unit(Job& job, UnitCode code, const Worker* by);
-  // Removes the units for which `which` is true from the lease and queues them again. A lease without units
-  // ends; if `send_worker`, its worker then gets a CancelLease.
+  // Removes from the lease those of its units for which `which` is true, and queues them again. A lease
+  // without units ends; if `send_worker` is true, its worker then gets a CancelLease.
   template <class Which>
   void free_units(LeaseRecord& lease, FreedCause why, bool send_worker, Which&& which);
   void free_lease(LeaseSeq seq, FreedCause why, bool send_worker);
@@ -185,7 +193,7 @@ struct Farm::State {
   std::vector<LeaseSeq> leases_of(const Job& job) const;
   void renew(LeaseRecord& lease);
 
-  // schedule.cpp
+  // Defined in schedule.cpp
   void dispatch();
   void serve(const std::vector<Worker*>& candidates, bool only_uncovered, bool only_holders);
   bool assign(Worker& worker, bool only_held);
@@ -197,17 +205,17 @@ struct Farm::State {
   bool lease_from(Job& job, Worker& worker);
   std::optional<UnitCode> next_for(Job& job, const Worker& worker);
   // True if the unit is speculative (the job may end without it) and the worker has enough other work for
-  // now. `units` and `cost` (predicted CPU seconds) describe the lease being made so far.
+  // now. `units` (number) and `cost` (predicted CPU seconds) are those of the lease that is being composed.
   bool too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units, double cost) const;
-  // True if a connected worker other than `but` may take units of the job and has not failed on this one.
+  // True if a connected worker other than `but` may take units of the job and has not failed on this unit.
   bool others_may_take(const Job& job, UnitCode code, const Worker& but) const;
   // Near the end of a job: takes back a lease that waits behind other work of its worker, so that an idle
-  // worker can render its units. True if units were queued again.
+  // worker can render its units. Returns true if a lease was taken back.
   bool take_back_for_idle();
-  bool untouched(const LeaseRecord& lease) const;  // true if its worker is still busy with earlier leases
+  bool untouched(const LeaseRecord& lease) const;  // true if earlier leases still keep its worker busy
   double waits_behind_others(const LeaseRecord& lease) const;
   LeaseRecord* longest_waiting_for(const Worker& idle);
-  void copy_overdue(Worker& worker);  // near the end of a job: leases copies of overdue units to the worker
+  void copy_overdue(Worker& worker);  // leases copies of overdue units to this idle worker
 };
 
 template <class Which>

@@ -1,5 +1,8 @@
-// The end of a job by its target error or by its time limit. For the target error, this file passes errors to
-// the stop rule (adaptive_stop.h), judges the image at each level and takes checkpoints of the levels.
+// The end of a job by its target error or by its time limit. For the target error, this file passes the
+// errors of rounds that were added to the image to the stop rule (adaptive_stop.h). The rule goes through
+// levels: falling thresholds, each of which determines for every tile the round after which it stops. When
+// all tiles have stopped at a level, this file decides whether the image meets the target; if it does not,
+// the rule goes to the next level. Checkpoints of the image are taken at some of the levels.
 #include <algorithm>
 
 #include "coordinator/domain/farm/farm_state.h"
@@ -59,7 +62,8 @@ AdaptiveStop::Verdict Farm::State::denoised_verdict(Job& job) {
     }
     return Verdict::no;
   }
-  // The check denoises the film, so the film must be exactly the image of the stop rule's present level.
+  // The check denoises the present image, so every tile must have exactly the rounds of the rule's present
+  // level.
   const std::vector<RoundIndex> ends = rule.ends();
   bool missing = false;
   for (TileIndex t = 0; t < job.units.tiles(); ++t) {
@@ -101,8 +105,8 @@ void Farm::State::take_marks(Job& job) {
 }
 
 void Farm::State::stop_at_level(Job& job) {
-  // Rounds for which a Fold was requested stay in the image. So if the target was raised, the image may have
-  // more rounds than the level needs.
+  // A round whose addition to the image was requested (effect Fold) stays in the image. So a tile may keep
+  // more rounds than the level needs, if the user has raised the target error.
   std::vector<RoundIndex> ends = job.adaptive->ends();
   for (TileIndex t = 0; t < job.units.tiles(); ++t) ends[t] = std::max(ends[t], job.units.issued(t));
   job.cut_off(ends, StopReason::error);
@@ -110,12 +114,12 @@ void Farm::State::stop_at_level(Job& job) {
   issue_folds(job);
 }
 
-// Decides which units are still rendered before the time limit. Queued units are considered in the order of
-// rounds, and kept as long as their predicted cost fits the remaining time: the time of all cores that may
-// render the job until the limit, minus the cost of its leased units. A unit is kept if at least half of it
-// fits, so the job ends as often before the limit as after it. Leased units stay leased, however long they
-// take: dropping slow units would bias the image. This function is called again until the limit, since
-// predictions improve.
+// Decides which units are still rendered before the time limit. The time available is the CPU time, until the
+// limit, of all workers that may render the job, minus the predicted cost of the job's leased units. Queued
+// units are kept, in the order of rounds, until their predicted cost uses up this time; a last unit that fits
+// only in part is kept if at least half of its cost fits. So the job ends as often before the limit as after
+// it. Leased units stay leased, however long they take: dropping slow units would bias the image. This
+// function is called again at every tick until the limit, since predictions improve.
 void Farm::State::plan_end(Job& job, TimePoint limit) {
   if (job.adaptive_running() || !job.cost.known()) return;
   if (job.stopping == StopReason::time) {

@@ -1,8 +1,10 @@
-// Audits detect faulty workers. A random share of the accepted results is rendered again by another worker,
-// and the two results are compared. Copies of slow units, which two workers render, are compared in the same
-// way. Only workers that held a lease on a unit may vote on it (VoterTable). If two results of a unit differ,
-// a third worker decides, and the outvoted one is quarantined: every tile to which it contributed, in any job
-// that has not ended, is folded again from round 0 (in a job with a target error every tile).
+// Audits detect faulty workers: a random share of the accepted results is rendered again by another worker,
+// and the two results are compared. The two results of a slow unit (a round of a tile) that two workers have
+// rendered are compared in the same way. If two results of a unit differ, a third worker renders the unit,
+// and the worker that is outvoted is quarantined. Only workers that held a lease on the unit have a vote
+// (VoterTable). Every tile with a result of the quarantined worker, in any job that has not ended, is
+// discarded and rendered again from round 0. In a job whose tiles are stopped by its target error, one such
+// tile causes all tiles to be discarded.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -50,8 +52,9 @@ void Farm::State::consider_audit(Job& job, UnitCode code, WorkerIndex first) {
   work_appeared = true;
 }
 
-// Continues the audits (units that are rendered again for comparison) that were open at the restart. No
-// worker is connected yet, so settle_audits() gives these audits some time before it drops them.
+// Reopens the audits (units that are rendered again for comparison) that were open when the coordinator
+// restarted. No worker is connected yet, so settle_audits() waits some time for workers before it drops these
+// audits.
 void Farm::State::restore_audits(Job& job, const JobRestored& event) {
   for (const JobRestored::Audit& open : event.audits) {
     const UnitCode code = unit_code(open.round, open.tile);
@@ -168,7 +171,8 @@ void Farm::State::agreed(Job& job, UnitCode code, const UnitAccepted& with, bool
   const WorkerIndex by = workers.index_of(with.worker);
   if (found == job.audits.end() || by == first.worker) return;
   const Audit audit = found->second;
-  // If this worker has delivered a different digest of this unit before, it is faulty.
+  // A worker that has delivered a different result (digest) of this unit before contradicts itself, so it is
+  // faulty.
   for (const auto& before : {audit.second, audit.claim})
     if (before && by == before->first)
       return found_faulty(with.unit, by, contradiction(with, before->second));
@@ -217,9 +221,9 @@ void Farm::State::disagreed(Job& job, UnitCode code, const UnitAccepted& with, b
                outvoted(with.unit, first.digest, workers.name_of(second), with.worker, claimed));
 }
 
-// Handles a result that differs from the accepted one and comes from a worker that held no lease on the unit.
-// The worker has chosen the unit itself, so its result is no vote. But the unit is audited: if the auditor
-// agrees with the accepted result, the worker that made the claim is faulty.
+// Handles a claim: a result that differs from the accepted one, from a worker that held no lease on the unit.
+// That worker has chosen the unit itself, so its result is no vote, but it causes an audit of the unit. If
+// the auditor's result equals the accepted one, the worker that made the claim is faulty.
 void Farm::State::claimed(Job& job, UnitCode code, const UnitAccepted& by) {
   const std::pair claimed{workers.index_of(by.worker), by.digest};
   if (const auto open = job.audits.find(code); open != job.audits.end()) {
@@ -273,7 +277,8 @@ void Farm::State::bar(const WorkerId& id, const std::string& why) {
 
 void Farm::State::void_results(Job& job, WorkerIndex faulty) {
   std::vector<TileIndex> tiles = job.units.tiles_of(faulty);
-  // The errors of these tiles have influenced how many rounds all other tiles get.
+  // The stop rule derives the numbers of rounds of all tiles from the errors of all tiles, and the errors of
+  // these tiles may have been wrong. So all tiles of the job are discarded.
   const bool by_error = job.adaptive && (!job.stopping || *job.stopping == StopReason::error);
   if (!tiles.empty() && by_error) {
     tiles.resize(job.units.tiles());
@@ -288,7 +293,8 @@ void Farm::State::void_results(Job& job, WorkerIndex faulty) {
   for (auto& [code, audit] : job.audits)
     if (audit.claim && audit.claim->first == faulty) audit.claim.reset();
   for (const TileIndex tile : tiles) void_tile(job, tile);
-  if (!tiles.empty()) job.checkpoint_spp = 0;  // earlier checkpoints described an image with wrong pixels
+  // Checkpoints so far have wrong pixels, so checkpoints are taken again from the first round on
+  if (!tiles.empty()) job.checkpoint_spp = 0;
   if (!tiles.empty() && job.adaptive) steer_anew(job);
   if (!tiles.empty()) job.move_windows(workers.threads());
   finish_if_complete(job);

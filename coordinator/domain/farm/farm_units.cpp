@@ -1,5 +1,5 @@
-// The farm's reaction to results and failures of units (rounds of tiles): when results are folded (added to
-// the image), and when a job fails.
+// The farm's reaction to results and failures of units (a unit is one round of one tile): when results are
+// folded (added to the image), and when a job fails.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +12,8 @@ void Farm::State::pin(Job& job, const Digest& numeric_class) {
   if (job.numeric_class) return;
   job.numeric_class = numeric_class;
   effects.emplace_back(JobPinned{job.plan.brief.job, numeric_class});
-  // Workers that may not begin jobs may take units of this job from now on, since it has a class.
+  // The job has a numeric class (set of machines that compute the same bits) now. So workers of this class
+  // with may_begin == false, which get no units of jobs without a class, may take its units.
   for (const WorkerIndex index : workers.wanting_work()) {
     const Worker& worker = workers.at(index);
     if (!worker.may_begin && worker.numeric_class == numeric_class) work_appeared = pinned_for_others = true;
@@ -80,8 +81,8 @@ void Farm::State::on(const UnitFolded& event) {
   Job* job = find(event.unit.job);
   if (job == nullptr || job->ended() || event.unit.tile >= job->units.tiles()) return;
   const UnitCode code = unit_code(event.unit.round, event.unit.tile);
-  // If the ranges differ, the job was extended: this round was truncated when it was rendered, and is
-  // rendered again in full.
+  // If the ranges differ, the job was extended after this round was rendered: the event concerns the round as
+  // truncated by the old sample limit. The round is rendered again in full, so the event is ignored.
   if (event.samples != job->range(code)) return;
   const RoundIndex before = job->units.rounds_complete();
   if (!job->units.fold(event.unit.tile, event.unit.round, event.rel_error_sum)) return;
@@ -91,12 +92,12 @@ void Farm::State::on(const UnitFolded& event) {
   if (job->units.rounds_complete() != before) refresh(*job);
 }
 
-// Takes a checkpoint after a round that the image has of every tile. In an adaptive job (one with a target
-// error) this function handles only the rounds that every tile gets in any case; later checkpoints are taken
-// at levels of the stop rule.
+// Takes a checkpoint when this round of every tile is in the image. In an adaptive job (one with a target
+// error) this function takes checkpoints only before kMinSppBeforeStop samples per pixel, which every tile
+// gets in any case; later ones are taken at levels of the stop rule (farm_stop.cpp).
 void Farm::State::checkpoint(Job& job, RoundIndex round) {
   const double spp = static_cast<double>(cut_range(round, job.spp).s1);
-  // A truncated round that is rendered again in full comes a second time, but makes no further checkpoint.
+  // A checkpoint must have more samples per pixel than the previous one, so none is taken twice.
   if ((!job.adaptive || cut_range(round, job.spp).s1 < std::min(job.spp, kMinSppBeforeStop)) &&
       spp > job.checkpoint_spp) {
     job.checkpoint_spp = spp;
@@ -142,7 +143,7 @@ void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const U
   WorkerFailures& record = worker.failures[job.seq];
   const bool was_blocked = record.blocked_at(now);
   record.add(now);
-  work_appeared = true;  // the failure changes which workers may take the unit
+  work_appeared = true;  // other workers may now take this unit
   std::size_t known = 0, willing = 0;
   for (const auto& [index, other] : workers.all()) {
     if (!other->connected || !fits(job, *other)) continue;

@@ -17,7 +17,7 @@ void Farm::State::touch(Worker& worker) {
 void Farm::State::on(const WorkerJoined& event) {
   Worker& worker = workers.get(event.worker);
   if (worker.connected) {
-    if (event.epoch <= worker.epoch) return;  // the event is of an older stream and comes late
+    if (event.epoch <= worker.epoch) return;  // late event of an older connection
     lose(worker, FreedCause::newer_stream);
   }
   worker.epoch = event.epoch;
@@ -67,7 +67,7 @@ void Farm::State::lose(Worker& worker, FreedCause why) {
   while (!worker.leases.empty()) free_lease(*worker.leases.begin(), why, false);
   workers.settle(worker);
   effects.emplace_back(WorkerStateChanged{worker.id, worker.state(), std::string(to_string(why))});
-  work_appeared = true;  // others may now take units that were left to this worker
+  work_appeared = true;  // other workers may now take the units of this worker
 }
 
 void Farm::State::on(const WorkerDrains& event) {
@@ -118,7 +118,7 @@ void Farm::State::on(const LeaseCameBack& event) {
   std::set<UnitCode> back;
   for (const UnitKey& unit : event.returned.unrendered) back.insert(unit_code(unit.round, unit.tile));
   workers.settle(*worker);
-  work_appeared = true;  // others may now take units that were left to this worker
+  work_appeared = true;  // other workers may now take the units of this worker
   free_units(*lease, FreedCause::returned, false, [&](UnitCode code) { return back.contains(code); });
 }
 
@@ -133,13 +133,13 @@ void Farm::State::on(const Tick&) {
     if (!job->leasable() || job->frozen) continue;
     const auto limit = job->time_limit(now);
     if (limit && now >= *limit) freeze(*job, StopReason::time);
-    // The end is planned before any lease could extend beyond the limit
+    // The last units are chosen early, before any lease could extend beyond the limit
     else if (limit && seconds(*limit - now) <= 2 * kTimePlanned)
       plan_end(*job, *limit);
   }
   work_appeared = true;
   for (const WorkerIndex index : workers.wanting_work()) {
-    if (!workers.at(index).saturated()) dirty.insert(index);  // they may render copies of overdue units
+    if (!workers.at(index).saturated()) dirty.insert(index);  // an idle worker may copy overdue units
   }
 }
 
@@ -148,7 +148,7 @@ void Farm::State::expire_leases() {
     Worker& worker = *lease->worker;
     worker.pause = now - worker.progress_at >= kNoGrowthLimit ? Pause::stuck : Pause::silent;
     workers.settle(worker);
-    // The worker gets no message: if it recovers and finishes before other workers do, its results are
+    // The worker is not told to stop: if it recovers and delivers results before other workers do, they are
     // accepted.
     free_lease(lease->seq, FreedCause::deadline_passed, false);
   }

@@ -13,7 +13,7 @@ namespace {
 
 struct LeaseSize {
   std::uint64_t units = 1;
-  double seconds = 0;  // CPU seconds; units are added to a lease until its predicted cost reaches this
+  double seconds = 0;  // CPU seconds: units are added to the lease until their predicted cost reaches this
 };
 
 // Returns the seconds until the job's time limit, minus the seconds that the worker needs for the leases it
@@ -24,9 +24,10 @@ double seconds_left(const Job& job, const Worker& worker, TimePoint now) {
   return std::max(0.0, seconds(*limit - now) - worker.seconds_until_free());
 }
 
-// Guided self-scheduling: if the waiting units were divided among all threads of the farm (`farm_threads`), a
-// lease would hold half of what the worker's threads get. So leases shrink, and all threads end at about the
-// same time. A lease also ends with the unit at which its predicted cost reaches `seconds`, a limit that
+// Returns the size of the worker's next lease (guided self-scheduling). If the waiting units were divided
+// equally among the farm's `farm_threads` threads, each worker would get a share in proportion to its
+// threads; a lease holds half of this share. As fewer and fewer units wait, leases shrink, and all threads
+// end at about the same time. A lease also ends when its predicted cost reaches LeaseSize::seconds, which
 // shrinks shortly before the job's time limit.
 LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, TimePoint now) {
   const std::uint64_t threads = static_cast<std::uint64_t>(worker.threads);
@@ -84,8 +85,8 @@ bool Farm::State::take_back_for_idle() {
   return false;
 }
 
-// A worker processes its leases in order. It has not begun this one as long as its earlier leases keep all
-// its threads busy.
+// True if the worker certainly has not begun this lease: it processes its leases in order, and the units of
+// its earlier leases keep all its threads busy.
 bool Farm::State::untouched(const LeaseRecord& lease) const {
   std::uint32_t units = 0;
   for (const LeaseSeq seq : lease.worker->leases) {
@@ -102,8 +103,8 @@ double Farm::State::waits_behind_others(const LeaseRecord& lease) const {
   for (const LeaseSeq seq : lease.worker->leases) {
     if (seq >= lease.seq) break;
     const LeaseRecord& earlier = leases.all().at(seq);
-    // The cost is predicted again, since the prediction at the time of the grant may precede the first
-    // measurement
+    // The cost is predicted now: LeaseRecord::seconds_per_unit may date from before the first measured cost
+    // of the job.
     before += earlier.remaining * earlier.job->predict(earlier.units.front());
   }
   return before / lease.worker->cores();
@@ -167,10 +168,10 @@ bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
   return true;
 }
 
-// Returns the job whose units this worker gets next; null: none. This is the first job in turn, or a later
-// one whose world (loaded scene) or scene file the worker has, since loading costs time. But the later job
-// must not be far ahead of its fair share, and some worker must be rendering the first job. Null also if the
-// worker will get units of the first job soon: leases of another job would delay these.
+// Returns the job whose units this worker gets next; null: none. This is the first job in turn or, to save
+// loading time, a later one whose world (loaded scene) or scene file the worker has. A later job is chosen
+// only if it is not far ahead of its fair share and some worker is rendering the first job. The result is
+// also null if the worker will get units of the first job soon: leases of another job would delay these.
 Job* Farm::State::choose(const Worker& worker) {
   Job* fair = nullptr;
   Job* chosen = nullptr;
@@ -203,8 +204,9 @@ std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker) {
   return code && !out_of_time(job, worker, *code, now) ? code : std::nullopt;
 }
 
-// A speculative unit (the job may end without it) that is leased early delays units that turn out to be
-// needed, and is more likely to be dropped.
+// True if the unit is speculative (the job may end without it) and the worker has enough work for now. Leased
+// early, the unit would delay units that turn out to be needed, and would be dropped more often. `units` and
+// `cost` (CPU seconds): the units already chosen for the same lease.
 bool Farm::State::too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units,
                             double cost) const {
   return !job.queue.wanted(code) &&

@@ -47,8 +47,8 @@ std::string target_of(const Request& request) {
   return target;
 }
 
-// Returns a redirect to the coordinator that has the job, or a 503 if that coordinator does not answer or the
-// job's owner cannot be looked up now. nullopt: no coordinator has the job.
+// Returns a redirect to the coordinator that has the job; a 503 if that coordinator does not answer, or if it
+// cannot be found out now which one has the job; nullopt if no coordinator has the job.
 std::optional<Response> at_its_owner(coordinator::Coordinator& coordinator, const Request& request,
                                      const Params& params) {
   if (params.empty() || !plausible_id(params[0])) return std::nullopt;
@@ -81,7 +81,7 @@ Api::Api(coordinator::Coordinator& coordinator, TokenRegistry& tokens, Limits li
 
 std::variant<Response, Match> Api::admit(Request& request) {
   auto found = admit_route(request);
-  // The limit on requests per caller has been applied to identified callers already. All other requests are
+  // If the caller was identified, the limit on its requests has been applied already. All other requests are
   // limited here, by address.
   if (request.caller.token_id.empty())
     if (auto refused = auth_.too_often(request, nullptr)) return *refused;

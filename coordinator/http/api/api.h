@@ -1,6 +1,6 @@
-// From request to response, without sockets: routing, authentication, limits, handlers. The server loop
-// (net/http_server.h) calls admit() when a header has arrived, then handle() with the whole body, or
-// open_upload() and its sink.
+// Api turns requests into responses, without sockets: routing, authentication, limits and handlers. The
+// server loop (net/http_server.h) calls admit() when a request's header has arrived. Then it reads the body
+// and calls handle(), or it passes a streamed body piece by piece to the sink from open_upload().
 #pragma once
 
 #include <functional>
@@ -33,7 +33,7 @@ class BodySink {
 
 class Api {
  public:
-  // `tokens` must outlive this. `secure`: requests arrive over TLS.
+  // `tokens` must outlive the object. `secure`: requests arrive over TLS.
   Api(coordinator::Coordinator& coordinator, TokenRegistry& tokens, Limits limits, StaticFiles files,
       bool secure = false);
 
@@ -70,7 +70,8 @@ class Api {
   // Sets the function from which /metrics gets the webhook counters; call this before the first request. If
   // it is never called, /metrics has no webhook counters.
   void webhooks(std::function<coordinator::WebhookFigures()> figures) { webhooks_ = std::move(figures); }
-  // The same for the counters of trace spans
+  // Sets the function from which /metrics gets the counters of trace spans; call this before the first
+  // request
   void traces(std::function<trace::Figures()> figures) { traces_ = std::move(figures); }
   std::optional<trace::Figures> traces() const { return traces_ ? std::optional(traces_()) : std::nullopt; }
   std::optional<coordinator::WebhookFigures> webhooks() const {

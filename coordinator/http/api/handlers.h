@@ -1,5 +1,5 @@
-// The functions that answer requests, one per route of the table in routes.h. Each is called on the thread
-// pool that its route names (Route::executor), possibly by several threads concurrently.
+// The functions that answer requests, one per route of the table in routes.h. Each is called on the thread or
+// thread pool that its route names (Route::executor), possibly by several threads concurrently.
 #pragma once
 
 #include "common/job/settings.h"
@@ -10,10 +10,10 @@ namespace ls::http {
 
 class BodySink;
 
-// system_handlers.cpp
+// Defined in system_handlers.cpp (get_metrics(): in metrics.cpp)
 Response get_healthz(Api&, const Request&, const Params&);
 Response get_readyz(Api&, const Request&, const Params&);
-Response get_metrics(Api&, const Request&, const Params&);  // metrics.cpp
+Response get_metrics(Api&, const Request&, const Params&);
 Response get_openapi(Api&, const Request&, const Params&);
 Response get_session(Api&, const Request&, const Params&);
 Response post_session(Api&, const Request&, const Params&);
@@ -25,7 +25,7 @@ Response get_workers(Api&, const Request&, const Params&);
 Response get_events(Api&, const Request&, const Params&);
 Response get_job_events(Api&, const Request&, const JobId&);
 
-// job_handlers.cpp
+// Defined in job_handlers.cpp
 Response get_jobs(Api&, const Request&, const Params&);
 Response post_again(Api&, const Request&, const JobId&);
 Response post_job(Api&, const Request&, const Params&);
@@ -33,7 +33,7 @@ Response get_job(Api&, const Request&, const JobId&);
 Response patch_job(Api&, const Request&, const JobId&);
 Response delete_job(Api&, const Request&, const JobId&);
 
-// output_handlers.cpp
+// Defined in output_handlers.cpp
 Response get_image_exr(Api&, const Request&, const JobId&);
 Response get_image_png(Api&, const Request&, const JobId&);
 Response get_thumbnail(Api&, const Request&, const JobId&);
@@ -50,7 +50,8 @@ Response get_convergence(Api&, const Request&, const JobId&);
 Response get_tiles(Api&, const Request&, const JobId&);
 Response get_log(Api&, const Request&, const JobId&);
 
-// upload_handlers.cpp; open_blob() is for PUT, open_bundle() for POST /jobs with an archive
+// Defined in upload_handlers.cpp. open_blob() is for PUT /blobs/SHA256, open_bundle() for POST /jobs with an
+// archive
 Response post_blobs_missing(Api&, const Request&, const Params&);
 Response head_blob(Api&, const Request&, const Params&);
 std::variant<Response, std::unique_ptr<BodySink>> open_blob(Api&, const Request&, const Params&);
@@ -72,14 +73,13 @@ Response submitted(Api& api, const JobId& id);
 // priority is allowed.
 std::optional<Response> refuse_priority(const Api& api, const Caller& caller, int priority);
 
-// spec_query.cpp: reads a job's spec (the settings in its submission: samples, size, seed, ...) from query
-// parameters, as in POST /api/v1/jobs?spp=64&size=320x240&define=NAME=VALUE&aov=a,b with an application/xml
-// body. Keys: spp, target_error, target_layer, time, seed, size, integrator, priority, float, denoise,
-// frames, max_workers, max_units, memory, numeric_class, reference, aov and tags (comma lists), define (may
-// be repeated). The key named by `also` is ignored; any other key, a repeated key, or a wrong value is an
-// error that names the key. Keys that the query lacks keep their values in `base`, the JSON of a spec. The
-// query's definitions are added to those of `base`; for a name in both, the query's value replaces the
-// other.
+// Reads a job's spec (the settings in its submission: samples, size, seed, ...) from query parameters, as in
+// POST /api/v1/jobs?spp=64&size=320x240&define=NAME=VALUE&aov=a,b with an application/xml body. Keys: spp,
+// target_error, target_layer, time, seed, size, integrator, priority, float, denoise, frames, max_workers,
+// max_units, memory, numeric_class, reference, aov and tags (comma lists), define (may be repeated). The key
+// named by `also` is ignored. Any other key, a repeated key, or a wrong value is an error that names the key.
+// Keys that the query lacks keep their values in `base`, the JSON of a spec. The query's definitions are
+// added to those of `base`; if both define a name, the query's value counts. (Defined in spec_query.cpp.)
 Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, const std::string& base = "{}");
 
 }  // namespace ls::http

@@ -122,7 +122,7 @@ Result<coordinator::JobChange> read_change(std::string_view text) {
 }
 
 constexpr std::size_t kMaxPage = 1000;
-constexpr std::size_t kMaxSearch = 200;  // characters
+constexpr std::size_t kMaxSearch = 200;  // greatest length of the query parameter `search`, in bytes
 constexpr std::array kStates = {coordinator::JobState::queued, coordinator::JobState::running,
                                 coordinator::JobState::paused, coordinator::JobState::done,
                                 coordinator::JobState::failed, coordinator::JobState::cancelled};

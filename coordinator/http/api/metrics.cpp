@@ -30,7 +30,7 @@ std::uint64_t files_in(const char* folder) {
   for (std::filesystem::directory_iterator at(folder, failed), end; !failed && at != end;
        at.increment(failed))
     ++count;
-  // The iterator itself has one descriptor open, which is not counted
+  // The iterator that lists the descriptors has one open itself, which is not counted
   return failed || count == 0 ? 0 : count - 1;
 }
 

@@ -81,7 +81,7 @@ constexpr auto kRoutes = [] {
 }();
 
 std::string_view next_part(std::string_view& pattern) {
-  pattern.remove_prefix(1);  // '/'
+  pattern.remove_prefix(1);  // the '/' before the part
   const std::string_view part = pattern.substr(0, pattern.find('/'));
   pattern.remove_prefix(part.size());
   return part;

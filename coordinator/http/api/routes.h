@@ -50,7 +50,7 @@ using Handler = Response (*)(Api&, const Request&, const Params&);
 
 struct Route {
   Method method = Method::get;
-  std::string_view pattern;  // "/api/v1/jobs/{id}"
+  std::string_view pattern;  // path of the address, such as "/api/v1/jobs/{id}"; {..} matches one segment
   Access access = Access::token;
   Executor executor = Executor::quick;
   BodyKind body = BodyKind::none;

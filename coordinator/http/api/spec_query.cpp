@@ -73,7 +73,7 @@ Result<void> add_define(Json& defines, std::string_view text) {
 Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, const std::string& base) {
   auto whole = parse_spec_object(base);
   if (!whole) return tl::unexpected(whole.error());
-  // An error in `base` is reported even if the query replaces the wrong value.
+  // A wrong value in `base` is an error even if the query replaces this value.
   if (const auto alone = job_spec_of(*whole); !alone) return alone;
   Json spec = Json::object();
   Json defines = Json::object();

@@ -14,7 +14,7 @@
 namespace ls::http {
 
 struct StaticFile {
-  std::string_view name;  // "app/main.js"
+  std::string_view name;  // such as "app/main.js"
   std::span<const std::byte> bytes;
 };
 

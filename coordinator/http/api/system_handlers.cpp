@@ -18,8 +18,9 @@ Response event_stream(const Request& request, std::string job) {
   EventStream stream;
   stream.job = std::move(job);
   stream.reader = request.caller;
-  // A browser that reconnects sends the header Last-Event-ID with the last id it got, which is later than the
-  // parameter last_event_id in the address.
+  // The parameter last_event_id is part of the address and stays as it is when a browser reconnects. The
+  // header Last-Event-ID, which the browser then sends, has the id of the last event that it got. So the
+  // header takes precedence.
   std::string_view text = request.header("last-event-id");
   if (text.empty()) text = request.parameter("last_event_id").value_or("");
   if (!text.empty()) {

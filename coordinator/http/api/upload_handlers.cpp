@@ -130,8 +130,9 @@ Response refused_part(const Error& error, const BlobStore& blobs, const Digest& 
   return refused_part(status_of(error.code), error.message, blobs.received(digest));
 }
 
-// Receives and ignores a part of a blob that is stored completely already. The part is read to its end, since
-// an earlier answer would break the connection.
+// Receives and ignores a part of a blob that is stored completely already. The part is read to its end: a
+// server that answers and closes while the client is still sending breaks the connection, and the client may
+// lose the answer.
 class IgnoreSink final : public BodySink {
  public:
   IgnoreSink(const Digest& digest, std::uint64_t bytes) : digest_(digest), left_(bytes) {}
@@ -294,7 +295,8 @@ std::variant<Response, std::unique_ptr<BodySink>> open_blob(Api& api, const Requ
   if (!request.header("content-range").empty()) return open_part(api, request, *digest);
   auto& blobs = api.coordinator().blobs();
   if (blobs.prove(*digest)) {
-    // A client that waits for '100 Continue' has not sent the body yet and need not send it.
+    // A client that sent 'Expect: 100-continue' waits with the body, and need not send it, because the blob
+    // is stored.
     if (!request.header("expect").empty()) return stored(*digest, 204);
     return std::make_unique<CompareSink>(*digest, api.limits().blob_bytes);
   }
@@ -339,7 +341,7 @@ Response post_blobs_missing(Api& api, const Request& request, const Params&) {
     digests.push_back(*digest);
   }
   const auto lacking = api.coordinator().blobs().missing(digests);
-  if (!lacking) return problem(lacking.error());  // it is unknown at the moment which blobs the store has
+  if (!lacking) return problem(lacking.error());  // the blob store cannot be asked now
   auto missing = nlohmann::ordered_json::array();
   for (const Digest& digest : *lacking) missing.push_back(digest.hex());
   return json_response(200, write_json({{"missing", std::move(missing)}}));

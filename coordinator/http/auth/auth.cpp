@@ -15,7 +15,7 @@
 namespace ls::http {
 namespace {
 
-constexpr std::size_t kNonceDigits = 32;  // hexadecimal
+constexpr std::size_t kNonceDigits = 32;  // hexadecimal digits of the nonce in a cookie
 
 bool unsafe(Method method) {
   return method != Method::get && method != Method::head && method != Method::options;

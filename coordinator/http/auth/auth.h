@@ -2,9 +2,10 @@
 //
 // The cookie's text is `expiry.nonce.token-id.mac`; the key of the MAC is TokenRegistry::session_key(). The
 // coordinator stores no open session, so sessions survive its restart. A session becomes invalid when its
-// token is revoked. Sessions closed by DELETE /session are remembered until they expire or the process ends,
-// for each token the kMaxClosedSessions that expire last. When another one is forgotten, all sessions of its
-// token that expire no later become invalid, so that no closed session becomes valid again.
+// token is revoked. Sessions closed by DELETE /session are remembered, and rejected, until they expire or the
+// process ends. For each token at most kMaxClosedSessions closed sessions are remembered: beyond that, the
+// one that expires first is forgotten. All sessions of the token that do not expire later than the forgotten
+// one are then rejected, even open ones, so that no closed session becomes valid again.
 #pragma once
 
 #include <cstdint>
@@ -34,9 +35,9 @@ class Auth {
   struct Options {
     Pace requests{};      // limits the requests with one token or, without a token, from one address
     Pace failures{};      // limits the wrong tokens from one address
-    bool secure = false;  // requests arrive over TLS, so the cookie may be sent only over TLS
+    bool secure = false;  // true if requests arrive over TLS: the browser then sends the cookie only over TLS
   };
-  // `tokens` must outlive this.
+  // `tokens` must outlive the object.
   Auth(const TokenRegistry& tokens, Options options, UnixClock now = system_unix_clock());
 
   // Returns the sender of the request, or the response 401, 403 or 429. In a request that may change
@@ -48,7 +49,7 @@ class Auth {
   // the client's address are counted instead.
   std::optional<Response> too_often(const Request& request, const Caller* caller);
 
-  // True unless the token of this caller has been revoked.
+  // False if the token of this caller has been revoked.
   bool still_valid(const Caller& caller) const;
 
   // For POST /session: returns the Set-Cookie value of a new session for this token, or the error response.
@@ -84,17 +85,19 @@ class Auth {
   Throttle throttle_;
   mutable std::mutex mutex_;
   struct Closed {
-    std::set<std::pair<std::int64_t, std::string>> sessions;  // expiry and text
-    std::int64_t refused_until = 0;  // sessions with this expiry or an earlier one are invalid
+    // Expiry time (seconds since 1970) and cookie text of each closed session
+    std::set<std::pair<std::int64_t, std::string>> sessions;
+    // Sessions that expire at this time or earlier are rejected (seconds since 1970)
+    std::int64_t refused_until = 0;
   };
-  std::map<std::string, Closed, std::less<>> closed_;  // by the token's id
+  std::map<std::string, Closed, std::less<>> closed_;  // closed sessions of a token, by the token's id
 };
 
 // Clears the fields of `worker` that describe its work for other users' jobs.
 void hide_work(coordinator::WorkerView& worker);
 
-// Returns the event without the parts that this caller may not see; nullopt: the caller may see nothing of
-// it.
+// Returns the event without the parts that this caller may not see; nullopt: the caller may not see any part
+// of the event.
 std::optional<coordinator::StreamEvent> visible(const coordinator::StreamEvent& event, const Caller& caller);
 
 }  // namespace ls::http

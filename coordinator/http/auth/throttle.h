@@ -13,8 +13,8 @@
 namespace ls::http {
 
 struct Pace {
-  double per_second = 0;  // 0: no limit
-  double burst = 1;       // capacity of the bucket
+  double per_second = 0;  // requests (or wrong tokens) per second in the long run; 0: no limit
+  double burst = 1;       // capacity of the bucket: how many may come at once
 };
 
 class Throttle {

@@ -87,7 +87,8 @@ Result<std::string> read_list(const std::filesystem::path& file) {
 constexpr std::size_t kIdDigits = 16;
 constexpr std::size_t kMaxLine = 256;
 
-constexpr std::array<std::string_view, 4> kRoles = {"admin", "submit", "read", "join"};  // by Role
+// Names of the roles, in the order of the enum Role
+constexpr std::array<std::string_view, 4> kRoles = {"admin", "submit", "read", "join"};
 
 std::string_view next_word(std::string_view& text) {
   const std::size_t begin = text.find_first_not_of(" \t\r");

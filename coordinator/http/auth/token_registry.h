@@ -1,8 +1,8 @@
-// All valid tokens. They are in files of one folder, here called DATA: that of --secrets or else of --data.
-// DATA/token (the administrator's) and DATA/join-token (the workers') contain their tokens in the clear. For
-// all other tokens DATA/tokens contains only the SHA-256, one per line: `ROLE USER SHA256`, with USER `-` if
-// the token has no user. Several coordinators may share the folder: before a coordinator checks a token, it
-// rereads DATA/tokens if that file has changed.
+// All valid tokens. They are in files of one folder, here called DATA: the folder of the option --secrets or,
+// if that is not given, of --data. DATA/token (the administrator's) and DATA/join-token (the workers')
+// contain their tokens in the clear. For all other tokens DATA/tokens contains only the SHA-256, one per
+// line: `ROLE USER SHA256`, with USER `-` if the token has no user. Several coordinators may share the
+// folder: before a coordinator checks a token, it rereads DATA/tokens if that file has changed.
 #pragma once
 
 #include <cstdint>
@@ -107,7 +107,7 @@ class TokenRegistry {
 
     std::filesystem::path file;  // empty: the tokens are in memory only
     FileState seen;
-    std::string trouble;  // the error of the last reading; empty: none
+    std::string trouble;  // the error message of the latest reading; empty: it succeeded
     std::vector<Entry> entries;
   };
   Guarded<Tokens>::Lock latest() const;

@@ -191,8 +191,8 @@ Result<std::optional<ArchiveEntry>> ArchiveReader::next() {
     entry.bytes = static_cast<std::uint64_t>(std::max<la_int64_t>(archive_entry_size(e), 0));
   entry.encrypted = archive_entry_is_encrypted(e) != 0;
   if (s.kind == ArchiveKind::zip) {
-    // The text is, for example, "ZIP 2.0 (deflation)". libarchive reports the compression method of an entry
-    // nowhere else.
+    // archive_format_name() returns, for example, "ZIP 2.0 (deflation)". libarchive reports the compression
+    // method of an entry nowhere else.
     const std::string_view format = archive_format_name(a);
     entry.packed_oddly = !format.ends_with("(deflation)") && !format.ends_with("(uncompressed)");
   }

@@ -1,6 +1,6 @@
-// Reads a zip, or a tar (plain or gzip), entry by entry, each entry's bytes piece by piece; the only user of
-// libarchive. It does not depend on bundles (bundle.h). A damaged archive gives an error, and memory stays
-// bounded.
+// ArchiveReader reads a zip, or a tar (plain or gzip), entry by entry, and each entry's bytes piece by piece.
+// Only archive.cpp uses libarchive. A damaged archive gives an error, and memory stays bounded. What a bundle
+// may contain is checked in bundle.h, not here.
 #pragma once
 
 #include <cstddef>

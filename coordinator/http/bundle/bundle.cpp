@@ -23,7 +23,7 @@ using nlohmann::json;
 constexpr std::string_view kBundleJobFile = "job.json";
 
 struct BundleFile {
-  std::string name;  // normalised
+  std::string name;  // normalised by normal_name()
   Digest digest;
 };
 
@@ -49,7 +49,7 @@ tl::unexpected<Error> bad_entry(std::string_view name, std::string_view what) {
   return bad_bundle(fmt::format("{} {}", shown(name), what));
 }
 
-// True for files that file managers add to archives and that no scene uses. `name` is as in BundleFile.
+// True for files that file managers add to archives and that no scene uses. `name` is a normalised name.
 bool is_litter(std::string_view name) { return name.starts_with("__MACOSX/") || name.starts_with('.'); }
 
 tl::unexpected<Error> refused(const Error& error) {
@@ -154,9 +154,10 @@ class Survey {
     return {};
   }
 
-  // True if this file may be the bundle's job.json: a job.json at the top of the archive, or directly in a
-  // folder, since a folder with all files (except litter) counts as the top. If two folders have a job.json,
-  // no folder contains all files, so the files of further folders are not kept.
+  // True if this file may be the bundle's job.json, so that its text must be kept. The file must be named
+  // job.json and lie at the top of the archive, or directly in a folder: if one folder contains all files
+  // (except litter), that folder counts as the top. From folders at most the first two are kept: if two
+  // folders have a job.json, no folder contains all files, and none of these files is used.
   bool may_be_job_file(const std::string& name) const {
     if (name == kBundleJobFile) return true;
     if (is_litter(name)) return false;

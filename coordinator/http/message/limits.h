@@ -1,4 +1,5 @@
-// All limits of the HTTP server. Sizes in bytes, times in seconds.
+// All limits of the HTTP server. Sizes are in bytes, times in seconds. A blob is a file of a scene; a bundle
+// is an archive with a scene and all its files.
 #pragma once
 
 #include <cstddef>
@@ -9,30 +10,39 @@
 
 namespace ls::http {
 
-// Greatest body of each route
-inline constexpr std::uint64_t kMaxJobJson = 4u << 20;  // POST /jobs with application/json: names and digests
+// Greatest size of the request body, by route. Other bodies: see Limits below
+
+// POST /jobs with application/json, which has the names and digests of the scene's files
+inline constexpr std::uint64_t kMaxJobJson = 4u << 20;
 inline constexpr std::uint64_t kMaxDigestList = 8u << 20;    // POST /blobs/missing
 inline constexpr std::uint64_t kMaxControlJson = 64u << 10;  // PATCH /jobs/ID and other short JSON
 inline constexpr std::uint64_t kMaxSessionJson = 4u << 10;   // POST /session
 
 // Contents of requests
-inline constexpr int kMaxJsonDepth = 16;             // levels of JSON; bounds the recursion that prints it
-inline constexpr std::size_t kMaxDigests = 100'000;  // digests in one POST /blobs/missing
-inline constexpr std::size_t kMaxAssetName = 1024;   // characters
-inline constexpr std::size_t kMaxTarget = 8u << 10;  // request target
+
+// Greatest depth of nested JSON, because the function that prints JSON is recursive
+inline constexpr int kMaxJsonDepth = 16;
+inline constexpr std::size_t kMaxDigests = 100'000;  // number of digests in one POST /blobs/missing
+inline constexpr std::size_t kMaxAssetName = 1024;   // length of a file name in a bundle
+// Length of the request target: path and query of the address
+inline constexpr std::size_t kMaxTarget = 8u << 10;
 inline constexpr std::size_t kMaxQueryParameters = 256;
 
 // Bundles
-inline constexpr std::size_t kMaxBundleEntries = coordinator::limits::kMaxAssets;  // files and folders
-inline constexpr std::size_t kMaxBundleNames = 16u << 20;    // bytes of all names together
-inline constexpr std::uint64_t kMaxArchiveList = 32u << 20;  // a zip's directory, which is read as a whole
-// An archive may unpack to this many bytes per byte of its own size...
+
+// Number of files and folders in a bundle
+inline constexpr std::size_t kMaxBundleEntries = coordinator::limits::kMaxAssets;
+inline constexpr std::size_t kMaxBundleNames = 16u << 20;  // length of all file names of a bundle together
+// Size of a zip's directory, which is held in memory as a whole
+inline constexpr std::uint64_t kMaxArchiveList = 32u << 20;
+// An archive of n bytes may unpack to at most n kMaxBundleRatio + kBundleSlack bytes. The second term is
+// there because a small archive of empty grids may compress even better than by kMaxBundleRatio
 inline constexpr std::uint64_t kMaxBundleRatio = 200;
-// ...plus this many bytes, because a small archive of empty grids may compress even better
 inline constexpr std::uint64_t kBundleSlack = 64u << 20;
 
 // Buffers
-inline constexpr std::size_t kReadBuffer = 64u << 10;  // per connection
+
+inline constexpr std::size_t kReadBuffer = 64u << 10;  // buffer for the bytes received from one connection
 // Bytes of a request's body that are passed to the disk at once
 inline constexpr std::size_t kBodyChunk = 256u << 10;
 // Bytes written to a client between two checks of its deadline
@@ -44,46 +54,49 @@ inline constexpr std::uint64_t kMaxBuffered = 256u << 20;
 inline constexpr std::uint64_t kMaxAnswers = 256u << 20;
 // Answers up to this size are not counted in kMaxAnswers
 inline constexpr std::uint64_t kSmallAnswer = 64u << 10;
-// Bytes that are read and dropped after an early rejection (see linger_seconds)
+// Greatest number of bytes of a body that are read and dropped after an early rejection (see linger_seconds)
 inline constexpr std::uint64_t kLingerBytes = 16u << 20;
 
 inline constexpr std::int64_t kSessionSeconds = 12 * 3600;
-inline constexpr std::size_t kMaxClosedSessions = 1000;  // of one token
+inline constexpr std::size_t kMaxClosedSessions = 1000;  // closed sessions that are remembered for each token
 
 // Limits that tests and the operator's config file may change
 struct Limits {
-  // PUT /blobs/SHA256, and each file of a bundle
+  // Greatest size of a blob: of the body of PUT /blobs/SHA256, and of each file in a bundle
   std::uint64_t blob_bytes = coordinator::limits::kMaxBlobBytes;
-  std::uint64_t bundle_bytes = std::uint64_t{16} << 30;    // POST /jobs with an archive
-  std::uint64_t unpacked_bytes = std::uint64_t{64} << 30;  // all files of a bundle
+  // Size of a bundle: the body of POST /jobs with an archive
+  std::uint64_t bundle_bytes = std::uint64_t{16} << 30;
+  std::uint64_t unpacked_bytes = std::uint64_t{64} << 30;  // size of all files of a bundle together, unpacked
   std::size_t header_bytes = 16u << 10;
   std::size_t connections = 512;
   // How many of `connections` may be event streams; the rest is for requests.
   std::size_t event_streams = 128;
-  std::size_t event_queue = 4096;  // events waiting for one reader
+  std::size_t event_queue = 4096;  // number of events that may wait for one reader of an event stream
   std::size_t event_queue_bytes = 4u << 20;
-  double header_seconds = 10;  // from the first byte of a request to the end of its header
+  double header_seconds = 10;  // allowed from the first byte of a request to the end of its header
   double idle_seconds = 60;    // a kept-alive connection is closed after this time without a request
   // A body (in either direction) is cut off when its transfer takes longer than body_grace_seconds + (bytes
   // so far) / min_rate. So a transfer of `length` bytes takes at most body_grace_seconds + length / min_rate,
   // and a stalled one is cut off after the grace time, for any announced length.
   double body_grace_seconds = 15;
-  double min_rate = 8u << 10;     // bytes per second
-  double heartbeat_seconds = 15;  // interval of the comments that keep a silent event stream alive
-  // After an early rejection the rest of the body is read for this long: closing at once could lose the
-  // answer
+  double min_rate = 8u << 10;  // in bytes per second
+  // A silent event stream gets a comment this often, to keep the connection alive
+  double heartbeat_seconds = 15;
+  // If a request is rejected before its body was read, the rest of the body is still read for this long: if
+  // the server closed the connection at once, the client could lose the answer
   double linger_seconds = 3;
-  // Requests with one token or, without a token, from one address; 0: no limit. The burst is twice as large
+  // Allowed requests per second with one token or, without a token, from one address; 0: no limit. Twice this
+  // number may come at once
   double requests_per_second = 500;
-  // Requests with a wrong token from one address; the burst has the same size. Further ones are answered
-  // with 429. 0: no limit
+  // Allowed requests per minute with a wrong token from one address; all of them may come at once. Further
+  // ones are answered with 429. 0: no limit
   double wrong_tokens_per_minute = 20;
   double stop_seconds = 5;  // how long a stopping coordinator waits for open requests
-  int quick_threads = 2;    // for answers from memory
-  int remote_threads = 8;   // for requests to other machines: blob stores, other coordinators
+  int quick_threads = 2;    // threads for requests that are answered from memory
+  int remote_threads = 8;   // threads for requests to other machines: blob stores, other coordinators
   int user_priority = 0;    // highest priority that a submit token may give to a job
-  int slow_threads = 4;     // for reading scenes, writing images and blobs
-  int bundle_threads = 2;   // for unpacking bundles, which thus never occupy the slow threads
+  int slow_threads = 4;     // threads that read scenes and write images and blobs
+  int bundle_threads = 2;   // threads that unpack bundles, so that unpacking never occupies the slow threads
   // Folder for bundles while they are read; empty: the system's temporary folder
   std::filesystem::path spool;
 };

@@ -21,7 +21,7 @@
 namespace ls::http {
 namespace {
 
-// By Method
+// The methods' names, in the order of the enum Method
 constexpr std::array<std::string_view, 7> kMethods = {"GET",   "HEAD",   "POST",   "PUT",
                                                       "PATCH", "DELETE", "OPTIONS"};
 
@@ -188,8 +188,8 @@ std::string head_text(const Response& response, const HeadOptions& options, std:
   field("Date", fmt::format("{:%a, %d %b %Y %H:%M:%S} GMT", fmt::gmtime(std::time_t{unix_seconds})));
   if (!response.content_type.empty()) field("Content-Type", response.content_type);
   const bool bodyless = response.status == 204 || response.status == 304;
-  // The answer to HEAD gives the length of the answer to GET. A handler that answers HEAD itself sets no
-  // content type, and the length is unknown.
+  // The response to HEAD has the Content-Length that the response to GET would have. This length is unknown
+  // if the handler answers HEAD without making the body of the GET response; it then sets no content type.
   const bool unknown = options.streamed || (options.method == Method::head && response.content_type.empty());
   if (!bodyless && !unknown) field("Content-Length", fmt::format("{}", response.length()));
   for (const auto& [name, value] : response.headers) field(name, value);
@@ -205,7 +205,7 @@ std::string head_text(const Response& response, const HeadOptions& options, std:
 
 namespace {
 
-// In queries '+' is a space.
+// Decodes percent codes. `plus_is_space`: '+' stands for a space, as it does in queries but not in paths.
 Result<std::string> decode(std::string_view text, bool plus_is_space) {
   std::string coded(text);
   if (plus_is_space) std::replace(coded.begin(), coded.end(), '+', ' ');

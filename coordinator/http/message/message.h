@@ -21,9 +21,9 @@ namespace ls::http {
 
 // The caller of a request and its role. What each role may do: docs/reference/authorisation.md.
 enum class Role {
-  admin,   // everything
-  submit,  // submits jobs; sees and changes only its own
-  read,    // sees everything, changes nothing
+  admin,   // may do everything
+  submit,  // may submit jobs, and see and change only its own jobs
+  read,    // may see everything, but change nothing
   join,    // a worker: may join the farm over gRPC, but may not use the HTTP API
 };
 std::string_view to_string(Role role);  // returns "admin", ...
@@ -31,8 +31,8 @@ std::optional<Role> parse_role(std::string_view name);
 
 struct Caller {
   Role role = Role::join;  // the role with the fewest rights, until the caller is identified
-  // Owner of the jobs that the caller submits; empty: the token has no user, like the administrator's in the
-  // file `token`
+  // The user that the caller's token belongs to, who becomes the owner of the jobs that the caller submits;
+  // empty: the token belongs to no user, as the administrator's token in the file `token`
   std::string user;
   std::string token_id;
   // True if the caller may see the jobs of the user `owner`.
@@ -44,7 +44,8 @@ struct Caller {
 // A response body that is read from a file. It is sent slice by slice, so that it does not fill memory while
 // a slow client reads it.
 struct FileBody {
-  // Closed with the last copy of the FileBody; the file is readable even after its removal
+  // The open file. It is closed when the last copy of the FileBody is destroyed, and can be read until then,
+  // even if the file has been removed from its folder.
   std::shared_ptr<const Descriptor> opened;
   std::uint64_t size = 0;  // bytes
 };
@@ -69,7 +70,7 @@ std::string_view take_part(std::string_view& rest, char separator);
 struct Request {
   Method method = Method::get;
   std::vector<std::string> segments;  // segments of the path, percent-decoded; none for "/"
-  Fields query;                       // decoded, in order
+  Fields query;                       // parameters of the query, percent-decoded, in their order
   Fields headers;                     // names in lower case
   std::optional<std::uint64_t> content_length;
   bool has_body = false;  // true for a Content-Length above zero or a chunked body
@@ -78,29 +79,29 @@ struct Request {
   Caller caller;     // set by Api::admit for routes that identify the caller; until then the default role
 
   std::string_view header(std::string_view lower_case_name) const;  // empty if absent
-  // Value of the first parameter with this name
+  // Value of the first parameter of the query with this name; nullopt: there is none
   std::optional<std::string_view> parameter(std::string_view name) const;
 };
 
 // Selects the events of a stream of Server-Sent Events. If a Response has an EventStream, the server sends
 // these events after the header.
 struct EventStream {
-  // Only events with higher ids; nullopt: only events that occur from now on
+  // Only events whose ids are higher than this are sent; nullopt: only events that occur from now on
   std::optional<std::uint64_t> after_id;
-  std::string job;  // only events of this job; empty: of all jobs
-  Caller reader;    // restricts the events to what the reader may see
+  std::string job;  // id of a job: only its events are sent; empty: the events of all jobs
+  Caller reader;    // who gets the stream: only events that this caller may see are sent
 };
 
 struct Response {
   int status = 200;
   std::string content_type;  // empty: no body
   Fields headers;
-  // The body; a span refers to static data
+  // The body. If it is a span, its bytes exist until the program ends (files built into the program).
   std::variant<std::string, std::vector<std::byte>, std::span<const std::byte>, FileBody> body;
   std::optional<EventStream> events;
 
-  std::span<const std::byte> bytes() const;  // empty for a file
-  std::uint64_t length() const;              // length of the body
+  std::span<const std::byte> bytes() const;  // the body's bytes; empty if the body is a file
+  std::uint64_t length() const;              // length of the body in bytes
   std::uint64_t in_memory() const;           // bytes held in memory while the response is sent
 };
 
@@ -109,11 +110,11 @@ Response json_response(int status, std::string json);
 
 std::string_view reason_phrase(int status);
 
-// Errors as RFC 9457 problem details. This is the only mapping from Errc to HTTP status.
+// Returns the HTTP status for an error. No other function maps Errc to HTTP status codes.
 int status_of(Errc code);
 
-// Makes a response {type, title, status, detail} with these headers; `detail` contains the cause, the place
-// and the remedy.
+// Makes a response that reports an error as RFC 9457 problem details: JSON {type, title, status, detail}. The
+// text `detail` states the cause, where it is, and the remedy.
 Response problem(int status, std::string_view detail, Fields headers = {});
 Response problem(const Error& error);
 // Returns a 429 with the header Retry-After: `wait_seconds`.

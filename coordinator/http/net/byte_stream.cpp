@@ -11,7 +11,7 @@ namespace {
 
 namespace ssl = net::ssl;
 
-constexpr unsigned char kHandshakeRecord = 22;  // the first byte of any TLS client
+constexpr unsigned char kHandshakeRecord = 22;  // the first byte that every TLS client sends
 
 std::string last_error() {
   const unsigned long code = ERR_get_error();

@@ -22,18 +22,20 @@ namespace net = boost::asio;
 using Tcp = net::ip::tcp;
 using boost::system::error_code;
 
-// For co_await: the operation reports failure in `ec` and does not throw.
+// The completion token for an operation that is awaited with co_await: a failed operation sets `ec` and does
+// not throw.
 inline auto awaiting(error_code& ec) { return net::redirect_error(net::use_awaitable, ec); }
 
-// Used by the network thread only; at most one read and one write may be in progress.
+// A client's connection. Only the network thread may use it; at most one read and one write may be in
+// progress.
 class Stream {
  public:
-  Stream(Tcp::socket socket, std::shared_ptr<const TlsIdentity> identity);  // null: no TLS
+  Stream(Tcp::socket socket, std::shared_ptr<const TlsIdentity> identity);  // `identity` null: no TLS
 
   enum class Opened { ready, plain_text, failed };
   // Does the TLS handshake; without TLS it has nothing to do and returns `ready`. plain_text: the client
   // speaks no TLS; further writes are sent in plain text, so that an error can be reported to the client.
-  // After cancel() it ends early.
+  // cancel() ends the handshake early, with `failed`.
   net::awaitable<Opened> open();
 
   using executor_type = Tcp::socket::executor_type;
@@ -64,7 +66,7 @@ class Stream {
   Tcp::socket socket_;
   std::shared_ptr<const TlsIdentity> identity_;
   std::optional<net::ssl::stream<Tcp::socket&>> tls_;
-  bool through_tls_ = false;  // between handshake and goodbye
+  bool through_tls_ = false;  // true from the end of the TLS handshake until send_goodbye()
 };
 
 }  // namespace ls::http

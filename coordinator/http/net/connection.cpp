@@ -1,3 +1,5 @@
+// Connection: one client's connection, served by a coroutine on the network thread (the one thread that waits
+// for all sockets). Work that may block runs on thread pools.
 #include "coordinator/http/net/connection.h"
 
 #include <fmt/format.h>
@@ -229,7 +231,7 @@ net::awaitable<Connection::Body> Connection::read_streamed(Parser& parser, const
   auto end = [sink = std::move(sink), whole]() mutable {
     std::optional<Response> answer;
     if (whole) answer = sink->finish();
-    sink.reset();  // here, on a thread of the pool, because it may remove a large file, which takes time
+    sink.reset();  // done on a thread of the pool: the destructor may remove a large file, which takes time
     return answer;
   };
   const bool unpacks = whole && shared_.api.body_kind(*match.route, request) == BodyKind::archive;
@@ -251,7 +253,7 @@ net::awaitable<Connection::Body> Connection::read_into(Parser& parser, BodySink&
     if (read == Read::ok && (chunk.size() == 0 || (chunk.size() < kBodyChunk && !parser.is_done()))) continue;
     disarm();
     // If the read has failed, the rest of the body will not arrive. The bytes that have arrived still go to
-    // the sink, so that an upload in parts makes progress even if every connection breaks within a chunk.
+    // `sink`, so that an upload in parts makes progress even if every connection breaks within a chunk.
     const auto paused = SteadyClock::now();
     std::optional<Response> refused;
     if (chunk.size() > 0) refused = co_await run_on(shared_.slow, shared_.io, append);
@@ -263,7 +265,8 @@ net::awaitable<Connection::Body> Connection::read_into(Parser& parser, BodySink&
   co_return Body{};
 }
 
-// Reads the next bytes of the body, or its end.
+// Reads the bytes of the body that arrive next, or notes that the body has ended. The whole body began at
+// `began`; `received` is its number of bytes so far, to which this call adds.
 net::awaitable<Read> Connection::read_portion(Parser& parser, SteadyClock::time_point began,
                                               std::uint64_t& received) {
   const std::size_t before = parser.get().body().size();
@@ -290,8 +293,8 @@ bool Connection::charge(std::uint64_t bytes) {
   return true;
 }
 
-// Counts the answer, unless it is small. An answer larger than kMaxAnswers is allowed while no other answer
-// is counted.
+// Answers of at most kSmallAnswer bytes are not counted in Shared::answers and are always allowed. A single
+// answer may be larger than kMaxAnswers while no other answer is counted.
 bool Connection::charge_answer(std::uint64_t bytes) {
   shared_.answers -= std::exchange(answer_charged_, 0);
   if (bytes <= kSmallAnswer) return true;
@@ -312,8 +315,8 @@ net::awaitable<bool> Connection::answer(const Request& request, const Response& 
   co_return written&& keep_alive;
 }
 
-// Answers bytes that could not be read as a request. (`unread` is a named variable because GCC 12 destroys a
-// temporary aggregate in a co_await twice.)
+// Sends `response` to a client whose request could not be read, and ends the connection. (answer() gets the
+// named variable `unread`, not a temporary: GCC 12 destroys a temporary aggregate in a co_await twice.)
 net::awaitable<void> Connection::answer_unread(const Response& response) {
   const Request unread;
   co_await answer(unread, response, false);
@@ -362,7 +365,7 @@ net::awaitable<bool> Connection::write_file(std::string_view head, const FileBod
   std::uint64_t sent = 0;
   std::vector<std::byte> slice(kWriteSlice);
   for (std::uint64_t offset = 0; offset < file.size;) {
-    disarm();
+    disarm();  // no deadline cancels operations of the connection while the disk is read
     const auto paused = SteadyClock::now();
     auto work = [&slice, &file, offset] {
       return read_slice(file, offset,

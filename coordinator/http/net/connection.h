@@ -80,8 +80,9 @@ class Connection {
   void cut();  // closes the connection immediately
 
  private:
-  // The result of reading a body. `answer` is the response to the request if it is known already: the body
-  // was rejected (the client may still be sending the rest), or the sink has processed all of it.
+  // The result of reading a request's body. `answer` is the response to the request if it is known already:
+  // the body was rejected (the client may still be sending the rest), or the BodySink, which receives bodies
+  // piece by piece, has processed all of it.
   struct Body {
     Read read = Read::ok;
     std::optional<Response> answer;
@@ -106,16 +107,16 @@ class Connection {
   net::awaitable<Body> read_into(Parser& parser, BodySink& sink);
   net::awaitable<Read> read_portion(Parser& parser, SteadyClock::time_point began, std::uint64_t& received);
   net::awaitable<bool> send_continue(const Request& request);
-  // Sets the size of this connection's request body in Shared::buffered. False: all bodies together would
-  // exceed kMaxBuffered.
+  // Counts `bytes` in Shared::buffered as the size of this connection's request body, in place of the size
+  // counted before. False: nothing is counted, since all bodies together would exceed kMaxBuffered.
   bool charge(std::uint64_t bytes);
 
   // Writing
   net::awaitable<bool> answer(const Request& request, const Response& response, bool keep_alive);
   net::awaitable<void> answer_unread(const Response& response);
   net::awaitable<void> answer_failed_read(Read read);
-  // Sets the size of this connection's answer in Shared::answers. False: all answers together would exceed
-  // kMaxAnswers.
+  // Counts `bytes` in Shared::answers as the size of this connection's answer, in place of the size counted
+  // before. False: nothing is counted, since all answers together would exceed kMaxAnswers.
   bool charge_answer(std::uint64_t bytes);
   net::awaitable<bool> write_all(std::string_view head, std::span<const std::byte> body);
   net::awaitable<bool> write_file(std::string_view head, const FileBody& file);
@@ -126,7 +127,7 @@ class Connection {
                                    SteadyClock::time_point began, std::uint64_t& sent);
   net::awaitable<void> linger();
 
-  // Event streams: event_writer.cpp
+  // Event streams (defined in event_writer.cpp)
   net::awaitable<void> stream_events(const Request& request, const Response& response);
   net::awaitable<void> write_events(EventQueue& queue, const Caller& reader);
   net::awaitable<void> reader_leaves();
@@ -138,7 +139,7 @@ class Connection {
   SteadyClock::time_point deadline_ = SteadyClock::time_point::max();
   bool timed_out_ = false;
   bool idle_ = true;
-  net::steady_timer* events_wait_ = nullptr;  // set while an event stream runs
+  net::steady_timer* events_wait_ = nullptr;  // timer on which an event stream waits; null: no stream runs
   std::uint64_t charged_ = 0, answer_charged_ = 0;
   beast::flat_buffer buffer_;
   // Callbacks hold a weak_ptr to alive_ and do nothing once the connection has been destroyed.

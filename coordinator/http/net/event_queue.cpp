@@ -47,8 +47,8 @@ void EventQueue::push(const coordinator::StreamEvent& event, const coordinator::
     text_ += text;
     ++events_;
   }
-  // Only the first event in the queue wakes the reader: a reader that is awake checks for more events before
-  // it waits again.
+  // Only an event that arrives in an empty queue wakes the reader, because a reader that is awake checks for
+  // more events before it waits again.
   if (first) wake_();
 }
 

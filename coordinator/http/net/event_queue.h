@@ -24,8 +24,8 @@ class EventQueue {
   };
   // If `job` is set, the reader gets only the events of this job (and of its frames) and those that belong to
   // no single job; if it is empty, all events. `after_id` is the id of the last event that the reader has
-  // received. If the first event pushed does not have the next id, the reader has missed events and first
-  // gets an event `reset`. `wake` is called when the queue is no longer empty.
+  // received. If the first event pushed has an id above `after_id` + 1, the reader has missed events and
+  // first gets an event `reset`. `wake` is called when the queue is no longer empty.
   EventQueue(Bounds bounds, std::string job, std::uint64_t after_id, std::function<void()> wake);
 
   // Adds an event; may be called on any thread, in the order of the events' ids. It never blocks. An event
@@ -39,14 +39,14 @@ class EventQueue {
   // True if the reader was too slow and an event had to be dropped. The connection then sends the result of
   // take() and ends; the reader connects again with the id of the last event that it got.
   bool overflowed() const;
-  // Detaches wake(): it is not called any more once this has returned.
+  // After close() has returned, `wake` is not called any more.
   void close();
 
  private:
   const Bounds bounds_;
   const std::string job_;
   mutable std::mutex mutex_;
-  // Id that the first event should have; nullopt after the first event.
+  // Id that the first event has if the reader has missed none; nullopt after the first event.
   std::optional<std::uint64_t> expected_;
   std::function<void()> wake_;
   std::string text_;

@@ -1,4 +1,4 @@
-// A connection that serves an event stream.
+// The functions of Connection that serve an event stream (Server-Sent Events) to one client.
 #include <fmt/format.h>
 
 #include <array>
@@ -12,8 +12,8 @@
 namespace ls::http {
 namespace {
 
-// Ends the bookkeeping of an event stream in its destructor, which also runs if the server is destroyed while
-// the stream waits.
+// Its destructor closes the queue of an event stream and no longer counts the stream as open. A destructor
+// does this, since it also runs if the server is destroyed while the stream waits.
 struct Undo {
   Shared& shared;
   net::steady_timer*& events_wait;
@@ -28,7 +28,8 @@ struct Undo {
 
 struct Start {
   std::uint64_t after = 0;
-  // true: the id in the request is higher than any event's here, so it comes from another data folder
+  // True if the request's id is higher than the id of every event here. The id then comes from a coordinator
+  // with another data folder, and the client must load its state again.
   bool reset = false;
 };
 
@@ -67,7 +68,8 @@ net::awaitable<void> Connection::stream_events(const Request& request, const Res
     co_await write_all(head, {});
     co_return;
   }
-  // An id without data is not an event; it only sets the id from which a reconnecting browser continues.
+  // A message with an id but without data is not an event for the browser; it only sets the id that the
+  // browser sends when it connects again.
   head += fmt::format("retry: 1000\nid: {}\n\n", start.after);
   if (start.reset)
     head += fmt::format("event: reset\ndata: {{\"missed_from\":0,\"missed_to\":{}}}\n\n", start.after);
@@ -85,7 +87,7 @@ net::awaitable<void> Connection::stream_events(const Request& request, const Res
   co_await (write_events(*queue, wanted.reader) || reader_leaves());
   queue->close();
   auto unsubscribe = [handle = std::move(subscription)]() mutable {
-    handle.reset();  // done on a thread of the pool, because it may wait for a callback in progress
+    handle.reset();  // on a thread of the pool, since reset() waits for a callback that is in progress
     return true;
   };
   co_await run_on(shared_.quick, shared_.io, std::move(unsubscribe));

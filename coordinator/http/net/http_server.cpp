@@ -42,8 +42,8 @@ Result<Address> parse_address(const std::string& text) {
 }  // namespace
 
 struct Server::State {
-  // The order of these members matters: destroying the io_context destroys the frames of coroutines, so
-  // everything that these frames use must be declared before it.
+  // The order of these members matters: destroying the io_context destroys the frames of coroutines. What
+  // these frames use is declared before `io`, so that it is destroyed after it.
   std::unique_ptr<net::thread_pool> quick, slow, bundles, remote;
   std::unique_ptr<Shared> shared;
   net::io_context io{1};
@@ -66,7 +66,7 @@ namespace {
 void refuse(Tcp::socket& socket) {
   error_code ignored;
   socket.non_blocking(true, ignored);
-  // Does not block: the answer fits into the empty send buffer
+  // The whole answer fits into the send buffer, which is empty: write_some() sends all of it.
   socket.write_some(net::buffer(kFull.data(), kFull.size()), ignored);
 }
 

@@ -13,8 +13,8 @@ namespace bhttp = beast::http;
 using boost::system::error_code;
 using Header = bhttp::request_header<bhttp::fields>;
 
-// Headers that a request may have only once: if there were two, a proxy could use one and this server the
-// other.
+// Headers that a request may have only once. If a header came twice with different values, a proxy might use
+// one value and this server the other.
 constexpr std::string_view kOnce[] = {"host",           "authorization",     "content-type",
                                       "content-length", "transfer-encoding", "origin",
                                       "expect",         "content-range"};

@@ -14,7 +14,8 @@
 namespace ls::http {
 
 namespace beast = boost::beast;
-// The parser's body contains the bytes that were read and not yet removed from it.
+// The parser of one request. Its buffer body() holds the bytes of the body that have arrived and that its
+// user has not removed yet.
 using Parser = beast::http::request_parser<beast::http::basic_dynamic_body<beast::flat_buffer>>;
 
 // Sets a new parser's limit on the header. The body gets no limit here.

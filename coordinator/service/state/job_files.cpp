@@ -14,7 +14,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kRemovedExtension = ".removed";  // suffix of a removed job's folder
 
-// Returns a name for the layout of TileError: a snapshot is read only by builds that have the same layout.
+// Returns a text that is stored in every snapshot and changes with the size of TileError, which snapshots
+// contain as raw bytes. A build reads only snapshots that have its own text.
 std::string snapshot_format() { return fmt::format("1-{}", sizeof(TileError)); }
 
 void remove_folders_if(const fs::path& in, const std::function<bool(const fs::path&)>& unwanted) {
@@ -88,7 +89,7 @@ std::string JobFiles::thumbnail_name(const StoredJob& job) const {
 }
 
 bool JobFiles::image_is_lost(const StoredJob& job) const {
-  // With an error the folder cannot be read: the image does not count as lost
+  // `unknown` is set if the folder cannot be read. The image then does not count as lost: it may still exist.
   std::error_code unknown;
   return on_disk() && !job.damaged && job.state == JobState::done &&
          !fs::exists(folder(job.id) / "image.exr", unknown) && !unknown;

@@ -17,7 +17,8 @@ namespace ls::coordinator {
 
 class JobFiles {
  public:
-  // `data`: empty if everything is in memory
+  // `data`: the data folder; empty if everything is in memory. `shared`: other coordinators use the same job
+  // store.
   JobFiles(std::filesystem::path data, bool shared) : data_(std::move(data)), shared_(shared) {}
 
   bool on_disk() const { return !data_.empty(); }
@@ -31,20 +32,22 @@ class JobFiles {
   // others have taken them over. Folders with a final image are kept.
   void remove_unknown(const std::vector<StoredJob>& jobs) const;
 
-  // Creates a snapshot file of the job. Its name has this suffix until the snapshot is committed.
+  // Creates a new snapshot file of the job. Its name is film.snap with `suffix` until it is committed; then
+  // it replaces film.snap.
   Result<SnapshotFile> create_snapshot(const StoredJob& job, const TileGrid& grid,
                                        std::string_view suffix) const;
   // Returns the image in the snapshot; an image without samples if there is no snapshot.
   Assembly load_image(const StoredJob& job, const TileGrid& grid) const;
   // Returns the tiles of the snapshot's image, to be read one by one; nullopt if there is no snapshot.
   std::optional<SnapshotTiles> tiles_of_image(const StoredJob& job, const TileGrid& grid) const;
-  // Returns a name for the job's image as it is on disk. If the job continues, the next image gets another
-  // name.
+  // Returns a name for the version of the job's image that the snapshot contains now. A later snapshot gives
+  // another name.
   std::string image_version(const StoredJob& job) const;
-  // Returns the file name of the thumbnail of that image.
+  // Returns the file name for the thumbnail of the image in the snapshot. A later snapshot gives another
+  // name.
   std::string thumbnail_name(const StoredJob& job) const;
-  // True if a done job's image is gone, which can happen if a record in Redis outlives the disk with the
-  // pixels.
+  // True if the job is done but its image.exr does not exist. This can happen if the jobs' records are in
+  // Redis and the disk with the image is lost.
   bool image_is_lost(const StoredJob& job) const;
 
  private:

@@ -23,7 +23,7 @@ std::string lower(std::string text) {
   return text;
 }
 
-// Returns the place of the state in the order JobOrder::active.
+// Returns the position of jobs in this state in a list ordered by JobOrder::active; 0 comes first.
 int rank(JobState state) {
   return state == JobState::running ? 0 : state == JobState::paused ? 1 : state == JobState::queued ? 2 : 3;
 }
@@ -35,7 +35,7 @@ bool asked_for(const Row& row, const JobsAsked& asked, const std::string& search
           lower(row.id.value).find(search) != std::string::npos);
 }
 
-// Returns the error to sort by. A job without an error counts as infinite.
+// Returns the relative mean squared error to sort by; infinity if the job has no error estimate yet.
 double error_of(const Row& row) {
   return row.view->error_now ? row.view->error_now->relmse : std::numeric_limits<double>::infinity();
 }

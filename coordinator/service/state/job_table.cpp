@@ -40,7 +40,7 @@ FrameRange Sequence::range() const {
   const StoredJob &first = frames.front()->stored, &last = frames.back()->stored;
   if (first.spec.frames) return *first.spec.frames;
   if (last.spec.frames) return *last.spec.frames;
-  return {frame_of(first.id)->frame, frame_of(last.id)->frame, 1};  // used if both records are damaged
+  return {frame_of(first.id)->frame, frame_of(last.id)->frame, 1};  // if both frames' records are damaged
 }
 
 ReportFacts facts_of(const JobEntry& entry, TimePoint now) {
@@ -109,8 +109,8 @@ Result<std::vector<EntryPtr>> JobTable::job_or_frames(const JobId& id) const {
 
 Result<std::string> JobTable::owner(const JobId& id) const {
   if (const auto entry = find(id)) return entry->stored.owner;
-  // The id may name a frame that an existing sequence lacks. Its owner is the sequence's, so that this user
-  // gets an error that lists the frames.
+  // The id may name a frame that does not exist, of a sequence that does. Then the sequence's owner is
+  // returned, so that this user, who may see the sequence, later gets an error that lists its frames.
   const auto frame = frame_of(id);
   const auto sequence = sequences_.find(frame ? frame->sequence : id);
   if (sequence != sequences_.end()) return sequence->second.frames.front()->stored.owner;
@@ -123,7 +123,8 @@ JobId JobTable::unused_id() const {
   return id;
 }
 
-// The limit per user is lower than the limit for all users, so that no single user can reach the total limit.
+// Checks the limit on all jobs and the limit on the jobs of `owner` (if not empty). The limit per user is the
+// lower one, so that no single user can use up the room of all.
 Result<void> JobTable::room_for(const std::string& owner, std::size_t jobs) const {
   if (jobs_.size() + jobs > limits::kMaxJobs)
     return fail(Errc::resource_exhausted,

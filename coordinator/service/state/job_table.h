@@ -20,22 +20,24 @@ namespace ls::coordinator {
 
 struct Denoised;
 
+// A job in memory: its record (`stored`), its image, and what is known about it only while the coordinator
+// runs.
 struct JobEntry {
   JobEntry(StoredJob job, TimePoint now);
 
-  // Creates an image without samples, and the tiles for the comparison with the reference.
-  void begin_image();
-  void begin_comparison();  // only for a job that has a reference
-  void free_image();        // afterwards only the job's record and its files are left
+  void begin_image();       // creates an image without samples
+  void begin_comparison();  // if the job has a reference image: creates reference_tiles from the image so far
+  void free_image();        // frees the image and closes the log; only the job's record and its files remain
   // Seconds on the job's clock, which starts with the first ray and stands still during pauses
   double elapsed(TimePoint now) const;
 
-  StoredJob stored;  // its state stays `running` until the final image is written
+  StoredJob stored;  // the job's record; its state stays `running` until the final image is written
   Digest settings_digest;
   TileGrid grid;
-  std::shared_ptr<PartialLog> log;   // file of accepted results; null if the job is only in memory
-  std::optional<Assembly> assembly;  // the image; nullopt once an ended job is on disk
-  // Pictures to compare with the reference, if it has one, while there is an assembly
+  std::shared_ptr<PartialLog> log;   // file of accepted results; null if all is in memory, or if `unloaded`
+  std::optional<Assembly> assembly;  // the image in memory; nullopt if `unloaded`
+  // Pictures for the comparison with the reference image; nullopt: the job has no reference image, or no
+  // `assembly`
   std::optional<ReferenceTiles> reference_tiles;
   // Noise of the reference image, estimated by the latest comparison; nullopt: unknown
   std::optional<ReferenceNoise> reference_noise;
@@ -43,44 +45,52 @@ struct JobEntry {
   // computed yet
   std::shared_ptr<const Denoised> denoised;
   std::vector<ConvergencePoint> points;
-  // Number of the current convergence curve; it rises when the curve is dropped because pixels were wrong or
-  // lost. A comparison with the reference that began for an older curve and ends later is ignored
+  // Number of the current convergence curve. The number rises when the curve is dropped because pixels were
+  // wrong or lost. The result of a comparison with the reference image is ignored if it began for an older
+  // curve.
   std::uint64_t curve = 0;
-  // True if it has ended and only its files and its record remain: the farm has forgotten it
+  // True if the job has ended (or could not be restored) and only its files and its record remain. The farm
+  // does not know such a job.
   bool unloaded = false;
-  // True if its user removed it, or another coordinator owns it: nothing more is stored for it
+  // True if a user removed the job, or another coordinator owns it: nothing more is stored for it
   bool removed = false;
-  bool pin_unsaved = false;     // its numeric class is not stored yet, so its results cannot be stored either
-  std::string audits;           // its open audits, as they were last written to disk (store/log/audit_file.h)
-  std::string broken;           // why it could not be restored at the start
-  std::uint64_t finishing = 0;  // number of the final image that is being made; 0: none
+  // True while the numeric class (machines that compute the same bits) that the job is pinned to is not
+  // stored yet. Until it is, no results of the job are stored.
+  bool pin_unsaved = false;
+  // The job's open audits (units that are rendered again for comparison), as the text last written to disk
+  // (store/log/audit_file.h)
+  std::string audits;
+  std::string broken;  // why the job could not be restored; empty: it could
+  // Number of the request for the final image that is being made (ImageWriter::finish); 0: none is being made
+  std::uint64_t finishing = 0;
   bool snapshot_running = false;
-  std::uint64_t snapshots = 0;  // number of snapshots committed; used by the writer thread only
+  std::uint64_t snapshots = 0;  // how many snapshots were committed; used by the writer thread only
   TimePoint last_snapshot{}, last_progress{};
   bool progress_due = false;
-  JobState last_state = JobState::queued;  // the state that clients were last sent
-  // When the job's clock stood at 0: the time of the first ray, moved later by pauses; nullopt while the
-  // clock does not run
+  JobState last_state = JobState::queued;  // the state in the last event about the job that was published
+  // Time at which the job's clock stood at 0: the time of the first ray, plus the length of all pauses that
+  // have ended. nullopt: no result has arrived yet, or the job's rendering has ended.
   std::optional<TimePoint> clock_zero;
-  // When its clock stopped because the job was paused; nullopt: the clock is not stopped
+  // Time at which a pause stopped the job's clock; nullopt: the job is not paused
   std::optional<TimePoint> still_since;
-  // When its rendering ended, in seconds since 1970. The job's record gets this value when the end is stored
+  // Time at which the job's rendering ended, in seconds since 1970. Copied into `stored` when the job's end
+  // is stored; for a done job this is after the final image is written.
   double ended_unix = 0;
   double fold_seconds = 0;    // seconds on the job's clock when a result was last added to the image
-  std::string trouble;        // why the job waits, for the user
-  std::uint64_t resumes = 0;  // how often it was resumed
+  std::string trouble;        // why the job does not continue, as a text for the user; empty: no problem
+  std::uint64_t resumes = 0;  // how often a pause of the job was ended since the coordinator started
   // For each leased unit (tile and round), the workers that it is leased to; for display
   std::map<std::pair<TileIndex, RoundIndex>, std::vector<WorkerId>> leased;
-  // For each durable result, the seconds on the job's clock when it was stored; set while a restart adds the
-  // results to the image again
+  // Only while a restart adds results to the image again: for the unit (tile and round) of each of these
+  // results, the seconds on the job's clock when the result was stored
   std::map<std::pair<TileIndex, RoundIndex>, double> replay_at;
   std::unique_ptr<JobTrace> trace;  // null: the job is not traced
 };
 using EntryPtr = std::shared_ptr<JobEntry>;
 
 struct Sequence {
-  std::vector<EntryPtr> frames;       // ascending, never empty
-  std::vector<std::string> warnings;  // of all frames, without duplicates
+  std::vector<EntryPtr> frames;       // in ascending order of frame numbers; never empty
+  std::vector<std::string> warnings;  // the warnings of all frames, each text once
   TimePoint last_progress{};
   bool progress_due = false;
 
@@ -96,15 +106,17 @@ class JobTable {
 
   EntryPtr find(const JobId& id) const;  // null if there is no such job
   Sequence* sequence(const JobId& id);   // null if there is no such sequence
-  // Return the job, or an error: job() fails for a sequence, which is no job of its own; usable() also fails
-  // for a job that could not be restored at the start. Such a job can only be removed.
+  // job() returns the job with this id, or an error if there is none; the id of a sequence is an error.
+  // usable() also gives an error for a job that could not be restored at the start, which can only be
+  // removed.
   Result<EntryPtr> job(const JobId& id) const;
   Result<EntryPtr> usable(const JobId& id) const;
   Result<std::vector<EntryPtr>> job_or_frames(const JobId& id) const;
   Result<std::string> owner(const JobId& id) const;
   const std::map<JobId, EntryPtr>& all() const { return jobs_; }
   std::map<JobId, Sequence>& sequences() { return sequences_; }
-  // In order of submission; a sequence appears once, not its frames
+  // The ids of all jobs and sequences in order of submission. A sequence is listed with its own id only, not
+  // with those of its frames.
   const std::vector<JobId>& order() const { return order_; }
 
   JobId unused_id() const;
@@ -112,10 +124,12 @@ class JobTable {
   Result<void> room_for(const std::string& owner, std::size_t jobs) const;
   // Adds a job. If it is a frame, it joins its sequence, which is listed at the place of its first frame.
   void add(const EntryPtr& entry);
-  // Removes a job or a sequence from order(). Its jobs stay in the table until remove()
+  // Removes the id of a job or a sequence from order(). The job, or the sequence's frames, stay in the table
+  // until remove().
   void unlist(const JobId& id);
-  // Removes the job. Returns the id that is no longer in order(): the job's, or the sequence's if the job was
-  // its last frame.
+  // Removes the job. Returns the id that is no longer in order(): the job's id, or the sequence's id if the
+  // job was its last remaining frame. nullopt: other frames of the sequence remain, or unlist() was called
+  // before.
   std::optional<JobId> remove(const EntryPtr& entry);
 
  private:
@@ -125,7 +139,7 @@ class JobTable {
   std::vector<JobId> order_;
 };
 
-// Returns all facts for the report except the digest of the pixels, which takes time.
+// Returns the values for the job's report, except the digest of the pixels, which takes time to compute.
 ReportFacts facts_of(const JobEntry& entry, TimePoint now);
 
 }  // namespace ls::coordinator

@@ -1,3 +1,5 @@
+// JobTrace: records the trace spans of one job, of its leases (lists of units that are assigned to one
+// worker), and of steps such as storing a result. A unit is one tile and one round of samples.
 #include "coordinator/service/state/job_trace.h"
 
 #include <fmt/format.h>
@@ -8,7 +10,7 @@
 namespace ls::coordinator {
 namespace {
 
-constexpr std::size_t kMaxEvents = 128;  // on one job's span
+constexpr std::size_t kMaxEvents = 128;  // a job's span keeps at most this many events
 constexpr int kMaxFormerLeases = 4096;
 
 std::int64_t to_ns(double unix_seconds) {
@@ -21,8 +23,8 @@ std::string identity_of(const StoredJob& job) {
   return fmt::format("job {} {} {}", job.id.value, job.submitted_unix, job.scene.hex());
 }
 
-// Returns the id of the job's span. A job that is extended after its end, when `ended_unix` is set, gets
-// another span.
+// Returns the id of the job's span. `ended_unix`: time at which the job ended before it was extended; 0: it
+// has not been extended. So a job that is extended after its end gets another span.
 trace::SpanId span_of(const trace::TraceId& trace, const StoredJob& job, double ended_unix) {
   return span_id_of(trace, fmt::format("{} {}", identity_of(job), ended_unix));
 }
@@ -76,8 +78,8 @@ JobTrace::JobTrace(const Tracing& tracing, const StoredJob& job, trace::SpanCont
       start_ns_(to_ns(std::max(job.submitted_unix, job.totals.ended_unix))),
       ended_(is_terminal(job.state)) {}
 
-// Converts a time to nanoseconds since 1970. The job's start may come from another clock, so a time before it
-// is replaced by the start.
+// Converts a time to nanoseconds since 1970, but returns at least the start of the job's span. The start may
+// have been measured by another machine's clock, which may be ahead of this one's.
 std::int64_t JobTrace::ns(TimePoint at) const { return std::max(tracing_.tracer->unix_ns(at), start_ns_); }
 
 void JobTrace::event(std::string name, TimePoint at) {
@@ -132,8 +134,9 @@ void JobTrace::result(const UnitResult& r, const WorkerId& worker, TimePoint che
       static_cast<std::int64_t>(std::min<std::uint64_t>(r.held_unix_ns, static_cast<std::uint64_t>(now_ns)));
   auto open = leases_.find(r.lease);
   if (open == leases_.end() && !r.lease.value.starts_with(tracing_.lease_prefix + "-")) {
-    // An earlier process of the coordinator granted this lease and ended before it recorded the lease. The
-    // number of such leases is bounded, since a lying worker can name any lease.
+    // An earlier process of the coordinator granted this lease (a list of units assigned to one worker) and
+    // ended before it recorded the lease's span. At most kMaxFormerLeases such leases are recorded, since a
+    // lying worker can name any lease.
     if (former_leases_ >= kMaxFormerLeases) return;
     ++former_leases_;
     OpenLease former{.worker = worker.value, .start_ns = held_ns > 0 ? held_ns : ns(checked)};
@@ -142,7 +145,8 @@ void JobTrace::result(const UnitResult& r, const WorkerId& worker, TimePoint che
   // If a lying worker names another worker's lease, the result is not counted for that lease.
   const bool foreign = open != leases_.end() && open->second.worker != worker.value;
   if (open != leases_.end() && !foreign) {
-    // A worker may have begun the unit under an earlier lease, which ended when its connection broke.
+    // The worker may have had the unit (one tile and one round) before this lease began: under an earlier
+    // lease, which ended when the worker's connection broke. The span then starts at that earlier time.
     if (held_ns > 0) open->second.start_ns = std::min(open->second.start_ns, held_ns);
     open->second.start_ns = std::max(open->second.start_ns, start_ns_);
     open->second.end_ns = now_ns;
@@ -158,7 +162,7 @@ void JobTrace::result(const UnitResult& r, const WorkerId& worker, TimePoint che
   child("check partial", parent, ns(checked), stored_ns, attributes(), failed);
   child("store partial", parent, stored_ns, now_ns, attributes(), failed);
   if (failed) return;
-  // The unit is done: it is taken out of all leases that hold it.
+  // The unit is done, so it is removed from all leases that contain it.
   const auto [first, last] = holders_.equal_range(unit);
   std::vector<LeaseId> held;
   for (auto it = first; it != last; ++it) held.push_back(it->second);
@@ -187,7 +191,8 @@ void JobTrace::units_freed(const UnitsFreed& freed, TimePoint now) {
   }
 }
 
-// Notes that one of the lease's units is done or was taken back.
+// Notes that one of the lease's units is done or was taken back. After the last unit, the lease's span is
+// recorded.
 void JobTrace::leave(const LeaseId& id, std::int64_t now_ns) {
   const auto open = leases_.find(id);
   if (open == leases_.end() || --open->second.left > 0) return;
@@ -196,8 +201,8 @@ void JobTrace::leave(const LeaseId& id, std::int64_t now_ns) {
 }
 
 void JobTrace::leases_end(TimePoint now) {
-  // The number of units in a lease of an earlier process is not known: its end is the time of its last
-  // result.
+  // A lease that an earlier process granted has `units` 0, since the number of its units is not known. Such a
+  // lease ends at the time of its last result; the other leases end now.
   for (const auto& [id, lease] : leases_) record_lease(id, lease, lease.units > 0 ? ns(now) : lease.end_ns);
   leases_.clear();
   holders_.clear();

@@ -2,8 +2,8 @@
 // leases (lists of units that are assigned to one worker), and steps such as adding a result to the image or
 // writing the final image. A job that is not traced has no JobTrace.
 //
-// The ids of trace, job and leases are derived from the job's record and the lease's id, so that another
-// coordinator, or this one after a restart, continues the same trace.
+// The ids of the trace and of the job's span are derived from the job's record, and the id of a lease's span
+// also from the lease's id. So another coordinator, or this one after a restart, continues the same trace.
 #pragma once
 
 #include <cstdint>
@@ -21,40 +21,45 @@
 
 namespace ls::coordinator {
 
-// The tracer of jobs, and the prefix of the coordinator's leases
+// What a JobTrace needs besides the job
 struct Tracing {
-  std::shared_ptr<trace::Tracer> tracer;  // null: nothing is traced
-  std::string lease_prefix;               // of the leases of this start of the coordinator
+  std::shared_ptr<trace::Tracer> tracer;  // receives the spans; null: nothing is traced
+  // The ids of all leases since this start of the coordinator begin with this text; the ids of earlier leases
+  // do not.
+  std::string lease_prefix;
 };
 
 class JobTrace {
  public:
   // Null if the job is not traced: there is no tracer, or the sampler leaves the job out.
   static std::unique_ptr<JobTrace> begin(const Tracing& tracing, const StoredJob& job);
-  // Returns the job's span for use by other programs, also after the job's end. nullopt: the job is not
-  // traced.
+  // Returns the ids of the job's trace and span, which other programs need to refer to the job. Works also
+  // after the job's end. nullopt: the job is not traced.
   static std::optional<trace::SpanContext> context_of(const Tracing& tracing, const StoredJob& job);
 
-  // Notes a change of the job, such as "running", on its span.
+  // Adds an event to the job's span. `name` is the change of the job, such as "running".
   void event(std::string name, TimePoint at);
-  // Records a step of the job.
+  // Records a span for a step of the job, such as writing the final image.
   void step(const char* name, TimePoint begin, TimePoint end, trace::Attributes attributes = {},
             bool failed = false);
 
-  // A lease begins. Returns its context, which goes to the worker.
+  // Begins the span of a lease. Returns the ids of its trace and span, which the worker gets with the lease.
   trace::SpanContext lease_begins(const Lease& lease, const WorkerId& worker, const std::string& worker_name,
                                   TimePoint now);
-  // Records how a result was handled: its check began at `checked` and took `check_seconds`; then it was
-  // stored, until `now`. `failed`: it was not stored, and its unit stays in every lease that holds it until
-  // units_freed().
+  // Records two spans for a result: its check, which began at `checked` and took `check_seconds`, and its
+  // storing, which began after the check and ended at `now`. If `failed` is false, the result's unit leaves
+  // all leases that contain it. If `failed` is true, the result could not be stored, and the unit stays in
+  // these leases until units_freed() is called.
   void result(const UnitResult& result, const WorkerId& worker, TimePoint checked, double check_seconds,
               TimePoint now, bool failed);
   void units_freed(const UnitsFreed& freed, TimePoint now);
   void leases_end(TimePoint now);
 
-  // The job ends: its leases and its span are recorded.
+  // Records the job's span, and before it the spans of the leases that have not ended. To be called when the
+  // job ends.
   void end(const StoredJob& job, TimePoint now);
-  // A job that has ended is extended: from here on its steps are part of another span of the same trace.
+  // Begins another span of the job in the same trace; later steps are part of the new span. To be called when
+  // a job that has ended is extended.
   void begin_again(const StoredJob& job, TimePoint now);
 
  private:
@@ -62,11 +67,11 @@ class JobTrace {
   struct OpenLease {
     std::string worker, worker_name;
     std::int64_t start_ns = 0;
-    std::int64_t end_ns = 0;  // time of its last result
-    std::size_t left = 0;     // units without a result
+    std::int64_t end_ns = 0;  // time of the lease's last result, in nanoseconds since 1970
+    std::size_t left = 0;     // number of units without a result
     std::int64_t units = 0, results = 0, samples = 0;
     double core_seconds = 0;
-    std::string lost;  // why units left the lease without a result; empty if none did
+    std::string lost;  // why units left the lease without a result of it; empty if no unit did so
   };
   JobTrace(const Tracing& tracing, const StoredJob& job, trace::SpanContext context,
            std::optional<trace::SpanId> parent);
@@ -79,7 +84,7 @@ class JobTrace {
 
   const Tracing tracing_;
   const std::string job_;
-  const std::string identity_;  // text that no other job has, not even a job of another farm
+  const std::string identity_;  // makes span ids; unique to this job among all jobs of all farms
   const std::optional<trace::SpanId> parent_;
   trace::SpanContext context_;
   std::int64_t start_ns_ = 0;
@@ -88,7 +93,7 @@ class JobTrace {
   std::uint32_t events_left_out_ = 0;
   std::map<LeaseId, OpenLease> leases_;
   int former_leases_ = 0;
-  std::multimap<Unit, LeaseId> holders_;  // the leases that each unit without a result is part of
+  std::multimap<Unit, LeaseId> holders_;  // for each unit without a result: the leases that contain it
 };
 
 }  // namespace ls::coordinator

@@ -16,8 +16,8 @@ struct CoreSeconds {
   std::optional<std::pair<double, double>> ci95;
 };
 
-// Predicts the core seconds that the job still needs; nullopt: unknown. May raise out.progress to the
-// progress towards the target error.
+// Predicts the core seconds that the job still needs; nullopt: unknown. Raises out.progress to the progress
+// towards the target error if that is greater.
 std::optional<CoreSeconds> core_seconds_left(const EtaInputs& facts, std::span<const ErrorPoint> points,
                                              Eta& out) {
   const auto known = [](double core) {
@@ -37,16 +37,21 @@ std::optional<CoreSeconds> core_seconds_left(const EtaInputs& facts, std::span<c
                      {{from_now(forecast->core_seconds_lo), from_now(forecast->core_seconds_hi)}}};
 }
 
-// How long a job with a target error lasts after its work has run out for some threads, as multiples of a
-// unit's duration u. Until the last needed unit is done the other threads wait between 0 and 1 u (Graham
-// 1969: list scheduling of work W on P threads takes at most W / P + (1 - 1 / P) u). They do not idle, but
-// render units that will be dropped; so the last needed unit itself may wait up to 1 u for a free thread. If
-// the samples end the job, the number of units is known, and all threads end at about the same time.
+// A job lasts longer than its work divided by its threads, because at its end some threads find no more units
+// that the job needs. These constants are the extra time as a multiple of u, the duration of one unit.
+//
+// kEven is for a job that ends at its number of samples: its units are known in advance, and all threads
+// finish at about the same time. The others are the least, mean and greatest extra time of a job that ends at
+// a target error. While the last needed unit is rendered, the other threads wait between 0 and 1 u (Graham
+// 1969: a list schedule of work W on P threads takes at most W / P + (1 - 1 / P) u). Meanwhile they render
+// units that will be dropped, so the last needed unit may itself have waited up to 1 u for a free thread;
+// this makes up to 2 u.
 constexpr double kEven = 0, kLeastWait = 0, kMeanWait = .5, kMostWait = 2;
 
 // Returns the wall-clock seconds that `core` core seconds of work take on `cores` cores. A unit runs on one
 // thread. So at most facts.units_at_once cores are busy, and the result is at least the duration of one unit
-// (facts.unit_seconds), or `core` if less work than that is left. `wait` is one of the multiples above.
+// (facts.unit_seconds), or `core` if less work than that is left. `wait` is kEven, kLeastWait, kMeanWait or
+// kMostWait.
 double seconds_on(double cores, double core, double wait, const EtaInputs& facts) {
   const double busy = facts.units_at_once > 0 ? std::min(cores, facts.units_at_once) : cores;
   const double waits = wait * facts.unit_seconds * std::max(0.0, 1 - 1 / busy);
@@ -62,7 +67,8 @@ double done_of(const StoredJob& job, double spp_done) {
   return job.spp ? std::min(1.0, spp_done / static_cast<double>(even_spp(*job.spp))) : 0;
 }
 
-// Sets the convergence status, trend and efficiency of `v` from its curve.
+// Sets the convergence status, trend and efficiency of `v` from `all`, the points of the job's convergence
+// curve. `doubt`: why the error figures are not trusted; empty if they are (JobTotals::doubt).
 void put_curve(JobView& v, const std::vector<ConvergencePoint>& all, const std::string& doubt) {
   const std::vector<ErrorPoint> points = error_points(all, !v.reference_same_seed);
   v.convergence_status = judge(points, doubt);
@@ -99,7 +105,8 @@ Eta eta_of(const EtaInputs& facts, std::span<const ErrorPoint> points) {
   return out;
 }
 
-// Predicts when the job will be done. Requires that the times and samples of `v` are set.
+// Predicts when the job will be done. Uses the elapsed seconds, core seconds and samples of `v`, which must
+// be set.
 Eta JobViews::eta(const JobEntry& entry, const JobFigures& figures, const JobView& v) const {
   const StoredJob& job = entry.stored;
   EtaInputs facts;
@@ -107,7 +114,8 @@ Eta JobViews::eta(const JobEntry& entry, const JobFigures& figures, const JobVie
   facts.core_seconds = v.core_seconds;
   facts.core_left = figures.core_seconds_left;
   facts.core_to_limit = figures.core_seconds_to_limit;
-  // The curve has the errors of the image itself, which do not show when the denoised layers reach a target.
+  // The convergence curve has the errors of the image before denoising. They do not show when the denoised
+  // layers reach a target.
   if (job.spec.target_layer == TargetLayer::raw) facts.target = job.spec.target_error;
   facts.time = job.spec.time;
   facts.elapsed = v.elapsed_seconds;

@@ -20,35 +20,40 @@ namespace ls::coordinator {
 // What is known of a job when its end is predicted
 struct EtaInputs {
   double done = 0;          // fraction of the requested samples, 0 to 1
-  double core_seconds = 0;  // core seconds spent so far, counted as in the convergence points
-  // Predicted core seconds until the job ends. For an adaptive job (one with a target error) this is the
-  // scheduler's own prediction; 0: unknown
+  double core_seconds = 0;  // core seconds spent on rendering so far, as in ErrorPoint::core_seconds
+  // Core seconds until the job ends, as the scheduler predicts them; 0: unknown. eta_of() prefers the
+  // forecast from the convergence points for a job with a target error.
   double core_left = 0;
-  double core_to_limit = 0;  // the same until the sample limit; 0: unknown
+  double core_to_limit = 0;  // predicted core seconds until all requested samples are rendered; 0: unknown
   // The target error (relMSE) and the time budget (seconds since the first ray); nullopt: the job has none
   std::optional<double> target, time;
   double elapsed = 0;  // seconds since the first ray
-  // CPU seconds per wall-clock second that the job's workers give it, or would give it if it were running
+  // Number of cores that render the job or, if none do, that would render it
   double cores = 0;
-  // `cores` if kMoreWorkers more workers joined; no more than `cores` if they would not help
+  // Number of cores that the job would have if kMoreWorkers more workers joined; at most `cores` if the job
+  // could not use more workers
   double cores_with_more = 0;
   double unit_seconds = 0;   // mean core seconds of a remaining unit; 0: unknown
-  double units_at_once = 0;  // units that can be rendered at the same time; 0: no limit
+  double units_at_once = 0;  // number of units that can be rendered at the same time; 0: no limit
 };
 
 struct Eta {
   double progress = 0;
-  std::optional<double> seconds;                  // seconds from now until the job is done; nullopt: unknown
-  std::optional<std::pair<double, double>> ci95;  // 95 % interval of `seconds`, if the target ends the job
-  std::optional<double> with_more;                // `seconds` with more workers, if that is less
-  std::optional<std::pair<double, double>> with_more_ci95;
+  std::optional<double> seconds;  // time until the job is done; nullopt: unknown
+  // 95 % interval of `seconds`; nullopt unless the target error is predicted to end the job
+  std::optional<std::pair<double, double>> ci95;
+  // Seconds until the job is done if kMoreWorkers more workers joined; nullopt: not less than `seconds`
+  std::optional<double> with_more;
+  std::optional<std::pair<double, double>> with_more_ci95;  // 95 % interval of `with_more`
 };
 
-// Predicts the end by samples, target error or time, whichever comes first. The core seconds until the target
-// are forecast from `points` (convergence.h), minus those spent since the last point. Before the first
-// checkpoint of an adaptive job, the scheduler's own prediction is used, without an interval. A unit runs on
-// one thread: few units keep few threads busy, and at the end of a job with a target threads wait for the
-// last units. An interval is cut at the sample limit.
+// Predicts when the job ends: when it has its samples, reaches its target error or has used up its time,
+// whichever comes first. The core seconds until the target are forecast from `points` (convergence.h), and
+// those spent since the last point are subtracted. Without a forecast, for example before the first
+// checkpoint, the scheduler's prediction is used, and there is no interval. The prediction also considers
+// that a unit runs on one thread: the job cannot use more threads than it has units, and at the end of a job
+// with a target error the threads wait for the last units. An interval is clipped where all requested samples
+// would be done.
 Eta eta_of(const EtaInputs& facts, std::span<const ErrorPoint> points);
 
 // Returns the state of the sequence. While frames are open (have not ended), it is paused if all of them are
@@ -59,15 +64,16 @@ JobState sequence_state(std::span<const JobView> frames);
 struct SequenceFacts {
   JobId id;
   FrameRange range;
-  std::vector<std::string> warnings;  // of all frames, without duplicates
+  std::vector<std::string> warnings;  // warnings of all frames, each text once
   double elapsed_seconds = 0;
-  double cores = 0;  // cores of the connected workers
+  double cores = 0;  // number of cores of the connected workers
   int workers = 0;   // number of connected workers
 };
-// Requires at least one frame; frames are ascending. The error is the mean over the pixels of the frames that
-// have one, and its interval treats these estimates as independent. The cost of the remaining frames is
-// extrapolated from the work so far. The remaining time assumes as many cores as the sequence's limits allow
-// and its units (rounds of tiles) can keep busy.
+// Makes the view of a sequence from the views of its frames, which must be in ascending order and at least
+// one. The sequence's error is the mean over the pixels of all frames that have an error estimate; its
+// interval treats these estimates as independent. The cost of the remaining frames is extrapolated from the
+// work so far. The remaining time assumes as many cores as the sequence's limits allow and its units (rounds
+// of tiles) can keep busy.
 JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frames);
 
 FrameView frame_view(const JobView& frame);

@@ -22,15 +22,16 @@ struct EventHub::State {
   Reserve reserve;
   std::mutex mutex;
   std::condition_variable_any changed;
-  std::deque<StreamEvent> kept;  // ascending ids
+  std::deque<StreamEvent> kept;  // the latest events, in the order of their ids
   std::uint64_t next_id = 1, reserved_end = 1;
   std::map<std::uint64_t, std::shared_ptr<Listener>> listeners;
   std::uint64_t last_listener = 0;
-  std::uint64_t calling = 0;  // the listener being called; 0: none
+  std::uint64_t calling = 0;  // number of the listener that is being called; 0: none is
   std::thread::id thread;
 
-  // Makes sure that next_id is reserved. If the store cannot reserve ids now, the next block of ids is used
-  // unreserved; a coordinator that starts after a crash may use these ids again.
+  // Makes sure that next_id is reserved in the store, in blocks of kEventIdBlock ids. If the store cannot
+  // reserve a block now, its ids are used without a reservation; then the coordinator may use them a second
+  // time after a crash.
   void reserve_ids() {
     while (next_id >= reserved_end) {
       const auto first = reserve(limits::kEventIdBlock);
@@ -44,7 +45,7 @@ struct EventHub::State {
     }
   }
 
-  // Returns the next event that a listener has not received, with that listener.
+  // Finds a listener that has not received all kept events. Returns its number and its next event.
   std::optional<std::pair<std::uint64_t, StreamEvent>> due() {
     if (kept.empty()) return std::nullopt;
     for (auto& [id, listener] : listeners) {
@@ -85,8 +86,8 @@ std::shared_ptr<void> EventHub::subscribe(std::uint64_t after_id,
   const std::lock_guard lock(state_->mutex);
   const std::uint64_t id = ++state_->last_listener;
   auto listener = std::make_shared<State::Listener>();
-  // If the store was lost and ids began again, `after_id` may be greater than any id given so far. The
-  // listener must get new events all the same.
+  // If the store was lost, ids begin at 1 again, and a reader's `after_id` from before may be greater than
+  // every present id. min() makes sure that such a reader gets the new events too.
   listener->next = std::min(after_id + 1, state_->next_id);
   listener->on_event = std::move(on_event);
   state_->listeners.emplace(id, std::move(listener));
@@ -146,8 +147,8 @@ void Publisher::progress(JobEntry& entry) {
 void Publisher::sequence(const JobId& id, bool at_once) {
   Sequence* sequence = jobs_.sequence(id);
   if (!sequence || quiet_) return;
-  // Even with `at_once`, a sequence of more than kFramesPerEvent frames is published at most once per
-  // `period`
+  // An event of a sequence takes longer to make the more frames it has. So a sequence of more than
+  // kFramesPerEvent frames is published at most once per `period` (in seconds), even with `at_once`.
   at_once &= sequence->frames.size() <= limits::kFramesPerEvent;
   const double period = limits::kProgressSeconds * (1 + static_cast<double>(sequence->frames.size()) /
                                                             static_cast<double>(limits::kFramesPerEvent));

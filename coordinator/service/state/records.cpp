@@ -63,7 +63,7 @@ Result<void> Records::put_quarantined() {
 
 void Records::log(const JobId& id, std::string text) {
   if (!jobs_.find(id)) return;
-  if (writes_.size() >= kMaxLogWrites) {  // the disk is slow, or there are too many messages
+  if (writes_.size() >= kMaxLogWrites) {  // the disk is slow, or messages arrive too fast
     ++lines_left_out_;
     return;
   }

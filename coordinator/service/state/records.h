@@ -1,5 +1,6 @@
 // Stores everything that must survive a restart: records of jobs, their logs and curves, quarantined workers.
-// Facts on which the farm relies are stored immediately, the rest in the background.
+// Jobs' records and quarantined workers are stored immediately, because the farm relies on them; logs and
+// curves are stored in the background.
 #pragma once
 
 #include <functional>
@@ -22,8 +23,8 @@ class Records {
 
   // Stores the job's record. If this fails, returns false, and trouble() gives the reason.
   bool put(const EntryPtr& entry);
-  // Calls `changes`, and then stores all jobs for which it called put(), in one transaction: a sequence may
-  // have thousands of frames.
+  // Calls `changes`, and then stores all jobs for which `changes` called put(). One transaction stores them
+  // all, since a sequence may have thousands of frames and a transaction for each would take long.
   Result<void> put_together(const std::function<void()>& changes);
   bool puts_together() const { return together_ != nullptr; }
   // Stores the numeric class (machines that compute the same bits) that the job is pinned to, if it is not
@@ -33,14 +34,14 @@ class Records {
   void add_quarantined(QuarantinedWorker worker) { quarantined_.push_back(std::move(worker)); }
   // Stores the quarantined workers that are not stored yet. Until they are, no result may be stored.
   Result<void> put_quarantined();
-  // Why a record or a result could not be stored recently; empty if the last result was stored
+  // Why a record or a result could not be stored; empty if a result has been stored since
   const std::string& trouble() const { return trouble_; }
   void set_trouble(std::string why) { trouble_ = std::move(why); }
 
   void log(const JobId& id, std::string text);
   void add_point(const EntryPtr& entry, const ConvergencePoint& point);
-  // Drops the points of the job's convergence curve, because its image was lost or had wrong pixels. New
-  // points come as the tiles' results are added to the image again.
+  // Drops the points of the job's convergence curve, because the job's image was lost or had wrong pixels.
+  // New points are added when the results of its tiles are added to the image again.
   void forget_curve(JobEntry& entry);
   // Drops the points of the curve and the checks of the denoised layers' error, because the image had wrong
   // pixels.
@@ -51,7 +52,7 @@ class Records {
   JobStore& store_;
   const JobTable& jobs_;
   BackgroundWrites& writes_;
-  std::set<EntryPtr>* together_ = nullptr;  // the jobs that put_together() stores afterwards
+  std::set<EntryPtr>* together_ = nullptr;  // jobs that put_together() will store; null: it is not running
   std::vector<QuarantinedWorker> quarantined_;
   std::string trouble_;
   std::uint64_t lines_left_out_ = 0;

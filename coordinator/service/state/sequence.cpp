@@ -55,7 +55,7 @@ FramesView count(std::span<const JobView> frames, const FrameRange& range) {
     v.cancelled += f.state == JobState::cancelled;
     if (!current && f.state == JobState::running) current = &f;
   }
-  if (!current)  // the last frame with finished units
+  if (!current)  // no frame is running: take the last one with finished units
     for (const JobView& f : frames)
       if (f.units_done > 0) current = &f;
   if (!current) current = &frames.front();
@@ -63,7 +63,8 @@ FramesView count(std::span<const JobView> frames, const FrameRange& range) {
   return v;
 }
 
-// Returns the error of the first failed frame. If there is none, returns why the first open frame waits.
+// Returns the error of the first failed frame. If no frame failed, returns why the first frame that has not
+// ended waits; empty if it does not wait.
 std::string trouble_of(std::span<const JobView> frames) {
   const JobView* found = nullptr;
   for (const JobView& f : frames)
@@ -84,7 +85,7 @@ struct WorkLeft {
 };
 
 // Predicts the remaining work. A frame that has not begun is expected to cost as much as the others on
-// average: their core seconds so far, divided by their progress.
+// average: the sum of their core seconds so far, divided by the sum of their progress (0 to 1 each).
 WorkLeft work_left(std::span<const JobView> frames) {
   double spent = 0, progress = 0;
   WorkLeft out;
@@ -124,8 +125,8 @@ void add_up(JobView& v, std::span<const JobView> frames) {
   if (pixels > 0) v.spp_done /= pixels, v.progress /= pixels;
 }
 
-// Returns how many cores of the farm the sequence can use. The bounds are its limits on workers and units,
-// and its number of remaining units, since a unit runs on one thread.
+// Returns how many cores of the farm the sequence can use. The number is limited by the sequence's limits on
+// workers and units, and by its number of remaining units, since a unit runs on one thread.
 double cores_for(const JobView& v, const SequenceFacts& facts, std::uint64_t units_left) {
   double cores = facts.cores;
   if (v.max_workers && facts.workers > 0)

@@ -33,7 +33,7 @@ struct Connection {
   void note_lease(const LeaseId& lease) {
     if (!first_lease_) first_lease_ = lease_number(lease, lease_prefix_);
   }
-  // True if the lease was assigned over this stream, not over an earlier one of the worker.
+  // True if the lease was assigned over this stream, false if over an earlier stream of the same worker.
   bool assigned(const LeaseId& lease) const {
     const auto n = lease_number(lease, lease_prefix_);
     return n && first_lease_ && *n >= *first_lease_;

@@ -19,9 +19,10 @@
 namespace ls::coordinator {
 namespace {
 
-constexpr std::size_t kMostReported = 2000;  // bytes kept of the program's messages
+constexpr std::size_t kMostReported = 2000;  // ffmpeg's messages are kept up to this many bytes
 
-// True for environment variables that ffmpeg gets: those that the dynamic loader reads.
+// True if ffmpeg inherits this environment variable: only those of the dynamic loader, such as
+// LD_LIBRARY_PATH.
 bool inherits(std::string_view variable) { return variable.starts_with("LD_"); }
 
 std::vector<std::string> command(const VideoEncoder::Asked& asked) {
@@ -30,7 +31,7 @@ std::vector<std::string> command(const VideoEncoder::Asked& asked) {
           "-f", "rawvideo", "-pixel_format", "rgb24", "-video_size",
           fmt::format("{}x{}", asked.size.width, asked.size.height), "-framerate",
           fmt::format("{:.6g}", asked.fps), "-i", "pipe:0",
-          // H.264 has colour at half the resolution, so the sides must be even
+          // yuv420p stores colour at half the resolution, so width and height are padded to even numbers
           "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv,format=yuv420p",
           "-c:v", "libx264", "-preset", "medium", "-crf", "16", "-threads", "2", "-colorspace", "bt709",
           "-color_primaries", "bt709", "-color_trc", "iec61966-2-1", "-fs",
@@ -87,7 +88,7 @@ VideoEncoder::~VideoEncoder() {
   end();
 }
 
-// Closes the socket and waits for the program's end.
+// Closes the socket, waits until the program ends, and returns its exit status.
 int VideoEncoder::end() {
   pixels_ = File();
   const int status = program_ ? wait_for_end(*program_) : 0;
@@ -103,7 +104,8 @@ void VideoEncoder::hear() {
                                             kMostReported - std::min(kMostReported, reported_.size())));
 }
 
-// Waits until the program takes pixels, or until it has closed its standard error, which it does at its end.
+// Waits for `events` on `fd`: until the program can take more pixels, or until it has closed its standard
+// error because it ended.
 Result<void> VideoEncoder::wait_for(int fd, short events) {
   const std::stop_callback kill_it(stop_, [pid = *program_] { ::kill(pid, SIGKILL); });
   const TimePoint stalled_at = clock_.now() + asked_.stall_limit;
@@ -155,7 +157,7 @@ Result<void> VideoEncoder::add(std::span<const std::uint8_t> rgb) {
 
 Result<void> VideoEncoder::finish() {
   ::shutdown(pixels_.fd(), SHUT_WR);
-  // At its end the program closes its standard error
+  // The program closes its standard error when it ends.
   if (auto closed = wait_for(errors_.fd(), POLLHUP); !closed) return closed;
   hear();
   const int status = end();

@@ -27,11 +27,11 @@ Result<std::string> find_ffmpeg();
 class VideoEncoder {
  public:
   struct Asked {
-    std::string ffmpeg;  // path of the program
+    std::string ffmpeg;  // path of the program ffmpeg
     std::filesystem::path file;
     FrameSize size;
     double fps = 24;
-    std::uint64_t most_bytes = 0;  // the file gets no larger
+    std::uint64_t most_bytes = 0;  // greatest size of the video file
     TimePoint until{};             // the program is killed at this time
     Duration stall_limit{};        // it is also killed when it takes no pixels for this long
   };
@@ -42,7 +42,7 @@ class VideoEncoder {
 
   // Adds one picture: 8 bits of R, G and B of each pixel, row by row, Asked::size in total.
   Result<void> add(std::span<const std::uint8_t> rgb);
-  // Completes the file. Returns the program's own message if it failed.
+  // Completes the file. If the program failed, the error contains the program's own message.
   Result<void> finish();
 
  private:
@@ -56,7 +56,7 @@ class VideoEncoder {
   const Asked asked_;
   const Clock& clock_;
   const std::stop_token stop_;
-  File pixels_;  // our end of the socket; closed by end()
+  File pixels_;  // the coordinator's end of the socket; closed by end()
   const File errors_;
   std::optional<pid_t> program_;
   std::string reported_;

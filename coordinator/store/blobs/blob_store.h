@@ -19,10 +19,10 @@ class BlobStore {
  public:
   virtual ~BlobStore() = default;
   virtual bool has(const Digest& digest) const = 0;
-  // Like has(), but returns an error if the store cannot be asked now.
+  // Like has(), but returns an error if the storage is unavailable, so that the answer is not known.
   virtual Result<bool> find(const Digest& digest) const { return has(digest); }
   // Returns those of the digests whose blobs the store lacks, in the given order. A remote store needs fewer
-  // requests for this than for a find() of each. Errors as of find().
+  // requests for this than for one find() per digest. Returns the same errors as find().
   virtual Result<std::vector<Digest>> missing(std::span<const Digest> digests) const {
     std::vector<Digest> lacking;
     for (const Digest& digest : digests) {
@@ -69,9 +69,9 @@ class BlobStore {
   };
   virtual Result<std::unique_ptr<Upload>> begin_upload(const Digest& digest) = 0;
 
-  // Uploads in parts
+  // Uploads in parts: an upload that can be continued after a broken connection
 
-  // Returns the number of bytes that the store has of an incomplete blob.
+  // Returns how many bytes of an incomplete blob the store has received.
   virtual std::uint64_t received(const Digest&) const { return 0; }
   // Continues an incomplete blob after its first `offset` bytes. failed_precondition: `offset` is not
   // received(). Appended bytes are kept if the Upload is destroyed before finish(), even over restarts. Bytes

@@ -22,15 +22,15 @@ namespace ls::coordinator {
 
 class CollectedBlobs final : public BlobStore {
  public:
-  // Blobs that no job needs, and interrupted uploads, are removed after the duration `keep`. It must be
-  // nullopt if other coordinators use these blobs: then blobs are never removed, and interrupted uploads
-  // after a day.
+  // Blobs that no job needs, and interrupted uploads, are removed after the duration `keep`. `keep` must be
+  // nullopt if other coordinators use these blobs, too. Then no blob is ever removed, and interrupted uploads
+  // are removed after a day.
   CollectedBlobs(std::shared_ptr<BlobStore> inner, std::shared_ptr<const Clock> clock,
                  std::optional<Duration> keep)
       : inner_(std::move(inner)), clock_(std::move(clock)), keep_(keep) {}
 
   struct Swept {
-    std::uint64_t blobs = 0, unfinished = 0;  // number removed
+    std::uint64_t blobs = 0, unfinished = 0;  // number of removed blobs and of removed uploads
   };
   // Removes blobs and uploads that are unused for long enough and returns their numbers. `needed` must
   // contain every blob that a job names. Error: the store could not be listed, or something could not be
@@ -74,7 +74,8 @@ class CollectedBlobs final : public BlobStore {
     std::uint64_t bytes = 0;
     TimePoint since{};
   };
-  // Notes a request for the blob, waits while the blob is being removed, and returns the inner store.
+  // Restarts the blob's duration, since the blob is requested. If the blob is being removed, waits until it
+  // is removed. Returns the inner store.
   BlobStore& asked_for(const Digest& digest) const;
   std::vector<Digest> idle_for_long(const std::vector<Digest>& there, const std::set<Digest>& needed);
   std::uint64_t sweep_unfinished(const std::vector<Digest>& there);
@@ -85,11 +86,11 @@ class CollectedBlobs final : public BlobStore {
   mutable std::shared_mutex using_;
   mutable std::mutex mutex_;
   mutable std::condition_variable gone_;
-  // Blobs that are being removed, which may take a while; a request for one of them waits until it is
+  // Blobs that are being removed, which may take a while. A request for such a blob waits until the blob is
   // removed.
   std::set<Digest> going_;
-  mutable std::map<Digest, TimePoint> idle_;  // blobs that no job needs, and since when
-  std::map<Digest, Unfinished> unfinished_;   // used by the sweeper only
+  mutable std::map<Digest, TimePoint> idle_;  // blobs that no job needs, with the time since when
+  std::map<Digest, Unfinished> unfinished_;   // interrupted uploads; used only by sweep_unfinished()
 };
 
 }  // namespace ls::coordinator

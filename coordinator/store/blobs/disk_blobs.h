@@ -114,9 +114,9 @@ class DiskBlobs final : public BlobStore {
   // The blobs that this process has read as a whole and found to match their digests, with the stamp of each
   // file at that time. A file whose stamp has changed since must be read again.
   mutable Guarded<std::map<Digest, FileStamp>> proofs_;
-  mutable std::mutex proving_;  // only one file is verified at a time: a second request waits for the result
-  // Held while a file is put in its place or moved aside. Otherwise a file could be repaired after its damage
-  // was noticed, and the good file be moved aside.
+  mutable std::mutex proving_;  // held while a file is verified; a second request waits and uses the result
+  // Held while a file is moved to its place or moved aside. Without it, an upload could replace a damaged
+  // file just before the file is moved aside, and then the good file would be moved aside.
   mutable std::mutex placing_;
   std::unique_ptr<UploadParts> parts_;
 };

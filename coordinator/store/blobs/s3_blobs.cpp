@@ -29,8 +29,9 @@ void LocalCopies::gone(const Digest& digest) {
 namespace {
 
 constexpr int kReadTries = 3;
-// missing() looks up at most this many digests, and one more for each list that all known blobs need;
-// above this it lists the store. S3 returns up to 1000 keys per list.
+// missing() either sends one request per unknown digest or lists the whole store, which takes one request per
+// kKeysPerList keys (the most that S3 returns at once). It lists the store if the number of unknown digests
+// is greater than kLeastLookups plus the expected number of list requests.
 constexpr std::size_t kLeastLookups = 16, kKeysPerList = 1000;
 
 std::string key_of(const Digest& digest) {
@@ -44,7 +45,7 @@ std::optional<Digest> digest_of_key(std::string_view key) {
 
 }  // namespace
 
-// An upload into the local folder. When it is complete, the file is sent to the S3 store.
+// An upload into the local folder. When the upload is complete, its file is sent to the S3 store.
 class S3Blobs::Passed final : public BlobStore::Upload {
  public:
   Passed(S3Blobs& store, std::unique_ptr<Upload> local, const Digest& digest)

@@ -19,15 +19,16 @@ namespace ls::coordinator {
 namespace {
 
 constexpr long kConnectSeconds = 10;
-constexpr long kStallSeconds = 30;          // a transfer without a byte for this long is ended
-constexpr long kAnswerSeconds = 5;          // the store counts as unavailable if answers() takes longer
-constexpr std::size_t kMaxText = 8u << 20;  // greatest size of an answer that is a list or an error, in bytes
-constexpr std::size_t kShownText = 300;     // a message quotes at most this many bytes of such an answer
+constexpr long kStallSeconds = 30;  // a transfer that moves no byte for this long is aborted
+constexpr long kAnswerSeconds = 5;  // the store counts as unavailable if answers() takes longer
+// Greatest size, in bytes, of an answer that is a list or an error
+constexpr std::size_t kMaxText = 8u << 20;
+constexpr std::size_t kShownText = 300;       // a message quotes at most this many bytes of such an answer
 constexpr std::uint64_t kMostParts = 10'000;  // the protocol's limit on the parts of an object
 constexpr std::uint64_t kChunk = 1u << 20;    // a part is hashed in chunks of this many bytes
 // SHA-256 of an empty payload
 constexpr const char* kNoBytes = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
-constexpr std::size_t kMaxListed = 10'000'000;  // keys in a list, at most
+constexpr std::size_t kMaxListed = 10'000'000;  // a list has at most this many keys
 
 using InputFile = std::unique_ptr<std::FILE, decltype([](std::FILE* file) { std::fclose(file); })>;
 using Headers = std::unique_ptr<curl_slist, decltype([](curl_slist* list) { curl_slist_free_all(list); })>;
@@ -112,18 +113,18 @@ Result<Digest> digest_of(const std::filesystem::path& path, std::uint64_t offset
 
 struct S3Link::Request {
   const char* method = "GET";
-  std::string key;                  // of the object; empty: the request is about the bucket
-  std::string query;                // sorted and escaped, as signed; every name with '='
+  std::string key;    // key of the object; empty: the request concerns the bucket
+  std::string query;  // parameters NAME=VALUE, sorted by name and escaped, as the signature needs them
   std::filesystem::path file = {};  // for PUT: the payload is `bytes` bytes of this file from `offset` on
   std::uint64_t offset = 0, bytes = 0;
-  std::string body = {};           // for POST
+  std::string body = {};           // payload of a POST request
   std::string payload = kNoBytes;  // SHA-256 of the payload
-  long most_seconds = 0;           // limit for the whole request; 0: no limit while bytes arrive
+  long most_seconds = 0;           // time limit for the request; 0: none, as long as bytes arrive
   const Sink* sink = nullptr;
   const std::function<Result<void>()>* restart = nullptr;
 };
 struct S3Link::Answer {
-  int status = 0;  // 0: no answer
+  int status = 0;  // HTTP status; 0: no answer came
   std::uint64_t length = 0;
   std::string etag;
   std::string text;  // the body, unless it was passed to a sink; if there is no answer, the reason
@@ -280,7 +281,8 @@ Result<void> S3Link::put_parts(const std::string& key, const std::filesystem::pa
   if (!upload) return tl::unexpected(upload.error());
   auto done = send_parts(key, *upload, file, bytes);
   if (done) return done;
-  // Without this the store would keep the parts, invisible but charged for.
+  // The upload failed, so the parts that were sent are removed. Otherwise the store would keep them: they are
+  // not listed as objects, but the operator pays for them.
   if (const auto gone = remove(key, "uploadId=" + percent_encode(*upload)); !gone)
     log_warn("store=s3", fmt::format("the parts of {} that were sent stay in {}: {}", key, shown(),
                                      gone.error().message));
@@ -327,8 +329,9 @@ Result<void> S3Link::send_parts(const std::string& key, const std::string& uploa
   // The store begins its answer before it has joined the parts, so an answer with status 200 may contain an
   // error.
   if (answer->status / 100 == 2 && xml_element(answer->text, "Code").empty()) return {};
-  // If the answer to an earlier attempt was lost, the upload may be complete, and the store no longer knows
-  // its id: then the object exists. After any other error an object may be one from before this upload.
+  // An earlier attempt may have completed the upload although its answer was lost. Then the store no longer
+  // knows the upload's id, but the object exists. After any other error an object may be older than this
+  // upload.
   if (xml_element(answer->text, "Code") == "NoSuchUpload")
     if (const auto there = look_at(key); there && there->bytes == bytes) return {};
   return tl::unexpected(error_of(end, *answer));

@@ -25,23 +25,25 @@ namespace ls::coordinator {
 struct S3Address {
   std::string bucket, prefix;  // `prefix` has no slash at its ends and may be empty
   std::string endpoint, region;
-  // Larger files are sent in parts of this size; 5 MiB to 5 GiB
+  // Files that are larger than this are sent in parts of this size; from 5 MiB to 5 GiB
   std::uint64_t part_bytes = std::uint64_t{64} << 20;
-  std::uint64_t copies_bytes = 0;  // limit on the bytes of all local copies; 0: no limit
-  std::string shown() const;       // the address for messages and logs
+  std::uint64_t copies_bytes = 0;  // greatest size of all local copies together; 0: no limit
+  std::string shown() const;       // returns the address as text, for messages and logs
 };
 Result<S3Address> parse_s3_url(std::string_view url);
 
 struct S3Keys {
   std::string id, secret, session;
 };
-// Error unauthenticated: a variable is missing; the message names it.
+// Reads the keys from the variables above. Error unauthenticated: a variable (named in the message) is
+// missing.
 Result<S3Keys> s3_keys_from_environment();
 
 struct S3Options {
   S3Address address;
   S3Keys keys;
-  // Greatest number of attempts of a request that fails for a transient reason: no answer, 429, 5xx
+  // A request is attempted at most this many times if each attempt fails for a transient reason: there is no
+  // answer, or it has HTTP status 429 or 5xx.
   int attempts = 6;
   Duration first_pause = std::chrono::milliseconds(100), longest_pause = std::chrono::seconds(5);
 };
@@ -54,7 +56,7 @@ class S3Link {
   Result<void> answers() const;
   struct Object {
     std::uint64_t bytes = 0;
-    std::string etag;  // changes with the object's bytes
+    std::string etag;  // version of the object's bytes: it changes when they change
   };
   Result<Object> look_at(const std::string& key) const;  // error not_found: there is no such object
   using Sink = std::function<Result<void>(std::span<const std::byte>)>;
@@ -63,13 +65,13 @@ class S3Link {
   // `sink` has received.
   Result<void> get(const std::string& key, const std::function<Result<void>()>& restart,
                    const Sink& sink) const;
-  // Sends a file of `bytes` bytes, whose digest the store checks: in one request or, if the file is larger
-  // than S3Address::part_bytes, in parts. The store checks the digest of
-  // each part, and each is retried separately.
+  // Sends a file of `bytes` bytes in one request or, if the file is larger than S3Address::part_bytes, in
+  // parts of that size. `digest` is the SHA-256 of the file. The store checks the digest of each request's
+  // bytes. A part that fails is sent again without the others.
   Result<void> put(const std::string& key, const std::filesystem::path& file, std::uint64_t bytes,
                    const Digest& digest) const;
-  Result<void> remove(const std::string& key) const { return remove(key, ""); }  // also if it is missing
-  Result<std::vector<std::string>> list() const;                                 // all keys under the prefix
+  Result<void> remove(const std::string& key) const { return remove(key, ""); }  // succeeds if there is none
+  Result<std::vector<std::string>> list() const;  // returns the keys of all objects under S3Address::prefix
 
   std::string shown() const { return options_.address.shown(); }
 
@@ -83,9 +85,9 @@ class S3Link {
                           const std::filesystem::path& file, std::uint64_t bytes) const;
   Result<void> remove(const std::string& key, const std::string& query) const;
   Result<Answer> ask_once(const Request& request) const;
-  Result<Answer> ask(const Request& request) const;  // with retries
-  // Like ask(), but an answer with a status other than 200 (2xx for requests that change something) is an
-  // error.
+  Result<Answer> ask(const Request& request) const;  // repeats ask_once() after transient failures
+  // Like ask(), but returns an error if the answer's HTTP status is not 200; for requests that change
+  // something, every status 2xx is a success.
   Result<Answer> ask_for(const Request& request) const;
   Error error_of(const Request& request, const Answer& answer) const;
   std::string url_of(const Request& request) const;

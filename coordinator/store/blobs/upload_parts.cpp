@@ -35,7 +35,8 @@ class UploadParts::Part final : public BlobStore::Upload {
         path_(std::move(path)),
         publish_(std::move(publish)) {}
   ~Part() override {
-    // Bytes that were reported as received are rarely lost by a power failure
+    // The client was informed how many bytes were received and continues after them. The sync makes it
+    // unlikely that a power failure loses some of these bytes.
     if (!ended_) ::fdatasync(file_.fd());
   }
 
@@ -51,7 +52,8 @@ class UploadParts::Part final : public BlobStore::Upload {
     return {};
   }
 
-  // Hashing a large file takes time. Meanwhile other writers to the file are rejected.
+  // Hashes the file without holding the slot's lock, since that takes long for a large file. Meanwhile
+  // `finishing` makes other writers to the file fail.
   Result<void> finish() override {
     {
       const auto slot = slot_->lock();

@@ -28,15 +28,16 @@ namespace ls::coordinator {
 // The state of a job store's mirror, a Redis to which every change is copied
 struct StoreStatus {
   std::string mirror;  // address of the mirror; empty: there is none
-  // Why the mirror cannot be updated now; empty: it is up to date or can be updated
+  // Why the mirror cannot be updated now; empty: updates succeed
   std::string trouble;
-  std::uint64_t behind = 0;  // number of jobs not completely mirrored
+  std::uint64_t behind = 0;  // number of jobs whose latest data the mirror does not have yet
 };
 
 // The coordinator that owns a job, if several coordinators share a store
 struct JobLocation {
-  std::string http;    // http://HOST:PORT; empty: unknown
-  bool alive = false;  // false: the coordinator is gone; another will take the job over, unless it has ended
+  std::string http;  // http://HOST:PORT; empty: unknown
+  // False: the coordinator is gone; another will take the job over, unless the job has ended
+  bool alive = false;
 };
 
 // Totals of a job over all its units (a unit is one tile with one range of samples). They are written when
@@ -48,14 +49,16 @@ struct JobTotals {
   std::uint64_t peak_rss_bytes = 0;
   double spp_done = 0;
   std::uint64_t units = 0;          // number of units done
-  std::uint64_t units_planned = 0;  // number of units that the job planned; 0: the same as `units`
+  std::uint64_t units_planned = 0;  // number of units that the job had planned; 0: as many as `units`
   Health health;
-  TimeSplit time;                         // `render` is not set; its value is core_seconds
-  double began_unix = 0, ended_unix = 0;  // wall clock of the first ray and of the end; 0: not yet
-  // From the last checkpoint: why the image's error figures were not trusted (ImageError::verdict; empty if
-  // they were, or before the first checkpoint), and the number of pixels with few hits (ImageError::few_hits;
-  // nullopt before the first checkpoint)
+  TimeSplit time;  // time.render is unused: core_seconds above has this value
+  // Times of the first ray and of the job's end, in seconds since 1970; 0: not yet
+  double began_unix = 0, ended_unix = 0;
+  // Why the image's error figures at the last checkpoint cannot be trusted (ImageError::verdict); empty: they
+  // can, or there was no checkpoint yet
   std::string doubt;
+  // Number of pixels that too few samples with light had hit for a reliable error estimate at the last
+  // checkpoint (ImageError::few_hits); nullopt: there was no checkpoint yet
   std::optional<std::uint64_t> few_hits;
   bool operator==(const JobTotals&) const = default;
 };
@@ -70,35 +73,37 @@ struct StoredJob {
   std::string traceparent;
   Digest scene;  // digest of the scene's blob
   RenderSettings settings;
-  JobSpec spec;  // as requested by the user; `spp` is the latest one if the job was extended
+  JobSpec spec;  // the user's request; if the job was extended, spec.spp is the new number of samples
   // Samples per pixel to render; nullopt: an error target or a time limit ends the job.
   std::optional<std::uint64_t> spp;
   std::vector<BlobRef> assets;
   std::vector<std::string> warnings;
-  bool reference_same_seed = false;  // true: its reference image has the same scene and seed
+  bool reference_same_seed = false;  // true: its reference image was rendered with this scene and seed
   std::vector<std::string> features_used, features_left_out;
   std::string needs;  // canonical JSON (common/scene/analysis/needs.h)
-  // JSON for the report: the renderer's features with reasons, and the pruned parts of the scene
+  // JSON for the report: which features of the renderer the scene needs and why, and which parts of the scene
+  // are not rendered and why
   std::string analysis;
   JobState state = JobState::queued;
   std::optional<StopReason> stopped;
   std::string error;
   std::optional<Digest> numeric_class;
-  // The numeric class (machines that compute the same bits) to which the job is pinned has this platform; the
-  // worker that determined the class had this build (WorkerHello)
+  // About the numeric class to which the job is pinned (the set of machines that compute the same bits).
+  // `build`: build of one of its workers; `platform`: its machine and build in words. Both are from a
+  // WorkerHello.
   std::string build, platform;
   bool fake = false;  // true if pinned to a fake worker; then only fake workers may render its units
   JobTotals totals;
-  // Rendering techniques that workers reported to use for this job
+  // Rendering techniques that workers use for this job, as they reported
   TechniqueSet techniques;
   // The checks of the denoised layers' error made so far, if the job's target error applies to these layers
   // (DenoisedTarget in domain/adaptive_stop.h). They decide when the job ends
   std::vector<DenoisedCheck> denoised_checks;
-  // Missing or damaged blobs: the job is paused until they are available
+  // Blobs that the job needs but that are missing or damaged; the job is paused until they are available
   std::set<Digest> missing_blobs;
   // Pixels whose tiles are rendered before the others (domain/event.h: JobPlan::focus)
   std::optional<PixelRect> focus;
-  std::uint64_t revision = 0;  // number of changes, in stores that count them (Redis)
+  std::uint64_t revision = 0;  // number of changes of this record; only the Redis store counts them
   // Number of times the job has changed its owner, if several coordinators share a store (redis_members.h)
   std::uint64_t fence = 0;
   bool damaged = false;  // true if its record cannot be read: only id, state (failed) and error are set
@@ -117,7 +122,7 @@ Result<std::vector<ConvergencePoint>> parse_points(std::string_view json);
 std::string log_json(const std::vector<LogLine>& lines);
 Result<std::vector<LogLine>> parse_log(std::string_view json);
 
-// A worker that rendered wrong pixels, with the evidence
+// A worker that rendered wrong pixels, and the evidence for this as text
 struct QuarantinedWorker {
   WorkerId worker;
   std::string evidence;
@@ -138,18 +143,18 @@ class JobStore {
   virtual Result<void> remove_jobs(std::span<const JobId> jobs) = 0;  // removes all jobs or none
 
   virtual Result<void> add_point(const JobId& job, const ConvergencePoint& point) = 0;
-  // Sets the reference error of the curve's point with these samples, replacing an earlier one.
+  // Sets the reference error of the convergence point that has `spp` samples. It replaces an earlier value.
   virtual Result<void> set_reference_error(const JobId& job, double spp,
                                            const ReferenceError& reference_error) = 0;
   virtual Result<std::vector<ConvergencePoint>> points(const JobId& job) const = 0;
-  virtual Result<void> remove_points(const JobId& job) = 0;  // including their reference errors
+  virtual Result<void> remove_points(const JobId& job) = 0;  // also removes their reference errors
 
   // Adds a line to the job's log. Of a longer log only the last kLogLinesKept lines are certain to stay.
   virtual Result<void> add_log(const JobId& job, const LogLine& line) = 0;
   virtual Result<std::vector<LogLine>> log(const JobId& job) const = 0;
 
-  // Stores that a worker is quarantined. The entry is permanent and outlives the jobs that revealed the
-  // worker. If the worker is quarantined already, its first evidence stays.
+  // Stores that a worker is quarantined. The entry is permanent: it stays when the jobs are removed whose
+  // results were the evidence. If the worker is quarantined already, its first evidence stays.
   virtual Result<void> quarantine(const QuarantinedWorker& worker) = 0;
   virtual Result<std::vector<QuarantinedWorker>> quarantined() const = 0;
 
@@ -159,22 +164,26 @@ class JobStore {
 
   virtual StoreStatus status() const { return {}; }
 
-  // For a store that several coordinators share
+  // The rest is for a store that several coordinators share: each job is owned by one of them.
+
+  // A job that this coordinator has taken over from one that is gone
   struct Inherited {
     StoredJob job;
-    std::string from;  // the coordinator that owned it before
+    std::string from;  // the coordinator that owned the job before
   };
   struct Moved {
-    // Quarantined by another coordinator; apply these before the rest
+    // Workers that another coordinator has quarantined. The caller must apply them before it takes the jobs.
     std::vector<QuarantinedWorker> quarantined;
-    std::vector<JobId> lost;  // taken over by another coordinator: their updates are no longer stored here
-    std::vector<Inherited> inherited;  // jobs from a coordinator that is gone; may include jobs lost before
+    // Jobs that another coordinator has taken over from this one; their updates are no longer stored here
+    std::vector<JobId> lost;
+    // May contain jobs that this coordinator has lost before.
+    std::vector<Inherited> inherited;
   };
-  virtual Moved moved() { return {}; }  // changes since the last call
+  virtual Moved moved() { return {}; }  // returns what has changed since the last call
   // Sets the addresses at which this coordinator can be reached.
   virtual void announce(const std::string&, const std::string&) {}
-  // Finds the coordinator that owns a job unknown to this one; may block for a second. nullopt: no
-  // coordinator has it.
+  // Finds the coordinator that owns a job which this one does not have; may block for a second. nullopt: no
+  // coordinator owns the job.
   virtual Result<std::optional<JobLocation>> locate_job(const JobId&) { return std::nullopt; }
 };
 

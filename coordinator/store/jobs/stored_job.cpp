@@ -14,10 +14,10 @@ using nlohmann::json;
 // JSON has no infinity and no NaN: the library would write null, which could not be read back as a number. So
 // finite() replaces them by 0.
 double finite(double value) { return std::isfinite(value) ? value : 0; }
-// Older records have null for such a number.
+// Records of earlier versions may have null where finite() now writes 0.
 double number_of(const json& j) { return j.is_null() ? 0 : j.get<double>(); }
-// Throws for any value but an integer from 0 to 2^64 - 1. The library alone would convert 1e20, which does
-// not fit.
+// Throws unless the value is an integer from 0 to 2^64 - 1. Without this check the library would convert even
+// 1e20, which does not fit into 64 bits.
 std::uint64_t count_of(const json& j) {
   if (!j.is_number_unsigned()) throw std::invalid_argument("a count is not an integer from 0 to 2^64 - 1");
   return j.get<std::uint64_t>();
@@ -26,7 +26,8 @@ std::uint64_t count_of(const json& j) {
 // Invalid UTF-8, which may come from a worker's name or message, is replaced, so that dump() never throws.
 std::string dumped(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
 
-// Returns read() of the JSON in the text; an exception becomes an error that begins with `what`.
+// Parses the text as JSON, passes the value to read() and returns the result. If parsing or read() throws,
+// returns an error whose message begins with `what`.
 template <class Read>
 auto decoded(std::string_view text, std::string_view what, Read read) -> Result<decltype(read(json()))> {
   try {
@@ -55,7 +56,7 @@ json to_value(const JobTotals& t) {
   return j;
 }
 
-// Returns 0 if the key is missing: a counter that is 0 is not stored.
+// Returns the counter with this key; 0 if the key is missing, since counters of 0 are not stored.
 std::uint64_t count_or_none(const json& j, const char* key) {
   const auto found = j.find(key);
   return found == j.end() ? 0 : count_of(*found);

@@ -15,11 +15,11 @@
 namespace ls::coordinator {
 
 std::string audits_text(const std::vector<JobRestored::Audit>& audits);
-// Invalid lines are ignored.
+// Reads audits from the text of the file; ignores invalid lines.
 std::vector<JobRestored::Audit> parse_audits(std::string_view text);
 
 Result<void> write_audits(const std::filesystem::path& folder, const std::string& text);
-// Returns an empty list if there is no file
+// Reads the file in `folder`. Returns an empty list if there is no file.
 std::vector<JobRestored::Audit> read_audits(const std::filesystem::path& folder);
 
 }  // namespace ls::coordinator

@@ -22,9 +22,10 @@ namespace ls::coordinator {
 
 // Marks the start of a record of the partial log. A record holds one partial: the encoded pixel sums of one
 // unit, that is of one tile and one range of samples.
-constexpr std::uint32_t kPartialMagic = 0x3250534c;  // "LSP2"
+constexpr std::uint32_t kPartialMagic = 0x3250534c;  // the text "LSP2" in the file
 
-// The header of a record as it is in the file: little endian, as on every supported machine.
+// The header of a record. Its bytes in memory are written to the file unchanged, so numbers in the file are
+// little endian, as on every machine that Lightshaft supports.
 struct RawHeader {
   std::uint32_t magic = kPartialMagic, bytes = 0;
   std::uint32_t tile = 0, round = 0;
@@ -42,7 +43,7 @@ static_assert(sizeof(RawHeader) == 184);
 
 namespace {
 
-// Returns the first 8 bytes of the SHA-256.
+// Returns the first 8 bytes of the SHA-256 of `bytes`.
 std::uint64_t check_of(std::span<const std::byte> bytes) {
   const Digest digest = sha256(bytes);
   std::uint64_t check = 0;
@@ -99,8 +100,8 @@ std::vector<std::byte> pack_index(std::span<const RawHeader> headers) {
   return out;
 }
 
-// Returns the headers in an index file; nullopt: the file is damaged, or the segment does not have the size
-// that the index implies, `segment_bytes`.
+// Returns the headers in an index file, whose content is `bytes`. nullopt: the index is damaged, or its
+// records do not add up to `segment_bytes`, the size of the segment.
 std::optional<std::vector<RawHeader>> unpack_index(std::span<const std::byte> bytes,
                                                    std::uint64_t segment_bytes) {
   const std::size_t end = sizeof(Digest::bytes);
@@ -117,8 +118,8 @@ std::optional<std::vector<RawHeader>> unpack_index(std::span<const std::byte> by
 
 constexpr std::uint64_t kHealthBytes = 64 << 10;
 
-// Returns the unit's health (counts of bad samples) at `offset`; nullopt: its text is damaged. unavailable:
-// the file cannot be read.
+// Reads the unit's health (counts of bad samples), which is at `offset` in the file. nullopt: its text is
+// damaged. Error unavailable: the file cannot be read.
 Result<std::optional<Health>> health_at(const File& file, std::uint64_t offset, const RawHeader& raw,
                                         const std::filesystem::path& path) {
   if (raw.health_bytes == 0) return Health{};
@@ -134,8 +135,8 @@ struct Scanned {
   Health health;
 };
 
-// Returns the record at `offset`, with verified checksums; nullopt: it is damaged, or extends beyond the
-// file's `size` bytes. unavailable: the file cannot be read.
+// Reads the record at `offset` and verifies its checksums. nullopt: the record is damaged, or extends beyond
+// the `size` bytes of the file. Error unavailable: the file cannot be read.
 Result<std::optional<Scanned>> record_at(const File& file, std::uint64_t offset, std::uint64_t size,
                                          const std::filesystem::path& path) {
   if (size - offset < sizeof(RawHeader)) return std::nullopt;
@@ -169,7 +170,8 @@ std::filesystem::path PartialLog::index_path(std::uint32_t segment) const {
 }
 
 Result<std::unique_ptr<PartialLog>> PartialLog::open(std::filesystem::path folder) {
-  // If `folder` exists, make_folder() checks that it is a folder; otherwise the first append() makes it
+  // A folder that does not exist is made by the first append(). For a path that exists, make_folder() returns
+  // an error unless it is a folder.
   if (std::error_code error; std::filesystem::exists(folder, error) || error)
     if (auto made = make_folder(folder); !made) return tl::unexpected(made.error());
   std::unique_ptr<PartialLog> log(new PartialLog(std::move(folder)));
@@ -208,8 +210,8 @@ bool PartialLog::scan_index(std::uint32_t segment, const File& file, std::uint64
   return true;
 }
 
-// Reads the segment's records. False: new records must not follow in this segment, because a part of it
-// cannot be read now.
+// Reads the segment's records. Returns false if a part of the segment cannot be read now; then no new records
+// may be appended to this segment.
 Result<bool> PartialLog::scan(std::uint32_t segment, bool last) {
   const auto path = segment_path(segment);
   auto file = File::open(path, O_RDWR);
@@ -223,7 +225,7 @@ Result<bool> PartialLog::scan(std::uint32_t segment, bool last) {
   while (at < size) {
     auto record = record_at(*file, at, size, path);
     if (!record) {
-      // The records may be sound, so none is cut off.
+      // The disk cannot be read here, but the records may be sound. So the file is not cut.
       log_warn(place(),
                record.error().message + ": the units of the records from here on are rendered again");
       return false;
@@ -236,8 +238,10 @@ Result<bool> PartialLog::scan(std::uint32_t segment, bool last) {
     at += raw.record_bytes();
   }
   if (at == size) return true;
-  // In a segment other than the last, the disk is damaged. The units of all records from here on are rendered
-  // again, and the bytes stay in the file for examination.
+  // The record at `at` is not intact. In the last segment the file is cut here, since this normally is a
+  // record that was being written when the process ended. In an earlier segment the disk has damaged the
+  // record, or writing it failed: its bytes stay in the file for examination. In both cases the units of all
+  // records from here on are rendered again.
   log_warn(place(), last ? "cut a torn record" : "left out damaged records; their units are rendered again");
   if (last && ::ftruncate(file->fd(), static_cast<off_t>(at)) != 0)
     return tl::unexpected(errno_error("truncate", path));
@@ -259,8 +263,8 @@ Result<void> PartialLog::start_segment(std::uint32_t segment) {
   return {};
 }
 
-// Failures are ignored: without the index a restart scans the segment. A segment that was abandoned after a
-// failed write or sync gets no index.
+// Writes the index of the current segment, which is full. Failures are only logged: without an index a
+// restart scans the whole segment. A segment that was abandoned after a failed write or sync gets no index.
 void PartialLog::finish_segment() {
   std::uint64_t bytes = 0;
   for (const RawHeader& header : headers_) bytes += header.record_bytes();
@@ -313,8 +317,9 @@ Result<void> PartialLog::sync() {
   return done;
 }
 
-// Syncs the current segment. After a failed sync the system may have dropped data and still report success at
-// the next sync; so this segment gets no more records, and the next record opens another one.
+// Syncs the current segment. After a failed sync the operating system may have dropped data and still report
+// success at the next sync. So after a failure this segment gets no more records; the next record opens
+// another segment.
 Result<void> PartialLog::flush() {
   if (!std::exchange(unsynced_, false)) return {};
   auto done = sync_data(current_, segment_path(segment_));

@@ -54,19 +54,21 @@ class PartialLog {
   // Reads the records of all segments in `folder`, in order. EXR bytes are verified only in segments without
   // an index, such as the last one: a segment is synced before it gets an index. A torn record at the end of
   // the last segment is cut off. If a part of a segment cannot be read (an error of the disk), its records
-  // stay in the file but are not found, and new records go to another segment. If there is no segment,
-  // nothing is created until the first append(), so that a waiting job has no files.
+  // stay in the file but are not found, and new records go to another segment. open() creates no files; the
+  // first append() does, so that a waiting job has none.
   static Result<std::unique_ptr<PartialLog>> open(std::filesystem::path folder);
 
   const std::vector<Entry>& found() const { return found_; }  // records found by open()
   void forget_found() { std::vector<Entry>().swap(found_); }
 
-  // On an error the file is unchanged.
+  // Writes one record. On an error, what was written of the record is cut off; if that fails too, later
+  // records go to a new segment.
   Result<Place> append(const PartialRecord& record, std::span<const std::byte> exr);
   // Makes the records appended so far durable. Error: the records appended since the last successful sync()
   // may be lost in a crash; the caller may append them again.
   Result<void> sync();
-  Result<std::vector<std::byte>> read(const Place& place) const;  // verifies the checksum
+  // Reads the EXR bytes and verifies their checksum.
+  Result<std::vector<std::byte>> read(const Place& place) const;
 
  private:
   explicit PartialLog(std::filesystem::path folder);
@@ -81,7 +83,7 @@ class PartialLog {
   std::filesystem::path folder_;
   File current_;
   std::uint32_t segment_ = 0;
-  std::uint64_t size_ = 0;  // size of the current segment
+  std::uint64_t size_ = 0;  // bytes in the current segment
   bool unsynced_ = false;
   std::optional<Error> lost_;       // set if a full segment could not be synced; reported by the next sync()
   std::vector<RawHeader> headers_;  // headers of the records in the current segment

@@ -11,11 +11,11 @@
 namespace ls::coordinator {
 namespace {
 
-// Number of jobs sent in one batch, which then has a few MB at most.
+// Greatest number of jobs in one batch of commands; such a batch has a few MB at most.
 constexpr std::size_t kJobsAtOnce = 64;
 
-// Returns an error if other coordinators share this Redis. Without --shared this coordinator would take over
-// all of their jobs.
+// Returns an error if other coordinators share this Redis. A coordinator that was started without --shared
+// ignores owners: it would take over the jobs of all the others.
 Result<void> refuse_shared(RedisLink& link) {
   auto nodes = link.run({"HKEYS", "lightshaft:nodes"});
   if (!nodes) return tl::unexpected(nodes.error());
@@ -35,7 +35,7 @@ Result<void> refuse_shared(RedisLink& link) {
 // Opens the store of a coordinator that shares its Redis. It first sends a heartbeat, so that from then on no
 // other coordinator takes over its jobs, and then finds out which jobs it still owns.
 Result<std::unique_ptr<JobStore>> open_shared(std::unique_ptr<JobStore> local, RedisStoreOptions options) {
-  const auto box = std::make_shared<RedisJobStore*>(nullptr);  // filled in before the members' thread starts
+  const auto box = std::make_shared<RedisJobStore*>(nullptr);  // set below, before other threads use it
   auto members = std::make_unique<RedisMembers>(
       MemberOptions{.address = options.address, .node = options.node},
       RedisMembers::Callbacks{
@@ -89,7 +89,7 @@ Result<std::unique_ptr<JobStore>> open_redis_job_store(std::unique_ptr<JobStore>
                                          link ? std::move(*link) : nullptr, nullptr);
 }
 
-// The thread that updates Redis
+// Runs on the thread that updates Redis: sends changes until it is stopped, then sends the rest.
 void RedisJobStore::send_loop(const std::stop_token& token) {
   Duration pause = options_.first_retry;
   auto state = state_.lock();
@@ -138,8 +138,8 @@ Result<void> RedisJobStore::send_once() {
   if (*renewed) memory_.clear();
   if (auto same = check_memory(); !same) return same;
   if (auto all = note_all_behind(); !all) return all;
-  // Quarantined workers are sent before the jobs, so that a coordinator that takes over the jobs gets them,
-  // too
+  // Quarantined workers are sent before the jobs, so that a coordinator that takes over the jobs knows these
+  // workers.
   if (auto sent = send_quarantined(); !sent) return sent;
   if (auto sent = send_counters(); !sent) return sent;
   return send_jobs();
@@ -163,7 +163,8 @@ Result<void> RedisJobStore::check_memory() {
   return {};
 }
 
-// Finds the jobs that Redis lacks or has in a lower revision, and marks them to be sent completely.
+// Finds the jobs that Redis lacks or has in a lower revision than this coordinator, and marks all their data
+// as not sent.
 Result<void> RedisJobStore::note_all_behind() {
   std::vector<std::pair<JobId, std::uint64_t>> known;
   {
@@ -231,10 +232,11 @@ Result<void> RedisJobStore::send_jobs() {
   std::map<JobId, Due> taken;
   std::vector<RedisLink::Command> commands;
   std::vector<JobId> owner;               // the job that each command belongs to
-  std::map<JobId, std::uint64_t> fences;  // fence with which each job is written
+  std::map<JobId, std::uint64_t> fences;  // the fence that each command carries (redis_members.h)
   {
     const auto state = state_.lock();
-    // Round robin, so that a job that Redis always rejects does not delay the others.
+    // Each batch begins after the job that was sent last. So a job that Redis always rejects does not delay
+    // the others.
     while (!state->due.empty() && taken.size() < kJobsAtOnce) {
       auto next = state->due.upper_bound(state->sent_last);
       if (next == state->due.end()) next = state->due.begin();
@@ -296,7 +298,7 @@ std::vector<RedisLink::Command> RedisJobStore::commands_of(const JobId& id, cons
   return {put_command(update)};
 }
 
-// Marks changes that could not be sent, so that the next batch includes them.
+// Puts changes that could not be sent back into the list of changes to send.
 void RedisJobStore::give_back(std::map<JobId, Due> taken) {
   const auto state = state_.lock();
   state->sending = 0;

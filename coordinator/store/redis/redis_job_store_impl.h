@@ -155,7 +155,7 @@ class RedisJobStore final : public JobStore {
     return JobLocation{(*owner)->http, (*owner)->alive};
   }
 
-  // Called by the members' thread
+  // The functions below are called by the members' thread.
 
   void take_over(std::vector<TakenJob> taken) {
     for (TakenJob& one : taken) {
@@ -163,8 +163,8 @@ class RedisJobStore final : public JobStore {
       job.fence = one.job.fence;
       auto kept = keep_inherited(*local_, one.job);
       const auto state = state_.lock();
-      // In Redis this node owns the job now. If the job cannot be stored here, the members' thread calls this
-      // function again with it.
+      // In Redis this node owns the job now. If the job could not be stored here, the members' thread will
+      // call this function again with the same job.
       if (!kept) {
         if (state->not_kept.empty())
           log_error(fmt::format("job={}", job.id.value),
@@ -184,8 +184,8 @@ class RedisJobStore final : public JobStore {
     for (const QuarantinedWorker& worker : workers) {
       const auto state = state_.lock();
       if (state->quarantined.contains(worker.worker)) continue;
-      // A quarantine applies even if it cannot be stored locally; after a restart it is read from Redis
-      // again.
+      // The worker counts as quarantined even if that cannot be stored locally: after a restart it is read
+      // from Redis again.
       if (auto kept = local_->quarantine(worker); !kept) {
         log_error(fmt::format("worker={}", worker.worker.value), kept.error().message);
       }
@@ -248,12 +248,12 @@ class RedisJobStore final : public JobStore {
     // Fence of every job, a number that increases with every new owner (redis_members.h); 0: the job was
     // never shared
     std::map<JobId, std::uint64_t> fences;
-    std::set<JobId> lost;  // jobs that others own now: their updates are not stored
+    std::set<JobId> lost;  // jobs that other coordinators own now: their updates are not stored
     Moved moved;           // the result of the next call of moved()
     std::map<JobId, Due> due;
     // Number of jobs that are being sent to Redis: they have left `due` but are not in Redis yet.
     std::size_t sending = 0;
-    JobId sent_last;  // the job sent most recently; the next batch starts after it
+    JobId sent_last;  // the last job of the last batch; the next batch begins with the job after it
     std::map<std::string, std::uint64_t> counters;
     std::map<WorkerId, std::string> quarantined;  // all known quarantined workers
     std::set<WorkerId> quarantined_due;
@@ -293,7 +293,7 @@ class RedisJobStore final : public JobStore {
     return {};
   }
 
-  // The thread that updates Redis
+  // These functions run on the thread that updates Redis.
   void send_loop(const std::stop_token& token);
   void send_the_rest();
   static void set_trouble(State& state, const Result<void>& sent);
@@ -310,10 +310,11 @@ class RedisJobStore final : public JobStore {
   RedisStoreOptions options_;
   mutable Guarded<State> state_;
   std::condition_variable_any wake_;
-  std::unique_ptr<RedisLink> link_;  // link_ and memory_ are used by the sending thread only
+  std::unique_ptr<RedisLink> link_;  // link_ and memory_ are used only by send_loop()'s thread
   std::string memory_;               // the last known value of lightshaft:memory; empty: unknown
   std::unique_ptr<RedisMembers> members_;
-  // The last member, so that this thread and the members' thread end before the other members are destroyed
+  // Declared last: both threads, this one and that of members_, must end before the variables above are
+  // destroyed.
   std::jthread sender_;
 };
 

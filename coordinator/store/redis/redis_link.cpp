@@ -12,9 +12,10 @@
 namespace ls::coordinator {
 namespace {
 
-// Replies to our commands are not nested deeper than this; deeper items are dropped.
+// A reply may contain arrays within arrays. The replies that this program needs are not nested deeper than
+// this; deeper items are dropped.
 constexpr int kMaxDepth = 4;
-// At most this many commands are sent without waiting for an answer
+// At most this many commands are sent before their replies are read
 constexpr std::size_t kBatch = 256;
 
 timeval timeval_of(Duration d) {
@@ -52,7 +53,7 @@ std::optional<int> whole_number(std::string_view text, int lo, int hi) {
   return value && *value >= lo && *value <= hi ? value : std::nullopt;
 }
 
-// HOST, HOST:PORT or [IPV6]:PORT.
+// Parses HOST, HOST:PORT, [IPV6] or [IPV6]:PORT into `address`. False: the text has none of these forms.
 bool take_host(std::string_view text, RedisAddress& address) {
   std::string_view port;
   bool has_port = false;

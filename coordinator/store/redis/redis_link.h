@@ -16,8 +16,8 @@ struct redisContext;
 
 namespace ls::coordinator {
 
-// An address redis://[USER:PASSWORD@]HOST[:PORT][/DB]; an IPv6 host is in brackets. TLS (rediss://) is
-// rejected with an explanation.
+// An address redis://[USER:PASSWORD@]HOST[:PORT][/DB]; an IPv6 host is in brackets. TLS addresses (rediss://)
+// are rejected by parse_redis_url() with an explanation.
 struct RedisAddress {
   std::string host = "127.0.0.1";
   int port = 6379;
@@ -45,7 +45,7 @@ class RedisLink {
   };
   // Connects, authenticates, selects the database.
   static Result<std::unique_ptr<RedisLink>> connect(const RedisAddress& address, Timeouts timeouts);
-  // Replaces the link by a new connection if it is null or broken. True: it was replaced.
+  // Replaces `link` by a new connection if `link` is null or broken. Returns true if it was replaced.
   static Result<bool> renew(std::unique_ptr<RedisLink>& link, const RedisAddress& address, Timeouts timeouts);
   ~RedisLink();
 

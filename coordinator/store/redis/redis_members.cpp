@@ -12,15 +12,17 @@
 namespace ls::coordinator {
 namespace {
 
-// Lifetime of the key heir:NODE. It is renewed at every job that is taken; between two such jobs up to
-// kTakenAtOnce jobs are stored here, which must take less time.
+// Lifetime of the key heir:NODE, which names the coordinator that is taking over the jobs of NODE
+// (redis_members.h). Each job that is taken renews it. Between two renewals the heir may store up to
+// kTakenAtOnce jobs locally; this must take less time.
 constexpr const char* kHeirMilliseconds = "15000";
-// A takeover stores the jobs that it has taken, and sends a heartbeat, after this many jobs: if it took
-// thousands of jobs without a heartbeat, this node would count as dead itself.
+// During a takeover, after every kTakenAtOnce jobs this node stores the jobs that it has taken and sends a
+// heartbeat. If it took thousands of jobs without a heartbeat, it would itself count as dead.
 constexpr std::size_t kTakenAtOnce = 64;
 
-// Sends a node's heartbeat. ARGV: node, addresses, lifetime of the heartbeat in ms, the node's number from
-// unique_start(), number of lost jobs handled. Returns {lost jobs, node, alive, node, alive, ...}.
+// Sends a node's heartbeat. ARGV: node; its addresses; lifetime of the heartbeat in ms; the node's number
+// from unique_start(); number of entries at the start of its list of lost jobs that it has handled, which are
+// removed. Returns {its list of lost jobs, node, alive, node, alive, ...}, where `alive` is 0 or 1.
 constexpr const char* kBeat = R"(
 redis.call('SET', 'lightshaft:alive:' .. ARGV[1], ARGV[2], 'PX', ARGV[3])
 redis.call('HSET', 'lightshaft:nodes', ARGV[1], ARGV[2])
@@ -36,10 +38,10 @@ end
 return answer
 )";
 
-// Takes over a job and renews the key heir:NODE. ARGV: job, dead node, node that takes it, sequence or '',
-// lifetime of the key in ms. Returns nothing if the dead node is alive again or no longer owns the job.
-// Returns -1 if the node that takes the job is not the heir any more: otherwise two heirs could each get some
-// frames of a sequence.
+// Takes over a job and renews the key heir:NODE. ARGV: job; dead node; node that takes the job; the job's
+// sequence or '' if it is not a frame; lifetime of the key in ms. Returns the job's fields. Returns nothing
+// if the dead node is alive again or no longer owns the job. Returns -1 if the node that takes the job is no
+// longer the heir: otherwise two heirs could each get some frames of one sequence.
 constexpr const char* kTake = R"(
 local key = 'lightshaft:job:' .. ARGV[1]
 local heir = 'lightshaft:heir:' .. ARGV[2]
@@ -95,7 +97,8 @@ Result<RedisLink*> RedisMembers::link() {
   if (!renewed) return tl::unexpected(renewed.error());
   if (*renewed) {
     absence_.begin_again();
-    // It is unknown whether Redis has carried out the last commands sent over the old connection
+    // The old connection broke. It is unknown whether Redis has carried out the last commands sent over it,
+    // so this node may own jobs without knowing it.
     own_unclear_ = true;
     quarantined_seen_ = 0;  // the new connection may lead to another Redis
   }
@@ -260,7 +263,7 @@ Result<std::optional<TakenJob>> RedisMembers::take(const JobId& id, const std::s
                 fmt::format("another coordinator goes on taking over the jobs of coordinator {}", dead));
   if (fields->items.empty()) return std::nullopt;
   auto job = parse_redis_job(*fields);
-  // This node owns the job by now; look_for_stranded() will check the job again.
+  // Redis has made this node the owner, but the job cannot be read. look_for_stranded() will try it again.
   if (!job || job->job.id != id) return std::nullopt;
   return TakenJob{std::move(*job), dead};
 }
@@ -288,7 +291,8 @@ Result<void> RedisMembers::take_from(const std::string& dead) {
   return {};
 }
 
-// Takes over these jobs, and stores those that it got even if it fails at one.
+// Takes over these jobs one by one until one fails. Passes the jobs that it got to callbacks_.taken, which
+// stores them, even if a later one failed.
 Result<void> RedisMembers::take_some(std::span<const JobId> ids, const std::string& dead) {
   std::vector<TakenJob> taken;
   std::optional<Error> cut;

@@ -37,7 +37,8 @@ class FailureDetector {
  public:
   explicit FailureDetector(int looks) : looks_(looks) {}
 
-  // `known`: all other coordinators, and whether each is alive. Returns those that count as dead.
+  // Adds the result of one poll. `known` contains all other coordinators; a value is true if the coordinator
+  // has a heartbeat. Returns the coordinators that count as dead.
   std::vector<std::string> look(const std::map<std::string, bool>& known) {
     std::map<std::string, int> now;
     std::vector<std::string> gone;
@@ -56,16 +57,16 @@ class FailureDetector {
 
  private:
   int looks_;
-  std::map<std::string, int> absent_;  // consecutive polls without a sign of life, per coordinator
+  std::map<std::string, int> absent_;  // number of latest polls without a heartbeat, by coordinator
 };
 
 struct MemberOptions {
   RedisAddress address;
   std::string node;  // this coordinator's permanent name
   RedisLink::Timeouts timeouts{std::chrono::milliseconds(500), std::chrono::seconds(1)};
-  Duration beat = std::chrono::seconds(1);   // interval of the heartbeats, and of the polls of the others
+  Duration beat = std::chrono::seconds(1);   // interval of the heartbeats and of the polls
   Duration lease = std::chrono::seconds(4);  // how long a heartbeat is valid
-  int looks = 2;                             // polls without a heartbeat after which a node counts as dead
+  int looks = 2;  // number of polls without a heartbeat after which a node counts as dead
 };
 
 // How a coordinator describes itself to the others
@@ -82,17 +83,18 @@ struct TakenJob {
 
 struct LostJob {
   JobId id;
-  // The fence (a number that increases with every new owner) of the new owner. If this node has a higher one,
-  // it has become the owner again since.
+  // The fence (a number that increases with every new owner) that the job got when this node lost it. If this
+  // node's record of the job has a higher fence, this node has become the owner again since.
   std::uint64_t fence = 0;
   bool operator==(const LostJob&) const = default;
 };
 
 class RedisMembers {
  public:
-  struct Callbacks {  // functions called on the members' thread; the same loss may be reported twice
-    std::function<void(std::vector<TakenJob>)> taken;
-    std::function<void(const std::vector<LostJob>&)> lost;
+  // Functions that are called on the heartbeat thread (and on the thread that calls join())
+  struct Callbacks {
+    std::function<void(std::vector<TakenJob>)> taken;       // called with jobs that this node has taken over
+    std::function<void(const std::vector<LostJob>&)> lost;  // may be called twice with the same job
     // Called with all workers that any coordinator has quarantined, whenever their number has grown, and
     // before `taken` is called.
     std::function<void(const std::vector<QuarantinedWorker>&)> quarantined = {};
@@ -111,8 +113,8 @@ class RedisMembers {
   // most a second.
   Result<std::optional<Member>> owner_of(const JobId& id);
 
-  // Sends a heartbeat, drops lost jobs, polls the other coordinators, and takes over the jobs of dead ones.
-  // Also completes earlier takeovers that failed because the answer of Redis was lost or the job could not be
+  // Sends a heartbeat, reports lost jobs, polls the other coordinators, and takes over the jobs of dead ones.
+  // Also completes earlier takeovers that failed because the answer of Redis was lost or a job could not be
   // stored.
   Result<void> beat();
   // Returns a message about a job that this node owns in Redis but cannot read there; empty: there is no
@@ -134,21 +136,24 @@ class RedisMembers {
 
   MemberOptions options_;
   Callbacks callbacks_;
-  mutable std::mutex mutex_;  // guards the addresses set by announce() and the text returned by stranded()
+  mutable std::mutex mutex_;  // guards http_, grpc_ and stranded_
   std::string http_, grpc_, stranded_;
-  std::unique_ptr<RedisLink> link_;  // link_ and the members below are used by the heartbeat thread only
+  // From here to trouble_: used only by the heartbeat thread, and before its start by join() and
+  // unique_start()
+  std::unique_ptr<RedisLink> link_;
   FailureDetector absence_;
-  std::set<std::string> settled_;      // dead nodes that have no jobs left to take over
-  std::size_t lost_taken_ = 0;         // entries of the last list of lost jobs; the next heartbeat drops them
-  std::int64_t quarantined_seen_ = 0;  // number of quarantined workers reported so far
-  bool own_unclear_ = true;            // true if this node may own jobs that it does not have
-  std::set<JobId> unreadable_;         // unreadable jobs that were reported already
+  std::set<std::string> settled_;  // dead nodes that have no jobs left to take over
+  // Length of the list of lost jobs that the last heartbeat returned; the next one removes these jobs from it
+  std::size_t lost_taken_ = 0;
+  std::int64_t quarantined_seen_ = 0;  // number of workers last passed to Callbacks::quarantined
+  bool own_unclear_ = true;            // true if this node may own jobs in Redis that it does not have
+  std::set<JobId> unreadable_;         // jobs that cannot be read and for which this was logged already
   std::uint64_t start_ = 0;
   std::string trouble_;
 
-  std::mutex asking_;  // guards the connection of owner_of()
+  std::mutex asking_;  // guards asking_link_, the connection that owner_of() uses
   std::unique_ptr<RedisLink> asking_link_;
-  std::jthread beater_;  // the last member: it ends before the others are destroyed
+  std::jthread beater_;  // declared last: this thread ends before the variables above are destroyed
 };
 
 }  // namespace ls::coordinator

@@ -11,11 +11,11 @@
 namespace ls::coordinator {
 namespace {
 
-// Added to counters read from Redis, which may have lost the last writes to them. Ids stay unique as long as
-// these writes reserved at most this many ids.
+// Number that is added to every counter of ids that is read from Redis, because Redis may have lost the last
+// writes to it. Ids stay unique as long as the lost writes reserved at most this many ids.
 constexpr std::uint64_t kCountsLost = 1'000'000;
 
-// Runs several commands; an error of any of them fails the call.
+// Runs several commands and returns their replies. Returns an error if any of the commands fails.
 Result<std::vector<RedisReply>> ask(RedisLink& link, std::span<const RedisLink::Command> commands) {
   auto replies = link.run_all(commands);
   if (!replies) return tl::unexpected(replies.error());
@@ -33,7 +33,7 @@ Result<std::vector<std::uint64_t>> revisions_of(RedisLink& link, std::span<const
   auto replies = link.run_all(commands);
   if (!replies) return tl::unexpected(replies.error());
   std::vector<std::uint64_t> revisions;
-  // A revision that cannot be read counts as 0, so that the others are still read.
+  // A job whose revision cannot be read gets revision 0, so that one bad job does not fail the call for all.
   for (const auto& reply : *replies) revisions.push_back(reply ? counter_of(reply->text) : 0);
   return revisions;
 }
@@ -53,8 +53,9 @@ Result<void> pull_counters(RedisLink& link, JobStore& local) {
   return {};
 }
 
-// Returns those jobs of `ids` that `here` (revisions by id) lacks or has in a lower revision than Redis.
-// Jobs that were removed from `local` are not returned; they are removed from Redis, too.
+// Returns the jobs of `ids` that must be copied: those that `here` (the revisions of local jobs, by id) lacks
+// or has in a lower revision than Redis. A job that was removed from `local` is not returned, but is removed
+// from Redis as well.
 Result<std::vector<JobId>> wanted_of(RedisLink& link, JobStore& local,
                                      const std::map<JobId, std::uint64_t>& here,
                                      const std::vector<JobId>& ids, const std::string& node) {
@@ -78,8 +79,9 @@ Result<std::vector<JobId>> wanted_of(RedisLink& link, JobStore& local,
   return wanted;
 }
 
-// Copies the jobs. Of those that `here` lacks, `local` may have points and a part of the log, if the process
-// was killed while it copied them; they are replaced.
+// Copies the jobs `wanted` from Redis to `local`. `here` contains the jobs that have a record in `local`. If
+// the process was killed while it copied a job, `local` has points and a part of the log of the job but no
+// record; these data are replaced.
 Result<void> take_jobs(RedisLink& link, JobStore& local, const std::map<JobId, std::uint64_t>& here,
                        const std::vector<JobId>& wanted) {
   std::vector<RedisLink::Command> commands;
@@ -108,7 +110,8 @@ Result<void> take_jobs(RedisLink& link, JobStore& local, const std::map<JobId, s
   return {};
 }
 
-// Copies the jobs in the Redis set `set_key` that `here` lacks or has in a lower revision.
+// Copies to `local` those jobs in the Redis set `set_key` that `here` (the revisions of local jobs, by id)
+// lacks or has in a lower revision.
 Result<void> pull_jobs(RedisLink& link, JobStore& local, const std::map<JobId, std::uint64_t>& here,
                        const std::string& set_key, const std::string& node) {
   const auto ids = job_ids(link, set_key);

@@ -14,20 +14,21 @@ namespace ls::coordinator {
 // Returns those members of a Redis set that have the form of a job's id.
 Result<std::vector<JobId>> job_ids(RedisLink& link, const std::string& set_key);
 
-// Returns the name of the counter in the local store that marks a job as removed.
+// Returns the name of a counter in the local store; the job is marked as removed if this counter is not 0.
 std::string removal_mark(const JobId& job);
 
-// Copies jobs from Redis to `local`, with their points (of the convergence curve) and logs, and also the
-// counters. It copies jobs that `local` never had, and jobs whose revision in Redis is higher than in
-// `known`, the jobs of `local`. Records that cannot be read are logged and stay in Redis.
+// Copies jobs from Redis to `local`, with their logs and the points of their convergence curves, and also the
+// counters and the quarantined workers. `known` contains all jobs of `local`. It copies the jobs that `local`
+// never had, and those whose revision in Redis is higher than in `known`. A record that cannot be read stays
+// in Redis, and the error is logged.
 Result<void> pull_from_redis(RedisLink& link, JobStore& local, std::span<const StoredJob> known);
 
-// The same for several coordinators that share the Redis, but without the counters: copies the jobs that
-// `node` still owns, and removes from `local` those that another coordinator has taken over.
+// Like pull_from_redis(), for a Redis that several coordinators share. Copies only jobs that `node` (this
+// coordinator) owns, and no counters; removes from `local` the jobs that another coordinator has taken over.
 Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& node);
 
-// Stores a job, its points and its log in `local`, the job last. Points in `local` are kept and only later
-// ones added; a log in `local` is kept unless it is empty.
+// Stores a job's points and log in `local`, and then its record. Points that `local` has are kept, and only
+// the later ones are added. A log that `local` has is kept unless it is empty.
 Result<void> keep_from_redis(JobStore& local, const RedisJob& job);
 // Stores a job that another coordinator owned until now. It replaces everything that `local` has of the job.
 Result<void> keep_inherited(JobStore& local, const RedisJob& job);

@@ -31,7 +31,8 @@ end
 return 1
 )";
 
-// Removes a job, unless another node owns it. ARGV: id, node, sequence or ''.
+// Removes a job, unless another node owns it. ARGV: the job's id; this node; the job's sequence, or '' if the
+// job is not a frame.
 constexpr const char* kRemove = R"(
 local owner = redis.call('HGET', KEYS[1], 'owner')
 redis.call('SREM', 'lightshaft:owned:' .. ARGV[2], ARGV[1])

@@ -13,7 +13,8 @@ namespace ls::coordinator {
 inline constexpr const char* kRedisJobs = "lightshaft:jobs";
 inline constexpr const char* kRedisMemory = "lightshaft:memory";
 inline constexpr const char* kRedisCounters = "lightshaft:counters";
-inline constexpr const char* kRedisQuarantined = "lightshaft:barred";  // hash: worker -> evidence
+// Hash of the quarantined workers: the key is a worker's id, the value the evidence against it
+inline constexpr const char* kRedisQuarantined = "lightshaft:barred";
 std::string redis_job_key(const JobId& id);
 std::uint64_t counter_of(const std::string& text);  // returns 0 for a text that is not a number
 // True if the text has the form of a job's id. Ids become names of folders, so other texts found in Redis
@@ -21,7 +22,7 @@ std::uint64_t counter_of(const std::string& text);  // returns 0 for a text that
 bool is_job_id(std::string_view id);
 std::vector<QuarantinedWorker> quarantined_workers(const RedisReply& fields);  // decodes the reply to HGETALL
 
-// Changes of one job for Redis; fields that are not set stay as they are.
+// Changes of one job that are to be written to Redis; fields that are not set stay in Redis as they are.
 struct RedisUpdate {
   JobId id;
   std::uint64_t revision = 0;  // revision of `record`; if `record` is not set, the latest known revision
@@ -33,12 +34,12 @@ struct RedisUpdate {
   std::string state;
 };
 enum class PutAnswer { later_revision = 0, put = 1, lost = -1 };
-// Makes the command that writes `update`. Redis answers it with a PutAnswer. It changes nothing and answers
-// later_revision if Redis has a higher revision of the job, or lost if the job has another owner or a higher
-// fence by now.
+// Makes the command that writes `update`; Redis answers with a PutAnswer. If Redis has a higher revision of
+// the job, it answers later_revision and changes nothing. If the job has another owner or a higher fence in
+// Redis, it answers `lost` and changes nothing.
 RedisLink::Command put_command(const RedisUpdate& update);
-// Makes the commands that remove a job. `node` is set if coordinators share the Redis: jobs that another node
-// owns then stay.
+// Makes the commands that remove a job. If coordinators share the Redis, `node` is the one that removes the
+// job; then the job stays if another node owns it.
 std::vector<RedisLink::Command> remove_commands(const JobId& id, const std::string& node = "");
 
 struct RedisJob {
@@ -46,9 +47,9 @@ struct RedisJob {
   std::vector<ConvergencePoint> points;
   std::vector<LogLine> log;
   std::string owner, from;  // the node that owns the job, and the previous owner; empty: unknown
-  std::uint64_t fence = 0;  // the owner's fence
+  std::uint64_t fence = 0;  // rises with every new owner (redis_members.h)
 };
-// Decodes the reply to HGETALL of a job.
+// Decodes the reply to HGETALL of redis_job_key().
 Result<RedisJob> parse_redis_job(const RedisReply& fields);
 
 }  // namespace ls::coordinator

@@ -14,15 +14,17 @@ struct Features {
   // The scene has nested or intersecting media (medium_stack.h), or coincident surfaces of which at least
   // one is null, that is, index-matched (coincident.h).
   bool overlaps = false;
-  // The scene has surfaces that light passes straight through: index-matched ones, masks, thin dielectrics.
+  // The scene has surfaces that light passes straight through: index-matched boundaries, masks, thin
+  // dielectrics.
   bool passing = false;
   // The radiance of each sample is split into the components of the light AOVs (path_records.h).
   bool split = false;
-  // The path tracer samples light at several points of each camera ray's segment in a medium
-  // (segment_nee.h), or directions and flights that pass close to lamps, that is, lights without
-  // extent (lamp_directions.h, equiangular.h).
+  // The integrator uses special sampling in media: it samples light at several points of each camera ray's
+  // segment in a medium (segment_nee.h), or it samples directions that pass close to lamps, that is, to
+  // lights without extent, and distances close to them (lamp_directions.h, equiangular.h).
   bool aimed = false;
-  // Vertices of paths are connected to points that a directional emitter lights (light_vertices.h).
+  // Bidirectional path tracing: vertices of camera paths are connected to vertices of paths that start at a
+  // directional emitter, the sun (light_vertices.h).
   bool connected = false;
   // The integrator is `whitted`: a path continues only after mirrors and clear glass. At the first other
   // surface it adds the direct light and ends.

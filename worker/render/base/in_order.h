@@ -1,4 +1,4 @@
-// Work on several threads whose results are used in a fixed order.
+// Runs work on several threads and uses the results in a fixed order.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,8 @@ namespace ls::render {
 
 // Computes make(0), make(1), ..., make(count - 1) on up to `threads` threads, and passes the results to
 // take(), one by one and in this order, until take() returns false. So the calls of take() do not depend on
-// the number of threads. Results that were computed after that one are dropped. make() must be thread-safe.
+// the number of threads. When take() returns false, further results that are already computed are dropped.
+// make() must be thread-safe.
 template <class Make, class Take>
 void in_order(int threads, std::size_t count, const Make& make, Take take) {
   const auto wave = static_cast<std::size_t>(std::max(1, threads));

@@ -1,6 +1,6 @@
-// Work counters: how often each thread did each kind of work. Tests and benchmarks use them to show that a
-// scene pays nothing for features that it does not use. They exist only in builds with LIGHTSHAFT_COUNT; in
-// all others LS_COUNT expands to a statement without effect.
+// Work counters count, per thread, how often each kind of work was done. Tests and benchmarks use them to
+// show that a scene pays nothing for features that it does not use. They exist only in builds with
+// LIGHTSHAFT_COUNT; in all others LS_COUNT expands to a statement without effect.
 #pragma once
 
 #include <cstdint>
@@ -10,20 +10,20 @@
 namespace ls::render {
 
 struct WorkCounters {
-  std::uint64_t density = 0;            // grid evaluations
-  std::uint64_t macro_cells = 0;        // macro cells visited by trackers
-  std::uint64_t phase = 0;              // phase function evaluations and samples
-  std::uint64_t transmittance = 0;      // evaluations in homogeneous media
-  std::uint64_t medium_emission = 0;    // segments integrated for medium emission
-  std::uint64_t equiangular = 0;        // segments sampled equi-angularly
-  std::uint64_t boundary_rays = 0;      // shadow-ray segments traced boundary by boundary
-  std::uint64_t null_transmission = 0;  // null-transmission evaluations
-  std::uint64_t texels = 0;             // image lookups
-  std::uint64_t instances = 0;          // hits transformed through an instance
-  std::uint64_t user_geometry = 0;      // spheres, disks and cylinders tested by the BVH
-  std::uint64_t light_tree = 0;         // light-tree samples and pdf evaluations
-  std::uint64_t environment_map = 0;    // environment map lookups and samples
-  std::uint64_t lens = 0;               // aperture samples
+  std::uint64_t density = 0;            // lookups in the voxel grids of media
+  std::uint64_t macro_cells = 0;        // macro cells (blocks of voxels with density bounds) entered by rays
+  std::uint64_t phase = 0;              // evaluations and samplings of phase functions
+  std::uint64_t transmittance = 0;      // evaluations of transmittance in homogeneous media
+  std::uint64_t medium_emission = 0;    // ray segments along which emission of a medium was integrated
+  std::uint64_t equiangular = 0;        // ray segments on which a distance was sampled equi-angularly
+  std::uint64_t boundary_rays = 0;      // segments of shadow rays, each from boundary to boundary
+  std::uint64_t null_transmission = 0;  // evaluations of null transmission at surfaces (bsdf.h)
+  std::uint64_t texels = 0;             // lookups in image textures
+  std::uint64_t instances = 0;          // ray hits transformed from an instance to the world
+  std::uint64_t user_geometry = 0;      // ray tests of spheres, disks and cylinders
+  std::uint64_t light_tree = 0;         // samplings and pdf evaluations of the light tree
+  std::uint64_t environment_map = 0;    // lookups and samplings of environment maps
+  std::uint64_t lens = 0;               // samplings of a point on the camera's lens
   std::uint64_t shadow_rays = 0;
 };
 

@@ -11,7 +11,8 @@
 
 namespace ls::render {
 
-// A material in the form that the inner loop uses: one of the kinds of all families.
+// A material in the form that the inner loop uses. It is one of all kinds of material; each list of kinds
+// below is a family.
 struct BsdfTable::Material {
   VariantOf<DiffuseKinds, ConductorKinds, DielectricKinds, PlasticKinds, NestedKinds, PrincipledKinds,
             CoatedConductorKinds>
@@ -38,7 +39,7 @@ Material material_of(std::variant<Kind...> kind) {
   return std::visit([](auto& k) { return Material{std::move(k)}; }, kind);
 }
 
-// True if `holds` is true for m or any of the materials that m consists of.
+// True if `holds(part)` is true for the index `part` of any material that m directly consists of.
 template <class F>
 bool any_part(const Material& m, F holds) {
   return with_kind(m.kind, [&](const auto& k) {
@@ -74,7 +75,8 @@ Result<BsdfTable> BsdfTable::build(const Scene& scene, const TextureTable& textu
   return table;
 }
 
-// Uniform diffuse, the most common material, is handled here without the overhead of the general case.
+// Diffuse with one reflectance everywhere, the most common material, is evaluated here directly, without the
+// overhead of the general case.
 BsdfEval BsdfTable::eval(BsdfIndex i, const UvPoint& uv, const V3& wo, const V3& wi) const {
   const Material* m = &materials_[i.value];
   V3 o = wo, in = wi;

@@ -29,7 +29,7 @@ namespace ls::render {
 struct MicrofacetEnergy;
 
 struct BsdfEval {
-  C3 f_cos{0, 0, 0};  // f |cos wi| [1/sr]; delta lobes give 0
+  C3 f_cos{0, 0, 0};  // f |cos wi| [1/sr], where f is the BSDF; 0 for delta lobes
   // The density [1/sr] with which sample() chooses wi by one of its smooth (not delta) lobes. It is positive
   // wherever f_cos is.
   float pdf = 0;
@@ -80,12 +80,12 @@ class BsdfTable {
   bool is_null(BsdfIndex i) const;
   // True if the material has a lobe that is not a delta, so that next-event estimation is useful
   bool has_smooth(BsdfIndex i) const;
-  // True if f_cos and pdf are |cos wi| times factors that depend only on the sides of the surface on which
-  // wo and wi are
+  // True if the material is ideally diffuse: f_cos and pdf are |cos wi| times factors that do not depend on
+  // the directions, except on whether wo and wi are on the front or the back
   bool is_diffuse(BsdfIndex i) const;
   bool reads_uv(BsdfIndex i) const;      // true if some parameter is a texture
-  bool anisotropic(BsdfIndex i) const;   // true if the tangents of the local frame matter
-  bool reads_slopes(BsdfIndex i) const;  // true if dp/du and dp/dv matter (see UvPoint)
+  bool anisotropic(BsdfIndex i) const;   // true if rotating the tangents changes the values
+  bool reads_slopes(BsdfIndex i) const;  // true if it uses dp/du and dp/dv (see UvPoint)
   std::size_t size() const;
   std::uint64_t bytes() const;
   std::uint64_t clamped_inputs() const;  // number of reflectances clamped to [0, 1]
@@ -93,14 +93,15 @@ class BsdfTable {
   struct Material;
 
  private:
-  // eval() and sample() for all kinds except two-sided and uniform diffuse.
+  // eval() and sample() handle two-sided materials and diffuse materials with one reflectance everywhere; for
+  // all other kinds they call these functions.
   BsdfEval eval_other(const Material& m, const UvPoint& uv, const V3& wo, const V3& wi) const;
   std::optional<BsdfSample> sample_other(const Material& m, const UvPoint& uv, const V3& wo, float u_lobe,
                                          V2 u) const;
 
   std::vector<Material> materials_;
-  // The tables that compensate for energy lost between microfacets (microfacet_energy.h). The materials with
-  // multiple_scattering point at them.
+  // Tables that compensate for energy lost between microfacets (microfacet_tables.h). Materials with the
+  // parameter multiple_scattering contain pointers to them.
   std::vector<std::unique_ptr<const MicrofacetEnergy>> energies_;
   const TextureTable* textures_ = nullptr;
   std::uint64_t clamped_ = 0;

@@ -5,27 +5,30 @@
 namespace ls::render {
 namespace {
 
-constexpr double kGrazing = 1e-6;  // the least cosine of the tables
-// The largest error of the tables of this file. The share of light that stays in the coat is reduced by it,
-// so that table errors cannot make a surface reflect more light than it receives.
+constexpr double kGrazing = 1e-6;  // the tables use this cosine in place of smaller ones
+// The largest error of the tables that this file computes. This value is subtracted from the share of light
+// that stays in the coat, so that table errors cannot make a surface reflect more light than it receives.
 constexpr double kTolerance = 2e-3;
 
-// Returns the direction, with z > 0, of light inside the coat that leaves it in the direction w. Its z is 0
-// if there is none: if the coat's index is below that outside and w is beyond the critical angle.
+// Returns the direction w refracted into the coat, with z > 0: light along it leaves the coat along w. The z
+// is 0 if there is no such direction, because the coat's index is below that outside and w is beyond the
+// critical angle.
 V3 refracted(const V3& w, float ior) {
   const auto cos_t = static_cast<float>(-fresnel_dielectric(w.z, ior).cos_t);
   return {w.x / ior, w.y / ior, cos_t};
 }
 
-// The material at one point, as seen from wo.
+// A coated conductor at one point of a surface, as seen from the direction wo. The value has three parts, the
+// coat, the metal and the rest (conductor.h). inner_o is wo refracted into the coat, the suffixes _o and _i
+// refer to wo and wi, and p_coat, p_base and p_rest are the probabilities of sampling the parts.
 struct SeenCoatedConductor {
   const RoughCoatedConductor& m;
   V3 wo, inner_o;
   Metal metal;
   RoughCoatedConductor::Shares coat_o;
   float staying_o;
-  // Colour of the third part of the value (`rest` in conductor.h): light that stays in the coat at
-  // first.
+  // Colour of the part `rest` of the value: light that stays in the coat after its first reflection by the
+  // metal.
   C3 rest;
   float p_coat, p_base, p_rest;
 
@@ -51,7 +54,8 @@ struct SeenCoatedConductor {
       p_base = 1;
   }
 
-  // R / (1 - F R), without the cancellation where R is near 1
+  // The sum R + R F R + ... = R / (1 - F R) of the reflections between a metal of reflectance R and a coat of
+  // reflectance F, computed without cancellation where R is near 1.
   static C3 series(const C3& R, float F) { return R / ((C3(1) - R) + R * (1 - F)); }
 
   void add_coat(BsdfEval& e, const V3& wi) const {
@@ -67,7 +71,8 @@ struct SeenCoatedConductor {
     if (!(coat_o.through > 0) || !(coat_i.through > 0) || !(inner_i.z > 0)) return;
     const V3 h = normalize(inner_o + inner_i);
     const float D = m.base.D(h), G = m.base.G1_over_cos(inner_o) * m.base.G1_over_cos(inner_i);
-    // The ratio of the projected solid angles inside and outside, times the cosine of wi
+    // The cosine of wi times 1 / n^2. n is the coat's index, and 1 / n^2 is the ratio of the projected solid
+    // angles inside the coat and outside.
     const float squeezed = wi.z / sqr(m.ior);
     e.f_cos += series(metal.reflectance(dot(inner_o, h)), std::min(coat_o.reflected, coat_i.reflected)) *
                (coat_o.through * coat_i.through * squeezed * .25f * D * G);
@@ -85,8 +90,8 @@ struct SeenCoatedConductor {
     return e;
   }
 
-  // Samples a direction of the part `metal`. Returns a direction with z <= 0 if the light does not leave the
-  // coat.
+  // Samples wi for the part `metal` of the value. If the sampled light does not leave the coat, the result
+  // has z <= 0.
   V3 sample_base(const V2& u) const {
     if (!(inner_o.z > 0)) return {0, 0, 0};
     const V3 w = normalize(reflect(inner_o, m.base.sample_normal(inner_o, u)));
@@ -124,7 +129,8 @@ void for_reflections(const Microfacets& facets, const V3& wo, F f) {
   constexpr int kSteps = 32;
   for (int i = 0; i < kSteps; ++i)
     for (int j = 0; j < kSteps; ++j) {
-      // From row to row the azimuths move by the golden ratio of a step, so that no two rows are alike.
+      // Each row has azimuths at equal steps; from row to row they move by 0.618 of a step (the golden
+      // ratio), so that no two rows have equal azimuths.
       const double row = (i + .5) / kSteps, turn = .6180339887498949 * i;
       const V2 u(static_cast<float>((j + turn - std::floor(turn)) / kSteps), static_cast<float>(row));
       const V3 wi = normalize(reflect(wo, facets.sample_visible(wo, u)));
@@ -191,7 +197,8 @@ class Tabulator {
         [&](double mu) {
           const double z = std::max(mu, kGrazing);
           if (!m_.anisotropic()) return staying(at_cosine(z, 0));
-          // The least of three azimuths is used, so that the energy stays below 1 at each of them.
+          // The table has no azimuth. It gets the least share at three azimuths, so that at none of them the
+          // surface reflects more light than it receives.
           return std::min({staying(at_cosine(z, 0)), staying(at_cosine(z, .25 * M_PI)),
                            staying(at_cosine(z, .5 * M_PI))});
         },
@@ -212,9 +219,9 @@ class Tabulator {
     return std::min(sum, 1.);
   }
 
-  // Returns the share of light from wo that stays in the coat at first, minus kTolerance: light that the
-  // metal reflects, that its facets do not mask, and that the series of the part `metal` (conductor.h)
-  // leaves out.
+  // Returns the share of light from wo that stays in the coat after its first reflection by a metal that
+  // absorbs nothing, minus kTolerance, but at least 0. This is the light that the metal's facets do not mask
+  // and that the part `metal` of the value (conductor.h) does not contain.
   double staying(const V3& wo) const {
     const V3 inner = refracted(wo, m_.ior);
     const auto coat_o = m_.shares(wo.z);
@@ -238,7 +245,8 @@ class Tabulator {
   }
 
   RoughCoatedConductor m_;
-  // For a rough coat only: its shares for light from inside, and its transmittance for light from outside.
+  // Set only if the coat is rough: the shares of light from inside that it reflects and transmits, and its
+  // transmittance for light from outside.
   std::optional<RoughShares> inside_;
   CosineTable entering_;
 };
@@ -271,7 +279,7 @@ std::variant<Conductor, RoughConductor, CoatedConductor, RoughCoatedConductor> m
   if (builder.refused()) return static_cast<const Conductor&>(m);
   m.ior = static_cast<float>(ior);
   m.coat_is_smooth = coat < double{kSpecularAlpha};
-  if (ior == 1) {  // a coat with the index of its surroundings is invisible
+  if (ior == 1) {  // a coat with the index of the outside is invisible
     if (mirror) return static_cast<const Conductor&>(m);
     RoughConductor plain;
     static_cast<Conductor&>(plain) = m;

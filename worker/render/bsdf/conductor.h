@@ -26,7 +26,7 @@ struct RoughConductor : Conductor {
   static constexpr bool kSmooth = true;
   Roughness roughness;
   const MicrofacetEnergy* energy = nullptr;  // null unless the material has multiple_scattering
-  C3 mean_fresnel{1, 1, 1};                  // set only with multiple_scattering
+  C3 mean_fresnel{1, 1, 1};                  // mean Fresnel reflectance; set only if `energy` is
 
   bool reads_uv() const { return any_texture(tint, roughness.u, roughness.v); }
   bool anisotropic() const { return !roughness.same_along_both(); }
@@ -53,7 +53,8 @@ struct RoughConductor : Conductor {
     const float D = facets.D(h), G = facets.G1_over_cos(wo) * facets.G1_over_cos(wi) * wi.z;
     return {metal.reflectance(dot(wo, h)) * (.25f * D * G), D * facets.pdf_over_D(wo)};
   }
-  // The weight is F G1(wi) times a ratio near 1. D, which may be huge or lose digits, cancels.
+  // The weight f |cos wi| / pdf is F G1(wi) times a ratio near 1, with F the Fresnel reflectance. It is
+  // computed in this form because the density D of the normals, which may be huge or inaccurate, cancels.
   static std::optional<BsdfSample> sample_facets(const Metal& metal, const Microfacets& facets, const V3& wo,
                                                  const V2& u) {
     const V3 h = facets.sample_normal(wo, u);
@@ -131,7 +132,7 @@ inline std::variant<Conductor, RoughConductor> make_material(const RoughConducto
 //
 // A smooth metal under a smooth coat. The metal's index is relative to that of the coat.
 struct CoatedConductor : Conductor {
-  float ior = 1;  // of the coat, over that outside
+  float ior = 1;  // index of the coat over the index outside
 
   C3 reflectance(const Metal& metal, float cos) const {
     const DielectricFresnel f = fresnel_dielectric(cos, ior);
@@ -149,10 +150,11 @@ struct CoatedConductor : Conductor {
 struct RoughCoatedConductor : CoatedConductor {
   static constexpr bool kSmooth = true;
   bool coat_is_smooth = true;
-  // The base is the metal; its roughness includes what the refractions of a rough coat add.
+  // The facets of the coat and of the metal (`base`). The metal's roughness includes what the two refractions
+  // at a rough coat add (see above).
   Microfacets coat, base;
   CoatedConductorTables tables;
-  C3 mean_fresnel{1, 1, 1};  // the metal's, without its tint
+  C3 mean_fresnel{1, 1, 1};  // mean Fresnel reflectance of the metal without its tint
 
   bool anisotropic() const { return base.ax != base.ay; }
   struct Shares {

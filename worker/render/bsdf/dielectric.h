@@ -30,7 +30,7 @@ namespace ls::render {
 
 struct DielectricKind : MaterialKind {
   static constexpr bool kFrontOnly = false;
-  float ior = 1;  // index of refraction inside over outside
+  float ior = 1;  // index of refraction inside over that outside
   Slot reflectance, transmittance;
 
   bool reads_uv() const { return any_texture(reflectance, transmittance); }
@@ -124,7 +124,7 @@ struct RoughDielectric : Dielectric {
       const float q2 = dot(h, h);
       const V3 m = normalize(h);
       const float om = dot(wo, m), im = dot(wi, m);
-      // True if wo or wi sees the facet from behind, or if wi lies in the surface plane.
+      // The value is 0 if wo or wi is on the wrong side of the facet, or if wi lies in the surface plane.
       if (!(om > 0) || !(reflected ? im > 0 : im < 0) || wi.z == 0) return {};
       const auto F = static_cast<float>(fresnel_dielectric(om, eta).reflectance);
       const float D = facets.D(m), V = facets.visible_over_D(wo);
@@ -169,7 +169,8 @@ struct RoughDielectric : Dielectric {
 struct RoughThinDielectric : ThinDielectric {
   static constexpr bool kSmooth = true;
   Roughness roughness;
-  // That of a rough mirror; null unless the material has multiple_scattering
+  // The table that compensates for energy lost between the facets of a rough mirror; null unless the material
+  // has multiple_scattering
   const MicrofacetEnergy* energy = nullptr;
 
   bool reads_uv() const { return any_texture(reflectance, transmittance, roughness.u, roughness.v); }

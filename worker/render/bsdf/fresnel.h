@@ -10,12 +10,13 @@ struct DielectricFresnel {
   // Cosine of the refracted direction, with the sign opposite to cos_i; 0 under total internal reflection.
   double cos_t = 0;
   double eta_it = 1;  // index on the transmitted side over the index on the incident side
-  double eta_ti = 1;  // its inverse
+  double eta_ti = 1;  // 1 / eta_it
 };
 
-// Reflectance and refraction at a smooth boundary of two dielectrics. cos_i is the cosine of the incident
-// direction from the outward normal: positive if light comes from the outside. eta is the index inside over
-// the index outside. Computed in double, because near eta = 1 the amplitudes cancel.
+// Computes reflectance and refraction at a smooth boundary of two dielectrics. cos_i is the cosine of the
+// angle between the outward normal and the direction towards the incident light; it is positive if the light
+// comes from the outside. eta is the index inside over the index outside. All is computed in double, because
+// the terms of the amplitudes cancel where eta is near 1.
 inline DielectricFresnel fresnel_dielectric(double cos_i, double eta) {
   const bool outside = cos_i >= 0;
   DielectricFresnel f;
@@ -36,10 +37,10 @@ inline DielectricFresnel fresnel_dielectric(double cos_i, double eta) {
 }
 
 // Returns the reflectance of a smooth boundary for diffuse light from inside. eta is the index inside over
-// the index outside. For light from the side with the lower index this is twice the integral of F(mu) mu
-// over the cosine mu from 0 to 1, with F the Fresnel reflectance. Simpson's rule computes it with a relative
-// error below 1e-7, because F is smooth on that side. The reflectance for light from the other side follows
-// from it by reciprocity.
+// the index outside. First the reflectance for diffuse light from the side with the lower index is computed.
+// It is twice the integral of F(mu) mu over the cosine mu from 0 to 1, with F the Fresnel reflectance. On
+// this side there is no total reflection and F is smooth, so Simpson's rule has a relative error below 1e-7.
+// The reflectance for light from the other side follows by reciprocity.
 inline double internal_diffuse_reflectance(double eta) {
   const double n = std::max(eta, 1 / eta);
   constexpr int kSteps = 256;
@@ -62,10 +63,10 @@ inline float fresnel_conductor(float cos_i, float eta, float k) {
   const float a = safe_sqrt(.5f * (a2b2 + t1));
   const float p = a2b2 + c2, q = 2 * cos_i * a;
   if (!(p + q > 0)) return 1;
-  // With an index of 1, p - q may have either sign by rounding
+  // p - q is >= 0, but for an index near 1 rounding may make it negative
   const float rs = std::max(0.f, p - q) / (p + q);
   const float u = a2b2 * c2 + s2 * s2, v = q * s2;
-  if (!(u + v > 0)) return rs;  // true if eta = k = 0 at normal incidence
+  if (!(u + v > 0)) return rs;  // happens if eta = k = 0 at normal incidence
   return .5f * (rs + rs * (u - v) / (u + v));
 }
 inline C3 fresnel_conductor(float cos_i, const C3& eta, const C3& k) {

@@ -1,5 +1,5 @@
-// The common part of all kinds of materials: their parameters, the lookup of these, and the interface of a
-// kind.
+// What all kinds of material have in common: parameters, their lookup at a point, and the interface of a
+// kind. A kind is a struct for one type of material, such as Diffuse.
 #pragma once
 
 #include <algorithm>
@@ -40,7 +40,7 @@ struct Roughness {
 
 // Reads the parameters of a material at one point of a surface.
 struct Lookup {
-  const BsdfTable& table;  // for materials that consist of others
+  const BsdfTable& table;  // used by materials that consist of other materials
   const TextureTable& textures;
   const UvPoint& at;
 
@@ -69,15 +69,16 @@ struct Lookup {
 // The interface of a kind of material, with defaults. Each kind derives from this class and hides the members
 // that differ from the defaults; every kind must define sample().
 struct MaterialKind {
-  // True if the back is black: eval() and sample() are then called only for directions above the surface.
+  // True if the back of the surface is black. eval() and sample() are then called only for directions above
+  // the surface (z > 0).
   static constexpr bool kFrontOnly = true;
-  static constexpr bool kSmooth = false;       // true if it has a lobe that is not a delta
+  static constexpr bool kSmooth = false;       // true if the kind has a lobe that is not a delta
   static constexpr bool kDiffuse = false;      // see BsdfTable::is_diffuse
   static constexpr bool kReadsSlopes = false;  // see BsdfTable::reads_slopes
 
   static bool reads_uv() { return false; }
   static bool anisotropic() { return false; }
-  static std::array<BsdfIndex, 0> parts() { return {}; }  // the materials that it consists of
+  static std::array<BsdfIndex, 0> parts() { return {}; }  // the materials of which this one consists
   static BsdfEval eval(const Lookup&, const V3& /*wo*/, const V3& /*wi*/) { return {}; }
   static NullTransmission null_transmission(const Lookup&, const V3& /*w*/) { return {}; }
 };

@@ -18,8 +18,8 @@
 
 namespace ls::render {
 
-// Records the first error and goes on building; later errors are ignored. So make_material() needs no error
-// handling of its own.
+// Builds the parts of materials. After an error the functions still return something, so make_material()
+// needs no error handling of its own: the builder records the first error and ignores later ones.
 class MaterialBuilder {
  public:
   MaterialBuilder(const Scene& scene, const TextureTable& textures,
@@ -56,7 +56,8 @@ class MaterialBuilder {
   const MicrofacetEnergy* energy(EnergyOf of, const Roughness& roughness, double eta);
   const MicrofacetEnergy* energy(EnergyOf of, Microfacet type, double alpha, double eta);
 
-  // Returns the tables of a coated metal with these parameters, which `make` makes.
+  // Returns the tables of a coated metal. Materials with equal `parameters` share them; `make` computes them
+  // if they do not exist yet.
   const CoatedConductorTables& coated_conductor(const std::array<float, 4>& parameters,
                                                 const std::function<CoatedConductorTables()>& make);
 

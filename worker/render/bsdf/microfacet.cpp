@@ -22,15 +22,17 @@ double erf_inverse(double x) {
   return p * x;
 }
 
-// Let theta be the angle between the viewer and the normal, and cos and sin those of theta. The density of
-// visible slopes s, which are at most cot = cos / sin, is proportional to the function exp(-s^2) (cos - s
-// sin). The integral of this function up to s is
+// Let theta be the angle between the viewer and the normal, and cos, sin and cot the functions of theta. The
+// slopes s that are visible are at most cot = cos / sin. Their density is proportional to the function
+// exp(-s^2) (cos - s sin), whose integral from minus infinity to s is
 //   H(s) = cos sqrt(pi)/2 (1 + erf s) + sin/2 exp(-s^2).
-// H(s) = u H(cot) is solved by Newton's method inside a shrinking bracket, in at most 64 steps. A step that
-// would leave the bracket is replaced by one that halves it, and 64 halvings exhaust a double.
+// The result s is the solution of H(s) = u H(cot). It is found by Newton's method inside a bracket, which
+// each of at most 64 steps shrinks. A step that would leave the bracket is replaced by one to its middle; 64
+// halvings reduce the bracket to the resolution of a double.
 double visible_slope(double cos_theta, double sin_theta, double u) {
   constexpr double kHalfSqrtPi = .886226925452758014;
-  constexpr double kEnd = 6.5;  // exp(-42) is smaller than any float32 u > 0
+  // Slopes below -kEnd have a probability below exp(-42), which is less than any random number u > 0.
+  constexpr double kEnd = 6.5;
   const auto H = [&](double s, double e) {
     return cos_theta * kHalfSqrtPi * std::erfc(-s) + .5 * sin_theta * e;
   };

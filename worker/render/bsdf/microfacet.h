@@ -24,8 +24,8 @@ inline float stretched_sine(const V3& w, float ax, float ay) {
 }
 
 namespace ggx {
-// The density of microfacet normals m. It is computed from the tangential part of m, to avoid cancellation
-// near the normal.
+// The density of microfacet normals m. It is computed from x and y of m instead of 1 - z^2, which would
+// cancel where m is near the surface normal.
 inline float D(const V3& m, float ax, float ay) {
   return 1 / (kPi * ax * ay * sqr(sqr(m.x / ax) + sqr(m.y / ay) + m.z * m.z));
 }
@@ -58,7 +58,7 @@ inline V3 sample_normal(const V3& wo, float ax, float ay, const V2& u, float k) 
 namespace beckmann {
 inline float D(const V3& m, float ax, float ay) {
   const float c2 = m.z * m.z, e = (sqr(m.x / ax) + sqr(m.y / ay)) / c2;
-  // The result is also 0 if e is NaN, that is, if c2 = 0
+  // If c2 = 0, e is NaN or infinite; the comparison is then false and the result is 0
   return e < 87 ? std::exp(-e) / (kPi * ax * ay * c2 * c2) : 0;
 }
 inline float G1_over_cos(const V3& w, float ax, float ay) {
@@ -67,11 +67,11 @@ inline float G1_over_cos(const V3& w, float ax, float ay) {
   const float a = w.z / s;
   return (3.535f + 2.181f * a) / ((1 + a * (2.276f + 2.577f * a)) * s);
 }
-// The exact G1 / cos. It is the inverse of the projected area of the microfacets that face w, per area of
-// the surface.
+// The exact G1 / cos. It is 1 / A, where A is the area of the microfacets that face w, projected along w, per
+// area of the surface.
 inline float exact_G1_over_cos(const V3& w, float ax, float ay) {
   const float s = stretched_sine(w, ax, ay);
-  if (w.z > 6 * s) return 1 / w.z;  // in float32 erf(6) is 1 and exp(-36) negligible
+  if (w.z > 6 * s) return 1 / w.z;  // in float32 erf(6) is 1, and exp(-36) is negligible
   const float a = w.z / s;
   return 1 /
          (.5f * w.z * (1 + std::erf(a)) + s * std::exp(-a * a) * .28209479177387814f);  // 1 / (2 sqrt(pi))
@@ -79,8 +79,8 @@ inline float exact_G1_over_cos(const V3& w, float ax, float ay) {
 inline float pdf_over_D(const V3& wo, float ax, float ay) { return .25f * exact_G1_over_cos(wo, ax, ay); }
 // Samples a microfacet normal that is visible from wo, by inversion, in double; u is in [0, 1)^2.
 V3 sample_normal(const V3& wo, float ax, float ay, const V2& u);
-// The inverse, at u, of the cumulative distribution of visible slopes along the viewing direction, for
-// roughness 1 and an angle theta between the viewer and the normal.
+// Samples the slope of a visible microfacet along the viewing direction, for roughness 1: returns the slope
+// at which the cumulative distribution of visible slopes is u. theta is the angle between viewer and normal.
 double visible_slope(double cos_theta, double sin_theta, double u);
 double erf_inverse(double x);
 }  // namespace beckmann

@@ -39,8 +39,9 @@ double masking(Microfacet type, double alpha, double x, double y, double z) {
   return a * (3.535 + 2.181 * a) / (1 + a * (2.276 + 2.577 * a));
 }
 
-// Returns the share of the light from i = (sin, 0, cos) that a microfacet with the normal m = (mx, my, mz)
-// sends on by `way`, times the masking of the new direction.
+// Light comes from the direction (sin, 0, cos) and meets a microfacet with the normal (mx, my, mz). Returns
+// the share of it that the facet reflects or refracts (`way`), times the masking of the light's new
+// direction.
 double sent_on(Way way, Microfacet type, double alpha, double eta, double sin, double cos, double mx,
                double my, double mz) {
   const double im = sin * mx + cos * mz;
@@ -62,7 +63,7 @@ double rough_share(Way way, Microfacet type, double alpha, double eta, double mu
     return way == Way::mirrored ? 1 : way == Way::reflected ? R : 1 - R;
   }
   const double sin = std::sqrt(1 - mu * mu), l = std::hypot(alpha * sin, mu);
-  // The direction of the viewer in the space where the roughness is 1
+  // Sine and cosine of the viewer's direction in the space that is stretched so that the roughness is 1
   const double is = alpha * sin / l, ic = mu / l;
   double sum = 0;
   for (std::size_t a = 0; a < q.x.size(); ++a) {
@@ -73,8 +74,8 @@ double rough_share(Way way, Microfacet type, double alpha, double eta, double mu
       if (type == Microfacet::beckmann) {
         x = -alpha * slope, y = alpha * q.gauss[b], z = 1;
       } else {
-        // The visible normals of GGX are a cap of the sphere (Dupuy and Benyoub 2023). Its two halves are
-        // equal, so one of them suffices.
+        // The visible normals of GGX correspond to a cap of the unit sphere (Dupuy and Benyoub 2023). The cap
+        // is symmetric in y, so its half with y >= 0 suffices.
         x = alpha * (r * q.cos[b] + is), y = alpha * r * q.sin[b], z = cap + ic;
       }
       const double n = 1 / std::sqrt(x * x + y * y + z * z);
@@ -87,17 +88,18 @@ double rough_share(Way way, Microfacet type, double alpha, double eta, double mu
 
 namespace {
 
-// The first nodes of a table are 0 and the powers of two from 2^-kOctaves to 1, since near grazing angles the
-// functions vary on the scale of alpha, which is at least 1/1024. Each interval is halved at most kDeepest
-// times: the error of linear interpolation falls with the square of the width, so with 2^12 parts it reaches
-// the resolution of float32. A table with kMostEntries entries is not refined further, because at extreme
-// roughnesses the functions consist of rounding noise.
+// The nodes of a table are cosines. At first they are 0 and the powers of two from 2^-kOctaves to 1; they are
+// dense near 0 because there the functions vary on the scale of the roughness alpha, which is at least
+// kSpecularAlpha. The intervals are halved until the error is small enough, but at most kDeepest times: the
+// error of linear interpolation falls with the square of the width, so with 2^12 parts it reaches the
+// resolution of float32. A table with kMostEntries entries is not refined further: at extreme roughnesses the
+// functions are rounding noise, and no refinement would make the error small.
 constexpr int kOctaves = 16, kDeepest = 12;
 constexpr std::size_t kMostEntries = 1024;
 
 const Quadrature& quadrature(double eta) {
   static const Quadrature kSmooth = gauss_legendre(64), kKinked = gauss_legendre(128);
-  // With eta below 1 the integrand has a kink where total reflection begins
+  // If eta < 1, the integrand has a kink where total reflection begins, so more nodes are needed
   return eta >= 1 ? kSmooth : kKinked;
 }
 
@@ -136,7 +138,8 @@ CosineTable::CosineTable(const std::function<double(double)>& f, double toleranc
 void CosineTable::refine(const std::function<double(double)>& f, double x0, double y0, double x1, double y1,
                          double tolerance, int depth) {
   double y[3];
-  // A whole octave is always halved: three points do not suffice to show that it is straight
+  // An undivided octave (depth 0) is always halved: three points do not suffice to show that f is straight
+  // there
   bool fine = depth > 0;
   for (int i = 0; i < 3; ++i) {
     const double t = .25 * (i + 1);
@@ -157,7 +160,7 @@ double CosineTable::mean() const {
   double sum = 0;
   for (std::size_t i = 1; i < x_.size(); ++i) {
     const double a = double{x_[i - 1]}, b = double{x_[i]}, p = double{y_[i - 1]}, q = double{y_[i]};
-    // Simpson's rule is exact for the product of two linear functions.
+    // On each interval f is linear, so Simpson's rule is exact for f(x) x.
     sum += (b - a) / 6 * (a * p + 4 * (.5 * (a + b)) * (.5 * (p + q)) + b * q);
   }
   return 2 * sum;

@@ -1,5 +1,6 @@
-// Integrals over the visible normals of microfacets, by Gauss-Legendre quadrature in double, and the tables
-// that materials make of them.
+// Integrals over the visible normals of microfacets, by Gauss-Legendre quadrature in double, and tables of
+// these integrals for materials. "Index" is the index of refraction, "cosine" that of the angle to the
+// surface normal.
 #pragma once
 
 #include <algorithm>
@@ -13,28 +14,28 @@
 namespace ls::render {
 
 struct Quadrature {
-  std::vector<double> x, w;             // nodes and weights on [0, 1]
-  std::vector<double> gauss, cos, sin;  // functions of the nodes: erf^-1(2 x - 1); cosine and sine of pi x
+  std::vector<double> x, w;             // nodes in [0, 1] and their weights
+  std::vector<double> gauss, cos, sin;  // at each node x: erf^-1(2 x - 1), cos(pi x) and sin(pi x)
 };
 // Returns the Gauss-Legendre quadrature with n nodes on [0, 1].
 Quadrature gauss_legendre(int n);
 
-// The interaction of light with a microfacet. It determines the facet's weight: F (reflected), 1 - F
-// (refracted), or 1 (mirrored, that is, reflected without loss). F is the Fresnel reflectance.
+// What happens to the light that meets a microfacet. With F the Fresnel reflectance, the share F is reflected
+// and 1 - F refracted. `mirrored` is reflection without loss: all light is reflected.
 enum class Way { reflected, refracted, mirrored };
 
-// Returns the share of light incident at the cosine mu that leaves by `way` after one bounce without being
-// masked: the mean over visible normals of the weight times the masking of the new direction (for Beckmann by
-// Mitsuba's fit). eta is the index on the other side over the index on the side of the incident light. If
-// alpha < kSpecularAlpha, the surface is a plane.
+// Light meets a rough surface at the cosine mu. Returns the share of it that is sent on by `way` and leaves
+// the surface after one bounce: the mean over the visible normals of the facet's share (see Way) times the
+// masking of the new direction (for Beckmann by Mitsuba's fit). eta is the index on the other side over the
+// index on the side of the incident light. If alpha < kSpecularAlpha, the surface is treated as a plane.
 double rough_share(Way way, Microfacet type, double alpha, double eta, double mu, const Quadrature& q);
 
 // A table of a function of a cosine in [0, 1]: piecewise linear, with adaptively placed nodes.
 class CosineTable {
  public:
   CosineTable() = default;
-  // Tabulates f. The error is at most `tolerance`, checked at the middle and the quarter points of each
-  // interval.
+  // Tabulates f with an error of at most `tolerance`. The error is checked at three points of each interval,
+  // its middle and its quarter points. It may be larger where a table has reached its largest size.
   CosineTable(const std::function<double(double)>& f, double tolerance);
 
   float at(float x) const {
@@ -43,7 +44,8 @@ class CosineTable {
     const float t = (x - x_[i - 1]) / (x_[i] - x_[i - 1]);
     return y_[i - 1] * (1 - t) + y_[i] * t;
   }
-  double mean() const;  // 2 int f x dx of the piecewise linear function
+  // Returns the mean 2 int f(x) x dx over x from 0 to 1, where f is the piecewise linear function.
+  double mean() const;
   std::size_t bytes() const { return (x_.size() + y_.size()) * sizeof(float); }
 
  private:
@@ -70,10 +72,12 @@ inline constexpr double kEnergyTolerance = 5e-4;
 // includes reflection and refraction, and nothing is absorbed. The factor depends only on the viewer, so
 // sampling does not change, and the BSDF is not reciprocal.
 struct MicrofacetEnergy {
-  CosineTable missing, missing_behind;  // (1 - E) / E seen from outside and, for dielectrics, from inside
-  // For plastics: the share of light that enters through the coat, compensated in the same way
+  // (1 - E) / E by the viewer's cosine: for viewers outside and, only for dielectrics, for viewers inside
+  CosineTable missing, missing_behind;
+  // Only for plastics: the share of light that passes the coat from outside, as part of the light that leaves
+  // after one bounce, by cosine
   CosineTable through;
-  float mean = 1;  // for conductors: E_mean
+  float mean = 1;  // E_mean; only for conductors
 
   // Returns the factor f' / f of a conductor whose mean Fresnel reflectance is F, for a viewer at the cosine
   // `cos`.
@@ -89,19 +93,24 @@ struct MicrofacetEnergy {
 MicrofacetEnergy conductor_energy(Microfacet type, double alpha);
 // eta is the index inside over the index outside.
 MicrofacetEnergy dielectric_energy(Microfacet type, double alpha, double eta);
-// Makes the tables for the coat of a rough plastic. Sets `through`, and leaves `missing_behind` empty.
+// Makes the tables for the coat of a rough plastic. Sets `missing` and `through`, and leaves `missing_behind`
+// empty. eta is the index of the coat over the index outside.
 MicrofacetEnergy coat_energy(Microfacet type, double alpha, double eta);
 
-// Returns the mean Fresnel reflectance 2 int F mu dmu of a conductor, per channel.
+// Returns the mean Fresnel reflectance of a conductor, 2 int F(mu) mu dmu over the cosine mu from 0 to 1, per
+// channel. eta and k are the real and the imaginary part of its index.
 C3 mean_fresnel(const C3& eta, const C3& k);
 
-// The tables of a coat over a metal that absorbs nothing (conductor.h).
+// The tables of a coat over a metal that absorbs nothing, by the cosine outside the coat. T, F and Q are
+// those of conductor.h: transmittance and reflectance of the coat for light from outside, and the share of
+// light that stays in the coat after its first reflection by the metal.
 struct CoatedConductorTables {
-  CosineTable through, reflected;  // T and F over the cosine outside; only of a rough coat
+  CosineTable through, reflected;  // T and F; empty if the coat is smooth
   CosineTable staying;             // Q
-  float staying_mean = 0;          // 2 int Q mu dmu
-  // Shares of diffuse light inside the coat: the coat reflects `internal` and transmits `leaving`, and a
-  // metal that absorbs nothing reflects `metal_albedo`, since its facets mask the rest.
+  float staying_mean = 0;          // Q_mean = 2 int Q(mu) mu dmu
+  // Shares of diffuse light inside the coat. Of the light that meets the coat, the share `internal` is
+  // reflected and the share `leaving` is transmitted. Of the light that meets the metal, the share
+  // `metal_albedo` is reflected; the metal's facets mask the rest.
   float internal = 0, leaving = 1, metal_albedo = 1;
 };
 

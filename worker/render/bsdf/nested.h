@@ -1,20 +1,23 @@
-// Materials that consist of other materials. Their functions call those of the table, at most
-// scene::kMaxBsdfNesting levels deep (checked by BsdfTable::build).
+// Materials that consist of other materials, their parts: two-sided, mask, blend, normal map and bump map.
+// Their functions call the functions of the parts through the BsdfTable, which holds all materials of a
+// scene. Materials are nested at most scene::kMaxBsdfNesting levels deep (checked by BsdfTable::build).
 #pragma once
 
 #include "worker/render/bsdf/material_builder.h"
 
 namespace ls::render {
 
-// Samples the scattering of the material `part`; a null material scatters nothing.
+// Samples the scattering of the material `part`. Returns nullopt if it is null, that is, index-matched, and
+// so scatters nothing.
 inline std::optional<BsdfSample> sample_part(const Lookup& look, BsdfIndex part, const UvPoint& uv,
                                              const V3& wo, float u_lobe, const V2& u) {
   if (look.table.is_null(part)) return std::nullopt;
   return look.table.sample(part, uv, wo, u_lobe, u);
 }
 
-// A two-sided material. BsdfTable replaces it by the material of one side before it calls eval() or
-// sample(), so those of this kind are never called. Neither of the two materials is two-sided.
+// A material with one part for each side of the surface. BsdfTable replaces it by the part of the side that
+// is seen before it calls eval() or sample(), so TwoSided::eval() and TwoSided::sample() are never called.
+// The parts are not two-sided themselves.
 struct TwoSided : MaterialKind {
   BsdfIndex front, back;
 
@@ -49,9 +52,9 @@ struct Mask : MaterialKind {
 
 struct Blend : MaterialKind {
   static constexpr bool kFrontOnly = false;
-  Slot weight;  // weight of the second part
+  Slot weight;  // weight of the second part, from 0 to 1
   BsdfIndex part[2];
-  bool passes = false;  // true if some part has null transmission
+  bool passes = false;  // true if light passes straight through a part (null transmission)
 
   std::array<BsdfIndex, 2> parts() const { return {part[0], part[1]}; }
   bool reads_uv() const { return any_texture(weight); }
@@ -116,9 +119,9 @@ struct Mapped : MaterialKind {
   static constexpr bool kFrontOnly = false;
   Slot map;
   BsdfIndex part;
-  bool passes = false;   // true if the nested material has null transmission
-  bool flips = false;    // flip_invalid_normals
-  bool shadows = false;  // use_shadowing_function
+  bool passes = false;   // true if light passes straight through the nested material
+  bool flips = false;    // the scene's parameter flip_invalid_normals (frame())
+  bool shadows = false;  // the scene's parameter use_shadowing_function (shadow())
 
   std::array<BsdfIndex, 1> parts() const { return {part}; }
   bool reads_uv() const { return any_texture(map); }
@@ -150,7 +153,7 @@ struct Mapped : MaterialKind {
     const V3 in = turned.to_local(w);
     if (!same_side(in, w)) return {};
     NullTransmission v = look.table.null_transmission(part, look.at.seen_in(turned), in);
-    v.transmission *= shadow(turned.n, w);  // light that passes straight through is shadowed by the map, too
+    v.transmission *= shadow(turned.n, w);  // the map also shadows light that passes straight through
     return v;
   }
 
@@ -165,15 +168,16 @@ struct Mapped : MaterialKind {
     const float l2 = dot(n, n);
     return l2 > 0 && std::isfinite(l2) ? Frame::from_tangent(n * (1 / std::sqrt(l2)), V3(1, 0, 0)) : Frame();
   }
-  // The shadowing factor for light from wi, by facets that have the slope of the map's normal n (Estevez,
-  // Lecocq, Stein 2019).
+  // The share of the light from wi that is not shadowed. The shadowing is that of rough facets whose typical
+  // slope is the slope of the map's normal n (Estevez, Lecocq, Stein 2019).
   float shadow(const V3& n, const V3& wi) const {
     if (!shadows) return 1;
     const float a2 = std::min(.125f * (n.x * n.x + n.y * n.y) / (n.z * n.z), 1.f);
     return a2 > 0 ? 2 / (1 + std::sqrt(1 + a2 * (wi.x * wi.x + wi.y * wi.y) / (wi.z * wi.z))) : 1;
   }
-  // True if a direction is on the same side of the surface in two frames; a and b are its components in them.
-  // Callers drop other directions, along which light would leak through the surface.
+  // True if a direction is on the same side of the surface in two frames; a and b are the direction's
+  // components in the first and in the second frame. Callers return zero for directions that are on different
+  // sides, since light would leak through the surface along them.
   static bool same_side(const V3& a, const V3& b) { return a.z * b.z > 0; }
 };
 
@@ -192,7 +196,7 @@ struct BumpMap : Mapped<BumpMap> {
     const UvPoint& at = look.at;
     const V2 slope = look.textures.slope(map.texture, at.uv) * scale;
     const V3 n = cross({at.du.x, at.du.y, slope.x}, {at.dv.x, at.dv.y, slope.y});
-    if (n.z == 0) return {0, 0, 1};  // true if dp/du and dp/dv are parallel or zero
+    if (n.z == 0) return {0, 0, 1};  // dp/du and dp/dv are parallel or zero
     return n.z < 0 ? -n : n;         // the sign depends on the handedness of (u, v)
   }
 };

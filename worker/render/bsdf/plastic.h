@@ -27,8 +27,8 @@ struct SeenPlastic {
     p_specular = s + d > 0 ? s / (s + d) : .5f;
   }
 
-  // The value f |cos wi| of the light that entered the coat, was scattered any number of times below it, and
-  // left again.
+  // The part of the BSDF, times |cos wi|, for light that enters through the coat, is scattered any number of
+  // times below it, and leaves again.
   C3 diffuse_f_cos(const V3& wi) const {
     const float r = m.internal_reflectance;
     const C3 inside = m.nonlinear ? C3(1) - diffuse * r : C3(1 - r);
@@ -70,9 +70,11 @@ struct SeenPlastic {
 struct CoatedDiffuse : MaterialKind {
   static constexpr bool kSmooth = true;
   Slot diffuse, specular;
-  float ior = 1;                   // index of refraction inside over outside
-  float specular_weight = 1;       // weight of the coat in lobe sampling, without its Fresnel term
-  float internal_reflectance = 0;  // reflectance of the coat for diffuse light from inside
+  float ior = 1;  // index of refraction inside over outside
+  // Weight of the coat in the choice of a lobe, which also takes account of the coat's transmittance; the
+  // base has the weight 1 - specular_weight
+  float specular_weight = 1;
+  float internal_reflectance = 0;  // share of diffuse light from inside that the coat reflects back
   bool nonlinear = false;
 
   bool reads_uv() const { return any_texture(diffuse, specular); }
@@ -80,7 +82,7 @@ struct CoatedDiffuse : MaterialKind {
 
 struct Plastic : CoatedDiffuse {
   static constexpr bool kHasFacets = false, mirror = true;
-  static constexpr Microfacets facets{};  // unused
+  static constexpr Microfacets facets{};  // never used; SeenPlastic names it
 
   float through(float cos) const { return 1 - coat_reflectance(cos, ior); }
   BsdfEval eval(const Lookup& look, const V3& wo, const V3& wi) const {
@@ -93,7 +95,9 @@ struct Plastic : CoatedDiffuse {
 
 struct RoughPlastic : CoatedDiffuse {
   static constexpr bool kHasFacets = true;
-  bool mirror = false;  // true if the coat is smooth; its transmittance is read from tables nevertheless
+  // True if the coat is so smooth that it reflects like a mirror. Even then its transmittance is read from
+  // tables.
+  bool mirror = false;
   Microfacets facets;
   const MicrofacetEnergy* energy = nullptr;  // null unless the material has multiple_scattering
   RoughPlasticTable coat;                    // set only without multiple_scattering

@@ -5,14 +5,15 @@
 namespace ls::render {
 namespace {
 
-constexpr float kCoatShadowing = .25f;  // roughness for the coat's masking, regardless of its gloss
+constexpr float kCoatShadowing = .25f;  // GGX alpha for the coat's shadowing and masking, at every gloss
 
 float mix(float a, float b, float t) { return a * (1 - t) + b * t; }
 float fifth(float x) { return sqr(sqr(x)) * x; }
 float schlick_weight(float cos) { return fifth(std::clamp(1 - cos, 0.f, 1.f)); }
 
-// Schlick's weight w in F = F0 + (1 - F0) w for light that arrives at the cosine `cos` from outside of a
-// material with relative index eta. For eta below 1 the cosine of the refracted angle is used.
+// Schlick's weight w in the Fresnel reflectance F = F0 + (1 - F0) w. `cos` is the cosine of the angle of
+// incidence, and eta the index of refraction behind the surface over that in front of it. If eta is below 1,
+// the cosine of the refracted angle is used instead of `cos`.
 float schlick(float cos, float eta) {
   return schlick_weight(eta > 1 ? cos : safe_sqrt(1 - (1 - cos) * (1 + cos) / (eta * eta)));
 }
@@ -63,7 +64,8 @@ struct SeenPrincipled {
     chance_diffuse = diffuse / sum;
   }
 
-  // False if wo is grazing, or is inside of a surface that light does not enter.
+  // False if the material is black as seen from wo: if wo is parallel to the surface, or if wo is behind a
+  // surface that refracts no light.
   bool visible() const { return wo.z > 0 && (front || bsdf > 0); }
   float fresnel(float cos) const { return static_cast<float>(fresnel_dielectric(cos, eta).reflectance); }
   // The probability that light is reflected, not refracted, at a sampled visible normal with the Fresnel
@@ -83,8 +85,8 @@ struct SeenPrincipled {
   }
 };
 
-// The value f |cos wi| of the diffuse lobe: diffuse reflection, retro-reflection, approximate subsurface
-// scattering, and sheen.
+// The diffuse lobe's part of the BSDF, times |cos wi|: diffuse reflection, retro-reflection, approximate
+// subsurface scattering, and sheen. cos_d is the cosine between wo and the half vector.
 C3 diffuse_f_cos(const SeenPrincipled& s, const C3& base, const V3& wi, float cos_d) {
   const float out = schlick_weight(wi.z), in = schlick_weight(s.wo.z);
   const float retro = 2 * s.look.share(s.p.roughness) * sqr(cos_d);
@@ -108,7 +110,9 @@ BsdfEval eval_reflection(const SeenPrincipled& s, const C3& base, const V3& wi) 
   const float F = s.fresnel(cos_d), D = s.facets.D(h);
   BsdfEval e;
   e.pdf = s.chance_facets * s.reflecting(F) * .25f * D * s.facets.visible_over_D(s.wo);
-  if (F > 0)  // as in Mitsuba: with equal indices nothing is reflected, even by a metal
+  // As in Mitsuba, facets reflect nothing if F is 0, as it is where the indices of refraction are equal. This
+  // applies to metals, too.
+  if (F > 0)
     e.f_cos = s.reflectance(F, cos_d, base) *
               (.25f * D * s.facets.G1_over_cos(s.wo) * s.facets.G1_over_cos(wi) * wi.z);
   if (!s.front) return e;
@@ -127,7 +131,8 @@ BsdfEval eval_reflection(const SeenPrincipled& s, const C3& base, const V3& wi) 
   return e;
 }
 
-// Returns the value for a wi below the surface, by the formulas of RoughDielectric.
+// Returns the BSDF and its sampling density for a wi on the other side of the surface than wo, by the
+// formulas of RoughDielectric.
 BsdfEval eval_refraction(const SeenPrincipled& s, const C3& base, const V3& wi) {
   if (!s.p.transmits || !(s.bsdf > 0)) return {};
   V3 h = s.wo + wi * s.eta;

@@ -1,5 +1,6 @@
 // Perspective (with optional thin lens), orthographic and spherical cameras, in Mitsuba's conventions: the
-// camera looks along its +z axis, and its +x axis points to the left of the image. Also the pixel filters.
+// camera looks along its +z axis, and its +x axis points to the left of the image. Also declares
+// PixelFilter, the reconstruction filters.
 #pragma once
 
 #include <cmath>
@@ -33,7 +34,7 @@ inline double tan_half_fov_x(double fov, FovAxis axis, double aspect) {
 
 struct CameraRay {
   V3 o, d;      // d has unit length
-  float t_max;  // far clip
+  float t_max;  // distance along the ray at which the camera clips it; may be infinite
 };
 
 class Camera {
@@ -67,14 +68,14 @@ class Camera {
   bool pinhole_ = true;           // true for a perspective camera without a lens
   V3d axis_x_, axis_y_, axis_z_;  // columns of to_world: the camera's axes in the world, not normalised
   V3 origin_;
-  V3 lens_x_, lens_y_;  // axes of the lens in world units
-  // The film position fx, fy has the camera-space direction (x, y, 1) with x = x0_ + dx_ * fx, and y
-  // likewise.
+  V3 lens_x_, lens_y_;  // axis_x_ and axis_y_ times the scale from scene to world
+  // The film position (fx, fy), in pixels, has the direction (x, y, 1) in camera space, where x = x0_ + dx_ *
+  // fx and y = y0_ + dy_ * fy.
   double x0_ = 0, dx_ = 0, y0_ = 0, dy_ = 0;
-  float aperture_ = 0, focus_ = 1;            // in scene units
-  float near_ = 0, far_ = 0;                  // in world units
-  double per_pixel_x_ = 1, per_pixel_y_ = 1;  // size of a pixel as a share of the frame
-  const TextureTable* textures_ = nullptr;    // set only with an aperture_scale
+  float aperture_ = 0, focus_ = 1;            // radius of the lens and focus distance, in scene units
+  float near_ = 0, far_ = 0;                  // clip distances: those of the scene times the scale
+  double per_pixel_x_ = 1, per_pixel_y_ = 1;  // width and height of a pixel over those of the frame
+  const TextureTable* textures_ = nullptr;    // set only if the sensor has an aperture_scale
   TextureIndex aperture_scale_;
 };
 
@@ -92,7 +93,9 @@ class PixelFilter {
  private:
   enum class Kind { box, tent, table } kind_ = Kind::box;
   double radius_ = .5;
-  std::vector<double> cdf_;  // table: cdf of the filter on [-radius, radius] in cdf_.size() - 1 equal steps
+  // For Kind::table: the filter's cumulative distribution at cdf_.size() equally spaced points from -radius_
+  // to radius_, both included
+  std::vector<double> cdf_;
 };
 
 }  // namespace ls::render

@@ -17,7 +17,8 @@
 namespace ls::render {
 namespace {
 
-// One side of a range of primitives: side 0 contains the opaque ones, side 1 those that let light pass.
+// The primitives [first, last) of a PrimitiveRange that belong to one of its two sides. Side 0 contains the
+// opaque primitives, side 1 those that let light pass.
 struct Side {
   std::uint32_t first, last;
   std::uint32_t count() const { return last - first; }
@@ -55,7 +56,7 @@ bool near_enough(const V3& o) { return dot(o, o) <= 1e18f; }  // within 1e9 time
 // If no primitive lets light pass, `all` and `opaque` are the same scene.
 struct Scenes {
   RTCScene all = nullptr, opaque = nullptr, boundary = nullptr;
-  std::uint32_t base[2 * kKinds] = {};  // index of the first primitive of each kind and side
+  std::uint32_t base[2 * kKinds] = {};  // index of the first primitive, by kind + side * kKinds
   ShapeSet<Sphere> spheres[2];
   ShapeSet<Disk> disks[2];
   ShapeSet<Cylinder> cylinders[2];
@@ -76,7 +77,7 @@ struct Accel::State {
   RTCDevice device = nullptr;
   std::optional<Scenes> own;
   std::deque<Scenes> groups;
-  std::vector<std::uint32_t> group_of;  // group of each instance
+  std::vector<std::uint32_t> group_of;  // for each instance, the index of its group
   std::atomic<std::int64_t> bytes{0};
   bool coincident = false;
 
@@ -146,13 +147,13 @@ void attach(RTCDevice device, const Geometry& g, const PrimitiveSet& set, Scenes
   add_shapes(g.cylinders, set.cylinders, to.cylinders[side], kCylinders);
 }
 
-// Creates the Embree scenes `to` and adds the primitives of `set` to them. `boundaries` is true if these
-// scenes need to separate primitives that let light pass, of `set` or of instances, from opaque ones. The
-// caller then adds any instances and commits the scenes.
+// Creates the Embree scenes `to` and adds the primitives of `set` to them. `boundaries` is true if `set`, or
+// an instance that is added later, has primitives that let light pass; `to` then has scenes of its own for
+// opaque primitives and for these. The caller has to add the instances, if any, and to commit the scenes.
 void fill(const Accel::State& st, const Geometry& g, const PrimitiveSet& set, bool boundaries, Scenes& to) {
   const RTCDevice device = st.device;
-  // between() needs a scene whose hits are filtered (st.coincident). It traces `all`, which without
-  // boundaries is the same scene as `opaque`.
+  // The second argument of new_scene() is true for the scene that between() traces, which needs filters for
+  // hits. This scene is `all`, and without boundaries `all` is the same scene as `opaque`.
   to.opaque = new_scene(device, st.coincident && !boundaries);
   if (!boundaries) {
     to.all = to.opaque;

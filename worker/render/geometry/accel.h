@@ -1,5 +1,6 @@
 // The interface to Embree. Embree is used only to find the primitive that a ray hits. Geometry::complete then
-// computes distance and position, so that the processor's approximate reciprocals never affect the image.
+// computes the distance and the position itself. Embree computes them with the processor's approximate
+// reciprocals, which differ between processors, so its results would make images differ, too.
 #pragma once
 
 #include <array>
@@ -48,7 +49,7 @@ class Accel {
   // Embree's version and the instruction set that it is configured to use. The text is part of the numeric
   // class, the digest that identifies machines that render the same bits (numeric_class() in render.h).
   static std::string describe();
-  static std::string version();  // "4.3.3"
+  static std::string version();  // of Embree, such as "4.3.3"
 
   struct State;
 

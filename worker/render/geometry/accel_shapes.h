@@ -34,7 +34,7 @@ enum : unsigned {
 template <class Shape>
 struct ShapeSet {
   std::span<const Shape> shapes;
-  const PlacedInstance* instances = nullptr;  // the world's instances
+  const PlacedInstance* instances = nullptr;  // Geometry::instances, by instance id - kFirstInstance
 };
 
 template <class Shape>

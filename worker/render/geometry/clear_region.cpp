@@ -6,10 +6,11 @@
 namespace ls::render {
 namespace {
 
-// A region is shrunk by this share of its largest coordinate. The offset of a ray from a surface is only
-// 2^-20 of that coordinate.
+// A region is smaller than its body, on each side, by this share of the body's largest coordinate. The offset
+// of a ray from a surface is only 2^-20 of that coordinate.
 constexpr double kMargin = 0x1p-12;
-// Corners that are farther from a face's plane than this share of the largest coordinate do not belong to it.
+// A corner is in the plane of a face if its distance from the plane is at most this share of the body's
+// largest coordinate.
 constexpr double kFlat = 0x1p-18;
 
 std::vector<std::uint32_t> triangles_of(const Geometry& g, std::uint32_t surface, std::size_t most) {
@@ -101,7 +102,7 @@ std::optional<ClearRegion> ClearRegion::inside(const Geometry& g, std::uint32_t 
   return region.contains(V3(middle)) ? std::optional(region) : std::nullopt;
 }
 
-// Adds the plane of a face; returns false if there are too many.
+// Adds the plane of a face. Returns false, and adds nothing, if there are kMostPlanes planes already.
 bool ClearRegion::add_plane(const V3d& n, double distance) {
   if (planes_ == kMostPlanes) return false;
   normal_[planes_] = V3(n);

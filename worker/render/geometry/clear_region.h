@@ -1,6 +1,6 @@
 // Convex regions without surfaces in them. A flight through a medium that begins and ends in such a region
-// meets no surface, so no ray has to be traced for it. A ray that leaves the region need not be traced
-// either, if no other surface is in its way.
+// meets no surface, so no ray has to be traced for it. For a ray that leaves the region no tracing is needed
+// either if the region's surface lets it pass unchanged and no other surface can be in its way (way_out()).
 #pragma once
 
 #include <algorithm>
@@ -14,14 +14,14 @@
 
 namespace ls::render {
 
-// The inside of a sphere, or of a closed convex body with at most kMostPlanes faces, shrunk by more than the
-// offset of rays that leave surfaces (offset_point).
+// The inside of a body, shrunk by more than the offset of rays that leave surfaces (offset_point). The body
+// is a sphere, or a closed convex mesh with at most kMostPlanes faces.
 class ClearRegion {
  public:
   static constexpr std::size_t kMostPlanes = 6;
 
-  // Returns the region inside of a surface. Returns nullopt if the surface is in a group, if it is neither a
-  // sphere nor such a body, or if the box of another surface touches its box. `boxes` holds the boxes of all
+  // Returns the region inside of a surface. Returns nullopt if the surface is in a group, if it bounds no
+  // body as described above, or if the box of another surface touches its box. `boxes` holds the boxes of all
   // surfaces. `media_overlap` is true if the scene's media may overlap: then the space outside may be filled
   // by a medium even if the surface names no exterior medium.
   static std::optional<ClearRegion> inside(const Geometry& g, std::uint32_t surface,
@@ -36,9 +36,8 @@ class ClearRegion {
     return true;
   }
 
-  // Requires that the region contains o and that d is a unit vector. If the ray o + t d leaves the enclosing
-  // body into a vacuum and certainly meets no other surface, returns the distance t at which it leaves the
-  // body, else nullopt.
+  // Requires that the region contains o and that d is a unit vector. Returns the distance t at which the ray
+  // o + t d leaves the body if it leaves it into a vacuum and certainly meets no other surface, else nullopt.
   std::optional<float> way_out(const V3& o, const V3& d) const {
     if (!lets_out_ || may_meet_others(o, d)) return std::nullopt;
     const float t = distance_to_body(o, d);
@@ -75,10 +74,10 @@ class ClearRegion {
     return t;
   }
 
-  std::size_t planes_ = 0;  // 0: a sphere
+  std::size_t planes_ = 0;  // number of faces; 0 if the body is a sphere
   V3 center_{0, 0, 0};
   float radius_ = 0;
-  std::array<V3, kMostPlanes> normal_;  // outward unit normals
+  std::array<V3, kMostPlanes> normal_;  // outward unit normals of the faces
   std::array<float, kMostPlanes> distance_{};
   float margin_ = 0;  // the distance from the region's faces to those of the body
   // True if the body's surface is index-matched and emits no light, and a vacuum is outside of it

@@ -10,8 +10,8 @@
 namespace ls::render {
 namespace {
 
-// The largest number of pairs of shapes or flat pieces that are compared. Comparing so many takes about half
-// a second. If there are more, all surfaces are treated as coincident.
+// The largest number of pairs of surfaces or flat pieces (struct Piece) that are compared. To compare so many
+// takes about half a second. If there are more, all surfaces are marked as coincident.
 constexpr std::uint64_t kMaxSurfacePairs = std::uint64_t{1} << 27;
 
 struct Piece {  // a triangle, or half of the square about a disk
@@ -41,7 +41,7 @@ bool boxes_touch(const Piece& p, const Piece& q, double tolerance) {
 }
 
 // True if the boxes of p and q touch and one of them lies in the plane of the other. Both planes are tried,
-// because that of the larger piece is the more accurate.
+// because the plane of the larger piece is the more accurate of the two.
 bool coincide(const Piece& p, const Piece& q) {
   const double tolerance = std::max(p.reach(), q.reach()) * 0x1p-20;
   return boxes_touch(p, q, tolerance) && (in_plane(p, q, tolerance) || in_plane(q, p, tolerance));
@@ -67,7 +67,9 @@ class Finder {
   }
 
  private:
-  struct Parts {  // the primitives of a surface; triangles are contiguous
+  // The primitives of a surface: the `triangles` triangles of a mesh, which have the indices from `first` on,
+  // or a disk, a sphere or a cylinder.
+  struct Parts {
     std::uint32_t first = 0, triangles = 0;
     const Disk* disk = nullptr;
     const Sphere* sphere = nullptr;
@@ -98,7 +100,8 @@ class Finder {
     ++marks_;
     SurfaceInfo& s = g_.surfaces[surface];
     s.coincident_reach = std::max(s.coincident_reach, static_cast<float>(reach));
-    if (!own) return;  // hits in instances compute their own reach
+    // Hits in instances do not use SurfaceInfo::reach (Geometry::complete_instanced)
+    if (!own) return;
     if (!(s.reach > 0)) {
       const Parts& p = shapes_[surface];
       for (std::uint32_t i = 0; i < p.triangles; ++i) s.reach = std::max(s.reach, g_.reach_of(p.first + i));

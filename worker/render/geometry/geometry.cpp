@@ -11,7 +11,7 @@ namespace {
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
 struct Barycentric {
-  double t, u, v;  // p = v0 + u (v1 - v0) + v (v2 - v0)
+  double t, u, v;  // the hit is at o + t d = v0 + u (v1 - v0) + v (v2 - v0), with the corners v0, v1, v2
 };
 
 // Intersects a triangle with the corner v0 and the edges e1 and e2. It divides in double and never uses the
@@ -36,9 +36,9 @@ bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, co
 [[gnu::noinline]] void keep_from_edges(const V3d& e1, const V3d& e2, double twice_area, float reach,
                                        Barycentric& b) {
   const double w = 1 - b.u - b.v;
-  // The distance from an edge in barycentric units is the distance divided by the triangle's height over that
-  // edge: four ulps of the reach (2^-22 reach) times the length of the edge over twice the area. `margin` is
-  // this without the edge's length.
+  // A distance from an edge, divided by the triangle's height over this edge, is a difference of barycentric
+  // coordinates. The height is twice the area over the edge's length. So for the distance 2^-22 reach the
+  // difference is `margin` times the edge's length.
   const double margin = 0x1p-22 * reach / twice_area;
   const auto least = [&](const V3d& edge) { return std::min(.25, margin * edge.length()); };
   const double lw = least(e2 - e1), lu = least(e2), lv = least(e1);
@@ -252,8 +252,8 @@ namespace {
 // single precision. Each component of the ray's origin is then a sum of four products, accurate to four ulps
 // of the sum of their absolute values. offset_point() moves rays by 16 ulps of the reach, so the reach must
 // be at least a quarter of that sum. In the world, an error in component k moves the hit off the surface by
-// the error times |A^T ng|_k, where A is the matrix of the map to the world. `local` is transformed to the
-// world by the same factors.
+// the error times |A^T ng|_k, where A is the matrix of the map to the world. An error of `local` in every
+// component moves it by the sum over k of `local` times |A^T ng|_k.
 float reach_of(const PlacedInstance& i, const V3& p, const V3& ng, float local) {
   const auto& a = i.to_world.a;
   const auto& b = i.to_local.a;
@@ -298,7 +298,7 @@ double intersect(const Sphere& s, const V3d& o, const V3d& d, double t_min, doub
   // for distant or grazing rays.
   const V3d f = o - s.center;
   const double a = d.dot(d), b = -f.dot(d), outside = f.dot(f) - s.radius * s.radius;
-  if (b < 0 && outside > 0) return kInf;  // the sphere is behind the ray
+  if (b < 0 && outside > 0) return kInf;  // the sphere is behind the ray's origin
   const V3d foot = f + d * (b / a);
   const double disc = s.radius * s.radius - foot.dot(foot);
   if (!(disc >= 0)) return kInf;

@@ -21,10 +21,11 @@ namespace ls::render {
 
 inline constexpr std::uint32_t kNone = 0xffffffffu;
 
-struct SurfaceInfo {  // properties of a surface; a surface is one shape of the scene
+// Properties of a surface. Each shape of the scene is one surface.
+struct SurfaceInfo {
   BsdfIndex bsdf;
-  std::uint32_t light = kNone;                       // index into Lights
-  std::uint32_t interior = kNone, exterior = kNone;  // indices of media
+  std::uint32_t light = kNone;                       // index into Lights; kNone if the surface emits no light
+  std::uint32_t interior = kNone, exterior = kNone;  // indices of media; kNone if the scene names none
   bool transition = false;                           // true if the media on its two sides differ
   // True if a ray that crosses the surface may enter another medium: the media on its two sides differ, or it
   // coincides with other surfaces (coincident_reach > 0), which may bound media of their own
@@ -38,17 +39,21 @@ struct SurfaceInfo {  // properties of a surface; a surface is one shape of the 
   bool null = false;  // index-matched: rays pass straight through
   // True if part of the light passes straight through (BsdfTable::null_transmission)
   bool null_transmission = false;
-  bool normals = false, uvs = false;  // for triangles: true if there are per-vertex data
-  // wants_uv: true if the material or the light of the surface, or an AOV, reads uv; otherwise hits have uv =
-  // (0, 0). wants_tangent: true if the material depends on a direction along the surface (anisotropy);
-  // otherwise hits have an arbitrary shading frame.
+  bool normals = false, uvs = false;  // for meshes: true if there are normals, uvs at vertices
+  // wants_uv: true if the material or the light of the surface reads uv, or if the surface is a mesh with uvs
+  // and the AOV `uv` reads them; otherwise the uv of hits is not set on meshes and spheres. wants_tangent:
+  // true if the material depends on a direction along the surface (anisotropy); otherwise hits have an
+  // arbitrary shading frame.
   bool wants_uv = true, wants_tangent = true;
   bool wants_slopes = false;      // true if hits have dp/du and dp/dv (bump maps); implies wants_tangent
   bool wants_attributes = false;  // true if hits have a FacePoint (mesh_attribute textures)
   // True if the material has a lobe that is not a delta, so that next-event estimation is used
   bool smooth = true;
-  bool diffuse = false;   // see BsdfTable::is_diffuse
-  float orientation = 1;  // -1: normals are flipped against winding or outward direction
+  // True if f_cos and the sampling density depend on directions only by |cos wi| and by the sides of the
+  // surface on which wo and wi are (BsdfTable::is_diffuse)
+  bool diffuse = false;
+  // -1 if normals are opposite to the mesh's winding or to the shape's outward side, else 1
+  float orientation = 1;
   // For a surface that coincides somewhere with others, one of them null: the largest reach (see
   // SurfaceHit::reach) of all of these surfaces, so that one step moves a ray past all of them. 0 if the
   // surface coincides with no other.
@@ -57,14 +62,17 @@ struct SurfaceInfo {  // properties of a surface; a surface is one shape of the 
   // surface are within a factor of 16; 0 if each triangle has its own. For other shapes: a lower bound for
   // the reach of a hit.
   float reach = 0;
-  double edge = 0;  // a hit whose barycentrics all exceed this need not be moved off the edges
+  // For triangles: a hit with three barycentric coordinates above this is far enough from all edges and need
+  // not be moved away from them (keep_from_edges)
+  double edge = 0;
 };
 
 struct Sphere {
   V3d center;
   double radius = 1;
   std::uint32_t surface = 0;
-  double to_local[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // a rotation, used for uv
+  // Row by row, the rotation from the world to the sphere's own axes, used for uv
+  double to_local[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 };
 struct Disk {  // points center + a u + b v with a^2 + b^2 <= 1
   V3d center, u, v, n;
@@ -99,7 +107,7 @@ struct PrimitiveSet {
 };
 struct PlacedInstance {
   std::uint32_t group = 0;
-  float mirrored = 1;         // -1 if the map reverses orientations, else 1
+  float mirrored = 1;         // -1 if the maps below mirror, else 1
   Affine to_world, to_local;  // maps between the world's space and the group's
 };
 
@@ -119,7 +127,7 @@ struct SurfaceHit {
   // True if `shading` has the normal ng because the interpolated normal would face away from the ray
   bool normal_replaced = false;
   V2 uv;
-  V3 du{1, 0, 0}, dv{0, 1, 0};  // see UvPoint
+  V3 du{1, 0, 0}, dv{0, 1, 0};  // dp/du and dp/dv in the frame `shading` (UvPoint)
   std::uint32_t surface = 0;
   PrimitiveId primitive;
   // The largest coordinate that was used to compute the hit. Perpendicular to the surface, the position p and
@@ -183,8 +191,8 @@ class Geometry {
   bool complete_instanced(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const;
 };
 
-// Return the first t in (t_min, t_max) at which the ray o + t d hits the shape, or infinity. The BVH
-// callbacks use them too.
+// The functions intersect() return the first t in (t_min, t_max) at which the ray o + t d hits the shape, or
+// infinity if there is none. The BVH's callbacks for shapes call them, too.
 double intersect(const Sphere& s, const V3d& o, const V3d& d, double t_min, double t_max);
 double intersect(const Disk& s, const V3d& o, const V3d& d, double t_min, double t_max);
 double intersect(const Cylinder& s, const V3d& o, const V3d& d, double t_min, double t_max);
@@ -207,8 +215,8 @@ inline V3 offset_point(const V3& p, const V3& ng, float reach, const V3& w) {
 inline V3 offset_point(const SurfaceHit& hit, const V3& w) {
   return offset_point(hit.p, hit.ng, hit.reach, w);
 }
-// The same for a point where a ray from x ends: the differences then contain coordinates of x, which may be
-// far larger than those of the surface.
+// Like offset_point(), moves p off the surface, for a ray from x that ends at p. The BVH then subtracts
+// coordinates of x, which may be far larger than those of the surface, so they count like the reach.
 inline V3 offset_target(const V3& p, const V3& ng, float reach, const V3& x, const V3& w) {
   return offset_point(p, ng, std::max(reach, largest(x)), w);
 }

@@ -1,5 +1,5 @@
-// Converts scene shapes to arrays of primitives, in the spaces of the world and of the groups. Opaque
-// primitives come first.
+// Converts scene shapes to arrays of primitives, in the spaces of the world and of the groups. In each
+// space opaque primitives precede those that let light pass.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -27,8 +27,9 @@ float orientation_of(const Shape& shape, bool vertex_normals) {
   return sign;
 }
 
-// True if the normals of a mirrored closed shape point inwards, as some do in Mitsuba. Its interior medium
-// stays inside: mirroring a glass of water should not fill the room around it with water.
+// True for a closed shape that to_world mirrors and whose normals therefore point inwards, as some do in
+// Mitsuba. Such a shape keeps its interior medium inside although its normals say otherwise: mirroring a
+// glass of water should not fill the room around it with water.
 bool mirrored_inwards(const Shape& shape, float orientation) {
   if (!(Affine(shape.to_world).determinant() < 0)) return false;
   if (std::holds_alternative<SphereShape>(shape.geometry)) return orientation < 0;
@@ -71,8 +72,8 @@ double bits_left(const Box& b, const V3d& origin) {
 
 // The space of the world. Its centre is the middle of the box of all shapes. If this leaves some mesh less
 // than 8 of the 24 bits of float32 (as in a small scene lit by a sphere of radius 1e5 at 1e7), the centre of
-// the mesh with the fewest bits is used instead, provided that every mesh then has more bits than this one
-// had before.
+// the mesh with the fewest bits is used instead, provided that afterwards every mesh has more bits than this
+// mesh had with the first centre.
 Space world_space(const std::vector<Box>& meshes, const Box& all) {
   Space s = unit_space(all);
   constexpr double kFewBits = 0x1p-16;
@@ -142,7 +143,7 @@ void append_mesh(Geometry& g, LocalMesh mesh, bool normals_given, std::uint32_t 
     g.uvs.insert(g.uvs.end(), mesh.uvs.begin(), mesh.uvs.end());
   }
   const std::uint32_t first_triangle = g.triangle_count();
-  std::vector<std::uint32_t> kept;  // triangles that are kept; needed for attributes only
+  std::vector<std::uint32_t> kept;  // indices, in the mesh, of the triangles that are kept; for attributes
   for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
     const std::uint32_t a = base + mesh.indices[i], b = base + mesh.indices[i + 1],
                         c = base + mesh.indices[i + 2];
@@ -223,7 +224,8 @@ bool finite(const Box& b) {
   return b.empty() || (std::isfinite(b.lo.x + b.lo.y + b.lo.z) && std::isfinite(b.hi.x + b.hi.y + b.hi.z));
 }
 
-// The placed shapes of a scene, with the bounds of the world (including instances) and of the groups.
+// The shapes of a scene as placed by their to_world, the bounds of the world (including instances), and those
+// of each group.
 struct Parts {
   std::vector<Placed> shapes;
   Box world;
@@ -267,7 +269,8 @@ Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
   return parts;
 }
 
-// Appends to g the shapes of one space, opaque ones first. `shapes` holds their indices in order.
+// Appends to g the shapes of one space, opaque ones first. `shapes` holds the indices of these shapes in
+// `parts.shapes`, ascending.
 PrimitiveSet append_all(Geometry& g, const std::vector<std::uint32_t>& shapes, const Parts& parts,
                         const Space& space) {
   PrimitiveSet set;
@@ -294,13 +297,13 @@ Result<PlacedInstance> place_instance(const Instance& instance, const Geometry& 
   out.group = instance.group.value;
   out.to_world = Affine::scale_translate(g.scale, -g.center * g.scale) * m *
                  Affine::scale_translate(1 / group.scale, group.center);
-  // Computes the translation without the cancellation that the product may have.
+  // The translation is computed again, because digits may cancel in the product of the three maps above
   out.to_world.b = (m.point(group.center) - g.center) * g.scale;
   if (!out.to_world.invertible()) return fail(Errc::invalid_argument, "its to_world has no inverse");
   out.to_local = out.to_world.inverse();
-  // The largest absolute value allowed in the matrix of an instance's inverse map. The BVH inverts the map
-  // itself, in float32, and cannot trace rays from too far away (near_enough() in accel.cpp), so the inverse
-  // must not be too large.
+  // The largest absolute value allowed in the matrix of to_local. The BVH transforms rays to the group's
+  // space by an inverse that it computes itself, in float32, and it cannot trace rays whose origin is then
+  // too far away (near_enough() in accel.cpp).
   constexpr double kLargestInverse = 5e8;
   const auto in_range = [](double x) { return std::abs(x) <= kLargestInverse; };
   if (!std::isnormal(static_cast<float>(out.to_world.determinant())) ||

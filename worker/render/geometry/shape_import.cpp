@@ -21,8 +21,9 @@ LocalMesh rectangle() {
   return m;
 }
 
-// The cube's mesh of six faces. The uv of each face fill the unit square. u increases along the edge
-// direction Face::a and v along a x n, where n is the normal of the face (as in Mitsuba 3.9.1's cube).
+// The cube as a mesh of six faces. On each face uv takes all values of the unit square: u increases along the
+// edge direction Face::a, and v along the cross product of Face::a and the normal Face::n (as in the cube of
+// Mitsuba 3.9.1).
 LocalMesh cube() {
   struct Face {
     V3d n, a;
@@ -164,7 +165,8 @@ Disk place_disk(const Affine& m) {
   d.center = m.point({0, 0, 0});
   d.u = m.vector({1, 0, 0});
   d.v = m.vector({0, 1, 0});
-  // The +z axis, also for a mirrored disk
+  // The normal points to the side to which m maps +z, also if m mirrors. m.normal() then gives the other
+  // side.
   d.n = m.normal({0, 0, 1}).normalized() * (m.determinant() < 0 ? -1. : 1.);
   return d;
 }
@@ -258,7 +260,7 @@ Box bounds_of(const Placed& p) {
   for (const V3d& v : p.mesh.positions) b.add(v);
   if (p.sphere) b.add(box_of(*p.sphere));
   if (p.cylinder) b.add(box_of(*p.cylinder));
-  if (p.disk) {  // the square around the disk
+  if (p.disk) {  // the corners of the square around the disk
     for (int k = 0; k < 4; ++k)
       b.add(p.disk->center + p.disk->u * (k & 1 ? 1. : -1.) + p.disk->v * (k & 2 ? 1. : -1.));
   }

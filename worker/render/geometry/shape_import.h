@@ -17,13 +17,13 @@ struct LocalMesh {
   std::vector<V3d> normals;
   std::vector<V2> uvs;
   std::vector<std::uint32_t> indices;
-  bool face_normals = false;            // true if the file requests flat triangles
+  bool face_normals = false;            // true if the mesh file itself requests flat shading
   std::uint64_t dropped_triangles = 0;  // number of triangles without area, which the file's reader left out
   std::vector<MeshAttribute> attributes;
 };
 struct Placed {
   LocalMesh mesh;
-  bool normals_given = false;  // true if the file has normals
+  bool normals_given = false;  // true if the mesh has normals from its file
   std::optional<Sphere> sphere;
   std::optional<Disk> disk;
   std::optional<Cylinder> cylinder;

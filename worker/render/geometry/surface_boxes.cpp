@@ -3,7 +3,7 @@
 namespace ls::render {
 namespace {
 
-constexpr std::size_t kMaxBoxes = std::size_t{1} << 23;  // these boxes take 300 MB
+constexpr std::size_t kMaxBoxes = std::size_t{1} << 23;  // so many boxes take 300 MB
 
 // Returns the box of each wanted surface, in the space of its primitives: the world's or that of its group.
 std::vector<Box> own_boxes(const Geometry& g, const std::vector<bool>& wanted) {

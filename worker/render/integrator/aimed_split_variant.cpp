@@ -1,4 +1,5 @@
-// The path tracer with Features::aimed and Features::split.
+// The variant of the path tracer with Features::aimed (light is sampled at several points of camera segments
+// in media, or close to lamps) and Features::split (radiance is split into the components of the light AOVs).
 #include "worker/render/integrator/segment_nee.h"
 #include "worker/render/integrator/variant.h"
 

@@ -31,7 +31,7 @@ constexpr AovSet kOfGuide = AovSet{}.with(Aov::denoising_albedo).with(Aov::denoi
 static_assert((kOfSurface.bits() ^ kOfLight.bits() ^ kOfGuide.bits()) == (1u << kAovs) - 1);
 
 // Returns the uv of a hit. On spheres it is computed from the position, because SurfaceHit::uv is set there
-// only if a material or a light needs it.
+// only if the surface's material or light needs it.
 V2 uv_of(const Geometry& g, const SurfaceHit& hit) {
   if (hit.primitive.kind != PrimitiveId::Kind::sphere) return hit.uv;
   const Sphere& s = g.spheres[hit.primitive.index];
@@ -87,8 +87,7 @@ void AovPixel::end_sample(int x, int y, std::uint64_t sample, bool usable) {
   if (first) add_surface(*first, stream, ray);
 }
 
-// Adds the light components of a sample whose radiance is usable. A component can be as large as the whole
-// radiance; one that is not finite counts as 0.
+// Adds the light components of a sample whose radiance is usable. A component that is not finite counts as 0.
 void AovPixel::add_light() {
   const auto part = [&](LightPart p) {
     const C3& c = split_[static_cast<std::size_t>(p)];

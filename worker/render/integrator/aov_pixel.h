@@ -19,7 +19,7 @@ class AovPixel {
 
   LightSplit* split() { return &split_; }  // light components of the current sample
   void begin_pixel();
-  void begin_sample() { split_.fill(C3(0)); }  // explicit, since C3{} is not initialised
+  void begin_sample() { split_.fill(C3(0)); }  // C3's default constructor leaves values uninitialised
   // Call after sample number `sample` of the image's pixel (x, y) has been rendered. `usable` is true if the
   // radiance of the sample counts.
   void end_sample(int x, int y, std::uint64_t sample, bool usable);

@@ -1,4 +1,4 @@
-// The path tracers of the integrator `volpath_distant_mis`.
+// The variants of the path tracer for the integrator `volpath_distant_mis` (segment_nee.h).
 #include "worker/render/integrator/segment_nee.h"
 #include "worker/render/integrator/variant.h"
 

@@ -70,13 +70,14 @@ class EquiAngular {
   // Nothing is cut off if the line passes the pivot so closely that the direction of the foot is lost in
   // rounding.
   void keep_lit(const Pivot& pivot, const V3& off) {
-    constexpr float kCloseness = 1e-5f, kRightAngle = 1.57079f;  // > atan(1 / kCloseness), the largest angle
+    // kRightAngle is less than pi / 2, but more than atan(1 / kCloseness), which no `angle` exceeds
+    constexpr float kCloseness = 1e-5f, kRightAngle = 1.57079f;
     const float size = std::max(std::abs(a_), std::abs(b_)), r = std::sqrt(dot(off, off));
     if (!(r > kCloseness * size)) return;
     limited_ = true;
     const float aside = -dot(pivot.axis, off) / r, along = dot(pivot.axis, d_);
     const float m = std::sqrt(aside * aside + along * along);
-    // Rounding moves the foot by at most 4 ulps of the segment's size
+    // `margin` covers rounding, which moves the foot by at most 4 ulps of `size`
     const float margin = 1e-6f + 4.8e-7f * size / r;
     const float half = std::acos(std::min(1.f, pivot.cos_reach / m)) + margin;
     const float mid = std::atan2(along, aside), lo = mid - half, hi = mid + half;
@@ -92,7 +93,7 @@ class EquiAngular {
   }
 
   V3 d_, foot_;
-  float start_ = 0;  // position of the segment's start; a_ is larger if the light does not reach the start
+  float start_ = 0;  // offset x of the segment's start; less than a_ if the light does not reach the start
   float a_ = 0, b_ = 0, distance_ = 0, angle_ = 0;
   bool uniform_ = false, limited_ = false;
 };
@@ -104,9 +105,9 @@ inline constexpr float kLampFlightShare = .1f;
 
 // Samples a flight from o along d that ends at t_max at the latest; t_max must be finite. `hero` is the
 // colour channel that decides distances (medium.h). There must be at least one lamp. The random number u(1)
-// of `numbers` decides whether the distance is exponential, given by bits[0], or sampled about a lamp, given
-// by u(2). The weight and the densities of the result mean the same as those of free_flight(). The density of
-// a distance is that of the mixture, so the weights follow the balance heuristic.
+// of `numbers` decides how the distance is sampled: exponentially, with the random bits bits[0], or about a
+// lamp, with u(2). The weight and the densities of the result mean the same as those of free_flight(). The
+// density of a distance is that of the mixture, so the weights follow the balance heuristic.
 inline Flight fly_past_lamps(const Medium& medium, int hero, const Group& numbers, const V3& o, const V3& d,
                              float t_max, const Lamps& lamps) {
   const auto about = [&](std::size_t i) { return EquiAngular(o, d, t_max, lamps.position[i]); };
@@ -133,7 +134,7 @@ inline Flight fly_past_lamps(const Medium& medium, int hero, const Group& number
     pdf[c] = f.scattered ? medium.sigma_t[c] * alone + near : alone;
   }
   const float own = pdf[hero];
-  // The densities underflow only where the transmittance is 0, too
+  // If the hero's density underflows to 0, the transmittance is 0, too
   if (!(own > 0)) {
     f.weight = C3(0);
     return f;

@@ -29,7 +29,7 @@ constexpr std::uint64_t kLearningPathsPerPixel = 16;
 // Paths are traced in batches of this many, on several threads.
 constexpr std::uint64_t kLearningBatch = 1 << 10;
 // After this many batches learning stops if they show that the technique (connections or portals) does not
-// pay (light_paths.h).
+// pay, that is, that it costs more than it gains (light_paths.h).
 constexpr std::uint64_t kFirstBatches = 4;
 // Portals are tried if, of all directions that BSDFs and phase functions sample, at most the share
 // kLeftThatPays leads to the sky. Portals pay if the noise of some pixels is more than kPortalGainThatPays
@@ -46,11 +46,12 @@ constexpr int kLongestPortalPath = 4;
 // estimates of direct light have a mean square of more than kSpreadThatPays times the square of their mean.
 // It pays if the noise of the direct light of some pixels is more than kLocalGainThatPays times as high
 // without it. This limit is high for two reasons: samples take up to 1.5 times as long, because a light that
-// reaches the vertex costs more time than one that does not; and the few pixels of a pilot hardly show the
-// edges of small patches of light.
+// reaches the vertex costs more time than one that does not; and the few pixels of a pilot (a rendering that
+// measures the noise) hardly show the edges of small patches of light.
 constexpr std::uint64_t kLocalLightPaths = 1 << 14;
-constexpr std::uint64_t kLocalLightLooks = 1 << 17;  // limit of lights times paths
-constexpr std::uint64_t kLocalLightTrial = 4;        // one path in this many decides if it is tried
+constexpr std::uint64_t kLocalLightLooks = 1 << 17;  // limit for the number of lights times that of paths
+// The first 1 / kLocalLightTrial of the paths decide whether the choice by place is tried
+constexpr std::uint64_t kLocalLightTrial = 4;
 constexpr int kLongestLocalLightPath = 6;
 constexpr double kSpreadThatPays = 1.2;
 constexpr double kLocalGainThatPays = 3;
@@ -60,7 +61,9 @@ constexpr double kLearningVertices = 1 << 15;
 // any number of boundaries between two vertices. The limit is 1,024 for each path of a batch, which paths
 // exceed in few scenes.
 constexpr std::uint64_t kLearningRaysOfBatch = 1 << 20;
-constexpr std::uint64_t kSunRays = 1 << 14;  // rays of the sun for one set of light vertices
+// Number of rays from the sun for one set of light vertices, the points that these rays light and to which
+// vertices of camera paths are connected
+constexpr std::uint64_t kSunRays = 1 << 14;
 // Number of rays from which the mean number of light vertices per ray of the sun is estimated.
 constexpr std::uint64_t kLearningRays = 1 << 12;
 // From this many scatterings on, connected paths are subject to Russian roulette: light that deep paths find
@@ -70,8 +73,8 @@ constexpr int kConnectedRoulette = 2;
 // and if the light that it finds there is more than the share kLightThatPays of the image's light.
 constexpr double kLitThatPays = .15;
 constexpr double kLightThatPays = .1;
-// Lower bound for the light that a surface vertex reflects, per unit cosine of the sun [1/sr]. A glossy
-// surface may reflect little in the four directions that look_of() evaluates, but much in others.
+// Lower bound [1/sr] for the BSDF that look_of() assumes at a light vertex on a surface. A glossy surface may
+// reflect little in the four directions for which look_of() evaluates the BSDF, but much in others.
 constexpr float kLeastReflected = .01f;
 // A shading normal counts as tilted if its cosine to the geometric normal is smaller than this.
 constexpr float kUntilted = .999999f;
@@ -85,7 +88,7 @@ constexpr std::uint64_t kSunRaySeed = 0x5eed0f5a1;
 // The paths of one learning pass and the data that they record. All passes record where paths find the sun
 // (SunMap).
 struct Lesson {
-  bool sky = false, lights = false;  // whether to record the light of the sky, and that of each light source
+  bool sky = false, lights = false;  // true if paths record the sky's light, each light source's light
   std::uint64_t first_path = 0, batch = kLearningBatch;
 };
 
@@ -140,9 +143,9 @@ Learned learn_batch(const World& w, const Lesson& lesson, std::uint64_t first, s
   return learned;
 }
 
-// Traces the camera paths with the numbers from lesson.first_path up to `paths`, or up to the limit of
-// kLearningPathsPerPixel. After the first kFirstBatches batches, go_on(learner) decides whether to trace the
-// rest.
+// Traces the camera paths with the numbers from lesson.first_path up to `paths` or up to the limit of
+// kLearningPathsPerPixel, whichever is less. After the first kFirstBatches batches, go_on(learner) decides
+// whether to trace the rest.
 template <Features F, template <Features> class Light, class GoOn>
 Learned learn_with(const World& w, std::uint64_t paths, int threads, const GoOn& go_on,
                    const Lesson& lesson) {
@@ -193,7 +196,7 @@ Learned learn(const World& w, std::uint64_t paths, int threads, const GoOn& go_o
                       : learn_with<kSurfaces, VertexNee>(w, paths, threads, go_on, lesson);
 }
 
-// True if the path tracers that learn have the features of the world.
+// True if a path tracer that is compiled for learning has all features that the world needs.
 bool can_learn(const World& w) {
   Features need = w.need;
   need.split = false;
@@ -201,8 +204,8 @@ bool can_learn(const World& w) {
   return kAimed.covers(need);
 }
 
-// Traces a set of light vertices with the features of the camera paths, because weights depend on how
-// directions are sampled.
+// Traces a set of light vertices. It uses a path tracer with the features of the camera paths, because the
+// MIS weights depend on how directions are sampled.
 LightVertices trace(const World& w, std::uint64_t seed, std::uint32_t set, std::uint64_t rays) {
   if (w.need.aimed) return trace_with<kAimed>(w, seed, set, rays);
   return w.need.media ? trace_with<kMedia>(w, seed, set, rays) : trace_with<kSurfaces>(w, seed, set, rays);
@@ -224,16 +227,17 @@ LightVertices::Look look_of(const World& w, const LightVertex& y) {
       return w.bsdfs.eval(surface.bsdf, y.hit.uv_point(), to_light, to);
     };
     const float cosine = std::abs(to_light.z);
-    // The mean over four directions at 45 degrees to the normal, on the lit side
+    // `even` is the mean of the BSDF over four directions at 45 degrees to the normal, on the lit side, times
+    // the cosine of the sun
     const float z = std::copysign(.70710678f, to_light.z);
     float even = 0;
     for (const V3& to : {V3(.5f, .5f, z), V3(-.5f, .5f, z), V3(.5f, -.5f, z), V3(-.5f, -.5f, z)})
       even += mean_component(eval(to).f_cos) * cosine / (4 * std::abs(z));
     look.even = light * std::max(even, kLeastReflected * cosine);
     // A Henyey-Greenstein lobe around the mirrored direction stands for the glossy part of the BSDF. In the
-    // mirrored direction the sum of this lobe and the even part is as high as the BSDF. The lobe is as wide
-    // as that of the BSDF for light along the normal. For light at other angles a microfacet lobe has this
-    // width in one direction, and is narrower by the cosine in the other.
+    // mirrored direction the sum of this lobe and the even part equals the BSDF. The lobe is round and as
+    // wide as the BSDF's lobe for light along the normal. The BSDF's lobe for light at another angle has this
+    // width in one direction only; in the other it is narrower by the factor `cosine`.
     const V3 mirrored(-to_light.x, -to_light.y, to_light.z);
     const BsdfEval at_peak = eval(mirrored);
     const float peak = mean_component(at_peak.f_cos), q = at_peak.pdf * cosine / kInvFourPi;
@@ -259,10 +263,11 @@ namespace {
 // `volpath` or `path`.
 void learn_connections(const IntegratorSettings& settings, int threads, World& w) {
   if (settings.light_vertices < 0 || !w.depth_allows(2)) return;
-  // Light vertices do not record how many null-transmitting surfaces the light has passed
+  // If passed surfaces count towards the maximum depth, there are no connections: light vertices do not
+  // record how many null-transmitting surfaces the light has passed
   if (w.passing_counts && w.null_transmission) return;
-  // An open boundary encloses no volume, so a ray from the sun may find another medium behind it than a
-  // camera path does
+  // If a medium has an open boundary, there are no connections: the boundary encloses no volume, so a ray
+  // from the sun may find another medium behind it than a camera path does
   if (std::any_of(w.geometry.surfaces.begin(), w.geometry.surfaces.end(),
                   [](const SurfaceInfo& s) { return s.transition && s.sheet; }))
     return;
@@ -341,7 +346,7 @@ void learn_local_lights(const IntegratorSettings& settings, int threads, World& 
   LightVisits visits = visits_of(0, trial);
   if (!in_any_case) {
     if (!(w.lights.spread_over(visits) > kSpreadThatPays)) return;
-    // Direct light is not connected, so no light vertices need to be traced
+    // The pilots below render direct light only. It needs no connections, so no light vertices are traced.
     const bool connected = std::exchange(w.need.connected, false);
     constexpr int kDirect = 2;  // segments of paths that show direct light
     const auto without = pilot_pixels(w, kDirect, threads);
@@ -355,8 +360,8 @@ void learn_local_lights(const IntegratorSettings& settings, int threads, World& 
   if (!visits.places.empty()) w.lights.set_local(&visits);
 }
 
-// Sets up shadow roulette and path splitting, which need the mean radiance of the image, in scenes with
-// grids.
+// In scenes with grids, sets up shadow roulette and path splitting. Both need the mean radiance of the image,
+// which is estimated here.
 void learn_roulette(const IntegratorSettings& settings, World& w) {
   if ((settings.shadow_roulette < 0 && settings.path_splitting < 0) || !w.depth_allows(1)) return;
   const auto mean = static_cast<float>(pilot_radiance(w, kLongestPilot).value_or(0));

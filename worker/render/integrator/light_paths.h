@@ -12,9 +12,10 @@
 
 namespace ls::render {
 
-// If sharing of tails (path_reuse.h) is possible in this world, which is otherwise complete, and pays, sets
-// its `reuse` and Features::reuse. Sharing is possible if the densities of second vertices are known. The
-// settings request or forbid it, or leave the decision to a pilot (reuse_variants.cpp).
+// Decides whether the paths of several pixels share their tails, the parts from their second vertices on
+// (path_reuse.h). If so, sets World::reuse and Features::reuse of w, which must be complete otherwise.
+// Sharing is possible only if the densities of second vertices are known. The settings request or forbid it,
+// or leave the decision to a pilot, which measures whether sharing pays (reuse_variants.cpp).
 void share_tails(const IntegratorSettings& settings, int threads, World& w);
 
 // Traces the light vertices of one set (LightVertexCache). They depend only on the world, its seed and the

@@ -32,9 +32,9 @@ auto PathTracer<F, Light>::fly_through(const Medium& medium, const SurfaceHit* e
   const Segment segment{t_max, ray_.lead(), end};
   if constexpr (kFliesFirst) {
     // The flight that was sampled before the ray was traced is kept, and only cut off at t_max. A new flight
-    // up to t_max could differ from it: t_max may shorten a dense cell, and then another algorithm is used in
-    // the cell (kExactDepth). To replace by new flights only those flights that leave the clear region would
-    // be biased.
+    // up to t_max could differ from it even before t_max: where t_max cuts off part of a dense cell of a
+    // grid, free_flight() may use another algorithm in the rest of the cell (kExactDepth). The ray was traced
+    // because of where `flown` ends, so a new flight in its place would bias the image.
     if (flown)
       return collide(medium, segment, {}, flown->scattered && flown->t < t_max ? *flown : Flight{.t = t_max});
   }
@@ -191,8 +191,9 @@ auto PathTracer<F, Light>::fly_through_several(const SurfaceHit* end, float reac
   return scatter_in(*met);
 }
 
-// Next-event estimation at a vertex p in a medium, without equi-angular points on the segment: it is weighted
-// against phase-function sampling alone. d is the direction of travel before the scattering.
+// Next-event estimation at a vertex p in a medium, where no equi-angular points on the segment are sampled.
+// Its MIS weight therefore takes account only of phase-function sampling. d is the direction of travel before
+// the scattering.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::light_vertex(const Medium& medium, const V3& p, const V3& d) {
   const Lights& lights = world_.lights;
@@ -215,8 +216,8 @@ void PathTracer<F, Light>::light_vertex_by(const LightChoice& choice, const Medi
 }
 
 // For each medium, adds its emission up to the point where a flight through the other media ends. The
-// probability that this flight reaches a point is the transmittance of the other media up to there. A channel
-// with a different extinction gets its own flight, with the same random numbers.
+// probability that this flight reaches a point is the transmittance of the other media up to there. Each
+// colour channel has a flight of its own, as its extinction may differ, but all use the same random numbers.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_medium_emission_among(float t_max) {
   if (depth_ == 0 && world_.hide_emitters) return;
@@ -278,9 +279,9 @@ auto PathTracer<F, Light>::start_medium() const -> Within {
   return in;
 }
 
-// The media on the side of the surface that w points to, for a path that arrives along `from` through the
-// media `in`. Null surfaces that coincide with this one are crossed together with it; only scenes with
-// F.overlaps have any.
+// Returns the media on the side of the surface that w points to, for a path that arrives along `from` through
+// the media `in`. Null surfaces that coincide with this surface are crossed together with it; there are such
+// surfaces only with F.overlaps.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::beyond(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& w,
                                   const V3& from, Within in) const -> Within {
@@ -304,9 +305,10 @@ void PathTracer<F, Light>::stand(const SurfaceInfo& s, bool outside, bool throug
   if (s.transition) in.only(outside ? s.exterior : s.interior);
 }
 
-// Returns the primitives that coincide with the hit one, for a ray that arrives along `from` and continues
-// along w. A short ray finds them: it begins in front of everything that may coincide with the surface, but
-// not behind the original ray's origin, and ends at the origin of the continued ray.
+// Returns the primitives that coincide with the primitive of `hit`, for a ray that arrives along `from` and
+// continues along w. A short ray finds them. It begins before the surface, by the offset that covers
+// everything that coincides with it, but not before the origin of the ray that arrives. It ends at the origin
+// of the ray that continues.
 template <Features F, template <Features> class Light>
 CoincidentHits PathTracer<F, Light>::others_at(const SurfaceHit& hit, const V3& from, const V3& w) const {
   const V3 back = offset_point(hit, -w) - hit.p;
@@ -317,9 +319,10 @@ CoincidentHits PathTracer<F, Light>::others_at(const SurfaceHit& hit, const V3& 
   return all;
 }
 
-// The media after crossing the hit surface and all null surfaces that coincide with it. All boundaries that
-// the path leaves are handled before those that it enters. Otherwise the path would for a moment be inside
-// more boundaries than there are at any point: two cells of one mesh that share a wall are one boundary.
+// Returns the media after crossing the hit surface and all null surfaces that coincide with it. The
+// boundaries that the path leaves are handled before those that it enters. Otherwise, where two cells of one
+// mesh share a wall, the path would for a moment be inside the mesh's boundary twice, as it is at no point of
+// the scene.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::through_all(const SurfaceHit& hit, const V3& w, const V3& from, Within in) const
     -> Within {
@@ -338,11 +341,11 @@ auto PathTracer<F, Light>::through_all(const SurfaceHit& hit, const V3& w, const
   return in;
 }
 
-// If `hit` is on a null surface that coincides with a scattering surface, replaces it by the hit on the
-// scattering one; the ray from o along d may have found either of them first. If the null surface were used,
-// the boundary of fog on a floor would let light through the floor, and a pane of glass on a null boundary
-// would not attenuate the light. Surfaces beyond t_max are ignored: shadow rays end there, in front of the
-// surface of their light.
+// If `hit` is on a null surface that coincides with a scattering surface, replaces it by the ray's hit on the
+// scattering surface. The ray from o along d may have found either of them first. If the null surface were
+// used, the boundary of fog on a floor would let light through the floor, and a pane of glass on a null
+// boundary would not attenuate the light. Surfaces beyond t_max are ignored: shadow rays end there, in front
+// of the surface of their light.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max) const {
   const SurfaceInfo& s = world_.geometry.surfaces[hit.surface];
@@ -359,8 +362,8 @@ void PathTracer<F, Light>::prefer_scatterer(SurfaceHit& hit, const V3& o, const 
   }
 }
 
-// Adds the emission of all null surfaces that coincide with the hit one; the ray may have found any of them.
-// Next-event estimation, against which this light is weighted, finds all of them too.
+// Adds the emission of all null surfaces that coincide with the surface of `hit`. The ray has found only one
+// of these surfaces, but next-event estimation, against which their light is weighted, finds all of them.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_emission_of_others(const SurfaceHit& hit) {
   const CoincidentHits others = others_at(hit, ray_.d, ray_.d);

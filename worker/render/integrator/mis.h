@@ -1,6 +1,6 @@
 // MIS weights for two strategies that sample the same light, computed from their densities (Veach 1997,
-// section 9.2). Any weights that add up to 1 are unbiased, so a wrong weight shows only in the variance, not
-// in the mean. Therefore the tests check the weights and second moments
+// section 9.2). Any weights that add up to 1 give unbiased results, so a wrong weight shows only in the
+// variance, not in the mean. Therefore the tests check the weights and second moments
 // (tests/unit/render/integrator/mis_test.cpp).
 #pragma once
 

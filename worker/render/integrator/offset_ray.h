@@ -14,9 +14,10 @@ namespace ls::render {
 // The part of a ray from the path's current position, in a medium, to the next surface.
 struct Segment {
   float length;  // infinite if the ray hits no surface
-  // The part of the length between the path's position and the offset origin of the ray
+  // Signed distance along the ray from the path's position to the ray's origin, which is offset from the
+  // surface (OffsetRay::lead)
   float lead;
-  const SurfaceHit* end;  // hit on the surface at the end; nullptr: there is none
+  const SurfaceHit* end;  // hit on the surface at the end; null if the ray hits no surface
 };
 
 struct OffsetRay {
@@ -25,9 +26,10 @@ struct OffsetRay {
   // Signed distance from `start` to `origin` along the ray; negative if `origin` was moved backwards.
   float lead() const { return dot(origin - start, d); }
 
-  // The length from `start` to the surface that the ray from `origin` hit. If `origin` is farther from that
-  // surface than `start` (because a vertex in a medium was moved away from this surface), the length is
-  // measured to the surface's plane.
+  // Returns the length from `start` to the surface that the ray from `origin` hit at `hit`. It is the ray's
+  // length plus lead(). If lead() is negative (because `origin`, a vertex in a medium, was moved away from
+  // this surface), it is the distance along the ray from `start` to the tangent plane at the hit, but at most
+  // the ray's length.
   float length_to(const SurfaceHit& hit) const {
     const float ahead = lead();
     if (ahead < 0) [[unlikely]]
@@ -35,9 +37,9 @@ struct OffsetRay {
     return hit.t + ahead;
   }
 
-  // The point p, which is at distance t on the segment s, moved off the surfaces at both ends of the segment.
-  // It is kept as far from them as the origin of a ray that leaves them, so that rounding cannot put it on
-  // their other side.
+  // Moves the point p, which is at distance t on the segment s, off the surfaces at both ends of the segment.
+  // The result is at least as far from them as the origins of rays that leave them, so that rounding cannot
+  // put it on their other side.
   V3 moved_off_ends(V3 p, Segment s, float t) const {
     const V3 from_end = s.end ? missing_offset(offset_point(*s.end, -d) - s.end->p, p - s.end->p) : V3(0);
     if (s.lead > 0) p += missing_offset(origin - start, d * t);
@@ -61,18 +63,18 @@ struct OffsetRay {
   }
 
  private:
-  // Returns the part of a surface's offset (the vector by which rays that leave it are moved) that a point
-  // still needs if it is displaced by `from_surface` from the surface. Zero if the point is far enough from
-  // the surface; more than the whole offset if it is behind the surface. A point may be behind a curved
-  // surface, because the length was measured along the line from `origin`, and a grazing line from `start`
-  // crosses the surface earlier.
+  // `offset` is the vector by which rays that leave a surface are moved off it, and `from_surface` leads from
+  // a point of the surface to p. Returns the part of the offset that has to be added to p so that p is as far
+  // from the surface as such rays. It is zero if p is far enough from the surface, and longer than `offset`
+  // if p is behind the surface. p may be behind a curved surface, because the segment's length was measured
+  // along the line from `origin`, and a grazing line from `start` crosses the surface earlier.
   static V3 missing_offset(const V3& offset, const V3& from_surface) {
     const float share = dot(from_surface, offset) / dot(offset, offset);
     return share < 1 ? offset * (1 - share) : V3(0);
   }
-  // For a ray that points back at the surface from which its origin was moved away, but ends before it (lead
-  // < 0): returns the displacement that puts the point at distance t as far from the surface's plane as
-  // `origin` is.
+  // Used if lead() < 0, that is, if `origin` was moved away from a surface that the ray approaches, and if
+  // the path stops well before this surface. Returns the displacement that puts the point at distance t as
+  // far from the plane through `start` perpendicular to the offset as `origin` is.
   V3 remaining_lead(float t) const {
     const V3 offset = origin - start;
     return offset * (1 - t * dot(offset, d) / dot(offset, offset));

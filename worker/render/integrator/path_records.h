@@ -1,5 +1,6 @@
-// The results of paths: the radiance and its components, data for AOVs, what learning paths record, and the
-// tails that the paths of several pixels share.
+// The results of paths: the radiance and its components, data for AOVs, what learning paths record (paths
+// that are traced before the first sample: light_paths.h), and the tails that the paths of several pixels
+// share.
 #pragma once
 
 #include <array>
@@ -64,9 +65,10 @@ constexpr LightPart part_of(int scatterings, bool first_in_medium) {
   return scatterings == 1 ? LightPart::surface_once : LightPart::surface_again;
 }
 
-// Data for paths of a scene with Features::connected, in addition to the world.
+// Data, in addition to the world, for paths with Features::connected: paths whose vertices are connected to
+// light vertices (points that the sun lights: light_vertices.h), and paths that learn.
 struct Connections {
-  const LightVertices* vertices = nullptr;  // null: paths are not connected
+  const LightVertices* vertices = nullptr;  // null if paths are not connected
   // What learning paths record about the light that connections, portals or local lights could find.
   // `learner` is null for other paths.
   struct Learner {
@@ -79,8 +81,8 @@ struct Connections {
     bool media_differ = false;
     bool keeps_sky = false;  // true if the light of the sky that vertices found is kept in `sky`
     std::vector<Portals::Found> sky;
-    double scatterings = 0;     // number of vertices
-    double left = 0;            // number of those that the path left towards the sky
+    double scatterings = 0;     // number of all vertices of the paths
+    double left = 0;            // number of vertices that paths left towards the sky
     bool keeps_lights = false;  // true if each vertex samples all lights and keeps their light in `lights`
     LightVisits lights;
 
@@ -97,19 +99,20 @@ inline constexpr std::size_t kMostSharing = 64;
 
 struct PathVertex {
   V3 p{0, 0, 0};
-  const Medium* medium = nullptr;  // null: on a surface, at `hit`
+  const Medium* medium = nullptr;  // null if the vertex is on a surface, at `hit`
   SurfaceHit hit;
 };
 
 // The first vertex of a path, which is connected to the second vertices of other paths.
 struct FirstVertex {
-  bool usable = false;  // false: there is none, or it scatters by delta lobes alone
+  bool usable = false;  // false if there is no first vertex or it scatters by delta lobes alone
   PathVertex at;
-  V3 d{0, 0, 0};        // the direction of travel before the vertex
-  C3 beta{0, 0, 0};     // the weight of the path up to the vertex
-  C3 density{1, 1, 1};  // the path's density with each channel as the hero (medium.h), over their mean
-  OneMedium around;     // the medium in front of the vertex
-  int passed = 0;       // surfaces passed straight through between the camera and the vertex
+  V3 d{0, 0, 0};     // the direction of travel before the vertex
+  C3 beta{0, 0, 0};  // the weight of the path up to the vertex
+  // The path's density with each channel as the hero (medium.h), divided by the mean of the three densities
+  C3 density{1, 1, 1};
+  OneMedium around;  // the medium in front of the vertex
+  int passed = 0;    // surfaces passed straight through between the camera and the vertex
   // A cache for a diffuse surface: the BSDF for a direction along the normal, on the normal's side [0] or on
   // the other [1]; nullopt if it was not evaluated yet.
   std::array<std::optional<BsdfEval>, 2> by_side;
@@ -117,15 +120,17 @@ struct FirstVertex {
 
 // The second vertex of a path, and the light that arrives there.
 struct SharedTail {
-  bool usable = false;  // false: there is none, or it was not sampled by a smooth lobe
+  // False if there is no second vertex, or if the direction to it was sampled by a delta lobe
+  bool usable = false;
   PathVertex at;
   int passed = 0;  // surfaces passed straight through between the camera and the vertex
-  // Along the way from the path's own first vertex: the optical depth of the media in each channel, the null
-  // transmission of the surfaces, and the probability of passing them.
+  // For the way from the path's own first vertex to the second: `depth` is the optical depth of the media, by
+  // channel, `transmission` the null transmission of the surfaces, and `passing` the probability of passing
+  // straight through all of these surfaces.
   C3 depth{0, 0, 0}, transmission{1, 1, 1};
   float passing = 1;
 
-  // Light found by next-event estimation; light_pdf = 0: none.
+  // The light that next-event estimation found at the second vertex; light_pdf is 0 if it found none.
   V3 to_light{0, 0, 0};
   float light_pdf = 0;
   bool light_is_delta = false;
@@ -145,16 +150,20 @@ struct SharedTail {
 // The state of a path that records its first vertex and its tail.
 struct SharingPath {
   enum class Part : std::uint8_t {
-    alone,   // before the first vertex, and where light counts for this pixel only
+    alone,   // before the first vertex, and from there on if the path has no tail to share
     second,  // on the way from the first vertex to the second
     tail,    // from the second vertex on
   };
   Part part = Part::alone;
   FirstVertex first;
   SharedTail tail;
-  C3 scale{1, 1, 1};   // the factor of light that counts for this pixel only
-  float survival = 1;  // factor of the throughput that Russian roulette compares (size())
-  // look_at() sets these two for the shadow ray that it traces:
+  // The path's weight up to its first vertex, scattering included, once the path is on the way to the second.
+  // The weight is then no longer part of the path tracer's beta_, and multiplies light that counts for this
+  // pixel only.
+  C3 scale{1, 1, 1};
+  // The part of the throughput that is no longer in beta_. Russian roulette multiplies beta_ by it (size()).
+  float survival = 1;
+  // look_at() sets `flight` and `crossed` for the shadow ray that it traces:
   C3 flight{1, 1, 1};  // the transmittance of its media times the probability of passing its surfaces
   int crossed = 0;     // number of surfaces that it passed
 };

@@ -31,7 +31,8 @@
 
 namespace ls::render {
 
-// If the path's current vertex is at depth 1, records it as the path's first vertex.
+// Records the path's current vertex as its first vertex, if the path was never scattered before (depth_ is
+// 1).
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::begin_sharing(const SurfaceHit* hit, const Medium* medium) {
   FirstVertex& first = sharing_.first;
@@ -168,7 +169,8 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
   end.target = y.p;
   if (!y.medium) {
     const V3 back = y.hit.shading.to_local(-w);
-    // A path from x would use the geometric normal at y, because the shading normal faces away from it
+    // If the shading normal at y faces away from x, a path from x would have the geometric normal in its
+    // place at y (SurfaceHit::normal_replaced), and so another BSDF. It cannot use this tail.
     if ((back.z > 0) != (dot(w, y.hit.ng) < 0)) return look;
     cosine = std::abs(dot(w, y.hit.ng));
     end.target = offset_target(y.hit, x.at.p, -w);
@@ -189,7 +191,7 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
     passed_ = x.passed;
     sharing_.flight = C3(1);
     sharing_.crossed = 0;
-    // Without media unoccluded() draws no random numbers
+    // The stream is not used without media, where unoccluded() draws no random numbers
     RandomStream stream(0);
     if constexpr (F.media) stream = stream_.stream(1, Purpose::track_connect);
     through = unoccluded(x.at.p, origin, end, around, stream);
@@ -232,7 +234,8 @@ class PathTracer<F, Light>::TowardsGroup {
     const PathVertex& y = giver.sharing_.tail.at;
     diffuse_ = !y.medium && giver.world_.geometry.surfaces[y.hit.surface].diffuse;
   }
-  // Returns the value towards a first vertex; d is the direction from that vertex to the second vertex.
+  // Returns the BSDF or phase function towards a first vertex; d is the direction from that vertex to the
+  // second vertex.
   BsdfEval operator()(const V3& d) {
     const PathVertex& y = giver_.sharing_.tail.at;
     const float z = diffuse_ ? dot(y.hit.shading.n, d) : 0;
@@ -272,8 +275,8 @@ template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::share(std::span<PathTracer* const> group) {
   struct Seen {
     Look look;
-    // BSDF or phase function at the tail's vertex, towards this path: for light from the light source and for
-    // light that arrives along the tail
+    // The BSDF or phase function at the tail's vertex, towards this path's first vertex: `lit` for the light
+    // that next-event estimation found, `onward` for the light that arrives along the tail
     C3 lit, onward;
   };
   boost::container::static_vector<Seen, kMostSharing> seen(group.size());
@@ -281,7 +284,7 @@ void PathTracer<F, Light>::share(std::span<PathTracer* const> group) {
   for (PathTracer* const giver : group) {
     const SharedTail& tail = giver->sharing_.tail;
     if (!tail.usable || !tail.brings_light()) continue;
-    float lit = 0, scattered = 0, emitted = 0;  // sums of densities
+    float lit = 0, scattered = 0, emitted = 0;  // denominators, sums over k, of the estimates of light
     TowardsGroup from_light(*giver, tail.to_light), from_onward(*giver, tail.onward);
     for (std::size_t k = 0; k < group.size(); ++k) {
       Seen& s = seen[k];
@@ -309,7 +312,8 @@ void PathTracer<F, Light>::share(std::span<PathTracer* const> group) {
       group[k]->add_shared(s.look.value * light);
     }
   }
-  // If a path was cut off, its tail is missing in all pixels of the group, so all samples are rejected
+  // If a path was cut off (SampleOutcome::cut_off), all samples of the group are rejected, since the light of
+  // its tail is missing in all of them
   for (const PathTracer* giver : group) {
     if (giver->outcome_.cut_off == HealthCause::none) continue;
     for (PathTracer* path : group) path->outcome_.reject(giver->outcome_.cut_off);

@@ -54,9 +54,9 @@ inline constexpr int kMaxShadowSegments = 1 << 16;
 inline constexpr int kForcedRouletteDepth = 1024;
 inline constexpr int kLastRouletteDepth = 1 << 16;
 inline constexpr float kLastSurvival = 1 - 0x1p-14f;
-// In media that lose no light, light subpaths would be so long that their vertices fill the memory. So from
-// kMostUnforced scatterings on, a light subpath survives each scattering with probability kForcedLight at
-// most.
+// In media that lose no light, light subpaths (paths from the sun) would be so long that their vertices fill
+// the memory. So from kMostUnforced scatterings on, a light subpath survives each scattering with probability
+// kForcedLight at most.
 inline constexpr int kMostUnforced = 8;
 inline constexpr float kForcedLight = .5f;
 constexpr float forced_survival(int depth) {
@@ -87,9 +87,11 @@ class PathTracer {
   // The first surface at which the path would be scattered if there were no media. The AOVs describe this
   // surface.
   std::optional<FirstSurface> first_surface(const CameraRay& ray);
-  // Follows the ray through boundaries, mirrors and clear glass to the first surface that is none of these.
+  // Returns the albedo and the normal of the first surface that is not an index-matched boundary, a mirror or
+  // clear glass, seen through the surfaces before it.
   DenoisingGuide denoising_guide(const CameraRay& ray);
   // With F.connected: follows a ray of the sun, and calls keep(vertex) for each light vertex on its way.
+  // Camera paths are connected to light vertices (light_vertices.h).
   template <class Keep>
   void follow_light(const SunMap::Ray& ray, const Keep& keep);
   // With F.reuse: share() adds to each path the light that all paths found from their second vertices on. The
@@ -109,11 +111,13 @@ class PathTracer {
   static constexpr bool kSplits = F.grids && !F.connected && !F.reuse;
   struct Vertex {  // where the current ray was scattered
     V3 p{0, 0, 0};
-    LightPlace place;   // the place by which lights are chosen
-    V3 ng{0, 0, 0};     // with F.connected: the geometric normal
-    float pdf = 0;      // density of the sampled direction
-    bool delta = true;  // sampled by a delta lobe or the camera: lights that are hit have full weight
-    float sum = 0;      // with F.connected: SubpathDensities::sum()
+    LightPlace place;  // the point and normal for which lights are chosen
+    V3 ng{0, 0, 0};    // with F.connected: the geometric normal
+    float pdf = 0;     // density, per steradian, of the sampled direction
+    // True if a delta lobe or the camera sampled the direction. Lights that the ray hits then have full
+    // weight.
+    bool delta = true;
+    float sum = 0;  // with F.connected: SubpathDensities::sum() of the path up to here
     typename Light<F>::Vertex in_medium;
   };
 
@@ -168,7 +172,7 @@ class PathTracer {
                                                       const SurfaceInfo& surface, const V3& wo);
   template <class LookFor>
   void learn_lights(const LightPlace& place, const LookFor& look_for);
-  // The place by which lights are chosen for the segment ahead.
+  // Returns the place in the medium for which lights are chosen on the segment ahead.
   LightPlace place_on(const Segment& segment) const {
     return {Lights::place_on(ray_.start, ray_.d, segment.length), V3(0)};
   }
@@ -189,7 +193,8 @@ class PathTracer {
                                                       float left, Within medium, RandomStream stream);
   C3 through_media(const Within& media, const V3& from, const V3& d, float t, RandomStream& stream) const;
   Within start_medium() const;
-  // `surface` is the surface of `hit`.
+  // Requires that `surface` is the surface of `hit`. The function is described at its definition
+  // (medium_crossing.h).
   [[gnu::always_inline]] inline Within beyond(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& w,
                                               const V3& from, Within in) const;
   void stand(const SurfaceInfo& s, bool outside, bool through, Within& in) const;
@@ -198,7 +203,7 @@ class PathTracer {
   [[gnu::noinline]] void prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max) const;
   [[gnu::noinline]] void add_emission_of_others(const SurfaceHit& hit);
   bool survives(float u);
-  // The throughput that decides whether Russian roulette ends the path.
+  // Returns the throughput by which survives() decides whether Russian roulette may end the path.
   float size() const;
   void refer_to_first_vertex();
   void prefetch_light_vertices() const {
@@ -209,9 +214,10 @@ class PathTracer {
   void connect_on(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo);
   template <class Scattering>
   void connect(const Receiver& x, const V3& start, const Scattering& scattering);
-  // Density of the light vertices that the sun lights directly, times the number of light vertices among
-  // which a connection chooses. It is per area of a surface with normal ng or, in a medium (ng = 0), per area
-  // perpendicular to the sun's rays. `rays` is the density of these rays, per area perpendicular to them.
+  // Returns the density of the light vertices that the sun lights directly, times the number of light
+  // vertices among which a connection chooses. The density is per area of a surface with normal ng or, in a
+  // medium (ng = 0), per area perpendicular to the sun's rays. `rays` is the density with which rays from the
+  // sun are traced, per area perpendicular to them.
   float first_density(float rays, const V3& ng) const {
     return world_.connections_per_ray * rays * (is_black(ng) ? 1 : std::abs(dot(ng, world_.sun.direction)));
   }
@@ -221,7 +227,8 @@ class PathTracer {
   struct Look {
     V3 w{0, 0, 0};      // the direction towards the second vertex
     C3 value{0, 0, 0};  // light at the camera per radiance that the second vertex scatters towards the first
-    float density = 0;  // density, per area or volume, with which this path finds the second vertex; 0: never
+    // The density, per area or volume, with which this path finds the second vertex; 0 if it cannot find it
+    float density = 0;
   };
   void begin_sharing(const SurfaceHit* hit, const Medium* medium);
   void look_for_second();
@@ -240,7 +247,7 @@ class PathTracer {
     if constexpr (F.reuse) return sharing_.part == SharingPath::Part::second;
     return false;
   }
-  // True on the path's way from its second vertex to the next one.
+  // True while the path is on the way from its second vertex to its third.
   bool is_leaving_second() const { return sharing_.part == SharingPath::Part::tail && depth_ == 2; }
   void keep_emitted(const C3& emitted, float pdf);
 
@@ -273,7 +280,7 @@ class PathTracer {
     add(light);
   }
 
-  // Adds light to the sample, already multiplied by the throughput. If `ahead`, it was scattered once more
+  // Adds `weighted`, light multiplied by beta_, to the sample. If `ahead`, this light was scattered once more
   // than the path so far, in the medium on the path's next segment.
   void add(const C3& weighted, bool ahead = false) {
     C3 light = weighted;
@@ -302,28 +309,29 @@ class PathTracer {
   LightSplit* split_;
   OffsetRay ray_;
   C3 beta_{1, 1, 1}, density_{1, 1, 1};
-  // Russian roulette may end the path if its throughput is below this (roulette.h). If it depends on the
-  // first vertex, it is kNoReference before that vertex.
+  // Russian roulette may end the path if its throughput is below reference_ (roulette.h). In worlds where
+  // reference_ depends on the path's first vertex, it is kNoReference before that vertex.
   float reference_ = 1;
   static constexpr float kNoReference = -1;
-  float eta_scale_ = 1;  // cancels the radiance scaling of refraction in Russian roulette
+  // Factor by which size() cancels the scaling of radiance by the path's refractions
+  float eta_scale_ = 1;
   int hero_ = 0;
   int depth_ = 0;                 // scatterings so far
   int passed_ = 0;                // null boundaries and null-transmitting surfaces passed so far
   std::uint64_t boundaries_ = 0;  // with F.connected: number of boundaries that shadow rays passed
-  int segment_ = 0;               // number of rays so far; behind each passed surface a new one begins
+  int segment_ = 0;               // number of the current ray; a new ray begins behind each passed surface
   Within medium_;
-  bool looked_for_sky_ = false;   // true if the first vertex sampled a second direction (look_for_sky)
+  bool looked_for_sky_ = false;   // true if look_for_sky() sampled a second direction at the first vertex
   bool first_in_medium_ = false;  // with F.split: true if the first scattering was in a medium
   Vertex last_;
-  SubpathDensities densities_;  // with F.connected: of the path up to the current vertex
+  SubpathDensities densities_;  // with F.connected: those of the path up to the current vertex
   Connections connections_;
   SampleOutcome outcome_;
   MediumCounters counters_;
-  // With F.aimed: near_lamps_ is the distribution of directions near lamps at the current vertex, and aim_
-  // the density of the BSDF or phase function divided by the density with which the last direction was
-  // sampled. Russian roulette excludes this factor: the closer a direction is to a lamp, the smaller the
-  // factor is and the brighter the light that the direction leads to.
+  // With F.aimed: near_lamps_ is the distribution from which the current vertex samples directions close to
+  // lamps (lights without extent), and aim_ is the density of the BSDF or phase function divided by the
+  // density with which the last direction was sampled. Russian roulette excludes this factor: the closer a
+  // direction is to a lamp, the smaller the factor is and the brighter the light that the direction leads to.
   LampDirections near_lamps_;
   float aim_ = 1;
   struct Nothing {};
@@ -414,8 +422,9 @@ void PathTracer<F, Light>::go_on(float t_max) {
   outcome_.majorant_violations += counters_.majorant_violations;
 }
 
-// The path passes every index-matched surface, and each null-transmitting one with its probability. It uses
-// the random numbers of trace() for the same ray, as long as both hit the same surfaces.
+// The path passes every index-matched surface, and each null-transmitting surface with that surface's
+// probability. As long as the ray hits the same surfaces as in trace(), the decisions use the same random
+// numbers as there.
 template <Features F, template <Features> class Light>
 std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay& ray) {
   ray_ = {ray.o, ray.o, ray.d};
@@ -488,7 +497,8 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
   return guide;
 }
 
-// Next-event estimation at a surface. wo is the direction back along the path, in the local frame.
+// Adds the light that next-event estimation finds at a surface. wo is the direction back along the path, in
+// the shading frame of `hit`.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];

@@ -19,7 +19,8 @@
 namespace ls::render {
 namespace {
 
-// The variants of `volpath` and `path` without the features of the lists in variant.h.
+// The variants of the integrators `volpath` and `path` without Features::aimed, connected and reuse. Variants
+// with these features have lists of their own (variant.h).
 std::span<const Variant> plain_variants() {
   static const Variant kVariants[] = {
       variant<Features{}>("surfaces"),
@@ -99,8 +100,9 @@ class Samples {
   }
 
  private:
-  // The set of light vertices of the previous even sample or of the previous odd one. A lookup in the
-  // LightVertexCache is needed only when the set changes.
+  // A set of light vertices that is kept from one sample to the next, so that it has to be looked up in the
+  // LightVertexCache only when the set changes. kept_[0] is for samples with even numbers, kept_[1] for odd
+  // ones.
   struct Kept {
     std::uint64_t set = 0;
     std::shared_ptr<const LightVertices> vertices;
@@ -132,7 +134,7 @@ class Samples {
   }
 
   struct Rendered {
-    std::vector<SampleOutcome> outcomes;  // of all samples of a block; entry sample * pixels + pixel
+    std::vector<SampleOutcome> outcomes;  // all samples of a block; index: sample * pixels + pixel
     std::vector<LightSplit> splits;
   };
   void render(const SharingBlock& block, Rendered& r) {
@@ -160,8 +162,10 @@ class Samples {
   SampleRange range_;
   Breadcrumb* crumb_;
   std::array<Kept, 2> kept_;
-  int row_ = -1;                    // row of the blocks in `blocks_`
-  std::map<int, Rendered> blocks_;  // by column
+  // With Features::reuse: the rendered blocks (SharingBlock) of the row of blocks `row_`; the key is the
+  // block's column
+  int row_ = -1;
+  std::map<int, Rendered> blocks_;
 };
 
 struct PixelSums {
@@ -184,8 +188,8 @@ PixelSums render_pixel(Samples& samples, int x, int y, SampleRange range, Health
     aovs.begin_sample();
     const SampleOutcome out = samples.of(x, y, s, aovs.split());
     aovs.end_sample(x, y, s, usable(out));
-    // A bad sample is counted in the health and contributes zero to the pixel. It remains one of the pixel's
-    // N samples and is never replaced.
+    // A sample that is not usable is counted in `health` and contributes zero to the pixel. It remains one of
+    // the samples by whose number the pixel's sum is divided; no other sample replaces it.
     if (!clean(out)) [[unlikely]] {
       count(out, {x, y, s}, health);
       if (!usable(out)) continue;

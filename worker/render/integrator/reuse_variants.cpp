@@ -22,13 +22,15 @@ constexpr std::size_t kSharing = kUsualPathReuse;
 // pixel, as many as a quick image has. With fewer samples, a larger part of the noise would come from edges
 // and soft shadows, which sharing does not reduce.
 constexpr std::uint64_t kSharingPilotSeed = 0x5eed0f9a7e;
-constexpr std::uint64_t kPilotGroups = 64;  // at most
+constexpr std::uint64_t kPilotGroups = 64;  // the largest number of groups
 constexpr std::uint64_t kFewestPilotGroups = 4;
 // One group is rendered for this many pixels of the frame, so that the pilot takes about as long as one
 // sample of each pixel.
 constexpr std::uint64_t kPixelsPerGroup = 1024;
 constexpr std::uint64_t kPilotSamples = 32;
-constexpr int kPilotDepth = 32;  // segments; paths in a white and dense medium have thousands
+// Largest number of segments of a pilot's path. Without a limit, paths in a white and dense medium have
+// thousands.
+constexpr int kPilotDepth = 32;
 // Sharing pays if the noise (squared relative error) without it is more than this many times the noise with
 // it. A shared sample takes 1.4 to 2.4 times as long (docs/decisions/0036-path-reuse.md). The limit is low
 // because the few pixels of the pilot rarely show the rare bright paths that sharing helps most.
@@ -43,7 +45,8 @@ class Pilot {
   Pilot& operator=(const Pilot&) = delete;
   ~Pilot() { w_.reuse = 0; }
 
-  // Sums of squared relative errors; not `usable` if a sample was rejected.
+  // Sums of squared relative errors of the same pixels, rendered with shared paths (`shared`) and without
+  // (`alone`). `usable` is false if a sample was rejected; the sums are then meaningless.
   struct Noise {
     double shared = 0, alone = 0;
     bool usable = true;
@@ -77,7 +80,8 @@ class Pilot {
     Noise noise;
     for (std::size_t k = 0; k < group.size(); ++k)
       for (int c = 0; c < 3; ++c) {
-        // The mean of both kinds of samples: a rare bright sample of one kind makes errors of both count less
+        // Errors are relative to the mean of both kinds of samples. So a rare bright sample of one kind
+        // reduces the relative errors of both kinds.
         const double mean =
             (shared[k][0][c] + shared[k][1][c] + alone[k][0][c] + alone[k][1][c]) / (2 * kPilotSamples);
         const double weight = 1 / (mean * mean + kRelMseDenominator);
@@ -89,7 +93,8 @@ class Pilot {
   }
 
  private:
-  using Halves = std::array<V3d, 2>;  // sums of samples
+  // Sums of a pixel's samples: [0] of those with even numbers, [1] of the others
+  using Halves = std::array<V3d, 2>;
 
   World& w_;
   const PilotSettings settings_;
@@ -139,15 +144,17 @@ void share_tails(const IntegratorSettings& settings, int threads, World& w) {
   const auto sharing =
       std::ranges::find_if(variants, [&](const Variant& v) { return v.covers.covers(need); });
   if (settings.path_reuse < 0 || settings.path_reuse == 1 || sharing == variants.end()) return;
-  // A tail keeps only one density of next-event estimation for a light that its path hits
-  // (SharedTail::hit_pdf). So next-event estimation may sample at most one of the lights that paths hit when
-  // they leave the scene.
+  // A tail keeps only one density (SharedTail::hit_pdf) with which next-event estimation finds the light that
+  // the tail's ray hits. A ray that leaves the scene may hit several lights: the sky and suns with an extent.
+  // So paths are shared only if next-event estimation samples at most one of these.
   if (!w.lights.single_environment_sample() || !w.depth_allows(2)) return;
-  // With Russian roulette at the first vertex, the densities would have to contain its probabilities
+  // Paths are not shared if Russian roulette may end them at the first vertex: the densities of second
+  // vertices would have to contain the probability of survival
   if (w.rr_depth < 2) return;
   for (const SurfaceInfo& s : w.geometry.surfaces)
-    // Rays from two sides may find different media behind an open boundary. A path may pass several surfaces
-    // that emit light, but a tail keeps the light of only one.
+    // Paths are not shared if a medium has an open boundary, behind which rays from different sides may find
+    // different media; nor if rays pass straight through surfaces that emit light, since a tail's ray may
+    // then hit several of them, but a tail keeps the light of only one.
     if ((s.transition && s.sheet) || ((s.null || s.null_transmission) && s.light != kNone)) return;
   const bool automatic = settings.path_reuse == 0;
   if (automatic && !sharing_pays(w, *sharing, threads)) return;

@@ -4,16 +4,16 @@
 //
 // There are two densities for points. (D) depth: a truncated exponential; in grids it uses the mean densities
 // of the macro cells (optical_depth.h) and is mixed with a uniform density. (A) angle: equi-angular about the
-// light. Some points are sampled with (D), others with (A). Their MIS weights are computed from the densities
-// e_D and e_A by World::heuristic. (A) requires a light with a position and a finite segment; otherwise (D)
-// is used alone.
+// light. Some points are sampled with (D), others with (A). Their MIS weights are computed by
+// World::heuristic from e_D and e_A, the densities of (D) and (A). (A) requires a light with a position and a
+// finite segment; otherwise (D) is used alone.
 //
 // Phase-function sampling that hits a light is a third strategy. With f(t) the density of flights (in grids
 // that of the macro cells' means) and p_l, p_s the solid-angle densities of light and phase sampling,
 // next-event estimation gets the weight e p_l / (e p_l + f p_s), where e is the sum of the densities used. In
 // place of e and f any functions of the path alone would give unbiased results; closer approximations of the
-// densities give less variance. Channels are combined as in path_tracer.h: densities are means over each
-// channel as the hero.
+// densities give less variance. Channels are combined as in path_tracer.h: each density is the mean of the
+// densities with each channel as the hero.
 #pragma once
 
 #include <algorithm>
@@ -82,17 +82,18 @@ class SegmentNee {
 
     static bool matters() { return true; }
   };
-  struct Vertex {  // default-constructed for a vertex that is not in a medium
+  // The data about a path's vertex. A vertex that is not in a medium has the default values.
+  struct Vertex {
     bool by_depth = true, by_angle = false;
     float depth_ratio = 1;  // the ratio e_D / f at this vertex
     float flight_pdf = 0, t = 0;
     V3 o{0, 0, 0}, d{0, 0, 0};
     float length = 0;
-    float points = 1;  // number of points of the segment sampled by depth; one more is sampled by angle
+    float points = 1;  // number of points that were sampled by depth on the segment that ends at the vertex
 
-    // False, because vertices on surfaces have this type too, and their lights are chosen otherwise. In media
-    // either answer gives the same probability, since worlds of this strategy never use the light tree there
-    // (Lights::use_tree_in_media).
+    // This type also describes vertices on surfaces, for which false is right. For vertices in media true
+    // would be right, but the probability of a light is the same in both cases, since the light tree is never
+    // used in media with this strategy (Lights::use_tree_in_media).
     static bool light_chosen_first() { return false; }
     float found_as_light() const { return std::min(points * depth_ratio, kMaxRatio); }
     float found_as_light(const Pivot& pivot) const {
@@ -138,13 +139,13 @@ class SegmentNee {
   }
 
   template <class Path>
-  // Does nothing, because ahead() has added all light
+  // Adds no light, because ahead() has already added all light scattered on the segment
   static void at_vertex(Path&, const Medium&, const V3&, const V3&) {}
 
  private:
-  // Returns the random numbers of point i out of `points`; `g` are those that a single point would use.
-  // Positions are stratified along the segment. The numbers that choose a light, and a point on it, advance
-  // by constant steps, modulo 1.
+  // Returns the random numbers of point i out of `points` points. `g` has the numbers that a single point
+  // would use. Positions are stratified along the segment. The numbers that choose a light, and a point on
+  // it, advance by constant steps, modulo 1.
   static Group point_of(const Group& g, int i, int points) {
     if (points == 1) return g;
     const auto k = static_cast<std::uint32_t>(i), n = static_cast<std::uint32_t>(points);
@@ -239,8 +240,8 @@ class SegmentNee {
     const bool both = choice.has_place && v.by_angle && v.by_depth;
     const float e_depth = at_point.rate * depth_pdf(path, medium, plan, at_point.x);
     if (both && !by_angle) e_angle = v.angle_pdf(pivot);
-    // The expected number of points per unit length at this point: of those sampled by depth, and of those
-    // sampled as this point was
+    // The expected numbers of points per unit length at this point: `by_depth` of all points sampled by
+    // depth, `own` of all points sampled by the strategy that sampled this point
     const float by_depth = e_depth * v.points;
     const float own = by_angle ? e_angle : by_depth;
     if (!(own > 0)) return;
@@ -273,7 +274,7 @@ class CameraSegmentNee {
 
  public:
   struct Plan {
-    std::optional<typename Points::Plan> points;  // nullopt: the default strategy
+    std::optional<typename Points::Plan> points;  // nullopt if the default strategy is used
     typename Single::Plan single;
 
     bool matters() const { return points || single.matters(); }

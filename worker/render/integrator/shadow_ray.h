@@ -9,9 +9,10 @@
 
 namespace ls::render {
 
-// The radiance that reaches `start` from the sampled light, attenuated by boundaries and media. p is `start`
-// moved off its surface after the light was sampled. The ray is re-aimed from p, so that it ends just before
-// the light and not on it.
+// Returns the radiance that reaches `start` from the sampled light, after attenuation by media and by
+// surfaces that light passes straight through. p is `start` moved off its surface. The light was sampled for
+// `start`, so for a light at a finite distance the ray gets a new direction and length: from p to
+// light.target, a point just in front of the light, so that the light itself does not block the ray.
 template <Features F, template <Features> class Light>
 C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSample& light,
                                     const Within& medium, RandomStream stream) {
@@ -35,9 +36,10 @@ C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSam
   return walk ? through_boundaries(light.radiance, start, p, d, left, medium, stream) : light.radiance;
 }
 
-// Returns `value` times the null transmission of surfaces and the transmittance of media along the ray from p
-// in the direction d, of length `left`. The ray must not be blocked by an opaque surface. `medium` contains
-// the media at the start of the ray; `start` is as in unoccluded().
+// Returns `value` times the transmittance of everything along the ray from p in the direction d, of length
+// `left`: of the media, and of the surfaces that light passes straight through (null transmission). No opaque
+// surface may block the ray. `medium` contains the media at the start of the ray. `start` is p before it was
+// moved off its surface; lengths in media are measured from there.
 template <Features F, template <Features> class Light>
 C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left,
                                             Within medium, RandomStream stream) {

@@ -1,4 +1,5 @@
-// The path tracers with Features::split of the integrators `volpath` and `volpath_distant_mis`.
+// The variants of the path tracer for the integrators `volpath` and `volpath_distant_mis` that also split the
+// radiance of each sample into light components (Features::split).
 #include "worker/render/integrator/segment_nee.h"
 #include "worker/render/integrator/variant.h"
 

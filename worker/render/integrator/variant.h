@@ -1,5 +1,6 @@
-// The variants of the path tracer: each is the path tracer compiled for one set of features and one
-// integrator. A scene is rendered with a variant that has all features that the scene needs.
+// The variants of the path tracer: each is the path tracer compiled for one set of features (features.h) and
+// one integrator. A scene is rendered with a variant that has all features that the scene needs. Light
+// components are the parts of a sample's radiance that were scattered in different ways (LightSplit).
 #pragma once
 
 #include <algorithm>
@@ -16,12 +17,14 @@
 
 namespace ls::render {
 
-// Renders one sample. The parameters are the world, the pixel's x and y in the image, the sample's index, the
-// light components (used only with Features::split) and the connections (only with Features::connected).
+// Renders one sample of a pixel. The parameters are the world, the pixel's x and y in the image, the sample's
+// index, the light components to which the sample's radiance is added (used only with Features::split), and
+// the light vertices to which paths are connected (used only with Features::connected).
 using SampleFn = SampleOutcome (*)(const World&, int, int, std::uint64_t, LightSplit*, Connections);
 
-// Renders sample number `sample` of several pixels, at most kMostTogether. The paths share the light that
-// they find, in groups of World::reuse pixels. `splits` has the light components of each pixel, or is empty.
+// Renders sample number `sample` of several pixels, at most kMostTogether. These are divided into groups of
+// World::reuse pixels; in a group each path also uses the light that the other paths found. `splits` has the
+// light components of each pixel, or is empty if they are not wanted.
 inline constexpr std::size_t kMostTogether = 256;
 struct PixelAt {
   int x, y;
@@ -32,7 +35,7 @@ struct Variant {
   Features covers;
   const char* name;
   SampleFn sample;
-  GroupFn group = nullptr;  // with Features::reuse: instead of `sample`
+  GroupFn group = nullptr;  // set with Features::reuse, and then used instead of `sample`
 };
 
 inline CameraRay camera_ray(const World& w, const SampleStream& stream, int x, int y) {
@@ -57,7 +60,8 @@ constexpr Variant variant(const char* name) {
 template <Features F>
 void group_with(const World& w, std::span<const PixelAt> pixels, std::uint64_t sample,
                 std::span<LightSplit> splits, std::span<SampleOutcome> outcomes) {
-  // Not arrays of optionals: the compiler would clear all of their bytes for each group
+  // These are static vectors and not arrays of std::optional, because the compiler would clear all bytes of
+  // such arrays at each call.
   boost::container::static_vector<PathTracer<F>, kMostTogether> paths;
   boost::container::static_vector<PathTracer<F>*, kMostTogether> sorted;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
@@ -78,16 +82,18 @@ constexpr Variant group_variant(const char* name) {
   return {F, name, nullptr, &group_with<F>};
 }
 
-// Pixels whose paths share their tails (path_reuse.h). The full frame is cut into squares (blocks). For each
-// sample the pixels of a block are put in random order and then divided into groups, so that two pixels are
-// rarely in the same group and their errors are nearly independent. Blocks begin at the corner of the full
-// frame and do not depend on tiles, so a tile or crop has the same pixels as the whole image.
+// A block of pixels whose paths share their tails, that is, the parts from the second vertex on
+// (path_reuse.h). The full frame is cut into squares, the blocks. For each sample the pixels of a block are
+// put in random order and then divided into groups, and the pixels of a group share. So two pixels are rarely
+// in the same group, and their errors are nearly independent. Blocks begin at the corner of the full frame
+// and do not depend on tiles, so a pixel has the same value in a tile, in a crop and in the whole image.
 class SharingBlock {
  public:
   static constexpr int kSide = 16;  // pixels
   static_assert(kSide * kSide <= kMostTogether);
 
-  // The block of a pixel of the image.
+  // Makes the block that contains this pixel, which is given by its place in the image (a crop of the full
+  // frame, or all of it).
   SharingBlock(const World& w, PixelAt pixel) : w_(w) {
     row_ = (pixel.y + w.origin_y) / kSide;
     column_ = (pixel.x + w.origin_x) / kSide;
@@ -102,8 +108,8 @@ class SharingBlock {
                                     column_ * kSide);
   }
   using Pixels = boost::container::static_vector<PixelAt, kMostTogether>;
-  // Returns the pixels of the block in a random order, which depends on the sample. Pixels may be outside the
-  // image if it is a crop.
+  // Returns the pixels of the block in a random order, which depends on the sample's index. If the image is a
+  // crop, some of the pixels may lie outside of it.
   Pixels in_order_of(std::uint64_t sample) const {
     Pixels order;
     for (int y = 0; y < height_; ++y)
@@ -116,25 +122,27 @@ class SharingBlock {
   }
 
  private:
-  static constexpr std::uint64_t kDealing = 0x6465'616c;  // keys the random numbers
+  // Sets these random numbers apart from others of the same seed.
+  static constexpr std::uint64_t kDealing = 0x6465'616c;
 
   const World& w_;
   int row_, column_, width_, height_;
 };
 
-// The variants of an integrator, cheapest first. The last one of each list also computes light components,
-// and has all features that the list supports.
+// Each function returns the variants of an integrator, cheapest first. The last variant of each list has all
+// features that the list supports, and also computes light components (Features::split).
 std::span<const Variant> distant_variants();  // of `volpath_distant_mis`
 std::span<const Variant> whitted_variants();  // of `whitted`, which ignores media
-// Those of `volpath` and `path` with Features::aimed.
+// The variants of `volpath` and `path` with Features::aimed.
 std::span<const Variant> aimed_variants();
-// Those with Features::connected. They support only grey media that neither overlap nor emit light.
+// The variants with Features::connected. They support only grey media that neither overlap nor emit light.
 std::span<const Variant> connected_variants();
-// Those with Features::reuse. They support only homogeneous media that neither overlap nor emit light.
+// The variants with Features::reuse. They support only homogeneous media that neither overlap nor emit light.
 std::span<const Variant> reuse_variants();
 
-// The last variants of the lists of `volpath`. They have source files of their own, because the compiler
-// inlines less into the variants of a file if these are among them.
+// The last variants of three lists: those of `volpath`, of aimed_variants() and of distant_variants(). They
+// are defined in source files of their own, because the compiler inlines less into the variants of a file if
+// these are among them.
 extern const Variant kSplitVariant, kAimedSplitVariant, kDistantSplitVariant;
 
 }  // namespace ls::render

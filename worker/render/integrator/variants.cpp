@@ -1,4 +1,5 @@
-// The path tracers of the integrator `whitted`, and those with Features::aimed or Features::connected.
+// The variants of the path tracer for the integrator `whitted`, and the variants with Features::aimed or
+// Features::connected.
 #include "worker/render/integrator/segment_nee.h"
 #include "worker/render/integrator/variant.h"
 

@@ -1,5 +1,7 @@
-// Part of path_tracer.h, which includes it: connects the vertices of a path to light vertices
-// (lights/light_vertices.h), and records what learning paths find (Connections::Learner).
+// Part of path_tracer.h, which includes it: connects the vertices of a camera path to light vertices, the
+// points at which paths from the sun were scattered (lights/light_vertices.h). Also records what learning
+// paths find (Connections::Learner). Learning paths are camera paths that are traced before the first sample
+// to find out where light comes from.
 #pragma once
 
 #include <algorithm>
@@ -12,10 +14,11 @@
 
 namespace ls::render {
 
-// Sets `densities_` (the subpath's share in the balance heuristic: SubpathDensities) for the vertex p, which
-// the path reaches from the vertex `from`. ng is the geometric normal if p is on a surface, and 0 in a
-// medium. `densities_` stays 0 if `from` is the camera or has scattered the path by a delta lobe: then no
-// connection of a shorter subpath finds the same path.
+// Sets `densities_` (SubpathDensities), from which the balance heuristic weights strategies, for the camera
+// subpath that ends at the vertex p. The path reaches p from the vertex `from`. ng is the geometric normal if
+// p is on a surface, and 0 in a medium. `densities_` stays 0 if `from` is the camera or has scattered the
+// path by a delta lobe. Then no strategy finds the same path with a shorter camera subpath, since it would
+// have to connect `from` to a light vertex.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::arrive(const Vertex& from, const V3& p, const V3& ng) {
   if (connections_.learner) ++connections_.learner->scatterings;
@@ -101,8 +104,8 @@ void PathTracer<F, Light>::connect_on(const SurfaceHit& hit, const SurfaceInfo& 
   connect(x, hit.p, OnSurface{*this, hit, surface, wo});
 }
 
-// Connects the vertex x to a light vertex and adds the light. `start` is the position of x before it was
-// moved off a surface; lengths in media are measured from there.
+// Connects the vertex x of the camera path to one light vertex, and adds the light that arrives this way.
+// `start` is the position of x before it was moved off its surface; lengths in media are measured from there.
 template <Features F, template <Features> class Light>
 template <class Scattering>
 void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Scattering& scattering) {
@@ -125,13 +128,17 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
   light.distance = std::sqrt(r2);
   light.radiance = C3(1);
   light.target = y.p;
-  // The densities with which, at y, a camera path samples the direction to the sun and a light path that to x
+  // At the light vertex y: cos_y is the cosine between the geometric normal and the connection (1 in media),
+  // camera_pdf the density with which a camera path that comes from x samples the direction to the sun, and
+  // light_pdf the density with which a light path samples the direction to x.
   float cos_y = 1, camera_pdf = 0, light_pdf = 0;
   if (y.medium == kNone) {
-    // Rejects the directions in which next-event estimation would not find the sun (light_surface)
+    // Next-event estimation does not find the sun in a direction that is on different sides of the shading
+    // normal and of the geometric normal ng (light_surface), so neither does a connection.
     const V3 to_x = y.hit.shading.to_local(-w), to_light = y.hit.shading.to_local(y.to_light);
     if ((to_light.z > 0) != (dot(y.to_light, y.hit.ng) > 0)) return;
-    if ((to_x.z > 0) != (dot(w, y.hit.ng) < 0)) return;  // a path from x would use ng as the shading normal
+    // A camera path that arrives from x would use ng instead of the shading normal.
+    if ((to_x.z > 0) != (dot(w, y.hit.ng) < 0)) return;
     cos_y = std::abs(dot(w, y.hit.ng));
     const BsdfIndex bsdf = world_.geometry.surfaces[y.hit.surface].bsdf;
     const BsdfEval f_y = world_.bsdfs.eval(bsdf, y.hit.uv_point(), to_x, to_light);
@@ -149,7 +156,8 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
   float from_light = 0;
   if (densities_.last > 0)
     from_light = light_pdf * scattering.cosine(w) * densities_sum([&] { return scattering.back(w); });
-  // The weight by the balance heuristic, times the factor 1 / r^2 of the geometric term
+  // The balance heuristic gives the weight r2 / (r2 + from_camera + from_light); the geometric term of the
+  // connection has the factor 1 / r2. This is their product.
   const float weight = 1 / (r2 + from_camera + from_light);
   C3 added = beta_ * value * y.light * (weight * choice.weight);
   const float size = mean(added);
@@ -165,9 +173,10 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
   --depth_;
 }
 
-// A light path is scattered like a camera path: at a surface the next direction is sampled as for a camera
-// path that arrives there the same way. The weight evaluates the BSDF with the two directions exchanged,
-// because the light travels the other way.
+// Traces a path from the sun that begins with the ray `from`, and calls keep(y) for each of its vertices y.
+// At a surface the next direction is sampled as for a camera path that arrives from the same side. But the
+// BSDF by which the light is multiplied is evaluated with the two directions exchanged, because the light
+// travels the other way.
 template <Features F, template <Features> class Light>
 template <class Keep>
 void PathTracer<F, Light>::follow_light(const SunMap::Ray& from, const Keep& keep) {
@@ -228,7 +237,9 @@ void PathTracer<F, Light>::follow_light(const SunMap::Ray& from, const Keep& kee
       }
       const float cosine = std::abs(dot(ray_.d, hit.ng));
       const V3 to_light = hit.shading.to_local(-ray_.d);
-      // Continues only with light that next-event estimation would find (light_surface)
+      // The path ends if next-event estimation would not find its light here (light_surface): if all lobes
+      // are delta lobes, or if the light is on different sides of the shading normal and of the geometric
+      // normal ng.
       if (!surface.smooth || !(cosine > 0) || (to_light.z > 0) != (dot(ray_.d, hit.ng) < 0)) return;
       if (hit.normal_replaced) return;
       y.medium = kNone;
@@ -237,7 +248,8 @@ void PathTracer<F, Light>::follow_light(const SunMap::Ray& from, const Keep& kee
       const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), to_light, g.u(2), {g.u(0), g.u(1)});
       if (!s || s->delta) return;
       const V3 w = normalize(hit.shading.to_world(s->wi));
-      if ((s->wi.z > 0) != (dot(w, hit.ng) > 0)) return;  // a camera path would use ng as the shading normal
+      // A camera path that arrives from this direction would use ng instead of the shading normal.
+      if ((s->wi.z > 0) != (dot(w, hit.ng) > 0)) return;
       const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), s->wi, to_light);
       beta_ *= f.f_cos * (std::abs(dot(w, hit.ng)) / (s->pdf * cosine));
       leave(s->pdf, f.pdf);

@@ -25,9 +25,9 @@
 
 namespace ls::render {
 
-// The density with which a free flight ends at this point, averaged over the three choices of the hero (the
-// channel that decides distances: medium.h). `density` is each channel's density of the path so far, relative
-// to that of the hero.
+// The density with which a free flight ends at the point `at_point`, averaged over the three choices of the
+// hero (the channel that decides distances: medium.h). `density` is each channel's density of the path so
+// far, relative to that of the hero.
 template <Features F>
 float flight_pdf(const Medium& m, [[maybe_unused]] const C3& density, const OpticalDepth::Point& at_point) {
   if constexpr (F.chromatic) {
@@ -40,8 +40,8 @@ float flight_pdf(const Medium& m, [[maybe_unused]] const C3& density, const Opti
   }
 }
 
-// The ratio e / f at one point. f may underflow to 0 where flights still end, since it uses the macro cells'
-// means; then all strategies use the same clamped ratio.
+// The ratio e / f at one point. f may underflow to 0 at points where flights do end, because it is computed
+// from the macro cells' means. All strategies then use the ratio kMaxRatio.
 inline float ratio_to_flight(float e, float f) { return f > 0 ? std::min(e / f, kMaxRatio) : kMaxRatio; }
 
 template <Features F>
@@ -52,7 +52,9 @@ class VertexNee {
 
     bool matters() const { return length > 0; }
   };
-  struct Vertex {  // o, length and t are relative to the part of the segment inside the medium
+  // A vertex in a medium. o, d and length are the start, the direction and the length of the part of the
+  // segment that has any density; t is the distance from o to the vertex, and flight_pdf is f there.
+  struct Vertex {
     bool equiangular = false, points_only = false;
     V3 o{0, 0, 0}, d{0, 0, 0};
     float length = 0, t = 0, flight_pdf = 0;
@@ -60,25 +62,27 @@ class VertexNee {
     bool uses_equiangular(bool is_point) const {
       return equiangular && (is_point || !(F.grids && points_only));
     }
-    // The ratio e / f at this vertex for a light with this pivot. Valid only for lights that are sampled
-    // equi-angularly (uses_equiangular).
+    // The ratio e / f at this vertex for a light with this pivot (the point about which segments are
+    // sampled). Valid only for lights that are sampled equi-angularly (uses_equiangular).
     float equiangular_ratio(const Pivot& pivot) const {
       return ratio_to_flight(EquiAngular(o, d, length, pivot).pdf(t), flight_pdf);
     }
-    // The density with which (1) and (3) sample this vertex, divided by that of the flight, for a light that
-    // was hit. Such a light is never a point light.
+    // For a light that the path hit after this vertex, as in strategy (2): the density with which (1) and (3)
+    // sample this vertex, divided by the density f of the flight. Such a light is never a point light.
     float found_as_light(const Pivot& pivot) const {
       return uses_equiangular(false) ? 1 + equiangular_ratio(pivot) : 1.f;
     }
     static float found_as_light() { return 1; }
-    // False: strategy (1) chooses its light by the vertex, not by Lights::choose_before_point().
+    // Returns false: strategy (1) chooses its light when the vertex is known, and not by
+    // Lights::choose_before_point().
     static bool light_chosen_first() { return false; }
   };
 
   template <class Path>
   static Plan ahead(Path& path, const Medium& medium, Segment segment) {
     if (medium.equiangular_mode == EquiangularMode::none) return {};
-    if (path.looks_for_second()) return {};  // not for shared paths: see path_reuse.h
+    // The second vertex of a path whose tail is shared is not sampled equi-angularly (path_reuse.h).
+    if (path.looks_for_second()) return {};
     if (!path.may_scatter() || !(points_only(medium) || std::isfinite(segment.length))) return {};
     sample_equiangular(path, medium, segment);
     return {segment.length};
@@ -95,8 +99,8 @@ class VertexNee {
     v.t = t - depths.from();
     const OpticalDepth::Point at_point = depths.at(t);
     v.flight_pdf = flight_pdf<F>(medium, path.density_, at_point);
-    // The vertex counts as equi-angularly sampled even if the flight density underflows to 0, because
-    // sample_equiangular() samples points there too.
+    // Equi-angular sampling is assumed to find this vertex even if the flight density underflows to 0,
+    // because sample_equiangular() samples points there too.
     v.equiangular = at_point.rate > 0 && v.length > 0;
     return v;
   }

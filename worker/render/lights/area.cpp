@@ -5,8 +5,9 @@ namespace {
 
 V3 absolute(const V3& v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
 
-// True if x is inside the sphere. Points on the surface itself, up to a few ulps of their coordinates, count
-// as being on the emitting side (`sign`: 1 outer, -1 inner), so that sampling and density agree on them.
+// True if x is inside the sphere. Points on the surface, up to a few ulps of the largest coordinate `reach`,
+// count as being on the side that emits (`sign`: 1 for the outer side, -1 for the inner one), so that
+// sampling a direction and computing its density treat them in the same way.
 bool is_inside(const Sphere& s, float reach, float sign, const V3& x) {
   const V3d f = s.center - V3d(x);
   const double margin = std::max(0., s.radius - double{sign} * 0x1p-20 * double{reach});
@@ -46,8 +47,9 @@ void AreaLight::set_emission(const AreaEmitter& e, float orientation, const Ligh
 }
 
 // The flux of a beam per unit radiance and area is 2 pi times the integral of beam_share(c) c dc over the
-// cosine c to the normal. Let beam and cutoff be the cosines of the two angles, w = beam - cutoff and p the
-// falloff. With c = cutoff + w s between the two cosines, the integral is
+// cosine c to the normal. beam_share is 0 below the cosine `cutoff` and 1 above the cosine `beam`. Between
+// them it is s^p, where p is the falloff, s = (c - cutoff) / w and w = beam - cutoff. With c = cutoff + w s
+// the integral is
 //   w integral_0^1 s^p (cutoff + w s) ds + (1 - beam^2) / 2.
 double AreaLight::beam_flux() const {
   if (!beam) return kPiD;
@@ -140,8 +142,8 @@ LightBounds MeshLight::bounds(const LightWorld& world) const {
   return b;
 }
 
-// numbers.x chooses the triangle. Its position among the numbers that choose this triangle is used for the
-// point.
+// numbers.x chooses the triangle, in proportion to area. The place of numbers.x in the interval of numbers
+// that choose this triangle is used as a random number for the point on it.
 AreaPoint MeshLight::point(const LightWorld& world, const LightNumbers& numbers) const {
   const Geometry& g = world.geometry;
   const double target = (numbers.x + .5) * 0x1p-32 * cdf.back();
@@ -235,7 +237,7 @@ std::variant<ParallelogramLight, MeshLight, SphereLight, DiskLight, CylinderLigh
   const Geometry& g = world.geometry;
   const auto triangles = primitives.triangles[surface], spheres = primitives.spheres[surface],
              disks = primitives.disks[surface], cylinders = primitives.cylinders[surface];
-  // Sets the members that do not depend on the shape.
+  // Returns the light l with the members set that do not depend on the shape.
   const auto shining = [&](auto l) {
     l.set_emission(*shape.emitter, g.surfaces[surface].orientation, world);
     return l;

@@ -8,9 +8,9 @@
 
 namespace ls::render {
 
-struct AreaPoint {  // a point on an area light
+struct AreaPoint {  // a point on an area light, and the unit normal of the emitting side
   V3 p, n;
-  V2 uv{0, 0};  // only for textured lights
+  V2 uv{0, 0};  // texture coordinates, used only for textured lights
   FacePoint face;
 };
 
@@ -19,15 +19,16 @@ struct AreaLight : LightKind {
   static constexpr bool kHasPlace = true, kIsArea = true;
   TextureIndex radiance;
   bool textured = false;
-  bool beam = false;     // true if the radiance depends on the angle
+  bool beam = false;     // true if the radiance depends on the angle to the normal
   bool uniform = false;  // true if the light is neither textured nor a beam
   C3 value;              // the light's radiance if `uniform`
-  // For a beam: from cos_beam to cos_cutoff its radiance falls to 0 as the power `falloff` of a term that is
-  // linear in the cosine.
+  // For a beam. The radiance is full if the cosine to the normal is at least cos_beam, and 0 if it is at most
+  // cos_cutoff. Between them the radiance has the factor ((cosine - cos_cutoff) * inv_transition)^falloff,
+  // where inv_transition is 1 / (cos_beam - cos_cutoff).
   float cos_cutoff = 0, cos_beam = 0, inv_transition = 0, falloff = 1;
   bool two_sided = false;  // true if the other side emits the same light
-  float sign = 1;          // orientation of the emitting side
-  float reach = 1;         // the largest coordinate of the light's points, which bounds the rounding error
+  float sign = 1;          // 1 if the shape emits where its own normals point, -1 if on the other side
+  float reach = 1;         // largest absolute coordinate of the light's points; it bounds rounding errors
   double area = 0;
 
   void set_emission(const AreaEmitter& emitter, float orientation, const LightWorld& world);
@@ -35,8 +36,8 @@ struct AreaLight : LightKind {
   double power(const LightWorld& world) const {
     return luminance(world.textures.mean(radiance)) * beam_flux() * area * (two_sided ? 2 : 1);
   }
-  // The radiance at `uv` and `face` towards a viewer whose direction has the cosine `cosine` > 0 to the
-  // normal.
+  // The radiance at the texture coordinates `uv` of `face`, towards a viewer whose direction has the cosine
+  // `cosine` > 0 to the normal.
   C3 emitted(const LightWorld& world, V2 uv, const FacePoint* face, float cosine) const {
     if (uniform) return value;
     const C3 varying = world.textures.eval(radiance, uv, face);
@@ -46,8 +47,8 @@ struct AreaLight : LightKind {
   // so that the shadow ray ends before the light.
   std::optional<LightSample> from_point(const LightWorld& world, const AreaPoint& y, const V3& x,
                                         float p) const;
-  // The density, per steradian at x, with which sample() finds the point `hit` in this direction, times p,
-  // the probability of choosing the light.
+  // The density, per steradian at x, with which sample() finds the point `hit`, which lies in the direction
+  // `direction` from x, times p, the probability of choosing the light.
   float pdf(const LightWorld&, const SurfaceHit& hit, const V3& x, const V3& direction, float p) const {
     const V3 f = hit.p - x;
     const float cosine = std::abs(dot(direction, hit.ng));
@@ -57,7 +58,7 @@ struct AreaLight : LightKind {
   static V3 pivot_of(const LightWorld&, const SurfaceHit& hit) { return hit.p; }
 
  protected:
-  // Returns bounds whose box reaches from middle - half to middle + half, for a light with normals in all
+  // Returns bounds with the box from middle - half to middle + half. Their cone of normals has all
   // directions.
   LightBounds bounds_of(const LightWorld& world, const V3& middle, const V3& half) const;
   // Sets the cone of the normals of the emitting side. If both sides emit, the normals point in all
@@ -67,7 +68,7 @@ struct AreaLight : LightKind {
     b.axis = axis;
     b.cos_spread = cos_spread;
   }
-  // Sets the members of the bounds that follow from the emission.
+  // Sets the members of the bounds that follow from the emission: intensity and cos_reach.
   void set_emission_bounds(const LightWorld& world, LightBounds& b) const;
   float beam_share(float cosine) const {
     if (cosine >= cos_beam) return 1;
@@ -90,7 +91,9 @@ struct SampledByPoint : AreaLight {
 };
 
 struct ParallelogramLight : SampledByPoint<ParallelogramLight> {
-  V3 corner, axis_u, axis_v, normal;  // uv is (0, 0) at the corner and 1 at the ends of the axes
+  // Texture coordinates are (0, 0) at the corner, (1, 0) at the end of axis_u and (0, 1) at the end of
+  // axis_v.
+  V3 corner, axis_u, axis_v, normal;
 
   AreaPoint point(const LightWorld&, const LightNumbers& numbers) const {
     const V2 u = numbers.unit();
@@ -131,15 +134,15 @@ struct CylinderLight : SampledByPoint<CylinderLight> {
 
 struct MeshLight : SampledByPoint<MeshLight> {
   std::uint32_t first = 0;  // index of the first triangle
-  std::vector<double> cdf;  // cumulative areas of the triangles
+  std::vector<double> cdf;  // for each triangle, the sum of the areas up to its end
 
   AreaPoint point(const LightWorld& world, const LightNumbers& numbers) const;
   LightBounds bounds(const LightWorld& world) const;
   std::uint64_t extra_bytes() const { return cdf.size() * sizeof(double); }
 };
 
-// A sphere is sampled by directions from the shaded point, so the pivot, which is needed before the shaded
-// point is known, is the centre.
+// A sphere is sampled by directions from the shaded point. The pivot (the point about which segments of paths
+// are sampled) is needed before the shaded point is known, so it is the sphere's centre.
 struct SphereLight : AreaLight {
   std::uint32_t primitive = 0;
 
@@ -158,7 +161,8 @@ struct SphereLight : AreaLight {
 
 using AreaKinds = Kinds<ParallelogramLight, MeshLight, SphereLight, DiskLight, CylinderLight>;
 
-// The index ranges, in Geometry's lists, of the primitives of each surface, which are contiguous there.
+// For each surface, the ranges of its primitives' indices in Geometry's lists. The primitives of a surface
+// are contiguous in each list.
 struct SurfacePrimitives {
   struct Range {
     std::uint32_t first = kNone, count = 0;

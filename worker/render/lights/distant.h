@@ -27,15 +27,16 @@ struct DirectionalLight : LightKind {
 struct SunLight : LightKind {
   V3 travel;
   C3 radiance;
-  float cone = 0;     // 1 - cos of its angular radius
-  float density = 0;  // 1 / solid angle
+  float cone = 0;     // 1 - cos of the sun's angular radius
+  float density = 0;  // 1 / (the sun's solid angle) [1/sr]
 
   bool dark(const LightWorld&) const { return is_black(radiance); }
   double power(const LightWorld& world) const {  // irradiance times area, as for directional lights
     const float radius = world.geometry.radius;
     return luminance(radiance) * kPiD * double{cone} * (2 - double{cone}) * kPiD * radius * radius;
   }
-  // Samples a direction uniformly over the sun's solid angle. It uses 1 - cos to avoid cancellation.
+  // Samples a direction uniformly over the sun's solid angle. It computes with 1 - cos of the small angle to
+  // the axis, because float32 cannot resolve the cosine itself, which is close to 1.
   std::optional<LightSample> sample(const LightWorld&, const LightNumbers& numbers, const V3&,
                                     float p) const {
     const V2 u = numbers.unit();
@@ -48,9 +49,10 @@ struct SunLight : LightKind {
     s.pdf = density * p;
     return s;
   }
-  // The radiance that a path finds if it leaves in this direction, weighted as in Lights::environment(); p is
-  // the probability of choosing this light. The test whether a direction d hits a sun with the axis a uses
-  // the chord, |d - a|^2 = 2 (1 - cos), which keeps the digits that the cosine of a small angle loses.
+  // The radiance that a path finds if it leaves the scene in this direction, weighted against next-event
+  // estimation as in Lights::environment(). `pdf` is the density with which the path sampled the direction,
+  // and p the probability of choosing this light. The test whether a direction d hits a sun with the axis a
+  // uses the chord, |d - a|^2 = 2 (1 - cos), which keeps the digits that the cosine of a small angle loses.
   C3 found(const V3& direction, float pdf, float p) const {
     const V3 chord = direction + travel;
     return dot(chord, chord) <= 2 * cone ? radiance * (1 / (1 + density * p / pdf)) : C3(0);
@@ -58,11 +60,13 @@ struct SunLight : LightKind {
 };
 
 // The sky as a light for next-event estimation. An environment map is sampled by its brightness. If there are
-// portals in front of the shaded point, directions through them are sampled too. With portals the constant
-// environment is a part of this light.
+// portals (openings through which the sky lights the scene: portals.h) in front of the shaded point,
+// directions through them are sampled too. A constant environment is a part of this light only if there are
+// portals; else paths find it when they leave the scene.
 struct SkyLight : LightKind {
-  // With portals, the probability of sampling a direction by the map's brightness alone, so that every
-  // direction from which light comes has a positive density; and the number of random words that choose this.
+  // If portals are in front of the shaded point: the probability with which a direction is sampled by the
+  // map's brightness alone, so that every direction from which light comes has a positive density.
+  // kBrightnessWords is the number of the 2^32 random words that choose this.
   static constexpr float kByBrightness = .25f;
   static constexpr std::uint64_t kBrightnessWords = std::uint64_t{1} << 30;
 
@@ -76,8 +80,9 @@ struct SkyLight : LightKind {
     const float radius = world.geometry.radius;
     return ((map ? map->flux() : 0) + 4 * kPiD * luminance(constant)) * kPiD * radius * radius;
   }
-  // Radiance and density are evaluated in the sampled direction itself. Paths that leave the scene do the
-  // same, so that both use the same density.
+  // Radiance and density are computed from the sampled direction, not from the numbers that it was sampled
+  // by. For paths that leave the scene they are computed from the direction too, so that the MIS weights
+  // match.
   std::optional<LightSample> sample(const LightWorld&, const LightNumbers& numbers, const V3& x,
                                     float p) const {
     const auto direction = direction_at(x, numbers);
@@ -89,7 +94,8 @@ struct SkyLight : LightKind {
     return LightSample{*direction, kInfinity, V3(0), light.radiance, pdf, false};
   }
   C3 radiance(const V3& d) const { return map ? map->at(d).radiance + constant : constant; }
-  // The light that arrives at x from the direction d, and the density of sample() for it
+  // Returns the radiance that arrives at x from the direction d, and the density, per steradian, with which
+  // sample() samples d there if it was called with p = 1.
   EnvironmentMap::Light from(const V3& x, const V3& d) const {
     EnvironmentMap::Light light = map ? map->at(d) : EnvironmentMap::Light{C3(0), 0};
     if (!portals) return light;
@@ -105,7 +111,8 @@ struct SkyLight : LightKind {
   std::optional<V3> direction_at(const V3& x, const LightNumbers& numbers) const {
     if (map && !(portals && portals->any_in_front_of(x))) return map->sample(numbers.x, numbers.y);
     if (!map) return portals->sample(x, numbers.x, numbers.y);
-    // The position of the word among those that make the same choice is reused as a random word
+    // numbers.x decides whether the map alone or the portals are sampled. Its position among the words with
+    // the same outcome is used again as a random word.
     if (numbers.x < kBrightnessWords)
       return map->sample(static_cast<std::uint32_t>((std::uint64_t{numbers.x} << 32) / kBrightnessWords),
                          numbers.y);

@@ -17,23 +17,23 @@ namespace ls::render {
 namespace {
 
 constexpr double kWords = 0x1p32;
-// The largest radiance of a texel. It equals the largest radiance of a sample (render_tile.cpp), since larger
-// samples cannot be summed.
+// The largest radiance of a texel. It equals the largest radiance that a sample may have (render_tile.cpp);
+// larger samples could not be summed.
 constexpr float kLargestTexel = 0x1p96f;
-// The tolerance for a to_world that is a rotation only up to rounding, because it was written with six
-// digits.
+// An element of to_world may differ this much from that of the nearest rotation, for example because the
+// matrix was written with six digits.
 constexpr double kSlack = 1e-4;
 
-// The orthogonal matrix nearest to t up to a uniform scale, by Newton's iteration X <- (X + X^-T) / 2 for the
-// polar decomposition (Higham 1986). Returns nullopt if t also stretches.
+// The orthogonal matrix nearest to t divided by its scale, by Newton's iteration X <- (X + X^-T) / 2 for the
+// polar decomposition (Higham 1986). Returns nullopt if t does not scale all directions equally.
 std::optional<Affine> rotation_of(const Transform& t) {
   Affine m(t);
   if (!m.invertible()) return std::nullopt;
   const double size = m.vector({1, 0, 0}).length();
   for (double& a : m.a) a /= size;
   Affine x = m;
-  // Each iteration doubles the number of correct digits, so that two suffice for a matrix written with six
-  // digits.
+  // Each iteration doubles the number of correct digits. Two suffice for a matrix that was written with six
+  // digits; the others are a reserve.
   for (int round = 0; round < 8; ++round) {
     const Affine inverse = x.inverse();
     for (std::size_t i = 0; i < 3; ++i)
@@ -44,15 +44,16 @@ std::optional<Affine> rotation_of(const Transform& t) {
   return x;
 }
 
-// The first of the 2^32 random words that choose share i. `before` holds the cumulative sums of the shares.
-// Shares that begin beyond the last word are empty.
+// Divides the 2^32 random words among shares, in proportion to their sizes. Returns the first word that
+// belongs to share i, or 2^32 if the share begins beyond the last word and so has none. before[i] is the sum
+// of the sizes of the shares before share i; the last element is the sum of all sizes.
 std::uint64_t first_word(const std::vector<double>& before, std::size_t i) {
   return static_cast<std::uint64_t>(std::llround(before[i] / before.back() * kWords));
 }
 
 // Samples x in (0, 1) with density proportional to a (1 - x) + b x, from the random number u in (0, 1). It is
-// stable if a = b or one of them is 0. The result is never 1, where the density may be 0, or, at a pole, the
-// azimuth undefined.
+// stable if a = b or one of them is 0. The result is never 1: there the density may be 0 and, at a pole of
+// the map, the azimuth undefined.
 float sample_linear(float a, float b, float u) {
   const float sum = a + b;
   if (!(sum > 0)) return u;

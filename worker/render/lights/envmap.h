@@ -71,12 +71,14 @@ class EnvironmentMap {
   std::uint64_t bytes() const;
 
  private:
-  struct Row {                // a row of cells
-    double top = 1;           // cosine at its upper edge; latlong only
-    double height = 0;        // solid angle of a cell, divided by 2 pi / width: the difference of the cosines
-    float density = 0;        // share of the words, divided by the solid angle of one cell
-    std::uint32_t first = 0;  // first of the words that choose this row; they end where the next row's begin
-    std::uint32_t used = 0;   // number of cells up to the last one that has a word
+  struct Row {       // a row of cells
+    double top = 1;  // cosine of the polar angle at its upper edge; latlong only
+    // Difference of the cosines at its two edges: the solid angle of a cell, divided by 2 pi / width.
+    double height = 0;
+    float density = 0;  // probability of choosing this row, divided by the solid angle of one cell
+    // First of the random words that choose this row. These words end where the next row's words begin.
+    std::uint32_t first = 0;
+    std::uint32_t used = 0;  // number of cells up to and including the last one that some word chooses
   };
   struct Corners {
     float l00, l10, l01, l11;  // luminances at the corners: upper left, upper right, lower left, lower right

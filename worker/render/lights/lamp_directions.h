@@ -1,6 +1,6 @@
-// The directions that a path may take from a vertex in a medium or on a surface. They are a mixture of the
-// vertex's own distribution (the phase function or the BSDF) and of directions that pass close to a lamp (a
-// light without extent).
+// The distribution of the directions in which a path leaves a vertex in a medium or on a surface. It is a
+// mixture of the vertex's own distribution (the phase function or the BSDF) and of a distribution that
+// prefers directions that pass close to a lamp (a light without extent).
 //
 // The light scattered at distance D from a lamp is proportional to 1 / D^2. Its integral along a ray whose
 // smallest distance to the lamp is D is proportional to 1 / D, with D = r sin(theta) for a ray from a vertex
@@ -28,7 +28,7 @@ struct Lamps {
 
 class LampDirections {
  public:
-  LampDirections() = default;  // without lamps: only the vertex's own distribution
+  LampDirections() = default;  // without lamps the mixture is the vertex's own distribution
   LampDirections(const Lamps& lamps, const V3& p) {
     for (std::size_t i = 0; i < lamps.count; ++i) {
       const V3 to = lamps.position[i] - p;
@@ -46,8 +46,9 @@ class LampDirections {
     for (std::size_t i = 0; i < count_; ++i) sum += near_pdf(to_lamp_[i], w);
     return (1 - kLampShare) * own + kLampShare / static_cast<float>(count_) * sum;
   }
-  // Chooses one of the two distributions by `choice`. If it is that of the lamps, samples a direction by u.
-  // nullopt: the vertex's own distribution was chosen; `choice` is then rescaled to be uniform again.
+  // Chooses one of the two distributions by the random number `choice` in [0, 1). If it is that of the lamps,
+  // returns a direction sampled from it by u. If it is the vertex's own, returns nullopt and rescales
+  // `choice` to be uniform in [0, 1) again, for the caller to use.
   std::optional<V3> sample(float& choice, V2 u) const {
     if (count_ == 0) return std::nullopt;
     if (choice < kLampShare) {
@@ -59,8 +60,9 @@ class LampDirections {
   }
 
  private:
-  // sin(theta) is bounded from below, since it is accurate only to about 1e-7. So very close to the lamp this
-  // differs from the density of near(), but all MIS weights use the same value.
+  // The density with which near() samples w. sin(theta) is bounded from below by 1e-6, because it is accurate
+  // only to about 1e-7. So for directions very close to the lamp the result is less than the true density,
+  // but all MIS weights use this same function.
   static float near_pdf(const V3& to_lamp, const V3& w) {
     const V3 c = cross(to_lamp, w);
     return kInvTwoPi * kInvPi / std::max(std::sqrt(dot(c, c)), 1e-6f);

@@ -6,7 +6,7 @@
 namespace ls::render {
 namespace {
 
-// The share of the density that is uniform over the rectangle
+// The part of the density's integral that is spread uniformly over the rectangle.
 constexpr double kRectangleShare = .2;
 
 }  // namespace
@@ -66,7 +66,7 @@ void LearnedRectangle::finish(float margin, double outside_share) {
   found_ = {};
 }
 
-// The cell that `word` chooses; side * side if it chooses none
+// Returns the index of the cell that `word` chooses, or side * side if it chooses none.
 std::size_t LearnedRectangle::chosen(std::uint32_t word) const {
   return static_cast<std::size_t>(std::lower_bound(last_.begin(), last_.end(), word) - last_.begin());
 }

@@ -1,10 +1,11 @@
 // The common part of all kinds of lights. Each kind is a struct in the file of its family (area.h,
 // punctual.h, distant.h) with these members:
 //
-//   bool dark(world)                        true if it emits no light; it is then left out
-//   double power(world)                     determines the probability of choosing it
-//   LightBounds bounds(world)               bounds for the tree; only for lights with a position
-//   V3 or Pivot pivot(world, numbers)       see lights.h; only for lights with a position
+//   bool dark(world)                        true if the light emits nothing; the list of lights then omits it
+//   double power(world)                     the flux; the probability of choosing the light follows from it
+//   LightBounds bounds(world)               bounds for light_tree.h; only for lights with a position
+//   V3 or Pivot pivot(world, numbers)       point about which segments of paths are sampled (lights.h);
+//                                           only for lights with a position
 //   optional<LightSample> sample(world, numbers, x, p)
 //                                           samples the light that arrives at x; p is the probability with
 //                                           which this light was chosen
@@ -33,7 +34,8 @@ struct LightSample {
   float distance = 0;  // distance to the light in that direction; infinity for distant lights
   // The point sampled on the light, moved off its surface: shadow rays end there. Not set for distant lights.
   V3 target{0, 0, 0};
-  // Arriving radiance if unobstructed; for delta lights the irradiance on a plane that faces the light
+  // The radiance that arrives if nothing blocks it; for delta lights the irradiance on a plane that faces the
+  // light.
   C3 radiance;
   // The density of `direction` per steradian, including the probability of choosing the light. For delta
   // lights it is the probability of choosing the light alone.
@@ -53,15 +55,16 @@ struct Pivot {
   Pivot(const V3& point, const V3& towards, float cosine) : p(point), axis(towards), cos_reach(cosine) {}
 };
 
-// Random words for choosing a light and a point on it. All 32 bits of each are used, because among many
-// lights or triangles the last bits decide.
+// Random words for choosing a light and a point on it. All 32 bits of each word are used, because with many
+// lights or triangles even the last bits decide which of them is chosen.
 struct LightNumbers {
   std::uint32_t light = 0, x = 0, y = 0;
   V2 unit() const { return {unit_float(x), unit_float(y)}; }
 };
 
-// Data that lights refer to, and the units of the world. Lengths are multiplied by the world's scale, so
-// intensities (power per solid angle) by the square of the scale; radiance and irradiance do not change.
+// Data that lights refer to, and conversions to the units of the world, where all lengths of the scene are
+// multiplied by geometry.scale. Radiance and irradiance stay the same. So intensities (power per solid angle,
+// that is, irradiance times squared distance) are multiplied by the square of the scale.
 struct LightWorld {
   const Geometry& geometry;
   const TextureTable& textures;
@@ -71,7 +74,7 @@ struct LightWorld {
 };
 
 struct LightKind {
-  static constexpr bool kHasPlace = false;  // true if it has a position, that is, is not infinitely far
+  static constexpr bool kHasPlace = false;  // true if it has a position: is not at infinite distance
   static constexpr bool kIsPoint = false;   // true if it has a position but no extent
   static constexpr bool kIsArea = false;    // true if it is an emitting surface
 

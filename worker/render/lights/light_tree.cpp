@@ -55,15 +55,15 @@ class LightTree::Builder {
  private:
   static constexpr std::uint32_t kNoParent = 0xffffffffu;
   static constexpr int kBins = 16;
-  // From depth kDeepest on, a node's lights are split into halves of equal size, regardless of cost. So 2^24
-  // lights are all separated at depth 30 + 24, and the turns on the way to a light fit the 64 bits of its
-  // trail (trails_).
+  // From depth kDeepest on, a node's lights are split into halves of equal size, regardless of cost. So even
+  // 2^24 lights, the most allowed, are separated at depth 30 + 24 at the latest, and the turns on the way to
+  // a light, one bit each, fit the 64 bits of its trail (trails_).
   static constexpr int kDeepest = 30;
   struct Job {
     std::uint32_t begin, end;
     int depth;
     std::uint64_t trail;
-    std::uint32_t parent;  // node whose right child this is
+    std::uint32_t parent;  // node whose right child this job makes; kNoParent for left ones
   };
   struct Pile {
     V3 low{1e30f, 1e30f, 1e30f}, high{-1e30f, -1e30f, -1e30f};
@@ -184,7 +184,8 @@ float LightTree::importance(const Node& node, const V3& x, const V3& n) {
   const V3 f = x - node.center;
   const float d2 = dot(f, f);
   const float base = node.intensity / std::max(std::max(d2, node.radius2), 1e-20f);
-  if (!(d2 > node.radius2)) return base;  // inside the ball the light may have any direction from x
+  // From inside the ball, a light of the node may be in any direction.
+  if (!(d2 > node.radius2)) return base;
   const V3 way = f * (1 / std::sqrt(d2));
   const float sin2_ball = node.radius2 / d2, sin_ball = std::sqrt(sin2_ball),
               cos_ball = safe_sqrt(1 - sin2_ball);

@@ -8,8 +8,9 @@
 //
 // with d the distance to the ball's centre and r its radius; a the angle between the cone's axis and the
 // direction to x, minus the cone's spread and the ball's angular radius as seen from x; i the angle between
-// n, or its opposite, and the direction to the centre, minus that radius; in a medium there is no cos i. A
-// light is sampled by descending from the root, choosing among children in proportion to their importance.
+// n, or its opposite, and the direction to the centre, minus the same angular radius. In a medium the factor
+// cos i is left out. A light is sampled by descending from the root, choosing among children in proportion to
+// their importance.
 //
 // Sampling splits random words instead of real numbers. The root has all 32-bit words, or as many as the
 // caller gives it, and each child gets a whole number of its parent's words. So the probability of a light is
@@ -27,7 +28,7 @@ namespace ls::render {
 
 struct LightBounds {
   V3 low, high;           // bounding box of the light
-  V3 axis{0, 0, 1};       // axis of a cone that contains its emission directions, the normals
+  V3 axis{0, 0, 1};       // axis of a cone that contains the normals of its emitting points
   float cos_spread = -1;  // cosine of that cone's half angle; -1: all directions
   float cos_reach = 0;    // cosine of the largest angle between a normal and the emitted light
   // Luminous flux per steradian along a normal, with textures averaged; positive and finite

@@ -9,18 +9,18 @@
 namespace ls::render {
 namespace {
 
-// The share of the sun map's rays that is uniform over the whole scene, so that light vertices also cover
-// light that no learning path found.
+// The share of the sun map's rays (SunMap) that is uniform over the whole scene. Because of it there are
+// light vertices also where no learning path (a camera path traced before the first sample) found the sun.
 constexpr double kSceneShare = .05;
-constexpr float kSmallestMargin = 1e-4f;  // margin of the rectangle, as a share of the scene's radius
-// The largest |g| of a phase function in towards(): with sharper ones, rounding errors would dominate the
-// estimate.
+constexpr float kSmallestMargin = 1e-4f;  // margin of the map's rectangle / the scene's radius
+// The largest |g| for which towards() evaluates the Henyey-Greenstein phase function; sharper ones are
+// clamped to it, because rounding errors would dominate the estimate.
 constexpr float kSharpest = .98f;
 constexpr float kTiny = 1e-30f;
 // A glossy surface may reflect much light that arrives at a grazing angle, so towards() adds this constant to
 // the cosines.
 constexpr float kGrazing = .1f;
-// The share of choices that is uniform over the candidates with a positive estimate. It bounds the weight of
+// This share of the mean estimate of a block is added to each positive estimate. It bounds the weight of
 // vertices that contribute more than estimated.
 constexpr float kAnyShare = .1f;
 
@@ -65,10 +65,10 @@ void LightVertices::finish() {
 }
 
 // Estimates the contributions of a block's light vertices y to the receiver x, without visibility and
-// transmittance. Up to a common factor they are L_y * f_x * c / (c r^2 + p_x cos_y). L_y is the radiance
-// times cosine that y's Look describes, c is Look::density, and r the distance. f_x is the BSDF times cosine
-// or the phase function at x, and p_x its density. Surfaces at x count as diffuse. Unused lanes have a
-// radiance of 0.
+// transmittance, and stores them in `target`. Up to a common factor they are L_y * f_x * c / (c r^2 + p_x
+// cos_y). L_y is the radiance times cosine that y's Look describes, c is Look::density, r the distance, and
+// cos_y the cosine at y (1 in media). f_x is the BSDF times cosine or the phase function at x, and p_x its
+// density. Surfaces at x count as diffuse. Entries of the block without a vertex have a radiance of 0.
 void LightVertices::towards(const Block& b, const Receiver& x, Lane& target) {
   const float other_side = x.both_sides ? 1.f : 0.f;
   const auto phase = [](float g, float cosine) {

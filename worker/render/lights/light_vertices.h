@@ -15,9 +15,12 @@
 //     kCandidates / (vertices per ray) * (rays per area of the sun's plane) * |cos_sun|,
 //   every other vertex, sampled from the sun or from the camera:
 //     pdf |cos| / r^2, with the density `pdf` of the direction in which the vertex before it scattered.
-// In a medium the cosines are 1. All densities leave out transmittances and Russian roulette. The result is
-// still unbiased: weights need not use the true densities, only the same functions of the path for all
-// strategies.
+// The first factor is the number of rays that have kCandidates vertices on average: a connection chooses one
+// of that many vertices (see below). |cos_sun| is the cosine between the vertex's normal and the direction to
+// the sun, |cos| that between the normal and the direction to the vertex before, and r the distance to that
+// vertex. In a medium the cosines are 1. All densities leave out transmittances and Russian roulette. The
+// result is still unbiased: weights need not use the true densities, only the same functions of the path for
+// all strategies.
 //
 // The sum over all light vertices is estimated by resampled importance sampling (Talbot et al. 2005): a block
 // of kCandidates vertices is chosen uniformly, and one of them in proportion to a cheap estimate of its
@@ -62,7 +65,7 @@ class SunMap {
 
   struct Ray {
     V3 o;           // origin, outside of the scene
-    float density;  // density of this ray, as by density()
+    float density;  // SunMap::density() of this ray
   };
   // Samples a ray by four uniform random words.
   Ray sample(const std::array<std::uint32_t, 4>& bits) const;
@@ -75,20 +78,21 @@ class SunMap {
   V3 direction_{0, 0, 1}, u_{1, 0, 0}, v_{0, 1, 0};
   float radius_ = 1;
   LearnedRectangle found_{kSide};
-  float everywhere_ = 0;  // density of the uniform share over the whole scene
+  float everywhere_ = 0;  // density of the rays that are uniform over the scene, per area of the plane
 };
 
 // A subpath's share in the denominator of the balance heuristic, for subpaths from the camera and from the
-// sun. It is the sum, over all strategies that find the same path with a shorter subpath from this end, of
-// the density of that strategy over the density of the strategy with this subpath. It is computed vertex by
-// vertex, as by Georgiev 2012, "Implementing vertex connection and merging", eqs. 31 to 36.
+// sun. It is a sum over all strategies that find the same path with a shorter subpath from this end; the term
+// of a strategy is its density divided by the density of the strategy with this subpath. It is computed
+// vertex by vertex, as by Georgiev 2012, "Implementing vertex connection and merging", eqs. 31 to 36.
 struct SubpathDensities {
-  float last = 0;    // 1 / density of the last vertex
-  float before = 0;  // the part of the vertices before it, without the factor `back` of sum()
+  float last = 0;  // 1 / (density with which the last vertex is sampled from this end)
+  // The part of the sum that belongs to the vertices before the last one, without the factor `back` of sum().
+  float before = 0;
 
-  // Returns the sum without one factor, the density with which the last vertex is sampled from the other end.
-  // `back` is the density, per steradian, with which a path from the other end samples, at the last vertex,
-  // the direction to the vertex before.
+  // Returns the subpath's share without one factor: the density with which the last vertex is sampled from
+  // the other end. `back` is the density, per steradian, with which a path that comes from the other end and
+  // scatters at the last vertex samples the direction to the vertex before it.
   float sum(float back) const { return last * (1 + before * back); }
   bool needs_back() const { return before > 0; }
 
@@ -114,11 +118,11 @@ struct LightVertex {
   SubpathDensities densities;
 };
 
-// A vertex of a path that is to be connected to a light vertex.
+// A vertex of a camera path that is to be connected to a light vertex.
 struct Receiver {
   V3 p{0, 0, 0};
-  V3 n{0, 0, 0};            // on surfaces: the normal on the side of the path
-  bool both_sides = false;  // on surfaces: light may also arrive at the other side
+  V3 n{0, 0, 0};            // on surfaces: the shading normal, on the side from which the path came
+  bool both_sides = false;  // on surfaces: true if light may also arrive at the other side
   V3 d{0, 0, 0};            // in media: the direction of travel before the scattering
   float g = 0;              // in media: the asymmetry parameter of the phase function
   bool in_medium = false;
@@ -128,20 +132,22 @@ class LightVertices {
  public:
   static constexpr std::size_t kCandidates = 32;
 
-  // The appearance of a light vertex from other points, from which choose() estimates its contribution. Up to
+  // How a light vertex looks from other points; from this choose() estimates the vertex's contribution. Up to
   // a common factor the radiance that leaves the vertex, times its cosine to the normal (1 in media), is
   //   even * cosine + lobe * 4 pi * (the Henyey-Greenstein phase function with parameter g),
   // where the phase function takes the angle between the outgoing direction and -axis. The lobe of a glossy
   // surface has no cosine factor, like the lobe of a microfacet distribution.
   struct Look {
     V3 n{0, 0, 0};  // surfaces: the geometric normal, on the side that is lit
-    // Surfaces: light may leave on the other side too, as through glass or where the shading normal is tilted
+    // Surfaces: true if light may also leave on the other side, as through glass or where the shading normal
+    // is tilted.
     bool both_sides = false;
-    float even = 0, lobe = 0;  // their sum is positive
+    float even = 0, lobe = 0;  // factors of the two terms above; their sum is positive
     V3 axis{0, 0, 1};
     float g = 0;
-    // 1 / densities.sum(1 / (4 pi)). The larger it is, the more weight connections to this vertex have among
-    // all strategies that find its light.
+    // 1 / densities.sum(1 / (4 pi)), that is, as if paths from the camera scattered uniformly at this vertex.
+    // The larger it is, the more weight connections to this vertex have among all strategies that find its
+    // light.
     float density = 0;
   };
   void add(const LightVertex& vertex, const Look& look);
@@ -151,9 +157,10 @@ class LightVertices {
     const LightVertex* vertex = nullptr;  // null: all candidates have the estimate 0
     float weight = 0;                     // 1 / (expected number of times that this vertex is chosen)
   };
-  // Prefetches into the processor's caches the vertices that choose() will need for the same `block`.
+  // Loads into the processor's caches the data that choose() needs if it is called with this `block`.
   void prefetch(std::uint32_t block) const;
-  // Chooses a light vertex for x. `block` is 32 uniform random bits; u is uniform in [0, 1).
+  // Chooses a light vertex for x. `block` is 32 uniform random bits, which choose a block of vertices; u is
+  // uniform in [0, 1) and chooses one of them.
   Choice choose(const Receiver& x, std::uint32_t block, float u) const;
 
   std::size_t count() const { return vertices_.size(); }
@@ -171,17 +178,18 @@ class LightVertices {
   std::vector<Block> blocks_;
 };
 
-// Caches the sets of light vertices of a world. Even samples of a pixel form one half, odd samples the other.
-// In each half kEpoch / 2 successive samples use the same set. So the halves are independent, and more
-// samples also average over more sets.
+// Caches the sets of light vertices of a world. The even samples of a pixel form one half and the odd ones
+// the other; the error is estimated by comparing the halves. The halves use different sets, so that they are
+// independent. In each half kEpoch / 2 successive samples use the same set, and later samples the next one,
+// so that the image also averages over sets.
 class LightVertexCache {
  public:
   static constexpr std::uint64_t kEpoch = 128;
   using Build = std::function<LightVertices(std::uint64_t set)>;
 
   static std::uint64_t set_of(std::uint64_t sample) { return 2 * (sample / kEpoch) + (sample & 1); }
-  // Returns the set, and builds it if it is not cached. Thread-safe; threads wait only for the set that they
-  // need.
+  // Returns the set with this number, and builds it if it is not cached. Thread-safe; a thread waits only for
+  // the set that it needs.
   std::shared_ptr<const LightVertices> get(std::uint64_t set, const Build& build);
 
  private:
@@ -191,7 +199,8 @@ class LightVertexCache {
     std::shared_ptr<const LightVertices> vertices;
   };
   std::mutex mutex_;
-  std::list<std::pair<std::uint64_t, std::shared_ptr<Slot>>> kept_;  // most recently used first
+  // The cached sets by number, most recently used first.
+  std::list<std::pair<std::uint64_t, std::shared_ptr<Slot>>> kept_;
 };
 
 }  // namespace ls::render

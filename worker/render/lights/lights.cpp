@@ -8,11 +8,11 @@
 namespace ls::render {
 namespace {
 
-// The smallest number of lights with a position for which the tree is used
-// (docs/decisions/0008-many-lights.md). With fewer, the table is used alone.
+// The smallest number of lights with a position for which the light tree (light_tree.h) is used
+// (docs/decisions/0008-many-lights.md). With fewer, all choices are made by the table of all lights.
 constexpr std::ptrdiff_t kTreeFrom = 32;
-// Of the words that choose lights in the tree, every kTableShare-th uses the table instead. So no light gets
-// less than 1/16 of its probability in the table.
+// Every kTableShare-th of the random words that choose among the lights of the tree uses the table of all
+// lights instead of the tree. So each of these lights keeps at least 1/16 of its probability in the table.
 constexpr std::uint64_t kTableShare = 16;
 
 }  // namespace
@@ -35,8 +35,8 @@ void Lights::add_area(const Scene& scene, std::uint32_t shape, const SurfacePrim
   const auto finish = [&](auto& l) {
     const LightBounds box = l.bounds(world());
     l.reach = std::max(largest(box.low), largest(box.high));
-    // If the light's surface is null, other surfaces may coincide with it. Shadow rays must then end in front
-    // of all of them.
+    // If the light's surface is null (light passes straight through it), other surfaces may coincide with it.
+    // Shadow rays must then end in front of all of these surfaces.
     if (g.surfaces[shape].null) l.reach = std::max(l.reach, g.surfaces[shape].coincident_reach);
     add(std::move(l));
   };
@@ -220,8 +220,9 @@ C3 Lights::suns(const V3& direction, float pdf, const LightPlace& place) const {
   return sum;
 }
 
-// Lights are chosen by the table of all lights or, if the shaded point is known, also by the tree or by the
-// learned probabilities of its place. Each maps a word, a random integer of 32 bits, to a light.
+// A light is chosen by the table of all lights or, if the shaded point is known, by the tree or by the
+// probabilities learned for the point's place. Each of the three maps a word, a random integer of 32 bits, to
+// a light.
 
 bool Lights::enough_for_tree() const {
   return std::count_if(lights_.begin(), lights_.end(), has_place) >= kTreeFrom;
@@ -304,8 +305,8 @@ DrawnLight Lights::by_table(std::uint32_t word) const {
   return {i, lights_[i].probability};
 }
 
-// Returns how many of the words below table_words_ choose light i. These words choose by the table: word w is
-// mapped to the table's word kTableShare * w.
+// Returns how many of the words below table_words_ choose light i. A word w below table_words_ chooses the
+// light that the table assigns to the word kTableShare * w.
 std::uint64_t Lights::table_words(std::uint32_t i) const {
   const std::uint64_t first = i == 0 ? 0 : std::uint64_t{last_[i - 1]} + 1, end = std::uint64_t{last_[i]} + 1;
   return (end + kTableShare - 1) / kTableShare - (first + kTableShare - 1) / kTableShare;

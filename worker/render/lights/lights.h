@@ -30,7 +30,8 @@ struct LightChoice {
 };
 
 // The place for which a light is chosen: a point on a surface and its normal or, with n = 0, a point in a
-// medium. If LocalLights chooses in media, all points of a segment have the same place (Lights::place_on).
+// medium. If learned probabilities (LocalLights) choose lights in media, all points of a path's segment have
+// the same place (Lights::place_on).
 struct LightPlace {
   V3 p{0, 0, 0}, n{0, 0, 0};
 };
@@ -38,8 +39,8 @@ struct LightPlace {
 class Lights {
  public:
   // Builds the list of the scene's lights and sets the light index of the surfaces of `geometry`. Lights
-  // without power or area are left out and counted. `images` loads environment maps; scenes without one do
-  // not need it.
+  // without power or area are left out and counted. `images` loads environment maps; it may be empty if the
+  // scene has no environment map.
   static Result<Lights> build(const Scene& scene, Geometry& geometry, const TextureTable& textures,
                               const ImageLoader& images = {});
 
@@ -60,8 +61,8 @@ class Lights {
   // Chooses a light before the shaded point is known: with probability 1/2 in proportion to power, else
   // uniformly.
   LightChoice choose(const LightNumbers& numbers) const { return chosen(numbers, draw(numbers.light)); }
-  // Chooses a light for a place: by the probabilities learned for places like this (local_lights.h) or, if
-  // none were learned and there are many lights, by a tree (light_tree.h).
+  // Chooses a light for a place: by the probabilities learned for this place (local_lights.h) or, if none
+  // were learned and there are many lights, by a tree (light_tree.h).
   LightChoice choose(const LightNumbers& numbers, const LightPlace& place) const {
     return chosen(numbers, alone_ ? only_one() : draw(numbers.light, place));
   }
@@ -103,8 +104,8 @@ class Lights {
     const float as_light = light.pdf * probability_at(sky_index_, place);
     return beside + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);
   }
-  // The radiance of the constant environment; black while portals are set, since it is then sampled as a
-  // light.
+  // The radiance of the constant environment; black while portals are set, since the constant environment is
+  // then a part of the sky, which is sampled as a light.
   const C3& constant_environment() const { return environment_; }
   // The environment radiance, split by whether next-event estimation samples it. Requires
   // single_environment_sample().
@@ -117,34 +118,34 @@ class Lights {
   // True if next-event estimation samples a direction by at most one light that paths can also hit when they
   // leave the scene: a sun with an extent, or the sky.
   bool single_environment_sample() const { return suns_.size() + (sky_.sampled() ? 1 : 0) <= 1; }
-  // Sets the radiance of the constant environment and returns the old one, which is black in a scene without
-  // one.
+  // Sets the radiance of the constant environment and returns the previous one, which is black if there was
+  // no constant environment.
   C3 exchange_constant_environment(const C3& radiance) { return std::exchange(environment_, radiance); }
   bool has_environment() const { return sky_.sampled() || !suns_.empty() || !is_black(environment_); }
   const EnvironmentMap* map() const { return map_.get(); }
   bool is_sky(const LightChoice& choice) const;
   // From this call on, directions towards the environment map and the constant environment are also sampled
-  // through these portals; null: no longer.
+  // through these portals. With null this ends.
   void set_portals(std::unique_ptr<const Portals> portals);
   const Portals* portals() const { return portals_.get(); }
 
-  // From this call on, lights are also chosen by the tree for points in media, if there is a tree. Only for
-  // integrators that do not sample points on segments: for such points the light is chosen before the point.
+  // From this call on, the tree (if there is one) also chooses lights for points in media. Integrators that
+  // sample points on segments must not call this, because they choose the light before they know the point.
   void use_tree_in_media() { tree_in_media_ = true; }
   bool has_tree() const { return !tree_.empty(); }
   std::size_t in_tree() const { return tree_.lights(); }  // number of lights in the tree
-  bool enough_for_tree() const;                           // counts the lights with a position
+  bool enough_for_tree() const;                           // true if enough lights have a position
   // True if lights are chosen by the tree at some places. `media`: the scene has media.
   bool uses_tree(bool media) const {
     return has_tree() && (!local_ || (media && tree_in_media_ && !local_in_media()));
   }
   // True if set_local() may be called.
   bool can_be_local() const { return lights_.size() > 1 && lights_.size() <= LocalLights::kMostLights; }
-  // How noisy the table's choice of a light is at these places: the mean square of next-event estimation over
-  // the square of its mean. It is at least 1, and is 1 where each light contributes in proportion to its
-  // probability in the table.
+  // How noisy the table's choice of a light is at the places of `visits`: the mean square of next-event
+  // estimation over the square of its mean. It is at least 1, and is 1 where each light contributes in
+  // proportion to its probability in the table. 0 if there are no places.
   double spread_over(const LightVisits& visits) const;
-  // From this call on, lights are chosen by probabilities learned from these visits; null: no longer.
+  // From this call on, lights are chosen by probabilities learned from these visits. With null this ends.
   void set_local(const LightVisits* visits);
   const LocalLights* local() const { return local_.get(); }
   // This light, as if it had been chosen with this probability.
@@ -153,7 +154,7 @@ class Lights {
   }
   std::uint64_t tree_bytes() const { return tree_.bytes(); }
   std::uint64_t table_bytes() const;
-  std::uint64_t map_bytes() const;  // of the environment map and its portals
+  std::uint64_t map_bytes() const;  // memory of the environment map and of the portals
 
   std::size_t count() const { return lights_.size(); }
   std::uint64_t left_out() const { return left_out_; }
@@ -215,7 +216,8 @@ class Lights {
 
   std::vector<Light> lights_;
   std::vector<std::uint32_t> suns_;  // indices of the suns in lights_
-  // Light i is chosen by the words from last_[i - 1] + 1 to last_[i]: its probability is exactly their share.
+  // Light i is chosen by the words from last_[i - 1] + 1 to last_[i]. The number of these words over 2^32 is
+  // exactly its probability.
   std::vector<std::uint32_t> last_;
   bool alone_ = false;  // true for a single light, which needs no choice
   const Geometry* geometry_ = nullptr;
@@ -224,7 +226,7 @@ class Lights {
   std::unique_ptr<const EnvironmentMap> map_;
   std::unique_ptr<const Portals> portals_;
   SkyLight sky_;                 // a copy of the SkyLight in lights_, if there is one
-  std::uint32_t sky_index_ = 0;  // its index in lights_
+  std::uint32_t sky_index_ = 0;  // index of that SkyLight in lights_
   // If there are many lights, those with a position come first in the list and are in the tree. The first
   // words of the table choose these lights; at each point the tree redistributes these words among them,
   // except every kTableShare-th word, which the table keeps.

@@ -8,16 +8,18 @@
 namespace ls::render {
 namespace {
 
-// Share of the choices that is made by the table of all lights.
+// The share of the choices that the table of all lights makes; learned probabilities make the others.
 constexpr double kTablePart = .25;
-// A cell is divided if it has more visits than this.
+// A cell (node of the k-d tree) is divided if it has more visits (vertices of learning paths) than this.
 constexpr std::ptrdiff_t kVisitsOfCell = 32;
-// The mean of the surrounding cell counts as this many visits in the mean of a cell.
+// A cell's mean is smoothed: it also includes the mean of the cell around it, with the weight of this many
+// visits.
 constexpr double kVisitsOfParent = 16;
 constexpr std::size_t kSides = 7, kInMedia = 6;
 
-// The class of a point by the side to which its normal faces: the axis of the normal's longest component, and
-// the sign of that. Points in media, which have no normal, are a class of their own.
+// The class of a point by the side to which its normal faces. It is given by the axis along which the normal
+// is longest and by the sign of the normal's component along this axis. Points in media, which have no
+// normal, are a class of their own.
 std::size_t side_of(const V3& n) {
   if (n == V3(0)) return kInMedia;
   const V3 size(std::abs(n.x), std::abs(n.y), std::abs(n.z));
@@ -42,7 +44,7 @@ void LightVisits::add(const LightVisits& more) {
 
 struct LocalLights::Builder {
   using Index = std::uint32_t;
-  using Means = std::vector<double>;  // for each light, the mean of its squared value
+  using Means = std::vector<double>;  // for each light, the mean square of its share in the arriving light
 
   LocalLights& of;
   const LightVisits& visits;
@@ -96,7 +98,8 @@ struct LocalLights::Builder {
       for (const float x : coordinates)
         if (x > low[axis]) plane = std::min(plane, x);
     }
-    // Stable, since the last bits of means() depend on the order.
+    // The partition is stable, so that means() always adds in the same order, on which the last bits of its
+    // sums depend.
     const auto above = std::ranges::stable_partition(some, [&](Index i) {
                          return visits.places[i].p[axis] < plane;
                        }).begin();

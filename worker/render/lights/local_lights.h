@@ -1,4 +1,5 @@
-// The choice of a light by a random word: by tables, and by tables that are learned for each place.
+// Chooses lights by random words (32 random bits): by one table for all places, or by tables that are learned
+// for each place (LocalLights).
 #pragma once
 
 #include <algorithm>
@@ -49,7 +50,8 @@ inline float probability_in_table(std::span<const std::uint32_t> last, std::uint
   return probability_of_words(std::uint64_t{last[light]} + 1 - before);
 }
 
-// Places, and the light that reached each.
+// Places at which learning paths (camera paths traced before the first sample) were scattered, and the light
+// that reached each place.
 struct LightVisits {
   struct Place {
     V3 p, n;  // n: the normal of its surface; 0 in a medium
@@ -69,7 +71,7 @@ struct LightVisits {
 // At the vertices of learning camera paths, one shadow ray per light measures the light that arrives. The
 // vertices are sorted into seven classes: six by the axis direction that their normal is closest to, one for
 // media. For each class a k-d tree, split at the median of the longest axis, has leaves with few vertices.
-// Let v_i be the light of light i over that of all lights, at the vertices of a leaf. Next-event estimation
+// Let v_i be the share of light i in the light that arrives at a vertex of a leaf. Next-event estimation
 // with one light, chosen with the probabilities p_i, has the least variance for p_i proportional to the
 // square root of the mean of v_i^2 (Vevoda, Kondapaneni and Krivanek 2018, "Bayesian online regression for
 // adaptive direct illumination sampling", equation 9). These probabilities are mixed with those of the table
@@ -96,16 +98,17 @@ class LocalLights {
   static constexpr std::uint8_t kLeaf = 3;
   struct Node {
     float plane = 0;
-    // Index of the child below the plane; the child above follows it. For a leaf: start of its table
+    // For an inner node: the index of the child below the plane; the child above has the next index. For a
+    // leaf: the index in tables_ at which its table begins.
     std::uint32_t next = 0;
-    std::uint8_t axis = kLeaf;  // of the plane
+    std::uint8_t axis = kLeaf;  // axis that the plane is perpendicular to; kLeaf: a leaf
   };
   struct Builder;
 
   std::span<const std::uint32_t> table_at(const V3& p, const V3& n) const;
 
   std::size_t lights_;
-  std::vector<Node> nodes_;  // first the roots of the seven classes
+  std::vector<Node> nodes_;  // the first seven are the roots, one for each class
   std::vector<std::uint32_t> tables_;
   bool in_media_ = false;
 };

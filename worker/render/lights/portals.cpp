@@ -32,8 +32,8 @@ constexpr float kRounding = 1e-5f;
 
 }  // namespace
 
-// The box in which most of the rays begin: the few origins outside of it, such as those on the ground outside
-// of a room, would make it so large that planes are far apart.
+// The box in which most of the rays begin. It leaves out the few origins that lie far away, such as those on
+// the ground outside of a room: with them the box would be so large that the tried planes would be far apart.
 struct Portals::Box {
   V3 low{0, 0, 0}, high{0, 0, 0};
 
@@ -56,15 +56,16 @@ struct Portals::Box {
       if (!(p[k] >= low[k] && p[k] <= high[k])) return false;
     return true;
   }
-  // The largest coordinate: it bounds rounding
+  // The largest absolute coordinate of the box; rounding errors are proportional to it.
   float reach() const {
     float r = 0;
     for (int k = 0; k < 3; ++k) r = std::max({r, std::abs(low[k]), std::abs(high[k])});
     return r;
   }
   float side(int axis) const { return high[axis] - low[axis]; }
-  // The place at which a ray crosses a plane: in the plane, and relative to the rectangle of the cells, from
-  // 0 to less than 1 along each side. nullopt if the ray does not cross the plane in this rectangle.
+  // The place at which a ray crosses a plane: on_plane in the plane's two coordinates, and of_box relative to
+  // the rectangle of the cells, from 0 to less than 1 along each side. nullopt if the ray does not cross the
+  // plane in this rectangle.
   struct Place {
     V2 on_plane, of_box;
   };
@@ -77,8 +78,8 @@ struct Portals::Box {
     if (!(share.x >= 0 && share.x < 1 && share.y >= 0 && share.y < 1)) return std::nullopt;
     return Place{at, share};
   }
-  // Returns the face through which a ray from inside leaves the box: 2 axis, plus 1 if the face is the one
-  // with the larger p[axis].
+  // Returns the number of the face through which a ray from inside leaves the box. The two faces
+  // perpendicular to an axis have the numbers 2 axis (at the smaller p[axis]) and 2 axis + 1 (at the larger).
   int face_of(const Found& f) const {
     int face = 0;
     float nearest = kInfinity;
@@ -99,8 +100,10 @@ std::optional<float> Portals::Plane::distance(const V3& p, const V3& d) const {
   return std::isfinite(t) && t > 0 ? std::optional(t) : std::nullopt;
 }
 
-// Returns the plane with the smallest entropy of the rays' light over its cells. exp(entropy) is the number
-// of cells over which evenly spread light has the same entropy.
+// Tries planes parallel to the face and returns the one on which the rays' light is most concentrated: the
+// one with the smallest entropy of the light over the plane's cells. Light with this entropy is as
+// concentrated as light spread evenly over exp(entropy) cells. Planes through which too little of the light
+// passes (kLeastThrough) are skipped; nullopt: all are.
 std::optional<Portals::Plane> Portals::best_plane(const Box& box, int face, std::span<const Found> rays) {
   Plane plane;
   plane.axis = face / 2;
@@ -172,7 +175,8 @@ float Portals::weight_in_front_of(const V3& p) const {
 }
 
 std::optional<V3> Portals::sample(const V3& p, std::uint32_t x, std::uint32_t y) const {
-  // The position of x among the words that choose a portal is used again to choose a place on it
+  // x chooses a portal. The position of x among the words that choose the same portal is used again to choose
+  // a place on it.
   const double sum = double{weight_in_front_of(p)}, at = std::ldexp((double{x} + .5) * sum, -32);
   const Portal* chosen = nullptr;
   double before = 0;

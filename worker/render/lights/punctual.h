@@ -83,21 +83,22 @@ struct SpotLight : Punctual<SpotLight> {
 };
 
 struct ProjectorLight : Punctual<ProjectorLight> {
-  // For a texel value of 1, the irradiance on the plane at distance 1, or the intensity if `even` is set.
+  // For a texel value of 1: the irradiance on the plane at distance 1 from the light or, if `even` is set,
+  // the intensity.
   C3 value;
   bool even = false;
   TextureIndex image;
   V3 axis_u, axis_v, axis;
-  float tan_x = 0, tan_y = 0;  // tangents of half its two fields of view
+  float tan_x = 0, tan_y = 0;  // tangents of half the field of view in x and in y
 
-  // The cosine to the axis of the image's corners
+  // The cosine of the angle between the axis and the corners of the image.
   float cos_corner() const { return 1 / std::sqrt(1 + tan_x * tan_x + tan_y * tan_y); }
   Pivot pivot(const LightWorld&, const LightNumbers&) const { return {position, axis, cos_corner()}; }
   bool dark(const LightWorld& world) const { return is_black(value) || is_black(world.textures.mean(image)); }
   double power(const LightWorld& world) const {
     return luminance(value * world.textures.mean(image)) * (even ? solid_angle() : area());
   }
-  // The image's area on the plane at distance 1, and its solid angle
+  // The image's area on the plane at distance 1, and the solid angle that it covers.
   double area() const { return double{4 * tan_x * tan_y}; }
   double solid_angle() const {
     const double x2 = tan_x * tan_x, y2 = tan_y * tan_y;

@@ -33,8 +33,8 @@ inline V3 equal_area_direction(const V2& place) {
   return {std::copysign(circle.x * radius, x), std::copysign(circle.y * radius, y), below ? -z : z};
 }
 
-// The place in [0, 1]^2 of a unit direction. 1 - |z| is not computed as a difference, which has few digits
-// next to the poles.
+// The place in [0, 1]^2 of a unit direction. 1 - |z| is computed as (x^2 + y^2) / (1 + |z|), because the
+// difference itself has few correct digits next to the poles.
 inline V2 equal_area_place(const V3& d) {
   const float r = std::sqrt((d.x * d.x + d.y * d.y) / (1 + std::abs(d.z)));
   const float b = r * (std::atan2(std::abs(d.y), std::abs(d.x)) * (2 * kInvPi)), a = r - b;

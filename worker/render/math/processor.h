@@ -11,8 +11,9 @@
 
 namespace ls::render {
 
-// Treats denormals as zero in this thread while the object lives, as Embree requires where rays are traced.
-// The destructor restores the previous mode, since adding pixel sums to the film needs denormals.
+// Treats denormals as zero in this thread while the object lives, as Embree requires of threads that trace
+// rays. The destructor restores the previous mode, since adding pixel sums to the film (the sums of the whole
+// image) needs denormals.
 class FlushDenormals {
  public:
   FlushDenormals() : saved_(read()) { write(saved_ | kFlush); }
@@ -36,8 +37,8 @@ class FlushDenormals {
   std::uint64_t saved_;
 };
 
-// The processor's estimates of 1 / x and 1 / sqrt(x), which Embree uses. Manufacturers implement them
-// differently.
+// The processor's approximate 1 / x and 1 / sqrt(x), which Embree uses. Processors of different manufacturers
+// return different results.
 #ifdef __x86_64__
 inline float reciprocal_estimate(float x) { return _mm_cvtss_f32(_mm_rcp_ss(_mm_set_ss(x))); }
 inline float reciprocal_root_estimate(float x) { return _mm_cvtss_f32(_mm_rsqrt_ss(_mm_set_ss(x))); }

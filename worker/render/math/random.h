@@ -23,9 +23,10 @@ constexpr std::uint64_t combine(std::uint64_t a, std::uint64_t b) { return combi
 inline float unit_float(std::uint32_t bits) { return static_cast<float>(bits >> 8) * 0x1p-24f; }
 // Returns -log y for a uniform number y. The caller passes y and its complement x = 1 - y, both with full
 // relative precision. So optical depths below t occur with probability 1 - e^-t however small t is; y alone
-// would not suffice, because it is rounded near 1. Rounding changes log y and y - 1 in the same proportion,
-// so their ratio stays correct (W. Kahan's log1p; Goldberg 1991, theorem 4). This avoids a branch that half
-// of all calls would take.
+// would not suffice, because near 1 it is rounded too coarsely. log y and 1 - y are both computed from the
+// rounded y, and rounding changes them in the same proportion. So their ratio is correct, and its product
+// with x is -log of the exact y (W. Kahan's log1p; Goldberg 1991, theorem 4). A separate formula for small
+// depths would need a branch, which half of all calls would take.
 inline float minus_log(float y, float x) {
   const float rest = 1 - y;  // exact for y >= 1/2
   return rest > 0 ? -std::log(y) * (x / rest) : x;

@@ -1,6 +1,7 @@
 // The random numbers of one sample of a pixel. They are a pure function of (seed, pixel, sample index,
 // branch, vertex, purpose), where a branch is one of the paths into which a path splits. Even sample indices
-// form half A, odd ones half B; each half of each pixel is its own scrambled Sobol sequence.
+// form half A, odd ones half B (the error is estimated by comparing them); each half of each pixel is its own
+// scrambled Sobol sequence.
 //
 // Sobol points have four dimensions, hash-based Owen scrambling and nested uniform shuffling (Burley,
 // "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020), and the direction numbers of Joe and Kuo 2008 for
@@ -157,7 +158,8 @@ class SampleStream {
   SampleStream(std::uint64_t seed, std::uint32_t x, std::uint32_t y, std::uint64_t sample)
       : SampleStream(combine(combine(seed, (std::uint64_t{y} << 32) | x), sample & 1), sample >> 1) {}
 
-  // Where a path splits in two, the first continues with this stream; returns the stream of the second.
+  // For a path that splits in two: the first part continues with this stream, and this function returns the
+  // stream of the second part.
   SampleStream of_branch() const {
     SampleStream s(*this);
     s.sequence_ = combine(sequence_, kBranch);
@@ -196,8 +198,8 @@ class SampleStream {
   }
   static const MixedSlots kMixedSlots;
 
-  // `sequence` is the key of the half, `index` the index of the sample in it. A Sobol sequence of 32-bit
-  // points has 2^32 members; later samples get hashed numbers.
+  // `sequence` is the key of the half (A or B) of the pixel's samples, and `index` the index of the sample in
+  // this half. A Sobol sequence of 32-bit points has 2^32 members; later samples get hashed numbers.
   SampleStream(std::uint64_t sequence, std::uint64_t index)
       : sequence_(sequence),
         sample_(combine(sequence, index)),
@@ -210,10 +212,10 @@ class SampleStream {
              static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(b >> 32)}};
   }
 
-  std::uint64_t sequence_;  // key of the half of the pixel
-  std::uint64_t sample_;    // key of the sample
-  std::uint32_t reversed_;  // index within the half, bits reversed
-  std::uint32_t by_sobol_;  // number of vertices with Sobol points
+  std::uint64_t sequence_;  // key of the Sobol points: the pixel, the half and the branch
+  std::uint64_t sample_;    // key of the hashed numbers of this sample
+  std::uint32_t reversed_;  // index of the sample within its half, bits reversed
+  std::uint32_t by_sobol_;  // number of vertices whose numbers are Sobol points
 };
 inline constexpr SampleStream::MixedSlots SampleStream::kMixedSlots = SampleStream::mixed_slots();
 

@@ -31,8 +31,8 @@ class Steps {
   }
   bool past() const { return !more_; }
   bool inside(double at) const { return more_ && begin() <= at; }
-  // Returns the next boundary after `at`, as a distance from the ray's origin: the beginning of the walk's
-  // cell if `at` lies before it, else the cell's end.
+  // Returns the next boundary after `at`, as a distance from the ray's origin. That is the beginning of the
+  // walk's current cell if `at` lies in front of this cell, else the cell's end.
   double boundary(double at) const { return !more_ ? kNoBoundary : begin() <= at ? end() : begin(); }
   double longest() const { return longest_; }
   const MacroCell& cell() const { return walk_.cell(); }
@@ -100,8 +100,8 @@ class EmissionWalk {
                                                         : hi > 0;
   }
 
-  // Returns the end of the interval that run() integrates from `at` on. `sampled` is the density grid's cell
-  // if the interval is to get an emission sample, else null.
+  // Returns the end of the interval that begins at `at` and that run() integrates as one. `sampled` is the
+  // density grid's cell if the interval is to get an emission sample, else null.
   double end_of_constant_part(double at, const MacroCell* sampled) const {
     double to = std::min(end_, density_.boundary(at));
     if (emitter_) to = std::min(to, emitter_->boundary(at));
@@ -112,8 +112,8 @@ class EmissionWalk {
     return varies ? std::min(to, at + density_.longest()) : to;
   }
 
-  // Returns the emission at distance t: radiance per length or, for emission per absorption, the radiance of
-  // the source.
+  // Returns the emission at distance t. For emission per length it is radiance per length. For emission per
+  // absorption it is a radiance; this times the absorption coefficient is the radiance per length.
   V3d source(double t) const {
     V3d e(m_.emission);
     if (!emitter_) return e;
@@ -143,8 +143,8 @@ class EmissionWalk {
     return a;
   }
 
-  // Adds the emission e, times `share` and the transmittance up to the interval, to channel c, or to all
-  // channels if they have the same extinction.
+  // Adds the emission of an interval to the sum: e times `share` times the transmittance up to the interval.
+  // Adds it to channel c alone or, if all channels have the same extinction, to all channels.
   void add(int c, const V3d& e, double share) {
     if (channels_ == 1) {
       sum_ = sum_ + e * (through_[0] * share);
@@ -153,8 +153,8 @@ class EmissionWalk {
     }
   }
 
-  // Adds the emission of an interval [a, b] without extinction. There the medium emits only per length, and
-  // the integral of this emission over the grid is exact.
+  // Adds the emission of an interval [a, b] without extinction. Where there is no extinction, a medium emits
+  // only per length, and the grid gives the integral of this emission exactly.
   void add_clear(double a, double b) {
     double field = b - a;
     for (int c = 0; c < 3; ++c) {
@@ -220,7 +220,8 @@ class EmissionWalk {
     }
   }
 
-  // Russian roulette, as for transmittance (medium.h). Returns false if the integration ends.
+  // Plays Russian roulette by the transmittance so far, in the same way as for transmittance (medium.h).
+  // Returns false if the integration ends.
   bool goes_on() {
     double largest = 0;
     for (int c = 0; c < channels_; ++c) largest = std::max(largest, through_[c]);
@@ -262,8 +263,8 @@ C3 emission_of_length(const Medium& m, float t_max) {
 
 C3 emission_of_grid(const Medium& m, const V3& o, const V3& d, float t_max, RandomStream stream) {
   if (m.by_channel[0]) {
-    // One walk per channel: it computes the emission as if all channels had the density of this one, and
-    // only the result of this channel is used.
+    // One walk for each channel c: it computes the emission as if all channels had the density of channel c,
+    // and only its result for channel c is used.
     C3 light;
     for (int c = 0; c < 3; ++c) {
       Medium one = m;

@@ -23,7 +23,8 @@ C3 emission_of_length(const Medium& m, float t_max);
 // unit length.
 C3 emission_of_grid(const Medium& m, const V3& o, const V3& d, float t_max, RandomStream stream);
 
-// The points on an interval of a ray at which emission_of_grid() evaluates the emission.
+// The functions below are for the points on an interval of a ray at which emission_of_grid() evaluates the
+// emission.
 
 // The mean of e^-t over [0, x]: (1 - e^-x) / x.
 inline double mean_transmittance(double x) { return x > 0 ? -std::expm1(-x) / x : 1; }

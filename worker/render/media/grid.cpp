@@ -22,9 +22,9 @@ Grid::Grid(std::array<int, 3> size, std::vector<float> values, const Affine& wor
       exact_(world_to_index),
       filter_(filter),
       wrap_(wrap) {
-  // Within half a voxel of its ends a mirrored grid equals a clamped one; without interpolation, wrapping
-  // has no effect inside the domain. So only repeating with interpolation needs the extra nodes of
-  // repeat_ends().
+  // Only grids that are repeated and interpolated need the extra nodes of repeat_ends(). A mirrored grid
+  // equals a clamped one within half a voxel of its ends, and without interpolation wrapping has no effect
+  // inside the domain.
   if (wrap == Wrap::repeat && filter == VolumeFilter::trilinear) repeat_ends();
   for (int k = 0; k < 3; ++k) {
     last_[k] = std::max(0, size_[k] - 2);
@@ -119,8 +119,8 @@ void Grid::use_cells(int cell_size) {
 }
 
 MacroCell Grid::bound_cell(int x, int y, int z) const {
-  // [a, b] is the range of nodes that interpolation inside the cell can use: one more on each side than the
-  // cell covers, because the traversal's positions are rounded.
+  // [a, b] is, along each axis, the range of nodes that interpolation inside the cell can use. The cell is
+  // enlarged by .01 voxels at each end, because the traversal's positions are rounded.
   int a[3], b[3];
   const int c[3] = {x, y, z};
   for (int k = 0; k < 3; ++k) {

@@ -1,4 +1,5 @@
-// A dense scalar grid, interpolated or not. Its macro cells, blocks of voxels, store bounds of its values.
+// A dense grid of scalar values, with trilinear interpolation or without interpolation. Its macro cells,
+// which are blocks of voxels, store bounds of its values.
 #pragma once
 
 #include <algorithm>
@@ -20,12 +21,12 @@ namespace ls::render {
 // float32 stay within them, and the control value for ratio tracking.
 struct MacroCell {
   float hi = 0;        // upper bound of all interpolated values
-  float control = 0;   // near the mean
+  float control = 0;   // control value for ratio tracking, near the mean of the values
   float residual = 0;  // upper bound of |value - control|
 };
 
-// The result of integrating the field along an interval of a ray. Integration stops where the integral
-// reaches a wanted value (`reached` is then true, and t the place), else at the end of the interval.
+// The result of integrating the field along an interval of a ray. Integration stops at t: where the integral
+// reaches a wanted value (`reached` is then true), else at the end of the interval.
 struct Passage {
   bool reached = false;
   float t = 0;
@@ -49,8 +50,8 @@ class Grid {
   // its world, the terms are large and nearly cancel.
   V3 to_index(const V3& p) const { return V3(exact_.point(V3d(p))); }
   VolumeFilter filter() const { return filter_; }
-  // Returns the value at index coordinates inside the domain. kFilter must equal filter(); it is a template
-  // parameter so that callers decide once for many values.
+  // Returns the value at index coordinates inside the domain. kFilter must equal filter(). It is a template
+  // parameter so that a caller that needs many values tests filter() only once.
   template <VolumeFilter kFilter>
   float value(const V3& index) const {
     LS_COUNT(density);
@@ -127,7 +128,8 @@ class Grid {
 
  private:
   friend class CellWalk;
-  friend double exact_integral(const Grid&, const V3d& o, const V3d& d, double t0, double t1);  // of tests
+  // Defined by the tests.
+  friend double exact_integral(const Grid&, const V3d& o, const V3d& d, double t0, double t1);
   void repeat_ends();
   V3 wrapped(const V3& index) const;
   int wanted_cell_size(double density_to_sigma) const;
@@ -193,9 +195,11 @@ class CellWalk {
   const MacroCell* cell_ = nullptr;
   double entry_ = 0;
   V3 origin_, direction_;
-  // Per axis: boundary number i between cells is at the distance first_ + i * spacing_. The walk leaves its
-  // cell through boundary plane_, at distance exit_, and step_ (1 or -1) leads to the boundary after it.
-  // left_ is the number of cells ahead, and stride_ the step in the cell table to the next one.
+  // The walk's state along each axis. Boundary number i between cells is at the distance first_ + i *
+  // spacing_ from the point of entry. The walk leaves the current cell through boundary number plane_, at the
+  // distance exit_. The number of the boundary after that is plane_ + step_, where step_ is 1 or -1. left_ is
+  // the number of cells still ahead, and stride_ is what to add to a cell's index in the cell table to get
+  // that of the next cell.
   float plane_[3], step_[3], first_[3], spacing_[3], exit_[3];
   int left_[3];
   std::ptrdiff_t stride_[3];
@@ -207,8 +211,8 @@ inline CellWalk::CellWalk(const Grid& grid, const V3& o, const V3& d, float t0, 
   const V3d p = grid.exact_.point(V3d(o)), v = grid.exact_.vector(V3d(d));
   if (!std::isfinite(p.x + p.y + p.z + v.x + v.y + v.z)) return;
   // If a component of the direction is so small that the ray cannot cross a cell along that axis, the ray
-  // counts as parallel to the two faces of the domain that are perpendicular to the axis. If it starts
-  // beyond one of these, it misses the grid.
+  // counts as parallel to the two faces of the domain that are perpendicular to the axis. Such a ray misses
+  // the grid if its origin is not between these faces.
   constexpr double kParallel = 1e-20;
   double from = t0, to = t1, inverse[3];
   for (int k = 0; k < 3; ++k) {
@@ -229,7 +233,7 @@ inline CellWalk::CellWalk(const Grid& grid, const V3& o, const V3& d, float t0, 
   stop_ = static_cast<float>(length);
   origin_ = V3(p + v * from);
   direction_ = V3(v);
-  // the size is a power of two, so that its reciprocal is exact
+  // The size is a power of two, so that its reciprocal is exact.
   const auto size = static_cast<float>(grid.cell_size_), per_size = 1 / size;
   const std::ptrdiff_t strides[3] = {1, grid.cells_[0], std::ptrdiff_t{grid.cells_[0]} * grid.cells_[1]};
   cell_ = grid.macro_.data();

@@ -48,8 +48,9 @@ Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d
   auto data = raw ? load_raw_grid(*path, files.name(v.file), v.order) : load_vol(*path, files.name(v.file));
   if (!data) return tl::unexpected(data.error());
   const bool node_centred = v.node_centred || raw;
-  // Values are at cell centres of the unit cube, or at nodes from face to face. The cube is first mapped to
-  // the file's box, if this is requested, and then transformed by to_world.
+  // The file's values are at the cell centres of the unit cube or, if node_centred is true, at nodes, the
+  // outermost of which are on the cube's faces. The cube is first mapped to the file's box, if this is
+  // requested, and then transformed by to_world.
   Affine unit_to_scene(v.to_world);
   if (v.use_grid_bbox || raw) {
     const V3d lo(data->bbox_min[0], data->bbox_min[1], data->bbox_min[2]),
@@ -77,7 +78,8 @@ Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d
                 fmt::format("{}: a grid with a border has three voxels or more along each axis, their values "
                             "at their centres, and does not wrap",
                             files.name(v.file)));
-  // How far the box reaches beyond the outermost values, in voxels.
+  // How far the box reaches beyond the outermost values, in voxels. It is negative if the outermost values
+  // are a border outside of the box.
   const double margin = node_centred ? 0 : v.border ? -.5 : .5;
   const V3d last(n[0] - 1, n[1] - 1, n[2] - 1), steps = last + V3d(2 * margin);
   Affine to_nodes;

@@ -11,7 +11,7 @@
 namespace ls::render {
 
 struct LoadedVolume {
-  std::vector<Grid> channels;  // 1 or 3 grids
+  std::vector<Grid> channels;  // one grid per channel; 1 or 3 channels
   std::uint64_t clamped = 0;   // number of negative values that were set to 0
 };
 

@@ -34,8 +34,8 @@ class ChannelFlight {
   ChannelFlight(const Medium& m, int hero, const V3& o, const V3& d) : m_(m), hero_(hero), o_(o), d_(d) {}
 
   void pass(int c, double depth) { log_[c] -= depth; }
-  // Adds null collisions. `product` is, for each channel, the product over these collisions of (majorant -
-  // density), relative to that of the hero.
+  // Adds null collisions. product[c] is a product over these collisions: (majorant - density) of channel c,
+  // divided by (majorant - density) of the hero.
   void add_nulls(const double (&product)[3]) {
     // A product of 0 gives the logarithm -infinity: such a flight is impossible in that channel.
     for (int c = 0; c < 3; ++c) log_[c] += std::log(product[c]);
@@ -131,8 +131,8 @@ Flight fly_channels(const Medium& m, int hero, float depth, const V3& o, const V
   return flight.through(t_max);
 }
 
-// One collision process serves all channels, at the rate of the largest residual. Otherwise this is the same
-// as transmittance_grid (medium.h).
+// The channels share one sequence of collisions, at the rate of the largest of their residuals. Otherwise
+// this is the same as transmittance_grid (medium.h).
 C3 transmittance_channels(const Medium& m, const V3& o, const V3& d, float t0, float t1,
                           RandomStream stream) {
   const float s = m.sigma_t.x;

@@ -25,8 +25,8 @@
 
 namespace ls::render {
 
-// A medium's emission is proportional to length or to absorption. For black_body it is proportional to
-// absorption, and the factor is the radiance of a black body.
+// Whether the emission of a medium is proportional to length or to absorption. For black_body it is
+// proportional to absorption, and the factor is the radiance of a black body.
 enum class EmissionKind : std::uint8_t { none, per_length, per_absorption, black_body };
 
 // The lights about which segments through a medium are also sampled equi-angularly (vertex_nee.h): none,
@@ -91,7 +91,7 @@ struct Flight {
   bool scattered = false;
   float t = 0;
   C3 weight{1, 1, 1};
-  C3 density{1, 1, 1};  // used in chromatic code only
+  C3 density{1, 1, 1};  // density of the flight relative to the hero's; only chromatic code uses it
 };
 
 // Counts densities that exceed the bound of their macro cell. Such a density biases the result, and nothing
@@ -100,12 +100,12 @@ struct MediumCounters {
   std::uint64_t majorant_violations = 0;
 };
 
-// free_flight() and transmittance() for grids with a density per channel (medium.cpp). Only chromatic code
-// calls them.
+// What free_flight() and transmittance() call for media with one density grid per channel
+// (Medium::by_channel). Only chromatic code uses them. They are defined in medium.cpp.
 Flight fly_channels(const Medium& m, int hero, float depth, const V3& o, const V3& d, float t_max,
                     RandomStream stream, MediumCounters& counters);
 C3 transmittance_channels(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream);
-// Returns the densities of the channels of such a grid at index coordinates inside its domain.
+// Returns the densities of the three channels of such a medium at index coordinates inside the grids' domain.
 C3 densities(const Medium& m, const V3& index);
 
 namespace detail {
@@ -213,11 +213,11 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
 }
 
 // Russian roulette of transmittance: once its estimate is below e^-4, a tracker survives with probability
-// estimate / e^-4 and continues with the estimate e^-4. This is decided by the whole estimate so far, not by
-// the control's optical depth alone: a ray that misses the dense voxel of an otherwise empty cell has a large
-// control depth there, which its factors compensate to a transmittance of 1 (docs/measurements/stability.md
-// N10). Roulette is played only in cells with a residual to track: constant densities cost nothing, and their
-// tails are exact (stability.md N05).
+// estimate / e^-4 and continues with the estimate e^-4. The decision depends on the whole estimate so far,
+// not on the optical depth of the control values alone. For a ray that misses the dense voxel of an otherwise
+// empty cell, that depth is large, but the factors of the collisions compensate for it, and the transmittance
+// is 1 (docs/measurements/stability.md N10). Roulette is played only in cells with a residual to track:
+// constant densities cost nothing, and their tails are exact (stability.md N05).
 inline constexpr float kRouletteDepth = 4;
 inline constexpr float kRouletteTransmittance = .018315639f;
 
@@ -283,8 +283,8 @@ C3 transmittance_homogeneous(const Medium& m, float length) {
   }
 }
 
-// Grids without interpolation are rare. This is not inlined, so that it does not slow down the code for other
-// grids.
+// Grids without interpolation are rare. Their functions are not inlined, so that they do not slow down the
+// code for other grids.
 template <bool kChromatic>
 [[gnu::noinline]] Flight fly_nearest(const Medium& m, int hero, float depth, const V3& o, const V3& d,
                                      float t_max, RandomStream stream, MediumCounters& counters) {

@@ -18,9 +18,9 @@ void MediaState::stand(const SurfaceInfo& s, bool outside, bool through, const s
   settle(media);
 }
 
-// The path enters a boundary: adds it to those that the path is inside of. A sheet is a surface that is not
-// closed: it encloses a volume only together with others, or none at all. A path may have come around the
-// edge of a sheet; then it is inside already, and nothing is added.
+// Called when the path enters a boundary: adds it to the boundaries that the path is inside of. A sheet is a
+// surface that is not closed: it encloses a volume only together with others, or none at all. A path may have
+// come around the edge of a sheet and be inside already; then nothing is added.
 void MediaState::enter(const Body& b, bool sheet) {
   if (sheet && std::find(body_.begin(), body_.begin() + bodies_, b) != body_.begin() + bodies_) return;
   if (bodies_ == kCapacity) {
@@ -30,11 +30,14 @@ void MediaState::enter(const Body& b, bool sheet) {
   body_[static_cast<std::size_t>(bodies_++)] = b;
 }
 
-// The path leaves a boundary: removes it from those that the path is inside of. If the path is not inside of
-// it, the path began there, and the boundary's interior was counted as the background. The boundary's
-// exterior then becomes the background. It also does if the path entered the boundary while no background was
-// known, and if the path only touches the boundary from outside (`through` is false) and is in no medium. It
-// does not if other boundaries around the path account for the exterior.
+// Called when the path leaves a boundary or, if `through` is false, touches it from outside. A path that
+// leaves removes the boundary from those that it is inside of. If it is not among them, the path began inside
+// it, so that its interior was counted as the background medium. The boundary's exterior then becomes the
+// background.
+//
+// The exterior also becomes the background in two other cases: if the path entered the boundary while no
+// background was known, and if the path only touches the boundary and is in no medium. But it never does if
+// other boundaries around the path already account for the exterior.
 void MediaState::leave(const Body& b, bool through) {
   const auto end = body_.begin() + bodies_;
   bool known = false;

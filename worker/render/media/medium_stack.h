@@ -1,9 +1,11 @@
 // The media at a path's current position (docs/decisions/0010-media-boundaries.md).
 //
-// A boundary has an interior and an exterior medium, either of which may be none. Starting with the
-// background medium, each boundary that encloses a point adds its interior medium and removes its exterior
-// medium. So the media at a point do not depend on the order in which a path crosses boundaries. Only the
-// media of the highest priority among them are in effect; if there are several, they overlap.
+// A boundary is a surface with an interior and an exterior medium, either of which may be none. The media at
+// a point follow from a count for each medium: the background medium counts once, and each boundary that
+// encloses the point adds 1 to the count of its interior medium and subtracts 1 from that of its exterior
+// medium. The media with a count above 0 are present at the point. So they do not depend on the order in
+// which a path crosses boundaries. Only the present media of the highest priority are in effect; if there are
+// several, they overlap.
 #pragma once
 
 #include <algorithm>
@@ -17,8 +19,8 @@
 
 namespace ls::render {
 
-// The medium of a path in scenes without overlaps: the medium of the boundary crossed last, on the side where
-// the path is (Mitsuba's rule).
+// Used in place of MediaState in scenes whose media do not overlap. It holds a single medium: of the two
+// media of the boundary crossed last, the one on the path's side (Mitsuba's rule).
 struct OneMedium {
   std::uint32_t medium = kNone;
 
@@ -30,11 +32,12 @@ struct OneMedium {
 
 class MediaState {
  public:
-  // The largest number of boundaries that a path may be inside of at the same time. If there would be one
-  // more, the sample is rejected and counted.
+  // The largest number of boundaries that a path may be inside of at the same time. If it enters one more,
+  // its sample is rejected and counted (HealthCause::nested_media).
   static constexpr int kCapacity = 32;
 
-  // The state is copied for every shadow ray; to save time, only the used parts of the arrays are copied.
+  // The copy operations copy only the used parts of the arrays, to save time: the state is copied for every
+  // shadow ray.
   MediaState() = default;
   MediaState(const MediaState& o) { *this = o; }
   MediaState& operator=(const MediaState& o) {
@@ -50,7 +53,8 @@ class MediaState {
   bool any() const { return count_ > 0; }
   bool several() const { return count_ > 1; }
   std::uint32_t one() const { return effect_[0]; }
-  // The indices of the media in effect, in ascending order. A medium that is present twice is listed twice.
+  // The indices of the media in effect, in ascending order. A medium whose count is 2 is listed twice, and so
+  // on.
   std::span<const std::uint32_t> all() const { return {effect_.data(), static_cast<std::size_t>(count_)}; }
   bool overflowed() const { return overflowed_; }
 
@@ -61,8 +65,8 @@ class MediaState {
   }
   // Sets the state of a path that starts outside of all boundaries, in the medium `background`.
   void start(std::uint32_t background, const std::vector<Medium>& media);
-  // Updates the state of a path that is now outside of the boundary s (if `outside`) or inside. `through` is
-  // true if the path came from the other side.
+  // Updates the state of a path that has met the boundary s and is now outside of it (if `outside`) or inside
+  // of it. `through` is true if the path crossed s, that is, was on the other side before.
   void stand(const SurfaceInfo& s, bool outside, bool through, const std::vector<Medium>& media);
 
  private:

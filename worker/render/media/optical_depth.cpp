@@ -5,8 +5,9 @@
 namespace ls::render {
 namespace {
 
-// Returns the rate dx / dt in a macro cell, its mean density. The result is positive wherever the density is,
-// even in a cell with one dense voxel whose mean may round to 0.
+// Returns dx / dt in a macro cell: about the cell's mean density, but at least 2^-10 of its largest density.
+// So the rate is above 0 wherever the density is, even in a cell with one dense voxel, whose mean may round
+// to 0.
 float rate_of(const MacroCell& cell) { return std::max(cell.control, cell.hi * 0x1p-10f); }
 
 }  // namespace
@@ -37,8 +38,8 @@ OpticalDepth::Point OpticalDepth::grid_at(float t) const {
     passed += double{rate} * (w.end() - w.begin());
     last = {t, static_cast<float>(passed), rate, w.index(w.end())};
   }
-  // By rounding, a distance from a far origin may lie at the very end of the medium; then the last non-empty
-  // cell is used.
+  // If the ray's origin is far away, rounding may move t to the very end of the medium, beyond the last cell.
+  // Then the point is in the last non-empty cell.
   return t <= to_ ? last : Point{t, total_, 0, {0, 0, 0}};
 }
 
@@ -53,7 +54,7 @@ OpticalDepth::Point OpticalDepth::grid_after(float x) const {
     }
     passed += here;
   }
-  return {to_, total_, 0, {0, 0, 0}};  // only rounding can place x beyond the end
+  return {to_, total_, 0, {0, 0, 0}};  // reached only if rounding has put x beyond total_
 }
 
 C3 OpticalDepth::grid_scattering(const Point& at_point, const V3& p) const {

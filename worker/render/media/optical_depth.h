@@ -1,8 +1,9 @@
-// Optical depth along a ray, parametrised so that the medium looks homogeneous. The parameter x is the
-// density integrated along the ray up to a point, and light of channel c is attenuated by about
-// exp(-sigma_t[c] x). In a homogeneous medium x is the length and the attenuation is exact. In a grid x
-// integrates the macro cells' mean densities. Nothing is stored: each query traverses the cells again (a few
-// nanoseconds per cell).
+// Optical depth along a ray, expressed by a parameter x in which every medium looks homogeneous: x is the
+// density integrated along the ray from its origin to a point, and light of channel c that gets there is
+// attenuated to about the share exp(-sigma_t[c] x). In a homogeneous medium the density is 1, so x is the
+// distance, and the attenuation is exact. In a grid the density is taken to be constant in each macro cell (a
+// block of voxels, grid.h): about the mean of its values. Nothing is stored: each query traverses the cells
+// again (a few nanoseconds per cell).
 #pragma once
 
 #include <type_traits>
@@ -15,9 +16,9 @@ namespace ls::render {
 class OpticalDepth {
  public:
   struct Point {
-    float t = 0;     // distance along the ray
-    float x = 0;     // density integrated from the origin to t
-    float rate = 0;  // dx / dt; 0 where the medium is absent
+    float t = 0;     // distance from the ray's origin [world units]
+    float x = 0;     // density integrated from the ray's origin to t
+    float rate = 0;  // dx / dt at t; 0 outside of the medium
     V3 index{0, 0, 0};
   };
 
@@ -27,8 +28,8 @@ class OpticalDepth {
     if (m.grid) measure();
   }
 
-  // The medium is empty outside of the part [from(), to()] of the ray. to() is infinite if the medium has no
-  // end.
+  // The part [from(), to()] of the ray contains all of the medium that the ray meets. to() is infinite if
+  // neither the ray nor the medium ends.
   float from() const { return from_; }
   float to() const { return to_; }
   // The value of x at to(). It is 0 if the ray misses the medium.
@@ -37,7 +38,7 @@ class OpticalDepth {
   Point at(float t) const { return medium_->grid ? grid_at(t) : Point{t, t, 1, {0, 0, 0}}; }
   Point after(float x) const { return medium_->grid ? grid_after(x) : Point{x, x, 1, {0, 0, 0}}; }
 
-  // Scattering coefficients at a point; p is its position in the world.
+  // Returns the scattering coefficients [1/world unit] at `at_point`, whose position in the world is p.
   C3 scattering(const Point& at_point, const V3& p) const {
     return medium_->grid ? grid_scattering(at_point, p) : medium_->sigma_s;
   }
@@ -53,7 +54,7 @@ class OpticalDepth {
   float t_max_, from_ = 0, to_, total_;
 };
 
-// OpticalDepth for a medium known to be homogeneous: the same interface, without any traversal.
+// OpticalDepth for a medium that is known to be homogeneous: the same interface, but no cells to traverse.
 class HomogeneousOpticalDepth {
  public:
   HomogeneousOpticalDepth(const Medium& m, const V3&, const V3&, float t_max)

@@ -1,6 +1,7 @@
-// The Henyey-Greenstein phase function. This form has no division by g and does not compute 1 - cos from a
-// rounded cosine, so it is exact for g = 0 and stable up to |g| = 0.99999. (Derivation: 1 - cos and 1 + cos
-// of the sampled angle are rational functions of the random number xi.)
+// The Henyey-Greenstein phase function. It is written in x, the distance of the scattering angle's cosine
+// from the function's peak: x = 1 - cos for g >= 0 and x = 1 + cos for g < 0. This form has no division by g
+// and does not compute x from a rounded cosine, so it is exact for g = 0 and stable up to |g| = 0.99999.
+// (Derivation: 1 - cos and 1 + cos of the sampled angle are rational functions of the random number xi.)
 #pragma once
 
 #include "worker/render/base/work_counters.h"
@@ -10,7 +11,7 @@ namespace ls::render {
 
 struct PhaseSample {
   V3 w;
-  float pdf;  // per steradian; equals the value of the phase function, as sampling is exact
+  float pdf;  // density per steradian; sampling is exact, so it equals the phase function
 };
 
 struct HenyeyGreenstein {
@@ -20,7 +21,7 @@ struct HenyeyGreenstein {
   // integrates to 1 over w1.
   float value(const V3& w, const V3& w1) const {
     LS_COUNT(phase);
-    const V3 diff = g >= 0 ? w - w1 : w + w1;  // x measured from the peak
+    const V3 diff = g >= 0 ? w - w1 : w + w1;  // |diff|^2 / 2 is x
     return from_x(.5f * dot(diff, diff));
   }
   PhaseSample sample(const V3& w, V2 u) const {

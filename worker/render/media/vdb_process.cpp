@@ -45,13 +45,14 @@ tl::unexpected<Error> how_it_ended(int status) {
   }
 }
 
-// Guards the limit, which is read and then set.
+// Guards the limit RLIMIT_DATA, because changing it takes two steps: it is read and then set.
 std::mutex& limit_mutex() {
   static std::mutex one;
   return one;
 }
 
-// Lowers the limit RLIMIT_DATA by `bytes`, if there is one. Returns by how much.
+// Lowers this process's limit RLIMIT_DATA by `bytes`, but not below 0. Returns the number of bytes by which
+// it was lowered: 0 if there is no limit.
 std::uint64_t lower_limit(std::uint64_t bytes) {
   const std::lock_guard lock(limit_mutex());
   rlimit limit{};
@@ -88,8 +89,8 @@ Result<VdbFile> VdbFile::read(const std::filesystem::path& path, const std::stri
   if (!status) return no_program(status.error().message);
   if (!WIFEXITED(*status) || WEXITSTATUS(*status) != 0) return how_it_ended(*status);
 
-  // Processes started by the program may still have the reply open. So the reply is sealed against changes
-  // before it is read, and rejected if sealing fails.
+  // If the program started other processes, they may still have the reply's file open and could change it. So
+  // the reply is sealed against changes before it is read, and rejected if sealing fails.
   if (::fcntl(reply.fd, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE) != 0) return vdb_nonsense();
   struct stat written {};
   if (::fstat(reply.fd, &written) != 0) return no_program("fstat", errno);

@@ -20,19 +20,21 @@
 
 namespace ls::render {
 
-// Returns the number of bytes that this process may still allocate under the limit; kNoDataLimit if there is
-// no limit.
+// Returns the number of bytes that this process may still allocate under its limit RLIMIT_DATA; kNoDataLimit
+// if there is no limit.
 std::uint64_t data_left();
 
 class VdbFile {
  public:
   // Reads the grid `grid_name` of the file `path`. If grid_name is empty, it reads the only grid, or the grid
-  // "density" if there are several. Fails with invalid_argument if the file is at fault, with
-  // resource_exhausted if a limit is exceeded, and with internal if the program could not be started.
+  // "density" if there are several. Fails with invalid_argument if the file is at fault; with
+  // resource_exhausted if the grid has more than max_values values or another limit (memory, time) is
+  // exceeded; and with internal if the program could not be started or ended with an error code.
   static Result<VdbFile> read(const std::filesystem::path& path, const std::string& grid_name,
                               std::uint64_t max_values,
                               const std::filesystem::path& program = program_beside_us("lightshaft-vdb"));
-  // The grid. Its sizes are at least 1, its values finite and not negative, and its transform is finite.
+  // The grid, which is valid: its sizes are at least 1, its values are finite and not negative, and its
+  // transform is finite.
   const LsVdbGrid& grid() const { return grid_; }
 
  private:

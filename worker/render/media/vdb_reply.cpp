@@ -30,8 +30,8 @@ Result<LsVdbGrid> validated_grid(std::span<const std::byte> reply, std::uint64_t
   if (said.code != 0)
     return fail(said.code == 2 ? Errc::resource_exhausted : Errc::invalid_argument, std::string(said.error));
   LsVdbGrid grid = said.grid;
-  // `values` points to non-const floats, which requires the const_cast. The file is mapped read-only, and the
-  // values are never written.
+  // LsVdbGrid::values points to non-const floats, so the const_cast is needed. The file is mapped read-only,
+  // and the values are never written.
   grid.values = reinterpret_cast<float*>(const_cast<std::byte*>(reply.data()) + kVdbValuesAt);
   const std::uint64_t count = values_of(grid);
   if (count == 0 || count > max_values || count > (reply.size() - kVdbValuesAt) / sizeof(float) ||

@@ -13,18 +13,20 @@
 extern "C" {
 
 struct LsVdbGrid {
-  // Number of nodes, including one layer of background nodes around the active voxels
+  // Number of nodes (grid points with a value) along x, y and z: the box of the active voxels, enlarged by
+  // one layer of nodes on each side
   std::int32_t size[3];
-  double index_to_scene[16];  // maps the node (i, j, k) to the scene; row-major, for column vectors
-  std::int32_t channels;      // 1 or 3 channels
-  float* values;              // channels interleaved, x fastest; freed by ls_vdb_free
+  double index_to_scene[16];  // 4 x 4 matrix from node (i, j, k) to the scene; row-major
+  std::int32_t channels;      // number of values per node: 1 or 3
+  float* values;              // x varies fastest, channels are interleaved; freed by ls_vdb_free
   std::uint64_t negatives;    // number of negative values, which were set to 0
 };
 
-// Reads the grid `grid_name` of the file `path`, which may be of either kind. Linked only into
-// lightshaft-vdb. It has plain types only, so that users need no headers of OpenVDB. Returns 0 on success, 1
-// if the file or the grid is at fault, and 2 if a limit is exceeded, such as max_values, the largest number
-// of values. `error` receives a message of at most error_size bytes.
+// Reads the grid `grid_name` of the .vdb or .nvdb file `path` into `out`. Linked only into lightshaft-vdb.
+// Its parameters have plain types, so that callers need no headers of OpenVDB. Returns 0 on success, 1 if the
+// file or the grid is at fault, and 2 if a limit is exceeded, such as max_values, the largest number of
+// values. On failure the buffer `error` of error_size bytes receives a message, which is cut off if it is
+// longer.
 int ls_vdb_read(const char* path, const char* grid_name, std::uint64_t max_values, LsVdbGrid* out,
                 char* error, std::uint64_t error_size);
 void ls_vdb_free(LsVdbGrid* grid);
@@ -32,15 +34,17 @@ void ls_vdb_free(LsVdbGrid* grid);
 
 namespace ls::render {
 
-inline constexpr std::uint64_t kNoDataLimit = ~std::uint64_t{0};  // lightshaft-vdb may use any memory
-inline constexpr std::uint64_t kVdbValuesAt = 4096;               // offset of the values in bytes
+// Stands for "no limit" where a number of bytes is expected.
+inline constexpr std::uint64_t kNoDataLimit = ~std::uint64_t{0};
+// Offset of the grid's values in the reply's file, in bytes
+inline constexpr std::uint64_t kVdbValuesAt = 4096;
 inline constexpr std::uint64_t kVdbMagic = 0x3162'6476'736c;
 
 struct VdbReply {
   std::uint64_t magic;
-  std::int32_t code;  // return value of ls_vdb_read
-  char error[512];    // null-terminated
-  LsVdbGrid grid;     // without `values`
+  std::int32_t code;  // 0, 1 or 2, as returned by ls_vdb_read
+  char error[512];    // null-terminated message if code is not 0
+  LsVdbGrid grid;     // its `values` is null; the values are in the file at kVdbValuesAt
 };
 static_assert(sizeof(VdbReply) <= kVdbValuesAt);
 
@@ -56,12 +60,12 @@ inline std::uint64_t values_of(const LsVdbGrid& grid) {
 }
 
 // Checks the grid of a reply and returns it. A valid grid has at most max_values values, all finite and not
-// negative, sizes of at least 1 and a finite transform. Its values stay where they are in `reply`, which must
-// be page-aligned, as mapped memory is. Fails with invalid_argument if the file is at fault or the reply is
-// malformed, and with resource_exhausted if a limit is exceeded.
+// negative, sizes of at least 1 and a finite transform. The returned grid points at its values in `reply`,
+// which must be page-aligned, as mapped memory is, and must outlive the grid. Fails with invalid_argument if
+// the file is at fault or the reply is malformed, and with resource_exhausted if a limit is exceeded.
 Result<LsVdbGrid> validated_grid(std::span<const std::byte> reply, std::uint64_t max_values);
 
-// The error that the caller reports for a malformed reply.
+// The error that a caller of lightshaft-vdb reports if its reply is malformed.
 tl::unexpected<Error> vdb_nonsense();
 
 }  // namespace ls::render

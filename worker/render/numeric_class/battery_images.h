@@ -1,6 +1,7 @@
-// Small images in formats whose decoders may round differently. Textures determine pixels, so decoding is
-// part of the numeric class, the digest that identifies machines that render the same bits. Each image is a
-// gradient with a pattern on it, given as the bytes of its file in hexadecimal digits.
+// Small image files in formats whose decoders may round differently on different machines. Textures are
+// decoded from such files, so pixels depend on the decoders. Therefore the decoded images are part of the
+// numeric class, the digest that two machines share only if they render the same bits. Each image is a
+// gradient with a pattern on it; its file is given as hexadecimal digits.
 #pragma once
 
 #include <string_view>

@@ -1,5 +1,6 @@
-// Computes the numeric class. Machines of the same class render the same bits: they have the same build, and
-// the computations below give the same bits on them. Each add_ function adds results to the digest.
+// Computes the numeric class: a digest of the build and of the results of the test computations below.
+// Machines with the same digest render the same bits. Each add_ function adds the results of one kind of
+// computation to the digest h.
 #include <fmt/format.h>
 
 #include <array>
@@ -32,7 +33,7 @@ void add(Sha256& h, const std::vector<T>& values) {
   h.update(std::as_bytes(std::span(values)));
 }
 
-// Adds values of the math library: those of every function that the renderer calls, at 4096 arguments each.
+// Adds values of the functions of the math library that the renderer calls: each function at 4096 arguments.
 // Square roots and divisions are left out, because IEEE 754 fixes their results on every machine.
 void add_math(Sha256& h) {
   std::vector<float> v;
@@ -50,8 +51,8 @@ void add_math_in_double(Sha256& h) {
   RandomStream r(3);
   for (int i = 0; i < 4096; ++i) {
     const double u = static_cast<double>(r.next() >> 11) * 0x1p-53, x = 40 * u - 20;
-    // Sine and cosine have different arguments, as in the renderer: with equal arguments, the compiler calls
-    // another function that computes both.
+    // Sine and cosine have different arguments, as in the renderer. With equal arguments the compiler would
+    // replace both calls by one of another function, which computes the two together.
     v.insert(v.end(), {std::exp(x), std::log(u + 0x1p-60), std::sin(x), std::cos(x + 1), std::tan(1.5 * u),
                        std::atan2(u, x), std::acos(2 * u - 1), std::pow(u, 2.4), std::erfc(x / 4),
                        std::hypot(u, x), std::expm1(x), std::log1p(u)});
@@ -59,7 +60,7 @@ void add_math_in_double(Sha256& h) {
   add(h, v);
 }
 
-// Adds the processor's reciprocal estimates.
+// Adds the processor's approximate 1 / x and 1 / sqrt(x), which differ between manufacturers.
 void add_reciprocals(Sha256& h) {
   std::vector<float> v;
   for (int i = 1; i <= 4096; ++i) {
@@ -109,8 +110,8 @@ void add_hits(Sha256& h) {
 
 void push(std::vector<float>& v, const V3& w) { v.insert(v.end(), {w.x, w.y, w.z}); }
 
-// Adds ray hits on spheres, which our own code intersects, not the BVH: which sphere is hit, where, and the
-// parametrisation there.
+// Adds ray hits on spheres, which the renderer's own code intersects, and not Embree: which sphere is hit,
+// where, and the uv and shading frame there.
 void add_sphere_hits(Sha256& h) {
   Geometry g;
   RandomStream r(4);
@@ -139,7 +140,7 @@ void add_sphere_hits(Sha256& h) {
   add(h, v);
 }
 
-// Adds to the list one element, with default parameters, of each kind that it lacks.
+// Adds to `list` one element, with default parameters, of each kind of which it has none.
 template <class... Kind>
 void add_missing_kinds(std::vector<std::variant<Kind...>>& list) {
   const auto add = [&](auto kind) {
@@ -204,8 +205,8 @@ std::vector<std::byte> bytes_of(std::string_view hex) {
   return bytes;
 }
 
-// Adds the results of lossy image decoders. Their transforms round differently depending on the version of
-// the library and the instruction set.
+// Adds the pixels that lossy image decoders return. The decoders' transforms round differently depending on
+// the version of the library and on the processor's instruction set.
 void add_decoded_images(Sha256& h) {
   for (const std::string_view picture : {battery::kJpeg, battery::kDwa, battery::kB44, battery::kPxr24}) {
     const auto image = decode_image("battery", bytes_of(picture));

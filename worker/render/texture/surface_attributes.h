@@ -1,4 +1,5 @@
-// The data of surfaces that textures use: those of a point, and mesh attributes.
+// The data of surfaces that textures read: the uv and derivatives at a point, and mesh attributes, that is,
+// colours or numbers that a mesh file gives for each vertex or each face.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +31,7 @@ struct UvPoint {
   const FacePoint* face = nullptr;
 
   UvPoint(float u, float v) : uv(u, v) {}
-  UvPoint(V2 at) : uv(at) {}  // NOLINT: most surfaces need only uv
+  UvPoint(V2 at) : uv(at) {}  // NOLINT: implicit, because most surfaces need only uv
   UvPoint(V2 at, V3 along_u, V3 along_v, const FacePoint* on = nullptr)
       : uv(at), du(along_u), dv(along_v), face(on) {}
   operator V2() const { return uv; }
@@ -42,19 +43,22 @@ struct UvPoint {
 struct SurfaceAttributes {
   static constexpr std::uint32_t kNoChannel = 0xffffffffu;
 
-  struct Channel {  // the place of one attribute of one mesh in `values`
+  struct Channel {  // where in `values` one attribute of one mesh is stored
     bool per_face = false;
-    std::uint32_t base = 0;  // index of the mesh's first vertex, or triangle, in the world's lists
+    // Index of the mesh's first vertex (first triangle if per_face) in the world's lists
+    std::uint32_t base = 0;
     std::uint32_t count = 0;
-    std::size_t first = 0;                      // index into values
-    std::uint32_t name = 0, next = kNoChannel;  // `next` is the next channel of the same surface
+    std::size_t first = 0;  // index in `values` of the mesh's first value
+    // `name` is the attribute's number in `names`; `next` is the index of the next channel of the same
+    // surface (kNoChannel: none)
+    std::uint32_t name = 0, next = kNoChannel;
   };
-  // The names of the attributes that the scene's textures read, each with its number.
+  // The names of the attributes that the scene's textures read; the value is the attribute's number.
   std::map<std::string, std::uint32_t, std::less<>> names;
-  std::vector<std::uint32_t> first_of;  // first channel of each surface
+  std::vector<std::uint32_t> first_of;  // by surface: index of its first channel, or kNoChannel
   std::vector<Channel> channels;
   std::vector<C3> values;     // values of all attributes; a scalar is stored as three equal components
-  std::vector<C3> means;      // mean of each attribute over all its values, by its number in `names`
+  std::vector<C3> means;      // by number in `names`: mean of the attribute over the values of all meshes
   std::uint64_t clamped = 0;  // number of negative values that were set to 0
 
   bool empty() const { return channels.empty(); }
@@ -71,8 +75,8 @@ struct SurfaceAttributes {
     for (std::size_t i = 0; i < sums.size(); ++i)
       means.push_back(counts[i] > 0 ? C3(sums[i] / counts[i]) : C3(0));
   }
-  // Returns the value at the point `at` of the attribute whose number in `names` is `name`. `corners`
-  // contains three vertex indices per triangle. The value is black if the surface has no such attribute.
+  // Returns the value of attribute number `name` (see `names`) at the point `at`; black if the surface has no
+  // such attribute. `corners` contains three vertex indices per triangle.
   C3 value(std::uint32_t name, const FacePoint& at, std::span<const std::uint32_t> corners) const {
     std::uint32_t i = first_of[at.surface];
     while (i != kNoChannel && channels[i].name != name) i = channels[i].next;

@@ -18,7 +18,7 @@ float fold(float u, Wrap wrap) {
     case Wrap::repeat:
       return u - std::floor(u);
     case Wrap::mirror: {
-      const float t = u - 2 * std::floor(u * .5f);  // in [0, 2], the period of mirroring
+      const float t = u - 2 * std::floor(u * .5f);  // position in the period of mirroring, [0, 2]
       return t > 1 ? 2 - t : t;
     }
     case Wrap::clamp:
@@ -27,18 +27,19 @@ float fold(float u, Wrap wrap) {
   return std::clamp(u, 0.f, 1.f);
 }
 
-// The derivative of fold() by u. For Wrap::clamp it is 1 even outside of [0, 1], where fold() is constant:
-// both neighbours() are the same texel there, so slopes are 0 anyway.
+// The derivative of fold() by u. For Wrap::clamp it returns 1 even outside of [0, 1], where fold() is
+// constant. That does no harm: both neighbours() are the same texel there, so slopes are 0 anyway.
 float fold_slope(float u, Wrap wrap) {
   return wrap == Wrap::mirror && u - 2 * std::floor(u * .5f) > 1 ? -1.f : 1.f;
 }
 
 struct Span2 {
   std::uint32_t lo, hi;
-  float t;  // weight of `hi`
+  float t;  // weight of `hi`; `lo` has the weight 1 - t
 };
-// Returns the two texels around u in [0, 1]. Beyond the edge, the neighbour is at the opposite edge when
-// repeating, else the edge texel itself (also when mirroring: texel -1 mirrors to texel 0).
+// Returns the indices (0 to n - 1) of the two texels whose centres are on either side of u in [0, 1]. If one
+// of them would lie beyond the image's edge, the texel at the opposite edge takes its place when repeating,
+// else the texel at the edge itself (also when mirroring, since texel -1 mirrors to texel 0).
 Span2 neighbours(float u, std::uint32_t n, Wrap wrap) {
   const float x = u * static_cast<float>(n) - .5f, f = std::floor(x);
   const std::int64_t lo = static_cast<std::int64_t>(f), last = n - 1;
@@ -64,7 +65,8 @@ C3 mean_of(const Texels& t) {
   return {static_cast<float>(sum[0] / n), static_cast<float>(sum[1] / n), static_cast<float>(sum[2] / n)};
 }
 
-// Keeps `keep` channels of v, from number `first` on; v has `have` interleaved channels.
+// Removes from v, which has `have` interleaved channels per pixel, all channels but the `keep` channels from
+// number `first` on.
 template <class T>
 void drop_channels(std::vector<T>& v, std::uint32_t have, std::uint32_t first, std::uint32_t keep) {
   if (have == keep) return;
@@ -75,7 +77,8 @@ void drop_channels(std::vector<T>& v, std::uint32_t have, std::uint32_t first, s
   v.shrink_to_fit();
 }
 
-// Reduces an image to one of its channels.
+// Reduces an image to one of its channels. If it has no alpha channel, that is an image of one pixel of value
+// 1; the red, green and blue channels of a grey image are its grey.
 void keep_channel(ImageData& image, Channel channel) {
   const bool has_alpha = image.channels % 2 == 0, is_grey = image.channels < 3;
   if (channel == Channel::alpha && !has_alpha) {
@@ -93,8 +96,8 @@ void keep_channel(ImageData& image, Channel channel) {
 }
 
 // True if the last channel is an alpha channel that serves as a mask, that is, falls below 1/2 somewhere. An
-// alpha channel that never does is no mask: in some images the colour is the mask, and the alpha channel is
-// nearly opaque.
+// alpha channel that is 1/2 or more everywhere is not used as a mask: in some images the colour is the mask,
+// and the alpha channel is nearly opaque.
 bool has_alpha(const ImageData& image) {
   if (image.channels % 2) return false;
   const auto transparent = [&](const auto& v, auto half) {

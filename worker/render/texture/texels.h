@@ -1,5 +1,5 @@
-// The texels of one image in the form used for lookup. 8-bit codes stay 8 bits (a table decodes them before
-// filtering); all other formats become linear float32. Grey images keep one channel.
+// The texels of one image in the form used for lookup. 8-bit values are stored as they are (a table decodes
+// them before filtering); all other formats become linear float32. Grey images keep one channel.
 #pragma once
 
 #include <array>
@@ -17,10 +17,10 @@ namespace ls::render {
 double srgb_to_linear(double v);
 
 struct Texels {
-  std::uint32_t width = 0, height = 0, channels = 3;  // 1 or 3 channels
-  std::vector<std::uint8_t> u8;                       // only one of u8 and f32 is used
+  std::uint32_t width = 0, height = 0, channels = 3;  // 1 channel (grey) or 3 (RGB)
+  std::vector<std::uint8_t> u8;                       // either u8 or f32 holds the texels; the other is empty
   std::vector<float> f32;
-  std::array<float, 256> decode{};  // the linear value of each 8-bit code
+  std::array<float, 256> decode{};  // the linear value of each 8-bit value
   C3 mean{0, 0, 0};
   std::uint64_t clamped = 0;  // number of negative values that were set to 0
 

@@ -21,7 +21,8 @@ namespace {
 
 struct UvAffine {
   float a = 1, b = 0, c = 0, d = 0, e = 1, f = 0;
-  // Maps non-finite coordinates to 0, so that lookups never see NaN.
+  // Returns the transformed coordinates. A coordinate that is not finite becomes 0, so that lookups never see
+  // NaN.
   V2 operator()(const V2& uv) const {
     const V2 p(a * uv.x + b * uv.y + c, d * uv.x + e * uv.y + f);
     return {std::isfinite(p.x) ? p.x : 0, std::isfinite(p.y) ? p.y : 0};
@@ -42,12 +43,13 @@ struct Entry {
   Kind kind = Kind::constant;
   TextureFilter filter = TextureFilter::bilinear;
   Wrap wrap = Wrap::repeat;
-  // Indices whose meaning depends on the kind: of a bitmap's texels, of the two textures of a checkerboard or
-  // a product, of the texture of a peak or a hue, or of an attribute's name.
+  // Indices whose meaning depends on the kind. A bitmap: `first` is the index of its texels. A checkerboard
+  // or a product: the indices of its two textures. A peak or a hue: `first` is the index of its texture. A
+  // mesh attribute: `first` is the number of its name.
   std::uint32_t first = 0, second = 0;
   C3 value{0, 0, 0};  // the value of a constant; for other textures the mean
   UvAffine to_uv;
-  float scale = 1;  // an attribute's scale; a product's threshold
+  float scale = 1;  // factor on a mesh attribute's values; threshold of a product
 };
 
 }  // namespace
@@ -61,8 +63,9 @@ struct TextureTable::Data {
 
 namespace {
 
-// Makes the texels of bitmaps. Bitmaps that read a file in the same way share their texels. A file is decoded
-// once, even if it is read in several ways; the decoded image is kept until the last of these has used it.
+// Makes the texels of bitmaps. Bitmaps that read a file in the same way (raw, alpha, channel) share their
+// texels. A file is decoded once, even if bitmaps read it in several ways; the decoded image is freed after
+// it was read in the last of these ways.
 class TexelsLoader {
  public:
   TexelsLoader(const Scene& scene, const ImageLoader& load, TextureTable::Data& data)
@@ -89,7 +92,8 @@ class TexelsLoader {
   }
 
  private:
-  using Key = std::tuple<std::uint32_t, bool, bool, Channel>;  // asset, raw, alpha, channel
+  // Index of the asset, then raw, alpha and channel of the bitmap
+  using Key = std::tuple<std::uint32_t, bool, bool, Channel>;
   static Key key_of(const BitmapTexture& b) { return {b.file.value, b.raw, b.alpha, b.channel}; }
 
   Result<ImageData> image_of(std::uint32_t file, const Asset& asset) {
@@ -103,13 +107,13 @@ class TexelsLoader {
   const Scene& scene_;
   const ImageLoader& load_;
   TextureTable::Data& data_;
-  std::map<std::uint32_t, int> left_;  // for each file, the number of ways to read it that remain
+  std::map<std::uint32_t, int> left_;  // by file: number of ways in which it is still to be read
   std::map<std::uint32_t, ImageData> decoded_;
   std::map<Key, std::uint32_t> made_;
 };
 
-// Makes the entry of a mesh_attribute texture. If no mesh has the attribute, the texture is never evaluated:
-// Geometry::build rejects meshes that use the texture but lack the attribute.
+// Makes the entry of a mesh_attribute texture; if no mesh has the attribute, the entry is a black constant.
+// It is never evaluated, because Geometry::build rejects meshes that use the texture but lack the attribute.
 Result<Entry> attribute_entry(const MeshAttributeTexture& t, const SurfaceAttributes* attributes) {
   Entry e;
   e.kind = Kind::attribute;
@@ -137,8 +141,9 @@ C3 hue_of(const C3& c) {
   return peak > 0 ? C3(c.x / peak, c.y / peak, c.z / peak) : C3(1, 1, 1);
 }
 
-// Computes the means of textures that contain others from the means of the contained ones. A chain of n
-// textures takes n passes; if the means still change after the last pass, there is a cycle or a longer chain.
+// Computes the means of textures that contain other textures from the means of those. Textures that are
+// nested n deep need n passes. If the depth of some texture still changes in the last pass, textures contain
+// each other in a cycle or are nested deeper than kMaxReferenceDepth.
 Result<void> resolve_nested(TextureTable::Data& data) {
   std::vector<int> depth(data.entries.size(), 0);
   for (int pass = 0; pass <= scene::kMaxReferenceDepth; ++pass) {

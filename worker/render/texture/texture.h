@@ -25,23 +25,23 @@ class TextureTable {
   TextureTable(TextureTable&&) noexcept;
   TextureTable& operator=(TextureTable&&) noexcept;
 
-  // The mesh attributes. Needed if any texture of the scene reads them. The data that the two members refer
-  // to must outlive the table.
+  // The mesh attributes. build() needs them if any texture of the scene reads mesh attributes. The data that
+  // the two members refer to must outlive the table.
   struct MeshData {
     const SurfaceAttributes* attributes = nullptr;
     std::span<const std::uint32_t> corners;  // three vertex indices per triangle
   };
-  // Builds the table of the scene's textures; `load` is called once for each file and way in which textures
-  // read it (raw, alpha, channel). Fails with invalid_argument if an index is out of range, if textures
-  // refer to each other in a cycle or deeper than kMaxReferenceDepth, or if a texel is NaN or infinite (the
-  // message names the file and the texel).
+  // Builds the table of the scene's textures; `load` is called once for each image file that textures read.
+  // Fails with invalid_argument if an index is out of range, if textures refer to each other in a cycle or
+  // deeper than kMaxReferenceDepth, or if a texel is NaN or infinite (the message names the file and the
+  // texel).
   static Result<TextureTable> build(const Scene& scene, const ImageLoader& load) {
     return build(scene, load, MeshData{});
   }
   static Result<TextureTable> build(const Scene& scene, const ImageLoader& load, MeshData meshes);
 
   // Returns the value of texture i at uv. `face` is the point on a triangle at which mesh attributes are
-  // read; without it they are black.
+  // read; if it is null, mesh attributes are black.
   C3 eval(TextureIndex i, V2 uv, const FacePoint* face = nullptr) const;
   // Returns the value of texture i at uv as a scalar: its luminance. In a checkerboard read as a scalar the
   // two colours are swapped, as in Mitsuba (see CheckerboardTexture in scene.h).
@@ -54,11 +54,11 @@ class TextureTable {
   C3 constant(TextureIndex i) const;  // the texture's value if is_constant(i), else its mean
   C3 mean(TextureIndex i) const;      // mean over the unit square, unfiltered; used for sampling weights
   std::size_t size() const;
-  std::uint64_t bytes() const;           // bytes of memory of the texels
+  std::uint64_t bytes() const;           // memory of all texels, in bytes
   std::uint64_t clamped_texels() const;  // number of negative texels that were set to 0
 
   struct Data;
-  const Data& data() const { return *data_; }  // the reference stays valid when the table moves
+  const Data& data() const { return *data_; }  // the reference stays valid when the table is moved
 
  private:
   std::unique_ptr<Data> data_;

@@ -1,6 +1,7 @@
-// lightshaft-vdb FILE GRID MOST_VALUES MOST_BYTES: reads a grid for worker/render/media/vdb_process.h and
-// exits. Writes the reply to the inherited file kHelperFd. MOST_VALUES is the largest number of values of
-// the grid. MOST_BYTES limits the memory of this program and of the reply together.
+// lightshaft-vdb FILE GRID MOST_VALUES MOST_BYTES: the program that worker/render/media/vdb_process.h starts
+// to read a grid. It reads the grid GRID of FILE, writes the reply (vdb_reply.h) to the inherited file
+// kHelperFd and exits. MOST_VALUES is the largest number of values of the grid. MOST_BYTES limits the memory
+// of this program and of the reply together.
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -18,8 +19,8 @@ namespace {
 
 constexpr rlim_t kMostCpuSeconds = 900;  // far more than the few seconds that the largest grids take
 
-// Makes this process end when its parent ends, and limits its resources to those that a valid file can need
-// and to the memory that its parent has left.
+// Makes this process end when its parent ends, and limits its resources: processor time and the size of the
+// reply to what a valid file can need, and memory to most_bytes, which is what the parent has left.
 void confine(std::uint64_t most_values, std::uint64_t most_bytes) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
@@ -74,7 +75,7 @@ int main(int argc, char** argv) {
   reply.grid = grid;
   reply.grid.values = nullptr;
   bool written = write_all(&reply, sizeof reply, 0);
-  // The reply is padded, so that its file always extends to the offset of the values.
+  // Pads the reply up to the offset of the values, even if no values follow.
   written = written && ::ftruncate(ls::kHelperFd, ls::render::kVdbValuesAt) == 0;
   if (reply.code == 0) written = written && write_all(grid.values, values, ls::render::kVdbValuesAt);
   ls_vdb_free(&grid);

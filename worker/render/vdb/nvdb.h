@@ -1,7 +1,7 @@
-// Reader of NanoVDB files (.nvdb) of ABI 32, as written by NanoVDB of OpenVDB 9 to 11. Every offset is
-// checked, because NanoVDB's own reader trusts the file. A grid is a buffer with offsets between its nodes.
-// It is stored as a whole: uncompressed, or compressed by zlib or Blosc. The layout follows PNanoVDB.h, the
-// library's portable description of it.
+// Reader of NanoVDB files (.nvdb) of ABI 32, as written by NanoVDB of OpenVDB 9 to 11. NanoVDB's own reader
+// trusts the file; this reader checks every offset. A grid is one buffer, whose nodes refer to each other by
+// byte offsets. A file contains each grid's buffer as a whole: uncompressed, or compressed by zlib or Blosc.
+// The layout of the buffer follows PNanoVDB.h, the library's portable description of it.
 #pragma once
 
 #include <array>
@@ -25,7 +25,8 @@ struct Refused {
   std::string text;
 };
 
-// Allocates an array of `values` values; the caller has already checked that number against the limit.
+// Allocates an array of `values` floats; throws Refused if there is not enough memory. The caller must have
+// checked the number against the limit max_values.
 inline float* room_for(std::uint64_t values) {
   float* room = new (std::nothrow) float[values];
   if (!room)
@@ -34,12 +35,13 @@ inline float* room_for(std::uint64_t values) {
   return room;
 }
 
-// Returns the index of the grid to read among the file's grids: the one called `wanted` or, if that is empty,
-// the only one, or "density" if there are several.
+// Returns the index in `names`, the names of the file's grids, of the grid to read: the one called `wanted`
+// or, if `wanted` is empty, the only one, or "density" if there are several. Throws Refused if there is no
+// such grid.
 std::size_t choose_grid(const std::vector<std::string>& names, const std::string& wanted);
 
-// Sets the size of a grid whose number of channels is set, unless the size is above the limits. `name` is for
-// messages.
+// Sets out.size. Throws Refused if the grid is larger than 2^14 voxels along an axis, or has more than
+// max_values values; for this, out.channels must be set already. `name` is the grid's name, for messages.
 void set_size(const std::string& name, const std::array<std::int64_t, 3>& size, std::uint64_t max_values,
               LsVdbGrid& out);
 
@@ -50,8 +52,9 @@ bool is_nvdb(const std::filesystem::path& path);  // true for an .nvdb file, dec
 void read_nvdb(const std::filesystem::path& path, const std::string& wanted, std::uint64_t max_values,
                LsVdbGrid& out);
 
-// The two steps of read_nvdb(): decode_nvdb() finds the wanted grid in the bytes of a file, decompresses it
-// and calls expand_nvdb(), which turns the buffer of a grid into values. `name` is for messages.
+// The two steps of read_nvdb(): decode_nvdb() finds the wanted grid in the bytes of a file, decompresses its
+// buffer and calls expand_nvdb(), which turns the buffer into values. `name` is the grid's name, for
+// messages.
 void decode_nvdb(std::span<const std::byte> file, const std::string& wanted, std::uint64_t max_values,
                  LsVdbGrid& out);
 void expand_nvdb(const std::string& name, std::span<const std::byte> buffer, std::uint64_t max_values,

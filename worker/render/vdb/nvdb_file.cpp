@@ -16,7 +16,7 @@ constexpr std::size_t kMaxGrids = 4096;
 constexpr std::uint32_t kMaxName = 1 << 16;
 constexpr std::uint32_t kAbi = 32;
 // The largest number of bytes to which one compressed byte can expand: an upper bound for zlib (at most 1032)
-// and Blosc's codecs.
+// and for Blosc's codecs. A grid that claims to expand more is damaged.
 constexpr std::uint64_t kMaxExpansion = 1100;
 // NanoVDB compresses a buffer by Blosc in pieces of kBloscPiece bytes.
 constexpr std::uint64_t kBloscPiece = std::uint64_t{1} << 30;
@@ -40,7 +40,8 @@ std::vector<std::byte> contents(const std::filesystem::path& path) {
 
 struct Entry {
   std::string name;
-  std::uint64_t at = 0, stored = 0, bytes = 0;  // offset and size in the file; decompressed size
+  // The grid's buffer: its offset and size in the file, and its decompressed size, in bytes
+  std::uint64_t at = 0, stored = 0, bytes = 0;
   std::uint16_t codec = kPlain;
 };
 

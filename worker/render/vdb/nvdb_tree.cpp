@@ -12,8 +12,9 @@ namespace {
 
 using Coord = std::array<std::int64_t, 3>;
 
-// Byte offsets of fields in the grid's header (672 bytes) and in the tree that follows it. Offsets that
-// depend on the type of values are in Layout.
+// Byte offsets of fields in the grid's header, which has kGrid = 672 bytes, and in the tree that follows it.
+// kMatrix and kOffset are relative to kMap, kRootOffset to the tree's start, and the child masks to their
+// node. Offsets that depend on the type of values are in Layout.
 constexpr std::uint64_t kGrid = 672, kGridSize = 32, kMap = 296, kMatrix = 88, kOffset = 232, kClass = 632,
                         kType = 636, kRootOffset = 24;
 constexpr std::uint64_t kUpperChildMask = 4128, kLowerChildMask = 544;
@@ -41,7 +42,7 @@ Layout layout_of(Type type) {
   if (type == kVec3d) return {32, 192, 24, 64, 8288, 1120, 24, 160};
   return {28, 64, 20, 32, 8256, 1088, 8, 96};
 }
-// The value of a voxel. If the grid has one channel, only the first component is used.
+// The value of a voxel: 3 components, of which a grid with one channel uses only the first.
 using Value = std::array<float, 3>;
 
 std::string type_name(std::uint32_t type) {
@@ -88,8 +89,8 @@ class Tree {
     out_.channels = type_ == kVec3f || type_ == kVec3d ? 3 : 1;
   }
 
-  // Finds the box of the active voxels, enlarged by one voxel on each side, and the transform from its nodes
-  // to the scene.
+  // Finds the box of voxels to read, which is that of the active voxels enlarged by one voxel on each side,
+  // and the transform from the nodes of the box to the scene (LsVdbGrid::index_to_scene).
   void place() {
     std::array<std::int64_t, 3> size;
     for (int k = 0; k < 3; ++k) {
@@ -132,8 +133,9 @@ class Tree {
     return v;
   }
 
-  // Returns the value of voxel number n of the leaf at the offset `leaf`. Quantised leaves store codes of 1
-  // to 16 bits, and the leaf's minimum and step.
+  // Returns the value of voxel number n of the leaf at the byte offset `leaf`. A leaf of a quantised type
+  // (Fp4 to FpN) stores a minimum, a step, and for each voxel a code of 1 to 16 bits: the value is the
+  // minimum plus the code times the step.
   Value voxel(std::uint64_t leaf, std::uint32_t n) const {
     const std::uint64_t table = leaf + layout_.leaf_table;
     if (type_ == kDouble || type_ == kVec3d) return value(table + 8 * channels() * n);
@@ -175,8 +177,8 @@ class Tree {
     return base + static_cast<std::uint64_t>(offset);
   }
 
-  // Reads an upper node (32^3 children of 128^3 voxels each) or a lower one (16^3 children of 8^3 voxels
-  // each).
+  // Reads the node at the byte offset `node`, which spans `side` voxels along each axis: an upper node (32^3
+  // children of 128^3 voxels each) or a lower node (16^3 children of 8^3 voxels each).
   void inner(std::uint64_t node, const Coord& origin, int side) {
     const bool upper = side == kUpperSide;
     const int child_side = upper ? kLowerSide : kLeafSide, per_axis = side / child_side;

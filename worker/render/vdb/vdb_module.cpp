@@ -96,9 +96,9 @@ void convert(const openvdb::GridBase::Ptr& base, std::uint64_t max_values, LsVdb
 void read(const char* path, const std::string& wanted, std::uint64_t max_values, LsVdbGrid& out) {
   initialize_once();
   openvdb::io::File file(path);
-  // Delayed loading is disabled, so that errors occur here
+  // `false` disables delayed loading, so that errors in the file occur here and not when values are used.
   file.open(false);
-  // A newer version is an error, although OpenVDB would only warn
+  // A file of a newer format version is rejected here; OpenVDB would only warn.
   if (file.fileVersion() > openvdb::OPENVDB_FILE_VERSION)
     throw Refused{1, "it is of version " + std::to_string(file.fileVersion()) +
                          " of the OpenVDB format; versions up to " +
@@ -151,8 +151,8 @@ int ls_vdb_read(const char* path, const char* grid_name, std::uint64_t max_value
   } catch (const Refused& r) {
     return say(r.code, r.text);
   } catch (const std::bad_alloc&) {
-    // If reading a small file takes more memory than there is, the file is damaged, and its counts are
-    // garbage.
+    // If memory runs out while a file smaller than kSmallFile is read, the file is damaged: the sizes that it
+    // claims are wrong.
     std::error_code unknown;
     const auto bytes = std::filesystem::file_size(path, unknown);
     if (!unknown && bytes < kSmallFile) return say(1, kDamaged);

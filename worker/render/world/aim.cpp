@@ -9,20 +9,22 @@
 namespace ls::render {
 namespace {
 
-// The number of points on a camera segment if points pay
-// (docs/decisions/0027-light-along-camera-segments.md).
+// The number of points at which light is sampled on each segment of a camera ray in a medium, if such points
+// pay, that is, reduce the noise by more than they cost (docs/decisions/0027-light-along-camera-segments.md).
 constexpr int kPointsThatPay = 2;
-// Points pay if the mean probability that a camera ray collides with a medium, over the rays that meet one
-// (CameraCollisions::met), is below this. In denser media the flights that end on the segment find the light
-// often enough, unless connections to light vertices (light_vertices.h) have removed most of the other noise.
+// Points pay if media scatter or absorb the camera rays that meet them with a mean probability below this
+// (CameraCollisions::met). In denser media the free flights that end on the segment find the light often
+// enough, unless connections to light vertices (light_vertices.h) have removed most of the other noise: with
+// these, points pay at any probability.
 constexpr float kThin = .35f;
-// Second directions pay if more than this share of the direct light comes from the constant environment.
+// Second directions towards the sky (aim.h) pay if more than this share of the direct light comes from the
+// constant environment.
 constexpr double kSkyThatPays = .125;
 
 int points_for(const IntegratorSettings& settings, const World& w) {
   if (settings.camera_points != 0) return std::max(0, settings.camera_points);
-  // Lights with a position are already found by equi-angular sampling on every segment; and where media
-  // overlap, points on segments are not supported
+  // Points are for lights without a position (suns, the sky), because equi-angular sampling already finds the
+  // other lights on every segment. Where media overlap, points are not supported.
   if (!w.lights.any_without_place() || w.overlaps) return 0;
   const float met = camera_collisions(w).met;
   return met > 0 && (met < kThin || w.need.connected) ? kPointsThatPay : 0;
@@ -53,7 +55,8 @@ void learn_sky_samples(const IntegratorSettings& settings, World& w) {
       is_black(w.lights.constant_environment()))
     return;
   if (!w.depth_allows(1)) return;
-  // Paths of two segments are scattered at most once, so they find direct light only.
+  // Paths of two segments are scattered at most once. Without the emitters that the camera sees directly,
+  // which are hidden here, they find direct light only.
   const bool hide_emitters = std::exchange(w.hide_emitters, true);
   const auto all = pilot_radiance(w, 2);
   const C3 sky = w.lights.exchange_constant_environment(C3(0));

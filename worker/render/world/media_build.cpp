@@ -19,7 +19,8 @@ Rgb times(const Rgb& a, const Rgb& b) { return {a[0] * b[0], a[1] * b[1], a[2] *
 // The largest extinction [1/world unit]. The products of larger values with a density and a length would
 // leave the range of float32.
 constexpr double kMaxExtinction = 1e30;
-// The largest emission. The integral of larger values along a ray could exceed the largest radiance of a
+// The largest emission of a medium [radiance per world unit, or radiance if it is multiplied by the
+// absorption coefficient]. The integral of a larger value along a ray could exceed the largest radiance of a
 // sample.
 constexpr double kMaxEmission = 1e25;
 
@@ -38,7 +39,8 @@ Result<HenyeyGreenstein> phase_of(const Scene& scene, PhaseIndex i) {
   return HenyeyGreenstein{g};
 }
 
-// Checks the extinction sigma [1/world unit] of a medium whose largest density is `largest`.
+// Checks that the extinction of a medium is at most kMaxExtinction: both `sigma`, the extinction per unit of
+// density [1/world unit], and its product with `largest`, the medium's largest density.
 Result<void> check_extinction(const Rgb& sigma, double largest, double world_scale) {
   for (const double s : sigma) {
     if (s <= kMaxExtinction && s * largest <= kMaxExtinction) continue;
@@ -51,9 +53,10 @@ Result<void> check_extinction(const Rgb& sigma, double largest, double world_sca
   return {};
 }
 
-// Sets the emission of m to `factor`, and its kind (none if it emits nothing). When rendering, the emission
-// is multiplied by the value of a grid or by a black body's radiance; `largest` is the largest such value, 1
-// if there is none. Error: the product exceeds kMaxEmission.
+// Sets the emission of m to `factor` and its kind to `emission_kind`, or to none if m emits nothing. During
+// rendering the emission is multiplied by the value of a grid or the radiance of a black body; `largest` is
+// the largest value of this second factor, or 1 if there is none. Fails with invalid_argument if the product
+// of the two exceeds kMaxEmission.
 Result<void> shine(Medium& m, EmissionKind emission_kind, const Rgb& factor, double largest) {
   for (const double e : factor)
     if (!(e * largest <= kMaxEmission))
@@ -65,7 +68,8 @@ Result<void> shine(Medium& m, EmissionKind emission_kind, const Rgb& factor, dou
   return {};
 }
 
-// Lengths are multiplied by the world's scale, so coefficients are divided by it.
+// Makes a homogeneous medium. `scale` is the number of world units per scene unit: lengths are multiplied by
+// it, so coefficients are divided by it.
 Result<Medium> homogeneous(const Scene& scene, const HomogeneousMedium& m, double scale) {
   Medium out;
   const Rgb sigma_t = times(m.sigma_t, m.scale / scale);
@@ -82,12 +86,13 @@ Result<Medium> homogeneous(const Scene& scene, const HomogeneousMedium& m, doubl
   return out;
 }
 
-// Emission grids are loaded with this value as their extinction per unit of value (density_to_sigma of Grid).
-// It makes their macro cells small, so that walks along rays can skip the cells without emission.
+// The extinction per unit of value (density_to_sigma of Grid) that is assumed for emission grids when they
+// are loaded. It is this large only to make their macro cells small, so that walks along rays can skip the
+// cells without emission.
 constexpr double kFine = 1e30;
-// An upper bound of the linear sRGB components of a black body whose spectrum has the peak 1: its XYZ are at
-// most 1 each, and the positive elements of a row of the matrix from XYZ to linear sRGB add up to less than
-// this.
+// An upper bound of the linear sRGB components of a black body whose spectrum is scaled to the peak 1: its
+// XYZ are at most 1 each, and the positive elements of a row of the matrix from XYZ to linear sRGB add up to
+// less than this.
 constexpr double kBrightestOfPeakOne = 3.25;
 
 struct HeteroBuilder {
@@ -163,8 +168,8 @@ Result<void> HeteroBuilder::albedo() {
   }
   auto loaded = load(volume, per_unit);
   if (!loaded) return tl::unexpected(loaded.error());
-  // An albedo above 1 is clamped when it is read, because no medium scatters more light than it extinguishes.
-  // Such values are counted here.
+  // Albedos above 1 are clamped whenever the grid is read (Medium::scattering_at), because no medium scatters
+  // more light than it extinguishes. They are only counted here.
   for (const Grid& g : loaded->channels) w.inputs.add(HealthCause::bright_albedo, g.count_above(1));
   out.albedo = keep(*loaded);
   return {};
@@ -217,7 +222,7 @@ Result<void> HeteroBuilder::black_bodies(const Volume& temperature) {
     return m.peak_one ? black_body_of_peak_one(kelvin) : black_body_radiance(kelvin);
   };
   const auto too_hot = [&](double value) {
-    // The radiance of a hotter body would leave the range of float32.
+    // The largest temperature [K]. The radiance of a hotter body would leave the range of float32.
     constexpr double kHottest = 1e30;
     return !(m.temperature_offset + m.temperature_scale * value <= kHottest);
   };
@@ -238,7 +243,8 @@ Result<void> HeteroBuilder::black_bodies(const Volume& temperature) {
   out.kelvin_offset = static_cast<float>(m.temperature_offset);
   out.peak_one = m.peak_one;
   out.weight = weight;
-  // The hottest of the bodies of peak 1 need not be the brightest, so a bound for all temperatures is used.
+  // If spectra are scaled to the peak 1, the hottest body need not be the brightest, so the bound for all
+  // temperatures is used.
   const C3 hottest = light(out.emitter[0]->max_value());
   const double largest = is_black(hottest) ? 0 : m.peak_one ? kBrightestOfPeakOne : max_component(hottest);
   return shine(out, EmissionKind::black_body, k, largest * heaviest);
@@ -258,7 +264,7 @@ Result<Medium> heterogeneous(const Scene& scene, const HeterogeneousMedium& m, c
   return b.out;
 }
 
-// Returns which media the camera or some surface refers to.
+// Returns, by index of the medium, whether the camera or some surface refers to it.
 std::vector<bool> named_media(const Scene& scene) {
   std::vector<bool> named(scene.media.size(), false);
   if (scene.sensor.medium) named[scene.sensor.medium->value] = true;

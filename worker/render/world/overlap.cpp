@@ -12,9 +12,10 @@
 namespace ls::render {
 namespace {
 
-// The largest number of pairs of boxes to examine. Boxes are sorted by their start along x. Pairs that
-// overlap along x are examined until a pair is found that touches, which takes n log n time unless many boxes
-// overlap along x. If there are more than kMaxBoxPairs such pairs, some are assumed to touch.
+// The largest number of pairs of boxes that any_touch() examines. It sorts the boxes by their start along x
+// and examines the pairs that overlap along x until it finds a pair that touches. This takes O(n log n) time
+// for n boxes unless many overlap along x. After kMaxBoxPairs pairs it stops and returns true, as if a pair
+// touched.
 constexpr std::size_t kMaxBoxPairs = std::size_t{1} << 24;
 
 bool any_touch(std::vector<SurfaceBox> boxes) {
@@ -29,8 +30,8 @@ bool any_touch(std::vector<SurfaceBox> boxes) {
   return false;
 }
 
-// True if there is a boundary that has the medium `ambience` on neither side, so that `ambience` may surround
-// it.
+// True if some boundary has the medium `ambience` on neither side. Such a boundary may lie inside that
+// medium, and then the two media overlap.
 bool stands_in_ambience(const Geometry& g, std::uint32_t ambience) {
   if (ambience == kNone) return false;
   return std::any_of(g.surfaces.begin(), g.surfaces.end(), [&](const SurfaceInfo& s) {
@@ -40,9 +41,9 @@ bool stands_in_ambience(const Geometry& g, std::uint32_t ambience) {
 
 constexpr int kMaxCrossings = 1 << 12;  // largest number of surfaces that a ray of camera_media() crosses
 
-// Counts in `left` each boundary that the ray leaves without having entered it: these boundaries enclose the
-// ray's origin.
-using Left = std::map<std::pair<std::uint32_t, std::uint32_t>, int>;  // key: surface and instance
+// Counts, for each boundary, the rays that leave it without having entered it: the boundary then encloses the
+// ray's origin. The key is the surface and the instance of the boundary. note_left() adds one ray.
+using Left = std::map<std::pair<std::uint32_t, std::uint32_t>, int>;
 void note_left(const World& w, V3 o, const V3& d, Left& left) {
   std::set<Left::key_type> seen;
   for (int i = 0; i < kMaxCrossings; ++i) {

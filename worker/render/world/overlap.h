@@ -1,5 +1,5 @@
-// Detects nested and intersecting boundaries of media when the world is built. So scenes without them pay
-// nothing during rendering.
+// Detects nested and intersecting boundaries of media when the world is built, so that scenes without them
+// pay nothing during rendering.
 #pragma once
 
 #include "worker/render/media/medium_stack.h"
@@ -7,14 +7,16 @@
 
 namespace ls::render {
 
-// True if some point may be in several media, or in another medium than the one on its side of the boundary
-// crossed last. The test compares bounding boxes: false is certain; an unnecessary true only costs time.
+// True if media may overlap: if some point may be in several media, or in another medium than the one that
+// the boundary crossed last has on the point's side. The test compares bounding boxes: a result of false is
+// certain; a result of true may be wrong, which costs rendering time but changes nothing else.
 bool media_may_overlap(const World& w);
 
-// Returns the media that contain the camera. If the scene gives the sensor no medium, there are none, as in
-// Mitsuba. Otherwise they are the sensor's `medium` and the interiors of the closed boundaries around the
-// camera. A boundary counts as enclosing the camera if at least two of three rays leave it without having
-// entered it. The camera's position is the origin of its central ray.
+// Returns the media that contain the camera, for scenes whose media overlap. If the scene gives the sensor no
+// medium, there are none, as in Mitsuba. Otherwise they are the sensor's `medium` and the interiors of the
+// closed boundaries around the camera. A boundary counts as enclosing the camera if at least two of three
+// rays from the camera leave it without having entered it. The camera's position is the origin of the ray
+// through the image's centre.
 MediaState camera_media(const World& w);
 
 }  // namespace ls::render

@@ -21,7 +21,7 @@ constexpr std::uint64_t kPilotSeed = 0x5eed0f5ad0;
 constexpr std::uint64_t kPilotPaths = 1 << 10;
 constexpr std::uint64_t kPixelsPerPath = 16;
 constexpr std::uint64_t kFewestPaths = 16;
-// Number of pixels from which the noise is estimated, and of samples of each
+// The number of pixels that pilot_pixels() renders, and the number of samples of each of them.
 constexpr std::uint64_t kNoisePixels = 128;
 constexpr std::uint64_t kNoiseSamples = 16;
 // pilot_pays() is false for frames of fewer pixels than kPilotFrame, and for scenes in which light passes
@@ -33,7 +33,8 @@ std::uint64_t pixels_of(const World& w) {
   return static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
 }
 
-// A random pixel of the full frame, in the coordinates of the image
+// Returns a random pixel of the full frame. Its coordinates are relative to the image, which may be a crop,
+// so they may lie outside of the image.
 std::pair<int, int> somewhere(const World& w, RandomStream& places) {
   const auto among = [&](int n) { return static_cast<int>(places.next() % static_cast<std::uint64_t>(n)); };
   const int x = among(w.frame.width) - w.origin_x;
@@ -53,7 +54,8 @@ float met_by(const World& w, const CameraRay& ray) {
     if (medium != kNone) {
       const Medium& m = w.media[medium];
       const OpticalDepth depths(m, start, ray.d, met ? dot(hit.p - start, ray.d) : left);
-      // A ray without end through a medium without end has an infinite optical depth, or 0 times infinity
+      // If both the ray and the medium are infinite, the optical depth is infinite, or NaN (0 times infinity)
+      // if sigma_t is 0; NaN then counts as a depth of 0.
       const float depth = mean_component(m.sigma_t) * depths.total();
       passes *= depth > 0 ? std::exp(-depth) : 1.f;
     }

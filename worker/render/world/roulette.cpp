@@ -5,14 +5,15 @@
 namespace ls::render {
 namespace {
 
-// Paths split if media of any kind scatter or absorb less than this share of the camera rays. If nearly all
-// pixels show a cloud, splitting is no better than more samples.
+// Paths split if media of any kind scatter or absorb less than this share of the camera rays. In images of
+// which nearly all pixels show a cloud, splitting is no better than more samples per pixel.
 constexpr float kSplitsPay = .75f;
 
 }  // namespace
 
 void learn_splitting(const IntegratorSettings& settings, float mean_radiance, World& w) {
-  // Single scattering is found at the vertex that would be split, so splitting needs a longer path
+  // The first vertex estimates the light that is scattered once, and the path splits after that. So splitting
+  // is of use only if paths may be scattered a second time.
   if (settings.path_splitting < 0 || !w.depth_allows(2)) return;
   w.mean_radiance = mean_radiance;
   w.paths_split = camera_collisions(w).all < kSplitsPay;

@@ -1,4 +1,6 @@
-// A scene prepared for tracing. Immutable once built; shared by all render threads.
+// A scene prepared for tracing. Immutable once built; shared by all render threads. In the comments below a
+// null surface is one that is index-matched, so that light passes straight through it; a grid is a
+// heterogeneous medium; and `Features` names the parts of the integrator that a scene needs (features.h).
 #pragma once
 
 #include <deque>
@@ -39,68 +41,80 @@ class World {
   PixelFilter filter;
 
   std::uint32_t camera_medium = kNone;
-  scene::Needs needs;       // needs of the scene; `need` is derived from them
+  scene::Needs needs;       // what the scene contains; `need` is derived from this
   bool overlaps = false;    // true if media may be nested or intersect; each path then keeps a MediaState
-  MediaState camera_media;  // with overlaps: the state with which paths start at the camera
-  bool coincident = false;  // true if some surfaces coincide, one of them null (coincident.h)
-  bool lights_on_others = false;  // true if there are emitting null surfaces among the coincident ones
+  MediaState camera_media;  // if `overlaps`: the media state with which camera paths start
+  bool coincident = false;  // true if surfaces coincide of which at least one is null (coincident.h)
+  // True if a null surface that emits light coincides with another surface
+  bool lights_on_others = false;
   Features need;
   bool use_media = true;  // false for the integrators `path` and `whitted`, which ignore media
-  // True if there are homogeneous media and lights with a position: then segments are also sampled
-  // equi-angularly.
+  // True if segments of paths in homogeneous media are also sampled equi-angularly about the lights that have
+  // a position.
   bool equiangular = false;
-  bool equiangular_points = false;  // the same in grids: true if there are point lights in or near them
-  // True if shadow rays must account for surfaces that light passes: some surface has null transmission, or
-  // crossings of null boundaries count (`passing_counts`)
+  // True if segments in grids are also sampled equi-angularly, because a point light is in or near a grid
+  bool equiangular_points = false;
+  // True if shadow rays must take account of the surfaces that they pass straight through: some surface has
+  // null transmission (a mask, a thin dielectric), which attenuates light, or each null surface that is
+  // crossed counts as a segment (`passing_counts`)
   bool null_transmission = false;
-  // True if shadow rays are traced boundary by boundary, for null transmission or because they may cross
-  // media.
+  // True if a shadow ray is traced from one surface that it passes to the next, because of
+  // `null_transmission` or because it may cross media.
   bool shadows_walk = false;
   bool distant_mis = false;  // true for the integrator `volpath_distant_mis` (segment_nee.h)
-  // How points on segments are sampled and weighted, by `volpath_distant_mis` and with `camera_points`
+  // How the points of `volpath_distant_mis` and `camera_points` are placed on segments, and the heuristic of
+  // their weights in multiple importance sampling
   DistanceSampling distance = DistanceSampling::mis;
   MisHeuristic heuristic = MisHeuristic::power;
-  // With Features::aimed:
-  Lamps lamps;                // lights without extent, near which directions are also sampled
-  bool lamp_flights = false;  // true if a share of the flights through homogeneous media ends near lamps
-  int camera_points = 0;      // number of points on a segment (segment_nee.h); 0: none
-  // With Features::connected:
-  Lights::Directional sun;  // the light that the light vertices come from
+  // The next three members are used with Features::aimed only.
+  Lamps lamps;  // lights without extent: paths also sample directions that pass close to them
+  // True if some flights through homogeneous media are made to end near lamps
+  bool lamp_flights = false;
+  // Number of points on each segment at which light is sampled (segment_nee.h); 0: none
+  int camera_points = 0;
+  // The next five members are used with Features::connected only. The sun is the directional emitter that
+  // lights the scene (light_vertices.h).
+  Lights::Directional sun;  // the light vertices are on paths that start at it
   SunMap sun_map;
-  // The number of light vertices from which a connection chooses one, divided by the mean number of light
-  // vertices that one ray of the sun leaves. The weights of multiple importance sampling need this ratio.
+  // The number of light vertices among which each connection chooses one, divided by the mean number of light
+  // vertices that one ray of the sun leaves behind. The weights of multiple importance sampling need this
+  // ratio.
   float connections_per_ray = 1;
-  float faint = 0;  // connections that would add less than this are made at random (Russian roulette)
-  mutable LightVertexCache light_vertices;  // safe from several threads
-  // With Features::grids: shadow rays that could add less than this are traced at random (roulette.h);
-  // 0: all are traced.
+  // Connections that would add less radiance than this are made only with some probability (Russian roulette)
+  float faint = 0;
+  mutable LightVertexCache light_vertices;  // several threads may use it at once
+  // With Features::grids: shadow rays that could add less radiance than this are traced only with some
+  // probability (roulette.h); 0: all are traced.
   float faint_shadow = 0;
-  // The mean radiance of the image, for Russian roulette (roulette.h); 0: roulette compares with 1
+  // The mean radiance of the image, for the Russian roulette of paths in roulette.h; 0: roulette compares
+  // throughputs with 1, as usual
   float mean_radiance = 0;
-  bool paths_split = false;  // paths split at their first vertex if it is in a grid (roulette.h)
-  // True if the first vertex, on a surface, samples a second direction towards the sky (aim.h)
+  bool paths_split = false;  // true if paths split in two at a first vertex in a grid (roulette.h)
+  // True if a path's first vertex, on a surface, also samples a second direction towards the sky (aim.h)
   bool sky_samples = false;
-  // With Features::reuse: the number of pixels whose paths share their tails (path_reuse.h)
+  // With Features::reuse: the number of pixels in a group, whose paths share their tails, that is, the parts
+  // from the second vertex on (path_reuse.h)
   int reuse = 0;
   bool hide_emitters = false;
   int max_depth = -1;  // maximum path length in segments; -1: unlimited
-  // True if passing a null boundary or a null-transmitting surface counts as a segment for max_depth, as in
-  // Mitsuba's `path`; false in its `volpath`.
+  // True if passing straight through a surface (null, or with null transmission) counts as a segment for
+  // max_depth, as in Mitsuba's `path`; false if it does not, as in Mitsuba's `volpath`.
   bool passing_counts = false;
   int rr_depth = 5;
   std::uint64_t seed = 0;
   FrameSize size;
   FrameSize frame;  // the full frame, of which the image may be a part
   // The position of the image's top left pixel in the full frame, in pixels. A cropped image has the same
-  // pixels as this part of the full frame.
+  // pixel values as that part of an image of the full frame.
   int origin_x = 0, origin_y = 0;
 
   AovSet aovs;
-  // For the ID AOVs: the identifiers of the shape and the material of each surface, and of each instance. For
-  // a hit inside an instance, the instance's identifier replaces the shape's.
+  // For the AOVs of identifiers (Cryptomatte): by surface, the identifiers of its shape and its material; and
+  // the identifiers of the instances. For a hit inside an instance, the instance's identifier replaces the
+  // shape's.
   std::vector<float> shape_ids, material_ids, instance_ids;
 
-  Health inputs;  // corrected inputs of the scene, by cause
+  Health inputs;  // number of corrected input values of the scene, by cause
 
   bool depth_allows(int scatterings) const { return max_depth < 0 || scatterings < max_depth; }
 };

@@ -26,8 +26,8 @@ Features features_of(const scene::Needs& n) {
           .passing = n.boundaries || n.null_transmission};
 }
 
-// Returns the features that the finished world requires. Except for `overlaps` and `chromatic`, these are
-// never more than features_of() gives for the scene's needs.
+// Returns the features that the finished world requires. Except for `overlaps` and `chromatic`, features_of()
+// returns all of these for the scene's needs, and maybe more.
 Features found_in(const World& w) {
   Features f;
   const auto& surfaces = w.geometry.surfaces;
@@ -54,15 +54,15 @@ Features found_in(const World& w) {
   return f;
 }
 
-// Sets, for each surface, which data its hits must contain and which kinds of lobes its BSDF has. Also sets
-// World::null_transmission.
+// Sets, for each surface, which data its hits must contain (uv, tangent, slopes) and which kinds of lobes its
+// BSDF has. Also sets World::null_transmission.
 void note_surface_needs(const Scene& scene, World& w) {
   for (std::size_t i = 0; i < w.geometry.surfaces.size(); ++i) {
     SurfaceInfo& s = w.geometry.surfaces[i];
     const auto& emitter = scene.shapes[i].emitter;
     s.wants_uv = w.bsdfs.reads_uv(s.bsdf) || (emitter && !w.textures.is_constant(emitter->radiance));
-    // The uv AOV computes uv only for meshes with uv, where computing it changes nothing else. For other
-    // shapes it would rotate the shading frame, and so change the samples.
+    // For the uv AOV, uv is computed only on meshes with uv, where this changes nothing else. On other shapes
+    // it would rotate the shading frame, and so change the samples.
     s.wants_uv = s.wants_uv || (w.aovs.has(Aov::uv) && s.uvs);
     s.wants_tangent = w.bsdfs.anisotropic(s.bsdf);
     s.wants_slopes = w.bsdfs.reads_slopes(s.bsdf);
@@ -72,8 +72,8 @@ void note_surface_needs(const Scene& scene, World& w) {
   }
 }
 
-// Sets the Cryptomatte identifiers of surfaces from the names of shapes and materials, or from their index if
-// the scene has no names.
+// Sets the Cryptomatte identifiers of shapes, materials and instances: from their names, or from their
+// indices if the scene gives no names.
 void name_surfaces(const Scene& scene, World& w) {
   const auto id = [](const std::vector<Label>& labels, std::size_t i, auto member,
                      std::string_view else_named) {
@@ -87,8 +87,9 @@ void name_surfaces(const Scene& scene, World& w) {
     w.instance_ids.push_back(id(scene.instance_labels, i, &Label::name, "instance"));
 }
 
-// True if a point light is in a grid, or within a tenth of its size: close to the light the scattered light
-// grows as 1 / distance^2, and free flights rarely end there.
+// True if a point light is in a grid or beside it, at most a tenth of the grid's size away. Then equi-angular
+// sampling is needed: close to the light the scattered light grows as 1 / distance^2, and free flights rarely
+// end there.
 bool a_point_shines_in_a_grid(const World& w) {
   const std::vector<V3> points = w.lights.points();
   return std::any_of(w.media.begin(), w.media.end(), [&](const Medium& m) {
@@ -104,12 +105,13 @@ bool a_point_shines_in_a_grid(const World& w) {
   });
 }
 
-// Finds the regions inside media that contain no surfaces: there flights may be sampled before their rays are
-// traced. With chromatic extinction such flights would be wrong, since the weight of a flight that reaches a
-// surface depends on the distance to the surface.
+// Finds the regions inside media that contain no surfaces. There a flight may be sampled first, and its ray
+// has to be traced only if the flight leaves the region. With chromatic extinction this would be wrong, since
+// the weight of a flight that reaches a surface depends on the distance to the surface.
 void find_clear_regions(World& w) {
-  // The largest number of bodies (surfaces that enclose a medium) to try. Each try examines all triangles and
-  // boxes, and if there are more bodies, each of them is a small part of the scene.
+  // The largest number of bodies (surfaces that enclose a medium) for which regions are sought. Each search
+  // examines all triangles and boxes, and where there are more bodies, each is so small a part of the scene
+  // that its region saves little.
   constexpr int kMostBodies = 64;
   const auto wanted = [&](const SurfaceInfo& s) {
     if (!s.transition || s.interior == kNone || s.sheet || w.need.chromatic) return false;
@@ -128,9 +130,9 @@ void find_clear_regions(World& w) {
   }
 }
 
-// Sets the camera and the position of the image in the full frame; returns the size of the full frame. A crop
-// renders the pixels of the full frame: the same samples give the same bits. If the image has another size
-// than the crop, the frame is scaled, and the image is the same part of it.
+// Sets the camera and the position of the image in the full frame; returns the size of the full frame. If the
+// scene has a crop, the image is that part of the full frame, and its samples have the same bits as there. If
+// the size requested for the image is not that of the crop, the full frame is scaled accordingly.
 FrameSize place_camera(const Scene& scene, const RenderSettings& settings, World& w) {
   const FilmSettings& film = scene.film;
   FrameSize frame = settings.size;
@@ -239,8 +241,10 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
   w.needs = scene::needs_of(scene, w.use_media);
   w.need = features_of(w.needs);
   w.need.whitted = settings.integrator == scene::kWhitted;
-  w.need.overlaps = found.overlaps || w.coincident;        // known only once the shapes are read
-  w.need.chromatic = w.need.chromatic || found.chromatic;  // a grid's file may have three channels
+  // The scene's description alone does not determine these two features: they also depend on the shapes in
+  // mesh files, and on the number of channels (1 or 3) of the grids' files.
+  w.need.overlaps = found.overlaps || w.coincident;
+  w.need.chromatic = w.need.chromatic || found.chromatic;
   if (!w.need.covers(found))
     return fail(Errc::internal, "the scene's analysis left out something that the scene has: this is a bug");
   w.overlaps = found.overlaps;
@@ -259,9 +263,10 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
       m.equiangular_mode = m.grid ? EquiangularMode::points : EquiangularMode::places;
   }
   find_clear_regions(w);
-  // Equi-angular sampling chooses a light before the shading point is known. Multiple importance sampling
-  // needs the same probability of the light at vertices. So for points in media the tree is used only if no
-  // segments are sampled.
+  // Equi-angular sampling chooses a light for a segment before the shading point is known, so it cannot use
+  // the light tree, whose choice depends on the point. Multiple importance sampling combines it with
+  // next-event estimation at vertices, which must choose each light with the same probability. So points in
+  // media use the tree only if segments are not sampled.
   if (!w.equiangular && !w.equiangular_points && settings.integrator != "volpath_distant_mis")
     w.lights.use_tree_in_media();
   aim(scene.integrator, w);

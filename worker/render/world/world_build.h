@@ -1,4 +1,4 @@
-// Makes the World of a scene, without the data that are learned by tracing paths through that World
+// Makes the World of a scene, except for the data that are learned later by tracing paths through that World
 // (integrator/light_paths.h).
 #pragma once
 
@@ -11,7 +11,7 @@
 
 namespace ls::render {
 
-// The same as build_world() of render.h, but without learning.
+// Does what build_world() of render.h does, but leaves out the learning.
 Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettings& settings,
                                           const AssetFiles& files, int threads);
 
