@@ -5,6 +5,7 @@
 #include <linux/audit.h>
 #include <linux/filter.h>
 #include <linux/landlock.h>
+#include <linux/sched.h>
 #include <linux/seccomp.h>
 #include <linux/sockios.h>
 #include <sys/ioctl.h>
@@ -51,6 +52,7 @@ constexpr std::uint32_t kDenied[] = {
     SYS_finit_module,
     SYS_delete_module,
     SYS_kexec_load,
+    SYS_kexec_file_load,
     SYS_reboot,
     SYS_swapon,
     SYS_swapoff,
@@ -127,6 +129,10 @@ void put(const Decided& d, std::vector<sock_filter>& program) {
   program.push_back(BPF_STMT(BPF_RET | BPF_K, d.allowed ? SECCOMP_RET_ALLOW : kDeny));
 }
 
+// Flags of clone that make new namespaces
+constexpr std::uint32_t kNamespaces =
+    CLONE_NEWNS | CLONE_NEWCGROUP | CLONE_NEWUTS | CLONE_NEWIPC | CLONE_NEWUSER | CLONE_NEWPID | CLONE_NEWNET;
+
 bool filter_calls() {
   constexpr std::size_t kCount = std::size(kDenied);
   static_assert(kCount < 200, "jumps of a filter have 8 bits");
@@ -141,6 +147,15 @@ bool filter_calls() {
     put(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, kDenied[i], static_cast<std::uint8_t>(kCount - 1 - i),
                  static_cast<std::uint8_t>(i + 1 < kCount ? 0 : 1)));
   put(BPF_STMT(BPF_RET | BPF_K, kDeny));
+  // The flags of clone3 are in memory, where a filter cannot read them. ENOSYS makes the C library use clone
+  // instead, of which the filter denies the flags of namespaces.
+  put(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_clone3, 0, 1));
+  put(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | ENOSYS));
+  put(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_clone, 0, 4));
+  put(BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, args)));
+  put(BPF_JUMP(BPF_JMP | BPF_JSET | BPF_K, kNamespaces, 0, 1));
+  put(BPF_STMT(BPF_RET | BPF_K, kDeny));
+  put(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
   for (const Decided& d : decided()) child::put(d, program);
   put(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
   const sock_fprog whole{static_cast<unsigned short>(program.size()), program.data()};

@@ -9,7 +9,7 @@ namespace ls::worker::child {
 
 struct Sandboxed {
   // True if the seccomp filter is in effect. It denies opening sockets, tracing other processes, sending them
-  // signals or setting their limits, unshare(2) and setns(2), kernel modules, io_uring, and shared memory,
+  // signals or setting their limits, new namespaces, kernel modules, io_uring, and shared memory,
   // semaphores and message queues that outlive the process.
   bool calls = false;
   // True if Landlock is in effect. It denies writing all files except /dev/null, and reading all files except

@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <linux/landlock.h>
+#include <linux/sched.h>
+#include <sched.h>
 #include <stdlib.h>
 #include <sys/ioctl.h>
 #include <sys/ipc.h>
@@ -25,6 +27,7 @@
 #include <fstream>
 #include <functional>
 #include <string>
+#include <thread>
 
 namespace ls::worker::child {
 namespace {
@@ -145,6 +148,31 @@ TEST_F(Cage, OpensNoSocketAndTracesNobody) {
   EXPECT_EQ(try_sandboxed([] { return ::ptrace(PTRACE_ATTACH, ::getppid(), 0, 0) == 0 ? 0 : 1; },
                           &Sandboxed::calls),
             EPERM);
+}
+
+TEST_F(Cage, MakesNoNamespaces) {
+  const auto cloned = [](long made) {
+    if (made == 0) ::_exit(0);  // the new process
+    return made > 0 ? 0 : 1;
+  };
+  const auto clone_with = [&](unsigned long flags) {
+    return try_sandboxed([&] { return cloned(::syscall(SYS_clone, flags | SIGCHLD, 0, 0, 0, 0)); },
+                         &Sandboxed::calls);
+  };
+  const int user = clone_with(CLONE_NEWUSER);
+  SKIP_UNCAGED(user, &Sandboxed::calls);
+  EXPECT_EQ(user, EPERM);
+  EXPECT_EQ(clone_with(CLONE_NEWUSER | CLONE_NEWNET), EPERM);
+  EXPECT_EQ(clone_with(CLONE_NEWPID), EPERM);
+  EXPECT_EQ(clone_with(0), 0) << "processes without namespaces of their own may be started";
+  clone_args args{};
+  args.flags = CLONE_NEWUSER;
+  args.exit_signal = SIGCHLD;
+  EXPECT_EQ(
+      try_sandboxed([&] { return cloned(::syscall(SYS_clone3, &args, sizeof args)); }, &Sandboxed::calls),
+      ENOSYS);
+  EXPECT_EQ(try_sandboxed([] { return ::unshare(CLONE_NEWUSER); }, &Sandboxed::calls), EPERM);
+  EXPECT_EQ(try_sandboxed([] { return std::thread([] {}).join(), 0; }, &Sandboxed::calls), 0);
 }
 
 TEST_F(Cage, SignalsNobodyButItself) {
