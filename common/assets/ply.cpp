@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <optional>
 #include <string>
@@ -192,8 +193,10 @@ class PlyReader {
     const char* const last = rest_.data() + rest_.size();
     const auto [end, ec] = std::from_chars(rest_.data() + a, last, v);
     if (ec == std::errc::invalid_argument) return std::nullopt;
-    // a number too large or too small for double is read as 0
-    if (ec == std::errc::result_out_of_range) v = 0;
+    // A number too small for double becomes 0 or denormal, one too large infinite. Triangles with an infinite
+    // vertex position are left out.
+    if (ec == std::errc::result_out_of_range)
+      v = std::strtod(std::string(rest_.data() + a, end).c_str(), nullptr);
     if (end != last && kBlanks.find(*end) == kBlanks.npos) return std::nullopt;
     rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
     return v;

@@ -167,6 +167,21 @@ TEST(Ply, ReadsAllThreeCodingsAlike) {
   }
 }
 
+TEST(Ply, NumbersOutsideOfDoubleAreInfiniteOrZero) {
+  const auto with = [](const std::string& x) {
+    return "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+           "element face 2\nproperty list uchar int vertex_indices\nend_header\n" +
+           x + " 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 1 2 3\n";
+  };
+  const auto decoded = [&](const std::string& x) { return decode_ply("m.ply", bytes_of(with(x))).value(); };
+  EXPECT_EQ(decoded("1e400").dropped_triangles, 1u);
+  EXPECT_EQ(decoded("-1e400").dropped_triangles, 1u);
+  EXPECT_EQ(decoded("1" + std::string(400, '0')).dropped_triangles, 1u);
+  const auto small = decoded("1e-400");
+  EXPECT_EQ(small.dropped_triangles, 0u);
+  EXPECT_EQ(small.positions[0], 0);
+}
+
 TEST(Ply, RefusesCountsThatTheFileCannotHold) {
   EXPECT_THAT(ply_error(replaced(kPlyAscii, "vertex 4", "vertex 4000000000")),
               HasSubstr("4000000000 elements 'vertex'"));
