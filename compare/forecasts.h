@@ -1,7 +1,7 @@
-// Checks forecasts of render times. While one of Lightshaft's renders runs, it can predict the remaining time
-// until its estimated relative error (relMSE) reaches a target. The forecasts are made again here from the
-// measurements of a race (race.h: integrators render a scene at equal cost) and compared with the actual
-// times.
+// Checks forecasts of render times. While Lightshaft renders, it can predict the remaining time until the
+// estimated error (relMSE, the mean squared relative error) reaches a target. The forecasts are made again
+// here from the measurements of a race (race.h: integrators render a scene at equal cost) and compared with
+// the actual times.
 #pragma once
 
 #include <string>

@@ -16,7 +16,7 @@ namespace ls::race {
 
 struct Entrant {
   std::string name;
-  // True if the integrator renders all features of the scene, so that its images can serve as references
+  // True if the integrator renders all features of the scene, so that its images can serve as references.
   bool whole = false;
 };
 
@@ -54,7 +54,8 @@ struct JudgedPoint {
   double seconds = 0;  // the cost so far, in seconds on the race's clock
   bool last = false;
   std::optional<ImageError> estimate;
-  // Errors against the reference; not positive: the noise of the reference hides the error
+  // Errors against the reference. A value that is not positive means that the noise of the reference hides
+  // the error.
   double mse = 0, relmse = 0;
 };
 struct JudgedLane {
@@ -76,7 +77,7 @@ struct Race {
 // features of the scene, or there are fewer than two seeds.
 Result<void> judges_itself(const Race& race, std::size_t seeds);
 
-// Measures the errors of all images against `reference`. Without it, each seed s gets its own reference. This
+// Measures the errors of all images against `reference`. Without it, each seed s gets its own reference. It
 // is made from final images of one entrant: of those that render all features of the scene, the one with the
 // smallest estimated error. Its images of all seeds but s give the two images of the reference: the mean of
 // their halves A (even samples), and the mean of their halves B (odd samples). These two are independent of

@@ -14,13 +14,14 @@
 namespace ls::race {
 namespace {
 
-// A round that does not fit into the remaining time is shortened. It is left out if it would then add less
-// than 1 / kLeastShare of the samples rendered so far.
+// A round (a range of samples that is rendered in all pixels) is shortened if it does not fit into the
+// remaining time. It is left out if it would then add less than 1 / kLeastShare of the samples rendered so
+// far.
 constexpr std::uint64_t kLeastShare = 16;
 
 // A turn ends after this many wall seconds, unless the round ends earlier. At the end of a turn threads wait
-// for the last tile: the turn is long enough to make this wait a small part of it. It is short enough that
-// changes of the machine's speed affect all racers.
+// until the last tile is rendered; the turn is long enough to make this wait a small part of it. It is short
+// enough that changes of the machine's speed affect all racers.
 constexpr double kTurnSeconds = 1;
 
 // Runs `work` on `threads` threads at once; returns their total CPU seconds.
@@ -116,7 +117,7 @@ class RenderRacer final : public Racer {
     auto rendered = render::render_tile(*entry_.world, partial.header.tile, *range_, &stop, nullptr);
     if (rendered.stopped) return true;
     partial.sums = std::move(rendered.sums);
-    const Digest digest;  // zero: the film chains the digests of results, which a race does not need
+    const Digest digest;  // zero, since a race does not use the film's tile_digest()
     const std::lock_guard lock(mutex_);
     const auto folded = film_.fold(tile, round_, partial, digest);
     if (!folded) {
@@ -178,7 +179,7 @@ class RenderRacer final : public Racer {
   const Conditions conditions_;
   const SystemClock clock_;
 
-  // Guards the data shared by the threads of a turn: film_, sums_, health_, next_tile_, trouble_
+  // Guards the data shared by the threads of a turn: film_, sums_, health_, next_tile_ and trouble_.
   std::mutex mutex_;
   Film film_;
   std::vector<double> sums_;  // pixel sums of half A, then of half B; R, G, B interleaved

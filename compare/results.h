@@ -68,8 +68,8 @@ struct Table {
 };
 Table summary_table(const Results& results);
 Table forecast_table(const Results& results);           // has no rows if nothing was predicted
-std::vector<std::string> remarks_on(const Race& race);  // the reference, notes and failures
-// Explains forecast_table(); empty if nothing was predicted
+std::vector<std::string> remarks_on(const Race& race);  // about the reference, notes and failures
+// Explains forecast_table(); empty if nothing was predicted.
 std::string forecast_words(const Results& results);
 std::string wide_words();  // explains the columns of summary_table()
 

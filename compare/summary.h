@@ -1,5 +1,5 @@
-// The results of a race: for each entrant its final error, its efficiency and its curve of error over time,
-// as means over the seeds.
+// The results of a race: for each entrant its final error, its efficiency and its curve of error over time.
+// All are means over the seeds (renders with different random numbers).
 //
 // Errors, times and efficiencies are positive and vary by factors, so they are averaged as logarithms: the
 // mean is geometric, and its 95 % interval is Student's t over the seeds, which are independent renders.
@@ -15,7 +15,7 @@
 namespace ls::race {
 
 struct Estimate {
-  // A mean and its 95 % interval [lo, hi]; unbounded if it is the mean of a single value
+  // A mean and its 95 % interval [lo, hi]; the interval is unbounded if there is only one value.
   double value = 0, lo = 0, hi = 0;
 };
 
@@ -47,9 +47,10 @@ struct Row {
   std::optional<Estimate> efficiency;  // final 1 / (relMSE x seconds)
   std::optional<Estimate> slope;       // s of relMSE ~ seconds^-s, fitted to points at doubling sample counts
   // The first entrant's efficiency divided by this one's, as geometric mean over the seeds. nullopt for the
-  // first entrant itself, and if an efficiency is unknown
+  // first entrant itself, and if an efficiency is unknown.
   std::optional<Estimate> ratio;
-  // Largest final relMSE of the seeds divided by the smallest; large if few pixels dominate
+  // The largest final relMSE of the seeds divided by the smallest. It is large if few pixels dominate the
+  // error.
   double spread = 1;
 };
 // Returns one row per entrant that finished, in the order of the entrants.

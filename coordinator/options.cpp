@@ -36,7 +36,8 @@ void add_limits(CLI::App& app, http::Limits& limits) {
 
 // Adds the options for scheduling (docs/design/scheduling.md): limits, per job and per user, on workers and
 // on units assigned to workers at the same time (a unit is one tile in one round of samples), the highest
-// priority that a user may set, the share of results that is audited, and --allow-fake.
+// priority that a user may set, the share of results that is audited (rendered again by another worker), and
+// --allow-fake, with which fake workers may join (for tests).
 void add_shares(CLI::App& app, Flags& flags) {
   const auto limit = [&app](const char* name, std::uint32_t& value, const char* text) {
     app.add_option(name, value, text)->check(CLI::Range(0, 1'000'000))->capture_default_str();

@@ -163,8 +163,9 @@ class Runner {
     bool any = false;
     for (const std::string& name : names) any = any || asked_for(name);
     if (!any) return {};
-    // Switches path reuse off: pixels would share parts of paths, so their errors would depend on each other.
-    // The standard error of a mean is computed from the errors of the pixels as if they were independent.
+    // Switches path reuse off. With it, pixels would share parts of paths, so their errors would depend on
+    // each other; but the standard error of a mean is computed as if the errors of the pixels were
+    // independent.
     Scene alone = scene;
     alone.integrator.path_reuse = -1;
     const auto m = measure(alone, files_, test_.sample_count, seed, options_.threads);
@@ -215,7 +216,7 @@ class Runner {
   const render::AssetFiles& files_;
   const ValidateOptions& options_;
   double level_ = 0;
-  std::uint64_t number_ = 0;  // number of tests so far; each test adds it to its seed
+  std::uint64_t number_ = 0;  // number of tests so far; it is added to the seed of the next test
   std::vector<ValidateCase> cases_;
 };
 

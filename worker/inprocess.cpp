@@ -24,8 +24,9 @@ tl::unexpected<UnitFailure> failed(const Error& error) {
 }
 
 // A scene's needs are the features and files that rendering it takes. Worker and coordinator both derive them
-// from the scene, and the coordinator serves only the files that it found. So this function checks that the
-// needs that this worker derives equal those in the job's brief, which the coordinator has derived.
+// from the scene, and the coordinator serves only the files that are among the needs it derived. So this
+// function checks that the needs that this worker derives equal those in the job's brief, which the
+// coordinator has derived.
 tl::expected<void, UnitFailure> check_needs(const Scene& scene, const JobBrief& brief) {
   if (brief.needs.empty()) return {};
   const std::string own =

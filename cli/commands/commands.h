@@ -16,8 +16,9 @@ namespace ls::cli {
 
 using Action = std::function<int()>;
 
-// Adds the command `name`. Its action calls `run` with a Flags object. Returns the command and this object,
-// into which the options are to be parsed; both live as long as `app`.
+// Adds the command `name`. Its action calls `run` with a Flags object. Returns the command and the Flags
+// object; both live as long as `app`. The caller adds the command's options, which store their values in the
+// object.
 template <class Flags>
 std::pair<CLI::App*, Flags*> add_command(CLI::App& app, Action& action, const std::string& name,
                                          const std::string& help, int (*run)(const Flags& flags)) {

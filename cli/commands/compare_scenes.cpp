@@ -98,9 +98,9 @@ class SceneRace {
     return std::optional(race::combine(read));
   }
 
-  // Rejects a reference image that was rendered from this scene with one of the seeds that the race uses. Its
-  // noise would be the same as that of the race's image with that seed, and the image's error would seem much
-  // smaller than it is.
+  // Rejects a reference image that was rendered from this scene with one of the seeds of the images that are
+  // compared with it. The reference would have the same noise as the image with that seed, whose error would
+  // therefore seem much smaller than it is.
   Result<void> refuse_own_noise(const race::ReferenceFile& file) const {
     for (const Digest& scene : scenes_)
       for (std::size_t i = 0; i < options_.seeds; ++i)

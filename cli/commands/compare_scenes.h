@@ -15,7 +15,7 @@ namespace ls::cli {
 struct CompareOptions {
   std::vector<std::string> scenes;
   std::vector<std::string> integrators;  // their names; empty: only the one that the scene names
-  race::Conditions conditions;           // time, clock, samples and threads; the image size is set later
+  race::Conditions conditions;           // time limit and its clock, samples, threads; the size is set later
   std::optional<FrameSize> size;         // size of the image; nullopt: the size in the scene
   std::size_t seeds = 5;
   std::uint64_t first_seed = 0;

@@ -40,8 +40,8 @@ struct Converted {
   std::vector<FileCopy> copies;  // files to copy beside the XML file
 };
 
-// Finds assets by name in a scene that was read before. The converted text is read with this source, which
-// opens no file.
+// Provides the assets of a scene that was already read, by name, without opening files. The converted text is
+// read with it.
 class KnownAssets final : public AssetSource {
  public:
   explicit KnownAssets(const Scene& scene) {
@@ -87,9 +87,10 @@ void rename_those_outside(Scene& scene) {
   }
 }
 
-// Returns the files to copy into `folder` for `written`, the scene with its new names. A file that already
-// exists there with the same content is left out. If `all` is false, only files that the reader made from
-// numbers in the scene's text are copied. already_exists: another file has the name of a copy.
+// Returns the files to copy into `folder` for `written`, the scene after its assets were renamed. A file that
+// already exists there with the same content is left out. If `all` is false, only temporary files are copied,
+// which were made from data in the scene's text when it was read. already_exists: `folder` has a different
+// file with the name of a copy.
 Result<std::vector<FileCopy>> copies_for(const LocalScene& scene, const Scene& written,
                                          const fs::path& folder, bool all) {
   std::vector<FileCopy> copies;
@@ -118,11 +119,11 @@ Result<std::vector<FileCopy>> copies_for(const LocalScene& scene, const Scene& w
 }
 
 // Converts a scene to the text of the file `out`, and lists the files to copy beside it. If `out` is in the
-// folder of the original scene, these are only files that the reader made from numbers in the scene's text.
-// Otherwise they are all files that the scene needs, with the same relative names; a file whose name is
-// absolute or leaves the folder by ".." goes directly into the folder of `out`. The new text is read again
-// and compared with the scene. internal: it describes another scene; already_exists: the folder has another
-// file under a name that the scene needs.
+// folder of the original scene, these are only temporary files that were made from data in the scene's text
+// when it was read. Otherwise they are all files that the scene needs, with the same relative names; a file
+// whose name is absolute or begins with ".." goes directly into the folder of `out`. The new text is read
+// again and compared with the scene. internal: the new text describes another scene; already_exists: the
+// folder has another file under a name that the scene needs.
 Result<Converted> convert_scene(const LocalScene& scene, const fs::path& out) {
   Scene written = scene.scene;
   Converted converted;

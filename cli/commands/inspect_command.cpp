@@ -189,7 +189,8 @@ std::string files(const ordered_json& j) {
                 staying);
 }
 
-// Draws a bar as long as `bytes` is large: 24 marks for `largest`, and at least one mark unless `bytes` is 0.
+// Draws a bar whose length is proportional to `bytes`: 24 marks for `largest`, and at least one mark unless
+// `bytes` is 0.
 std::string bar(std::uint64_t bytes, std::uint64_t largest) {
   if (bytes == 0 || largest == 0) return "";
   const auto marks =
@@ -212,7 +213,7 @@ std::string memory(const ordered_json& j) {
 }
 
 // Describes a variant's instructions per path, and by how many percent they exceed those of the cheapest
-// variant. Either argument is null if the instructions could not be counted.
+// variant. An argument is JSON null if the instructions could not be counted.
 std::string instructions(const ordered_json& per_path, const ordered_json& cheapest) {
   if (per_path.is_null()) return "";
   const double n = per_path;

@@ -1,4 +1,5 @@
-// lightshaft validate: runs the table of cases with known answers or, with FILE, the tests of a Nori file.
+// lightshaft validate: tests the renderer, with the built-in table of cases whose answers are known or, given
+// FILE, with the tests in a file of the Nori renderer.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
@@ -47,8 +48,9 @@ int report(const std::vector<ValidateCase>& lines, nlohmann::ordered_json json, 
   return failed > 0 ? kFailed : kOk;
 }
 
-// Returns the table as JSON, with its significance level and the cases that --quick has left out. The docs
-// page is generated from it, and a check finds missing cases in it.
+// Returns the results `lines` as JSON, with the table's significance level and the cases that --quick has
+// left out. The docs page is generated from this JSON; tests/system/test_validation_table.py checks that
+// every required case is in it or has a test of its own.
 nlohmann::ordered_json table_with_rows(const cases::Table& table, const std::vector<ValidateCase>& lines,
                                        bool quick) {
   nlohmann::ordered_json json = table_json(lines);

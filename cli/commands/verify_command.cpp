@@ -132,8 +132,9 @@ VerifiedTile verify_tile(const render::World& world, const SealedImage& image, T
 }
 
 // Returns, as "header NAME", the headers in the image that contradict its settings or the names in the scene.
-// If `tiles` has all tiles of the image, also returns headers that contradict the tiles' samples. Only the
-// seal (the digests of all layers and headers) protects the other headers (seconds, health, ...).
+// If `tiles` has all tiles of the image, also returns headers that contradict the tiles' samples. The other
+// headers (seconds, health, ...) are not checked here: only the seal (the digests of all layers and headers)
+// protects them.
 std::vector<std::string> wrong_headers(const SealedImage& image, const CryptomatteManifests& names,
                                        const std::vector<VerifiedTile>& tiles) {
   auto expected = final_layers(Film(image.grid(), aovs_of(image.settings)).row(0), names, true).strings;
@@ -160,7 +161,8 @@ std::vector<std::string> wrong_headers(const SealedImage& image, const Cryptomat
   return wrong;
 }
 
-// The number of tiles with each result. `stopped`: not rendered, because the user interrupted the check.
+// The number of tiles with each result; `stopped` counts tiles that were not rendered, because the user
+// interrupted the check.
 struct Tally {
   std::size_t right = 0, wrong = 0, stopped = 0;
 };

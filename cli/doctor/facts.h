@@ -34,7 +34,7 @@ struct MachineFacts {
   std::optional<worker::child::Sandboxed> sandbox;
   std::filesystem::path vdb_program;
   bool vdb_found = false;
-  std::string denoiser, denoiser_trouble;  // name of the denoiser, or why there is none
+  std::string denoiser, denoiser_trouble;  // the denoiser's name, or why there is no denoiser
   std::filesystem::path redis_server;      // path of redis-server; empty: not in PATH
   std::vector<FolderFacts> folders;
 };

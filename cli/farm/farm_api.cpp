@@ -26,7 +26,8 @@ constexpr std::size_t kDigestsPerQuestion = 10'000;
 // smaller file is sent as a whole, and again if necessary; this saves the request that asks how many bytes
 // have arrived.
 constexpr std::uintmax_t kSentInParts = 1u << 20;
-constexpr int kBarrenAttempts = 8;  // an upload fails after more consecutive attempts without progress
+// An upload fails after more than this many consecutive attempts without progress.
+constexpr int kBarrenAttempts = 8;
 
 std::string environment(const char* name) {
   const char* value = std::getenv(name);

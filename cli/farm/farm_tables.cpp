@@ -118,8 +118,8 @@ void add_error_rows(std::vector<Row>& rows, const json& job) {
   add_known(rows, "efficiency", job, "efficiency_per_core", "{:.3g} (1 / (relMSE x core seconds))");
 }
 
-// Returns the numeric class of a worker or job (machines of one class render the same bits): the digits that
-// `submit --numeric-class` takes, and the platform in words.
+// Returns the numeric class of a worker or job (machines of one class render the same bits): its first 12
+// digits, which `submit --numeric-class` accepts, and the platform in words.
 std::string class_text(const json& of) {
   const std::string digits = text(of, "numeric_class").substr(0, 12), platform = text(of, "platform");
   return platform.empty() ? digits : digits + " " + platform;

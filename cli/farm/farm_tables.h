@@ -10,6 +10,6 @@ std::string jobs_table(const nlohmann::json& answer);     // formats the answer 
 std::string tokens_table(const nlohmann::json& answer);   // formats the answer to GET /tokens
 std::string workers_table(const nlohmann::json& answer);  // formats the answer to GET /workers
 std::string job_text(const nlohmann::json& job);          // formats the answer to GET /jobs/ID
-bool is_over(const nlohmann::json& job);                  // true if done, failed or cancelled
+bool is_over(const nlohmann::json& job);                  // true if the job is done, failed or cancelled
 
 }  // namespace ls::cli

@@ -20,7 +20,7 @@ constexpr long kStallSeconds = 60;  // a transfer that moves no byte for this lo
 constexpr long kRedirects = 3;
 constexpr double kRemoteSeconds = 120;
 constexpr int kFirstPauseMilliseconds = 250, kLongestPauseMilliseconds = 4000;
-constexpr long kWorkSeconds = 3600;  // replaces kStallSeconds if the server must work long before it answers
+constexpr long kWorkSeconds = 3600;  // instead of kStallSeconds, if the server's work may take long
 
 struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }

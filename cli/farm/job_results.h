@@ -26,7 +26,8 @@ int print_end(const nlohmann::json& job, bool quiet);
 void print_denoised(FarmApi& api, const nlohmann::json& job);
 
 struct Results {
-  // File names; empty: not wanted. A run of # is replaced by the frame number
+  // Names of the files to write; empty: this result is not wanted. A run of # is replaced by the frame
+  // number.
   std::string image, report, html;
   bool json = false;     // print each file as a line of JSON on stdout
   bool patient = false;  // keep trying for a while if the coordinator is unreachable

@@ -102,7 +102,8 @@ Result<std::shared_ptr<const worker::BlobFile>> LocalBlobFiles::acquire(const Bl
   return memory;
 }
 
-// Forwards all calls to a backend, and records how long loading took and, if the scene was at fault, why.
+// Forwards all calls to a backend, and records how long loading took and, if it failed because of the scene,
+// the reason.
 struct LocalFarm::Watched final : worker::RenderBackend {
   Watched(std::unique_ptr<worker::RenderBackend> b, const Clock& c) : backend(std::move(b)), clock(c) {}
 

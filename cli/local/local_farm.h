@@ -79,7 +79,7 @@ class LocalFarm {
   std::optional<Error> agent_error() const;  // the error with which the agent ended; nullopt: none
 
  private:
-  struct Watched;  // the render backend, which also records what the functions above return
+  struct Watched;  // the render backend; it records what load_seconds() and scene_fault() return
   explicit LocalFarm(Options options);
   Result<std::unique_ptr<worker::RenderBackend>> make_backend() const;
 

@@ -111,7 +111,7 @@ void print_report_health(const json& j) {
         cut));
 }
 
-// Returns the larger peak: of this process, or of any ended child process.
+// Returns the peak memory use of this process or of any child process that has ended, whichever is largest.
 std::uint64_t peak_rss_bytes() {
   rusage own{}, children{};
   ::getrusage(RUSAGE_SELF, &own);

@@ -29,7 +29,7 @@ struct LocalFacts {
   std::uint64_t peak_rss_bytes = 0;
   int threads = 1;
   bool interrupted = false;
-  // Instructions of the whole process; an error: why they were not counted
+  // Number of instructions that the whole process has executed; an error: why they were not counted.
   Result<std::uint64_t> instructions = 0;
 };
 // Returns `report`, the coordinator's report in JSON, with `facts` added and the scene's path reduced to its

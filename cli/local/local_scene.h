@@ -23,8 +23,8 @@ struct LocalFile {
   Digest digest;
   std::uint64_t bytes = 0;
   bool is_text = false;  // true for an included scene file
-  // True for a temporary file that the reader made from numbers in the scene's text; it exists as long as
-  // LocalScene::made
+  // True for a temporary file (a mesh, grid or image) that was made from data in the scene's text when the
+  // scene was read. The file exists as long as LocalScene::made.
   bool is_made = false;
 };
 

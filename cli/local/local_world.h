@@ -1,5 +1,5 @@
-// A scene prepared for tracing in this process, without a farm: for `inspect` and for rendering one sample
-// again.
+// A scene prepared for tracing in this process, without a farm: for the commands `inspect`, `compare` and
+// `verify`, and for rendering one sample again.
 #pragma once
 
 #include <memory>

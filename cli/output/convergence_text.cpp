@@ -36,7 +36,9 @@ std::string reference_errors_text(const json& job) {
   return out;
 }
 
-constexpr std::size_t kMostCauses = 64;  // largest number of causes shown from a farm's answer
+// Limits health_lines(), which has one or two lines for each cause of numeric problems: at most two lines for
+// this many causes.
+constexpr std::size_t kMostCauses = 64;
 
 // Returns the causes of the job's numeric problems, such as invalid samples; an empty list if none are known.
 const json& causes_of(const json& job) {

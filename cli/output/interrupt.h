@@ -7,8 +7,8 @@
 
 namespace ls::cli {
 
-// Its constructor blocks the signals. An Interrupt must be created before any other thread, because a thread
-// inherits blocked signals only when it starts.
+// The constructor blocks these signals for the calling thread. An Interrupt must be created before any other
+// thread, because a thread inherits blocked signals only when it starts.
 class Interrupt {
  public:
   Interrupt();

@@ -1,5 +1,5 @@
-// Options of commands: how they are added and parsed, and those that `render` and `submit` share, the request
-// for a job.
+// Adds and parses options of commands. JobOptions has the options that `render` and `submit` share: they
+// describe the requested job.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -79,7 +79,7 @@ Result<void> write_output(const fs::path& file, std::span<const std::byte> bytes
   const fs::file_status status = fs::status(file, error);
   if (!fs::exists(status) || fs::is_regular_file(status))
     return coordinator::write_atomically(fs::absolute(file, error), bytes);
-  // A pipe or device cannot be replaced by renaming, so it is written directly
+  // A pipe or device cannot be replaced by renaming, so it is written directly.
   std::ofstream out(file, std::ios::binary);
   out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   out.close();

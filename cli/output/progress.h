@@ -38,11 +38,11 @@ std::string progress_line(const ProgressFigures& figures, int columns, bool with
 
 enum class ProgressForm {
   none,
-  bar,    // one line that is overwritten, only if stderr is a terminal
+  bar,    // one line that is overwritten; nothing if stderr is not a terminal
   lines,  // for logs and programs: a line without bar whenever the whole percent has changed
 };
 
-// Shows the line on stderr.
+// Shows progress_line() on stderr, in the given form.
 class ProgressBar {
  public:
   explicit ProgressBar(ProgressForm form);

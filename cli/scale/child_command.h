@@ -14,7 +14,7 @@ namespace ls::cli {
 using Words = std::vector<std::string>;
 
 struct CommandOutput {
-  int code = 0;  // exit code, or 128 + number of the signal
+  int code = 0;  // exit code, or 128 + number of the signal that ended the program
   std::string out, err;
 };
 

@@ -69,7 +69,7 @@ Result<EngineList> parse_docker_ps(const std::string& lines, double unix_time);
 // the Deployment's manifest.
 struct KubernetesOptions {
   std::string farm;
-  std::string like = "deployment/worker";  // the Deployment whose template the pods get
+  std::string like = "deployment/worker";  // the Deployment from whose template pods are made
   int threads = 1;                         // cores that the template must request
   int drain_seconds = 120;  // the pods' grace period: time that a worker has to deliver its results and end
   int minutes = 60;         // time limit, after which Kubernetes ends the pod, with that grace period

@@ -122,7 +122,7 @@ int Scaler::affordable(std::span<const EngineWorker> workers, double spent) cons
                   static_cast<int>(std::min<double>(limits_.most_workers, left / (limits_.threads * each))));
 }
 
-// Returns for how many seconds, at most, a worker still costs if the next check asks it to drain: the
+// Returns for how many more seconds, at most, a worker must be paid if the next check asks it to drain: the
 // interval until that check, the time to drain, and another interval until its end is noticed.
 double Scaler::seconds_to_end() const { return limits_.drain_seconds + 2 * limits_.poll_seconds; }
 

@@ -19,8 +19,8 @@ namespace ls::cli {
 struct Demand {
   int open_jobs = 0;    // queued or running, with something left of their budgets
   int unpaid_jobs = 0;  // queued or running, but nothing is left of their budgets
-  // Predicted cost of the work that no worker holds, as far as the budgets pay for it. The cost also counts
-  // as 0 while no cost of the job has been measured.
+  // Predicted cost of the work that no worker holds, as far as the budgets pay for it. The work of a job
+  // counts as 0 until workers have measured its cost.
   double queued_core_seconds = 0;
   bool more_helps = true;        // false: by the coordinator's forecast, more workers would save no time
   int other_threads = 0;         // threads of connected workers that this command did not start
@@ -55,7 +55,8 @@ class Scaler {
   // Returns the actions while the command is ending: start no worker, drain all, and kill those that have not
   // ended after drain_seconds.
   ScaleActions end(std::span<const EngineWorker> workers, TimePoint now);
-  // Must be called if the engine could not start workers. The next attempt waits, longer with each failure.
+  // Must be called if the engine could not start workers. The next attempt is delayed, longer after each
+  // failure.
   void start_failed(TimePoint now);
   // Must be called if the engine could not ask these workers to drain. The request will be repeated.
   void drain_failed(std::span<const EngineWorker> workers);

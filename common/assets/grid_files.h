@@ -22,7 +22,8 @@
 
 namespace ls {
 
-Result<GridData> decode_vol(std::string_view name, std::span<const std::byte> file);  // 1 or 3 channels
+// Decodes or loads a .vol grid, which must have 1 or 3 channels.
+Result<GridData> decode_vol(std::string_view name, std::span<const std::byte> file);
 Result<GridData> load_vol(const std::filesystem::path& path, std::string_view name);
 
 Result<GridData> decode_raw_grid(std::string_view name, std::span<const std::byte> file, GridOrder order);

@@ -1,4 +1,4 @@
-// Decoders, written without a library, of images with floating-point values: Radiance .hdr and .pfm.
+// Decodes images with floating-point values without a library: Radiance .hdr and .pfm.
 #include <fmt/format.h>
 
 #include <array>

@@ -18,7 +18,7 @@ Result<void> check_size(const BrokenImage& broken, std::int64_t width, std::int6
                          max_pixels);
 }
 
-// The fields that are used of BMP's two headers (file header and image header), in the order of the file.
+// Those fields of BMP's two headers (file header and image header) that the decoder uses, in file order.
 struct BmpHeader {
   std::uint32_t pixels_at = 0;
   // A positive height means rows from the bottom up, a negative one rows from the top down.

@@ -337,15 +337,16 @@ class PlyReader {
     a.values[a.values.size() - a.components + place.component] = static_cast<float>(decoded(*p.type, *v));
     return true;
   }
-  // Decodes a value of an attribute. As in Mitsuba 3.9, values of integer types are sRGB codes of colours,
-  // whatever the attribute's name. Bytes (u8) and floating-point numbers are returned as they are.
+  // Decodes a value of an attribute. Unsigned bytes and floating-point numbers are returned as they are. As
+  // in Mitsuba 3.9, values of all other integer types are taken as sRGB codes and made linear, whatever the
+  // attribute's name.
   static double decoded(const Type& t, double v) {
     if (t.largest == 0 || is_byte(t)) return v;
     const double x = v / t.largest;
     return x <= .04045 ? x / 12.92 : std::pow((x + .055) / 1.055, 2.4);
   }
-  // Copies the attributes of the last face, so that each triangle of this face has them. Removes them if the
-  // face has no triangles.
+  // Repeats the attributes of the face that was read last, so that each of its `triangles` triangles has a
+  // copy. Removes them if the face has no triangles.
   void share_among_triangles(const std::vector<Place>& places, std::size_t triangles) {
     for (const Place& p : places) {
       if (p.attribute < 0 || p.component > 0) continue;

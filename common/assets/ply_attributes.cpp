@@ -24,8 +24,8 @@ std::optional<PlyAttribute> colour(std::span<const std::string_view> names) {
   return std::nullopt;
 }
 
-// Consecutive properties with the same prefix, such as foo_x foo_y. Their last characters are the first
-// characters of `kind`, which is one of the sequences in kKinds.
+// Consecutive properties with the same prefix, such as foo_x foo_y. Their last characters, in this order, are
+// the beginning of `kind`, which is one of the sequences in kKinds.
 struct Run {
   std::string_view prefix;
   std::string_view kind;

@@ -1,5 +1,5 @@
-// Clocks and conversions of time. Only main() and SystemClock read the system's clock; other functions get
-// the time as an argument.
+// Clocks and conversions of time. Code that must be testable at any time gets a Clock or the time as an
+// argument. SystemClock and the functions below read the system's clocks.
 #pragma once
 
 #include <time.h>

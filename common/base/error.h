@@ -1,5 +1,5 @@
-// Errors as values. Every function that can fail returns Result<T>; exceptions do not cross a folder
-// boundary. The message is for the person who must act: what happened, where, and what to do.
+// Errors as values. Every function that can fail returns Result<T>; no exception leaves the source folder in
+// which it is thrown. The message is for the person who must act: what happened, where, and what to do.
 #pragma once
 
 #include <array>
@@ -41,7 +41,7 @@ inline tl::unexpected<Error> bad_argument(std::string message) {
   return fail(Errc::invalid_argument, std::move(message));
 }
 
-// The names of the codes, in their order.
+// The names of the codes, in the order of Errc.
 inline constexpr std::array<std::string_view, 9> kErrcNames = {
     "invalid_argument",    "not_found",          "already_exists",
     "failed_precondition", "resource_exhausted", "permission_denied",

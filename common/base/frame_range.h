@@ -15,7 +15,7 @@ inline constexpr std::uint32_t kMaxFrameNumber = 9'999'999;
 inline constexpr std::uint32_t kMaxFrames = 10'000;  // largest number of frames in one sequence
 
 struct FrameRange {
-  std::uint32_t first = 0, last = 0;  // both included
+  std::uint32_t first = 0, last = 0;  // ends of the range; `last` is included if a step reaches it
   std::uint32_t step = 1;
   std::uint32_t count() const { return (last - first) / step + 1; }
   bool contains(std::uint32_t frame) const {

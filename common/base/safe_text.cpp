@@ -36,8 +36,8 @@ bool is_shown(std::uint32_t code) {
   const auto within = [code](std::uint32_t first, std::uint32_t last) {
     return code >= first && code <= last;
   };
-  // Not shown are control characters, line and paragraph separators, directional embeddings and overrides
-  // (all in 0x2028 to 0x202E), and directional isolates.
+  // These are not shown: control characters; line and paragraph separators, directional embeddings and
+  // overrides (together 0x2028 to 0x202E); directional isolates.
   return !within(0, 0x1F) && !within(0x7F, 0x9F) && !within(0x2028, 0x202E) && !within(0x2066, 0x2069);
 }
 

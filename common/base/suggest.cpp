@@ -11,7 +11,7 @@ namespace ls {
 namespace {
 
 constexpr std::size_t kMaxName = 64;    // longer names are not compared, since the cost is quadratic
-constexpr std::size_t kMaxListed = 24;  // more alternatives would make a message unreadable
+constexpr std::size_t kMaxListed = 24;  // a longer list of names would make a message unreadable
 
 std::string folded(std::string_view name) {
   std::string out;

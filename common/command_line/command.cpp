@@ -99,7 +99,7 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-// Quotes text as one argument of a macro.
+// Quotes text as one argument of a troff macro.
 std::string quoted(const std::string& text) {
   std::string out = "\"";
   for (const char c : escaped(text)) out += c == '"' ? std::string("\\(dq") : std::string(1, c);

@@ -37,13 +37,13 @@ Command describe_command(const CLI::App& app);
 // after all other options were added.
 void add_man_page_option(CLI::App& app, const std::string& version);
 
-// Returns scripts by which shells complete the program's commands, options, values and file names.
+// Each returns a script by which the shell completes the program's commands, options, values and file names.
 std::string bash_completion(const Command& program);
 std::string zsh_completion(const Command& program);
 std::string fish_completion(const Command& program);
 
 // Returns a manual page in troff with the macros of man(7): the page of section 1 for a program with all of
-// its commands. `date`: of the page, as YYYY-MM-DD.
+// its commands. `date` is the date that the page shows, as YYYY-MM-DD.
 std::string man_page(const Command& program, const std::string& version, const std::string& date);
 
 }  // namespace ls

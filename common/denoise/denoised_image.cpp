@@ -25,9 +25,9 @@ struct Noisy {
   std::vector<bool> counts;
 };
 
-// For one half (A or B of the samples) of a guide (an AOV for the denoiser): the indices in TileAovs::sums of
-// its three planes, in the order R, G, B or X, Y, Z. TileAovs::sums itself has planes sorted by name: B, G, R
-// or X, Y, Z.
+// The indices in TileAovs::sums of the three planes of a guide (an AOV for the denoiser), for one half of the
+// samples. They are in the order red, green, blue or x, y, z. In TileAovs::sums itself planes are sorted by
+// name: blue before green before red, or x, y, z.
 struct GuidePlanes {
   std::array<std::size_t, 3> plane{};
 };

@@ -32,11 +32,12 @@
 //
 // The two terms of this difference have the same sign, so its square is at most the sum of their squares. The
 // first term is the product of the residuals. The second cannot be measured, but its square has the
-// expectation s^4 Var^2, and so has, for Gaussian noise, (D(A) - D(B))^4 / 12, since E (a - b)^4 = 12 Var^2
-// (more with heavier tails). So the squared product plus (D(A) - D(B))^4 / 12 is, in the mean, at least n^2;
-// bias increases it and makes the interval wider. Channels are summed before they are squared, since they
-// share paths. No interval is given if the number of pixels that carry the noise, (sum n^2)^2 / sum n^4, is
-// below four: the variance of a single pixel cannot be estimated from one pair of halves.
+// expectation s^4 Var^2. For Gaussian noise (D(A) - D(B))^4 / 12 has the same expectation, since E (a - b)^4
+// = 12 Var^2; with heavier tails it has a larger one. So the squared product plus (D(A) - D(B))^4 / 12 is, in
+// the mean, at least n^2; bias increases it and makes the interval wider. Channels are summed before they are
+// squared, since they share paths. No interval is given if the number of pixels that carry the noise, (sum
+// n^2)^2 / sum n^4, is below four: the variance of a single pixel cannot be estimated from one pair of
+// halves.
 #pragma once
 
 #include <algorithm>

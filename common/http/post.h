@@ -35,8 +35,8 @@ struct HttpAnswer {
 // Returns the answer, whatever its status. Error unavailable: no connection, or no answer in time.
 Result<HttpAnswer> post(const HttpPost& request);
 
-// Returns invalid_argument unless requests can be sent to this address. `setting` names it in the message: a
-// flag or a variable.
+// Returns invalid_argument unless requests can be sent to this address. `setting` is the flag or environment
+// variable that gave the address; the message names it.
 Result<void> check_http_url(const std::string& url, std::string_view setting);
 
 }  // namespace ls

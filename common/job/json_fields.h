@@ -31,7 +31,8 @@ class Fields {
 
   const std::optional<Error>& error() const { return error_; }  // the first error; nullopt: no error so far
 
-  // Each of these returns nullopt if the key is absent or its value is wrong.
+  // Each of these returns nullopt if the key is absent or its value is wrong. A wrong value is recorded as an
+  // error.
   std::optional<std::uint64_t> whole(const char* key, std::uint64_t least, std::uint64_t most);
   std::optional<std::int64_t> integer(const char* key, std::int64_t least, std::int64_t most);
   std::optional<double> positive(const char* key, double most);

@@ -62,8 +62,8 @@ struct JobSpec {
   std::optional<FrameRange> frames;
   std::optional<std::uint32_t> max_workers;  // maximum number of workers at the same time
   std::optional<std::uint32_t> max_units;    // maximum number of units assigned to workers at the same time
-  // Memory, in bytes, that a worker must have to get units of the job. It is at least the size of the job's
-  // files, even if this value is smaller.
+  // Memory, in bytes, that a worker must have to get units of the job. If the job's files are larger than
+  // this, the worker must have as much memory as the files.
   std::optional<std::uint64_t> memory;
   // The numeric class of the workers that may render the job; machines of one class compute the same bits.
   // The text is the beginning of the class's digest in hexadecimal, or the beginning of its platform

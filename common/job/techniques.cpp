@@ -49,7 +49,7 @@ TechniqueSwitch off_switch(Technique technique, std::string_view integrator) {
   if (technique == Technique::exponential) return {"distance", "equiangular"};
   if (technique == Technique::lamp_directions) return {"phase_only", "true"};
   return {kRows[static_cast<std::size_t>(technique)].name,
-          // Every other technique has a parameter of its own name, and the value -1 switches it off.
+          // Each of the remaining techniques has a parameter with its own name; the value -1 switches it off.
           "-1"};
 }
 

@@ -76,7 +76,7 @@ struct Lease {
 // Times, in seconds, that a worker spent on a unit besides rendering it. Before its first unit of a job, a
 // worker builds the job's world (the scene prepared for rendering). `load` is the time to fetch the job's
 // files, `build` the wall-clock time in which one thread reads them and builds the world. Both are set only
-// in the first result that is rendered with a world; in all others they are 0.
+// in the first result after the world was built; in all other results they are 0.
 struct UnitTimes {
   double load = 0, build = 0;
   double transfer = 0;  // time to encode the result and compute its digest

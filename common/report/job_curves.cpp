@@ -28,9 +28,9 @@ std::string range(const std::optional<std::pair<double, double>>& ci, std::strin
   return ci ? fmt::format("{} to {}", words(ci->first), words(ci->second)) : std::string();
 }
 
-// Returns the 95 % interval of the error at a checkpoint, to be shown. With `doubt`, the error estimate at
-// the last checkpoint is not trusted. The report does not judge earlier checkpoints, so in this case none of
-// them gets an interval either.
+// Returns the 95 % interval of the error that is shown at a checkpoint. `doubt`: the error estimate at the
+// last checkpoint is not trusted. Then no checkpoint gets an interval, because the report does not judge the
+// estimates at earlier checkpoints.
 std::optional<std::pair<double, double>> shown_interval(const Json& point, bool doubt) {
   return doubt ? std::nullopt : interval(point, "relmse_ci95");
 }

@@ -52,7 +52,8 @@ std::string verdict(const Json& report) {
     const std::string words = text(report, "verdict");
     out += fmt::format("<p class=\"verdict\" role=\"note\">{}</p>",
                        escape_html(words.empty() ? phrase("estimateInDoubt") : words));
-    // If the report has convergence curves, these words are printed below the curves instead.
+    // Prints a sentence on the convergence. If the report has convergence curves, the sentence is below the
+    // curves instead.
   } else if (objects(report, "convergence").empty()) {
     out += paragraph("note", verdict_words(report));
   }

@@ -17,7 +17,7 @@ constexpr double kShort = 2.2;
 constexpr double kFine = 4.5;
 constexpr std::size_t kMostLabels = 8;
 constexpr std::size_t kFewTimes = 4;  // If fewer time labels than this fit, labels between them are added.
-// The ends of an axis are from 10^-300 to 10^300, so that they can be computed in double.
+// The ends of an axis are limited to 10^-300 and 10^300, so that they can be computed in double.
 constexpr double kFarthest = 300;
 constexpr double kMinute = 60, kHour = 3600, kDay = 86400;
 

@@ -26,8 +26,8 @@ enum class AxisUnit {
   seconds,  // labels such as 1 s, 10 s, 1 min, 1 h, 1 d
 };
 // Returns the ticks in ascending order. Labels are at powers of ten, or for times at usual values (1 s, 10 s,
-// 1 min, ...). A short axis also has labels between these. A long axis has labels only at every n-th of them,
-// so that there are not too many.
+// 1 min, ...). A short axis also has labels between these. A long axis has a label only at every second,
+// third, ... of these values, so that there are not too many labels.
 std::vector<Tick> ticks(const LogAxis& axis, AxisUnit unit);
 
 }  // namespace ls::report

@@ -18,10 +18,10 @@ namespace {
 constexpr double kWidth = 520, kLeft = 60, kRight = 504, kTop = 14;
 constexpr double kPlotHeight = 290, kBelow = 50, kLegendLine = 22;
 // Half the width of the widest time label, in units of the drawing. The middle of a label keeps this distance
-// from the right edge of the drawing, so that they are not cut off.
+// from the right edge of the drawing, so that the label is not cut off.
 constexpr double kHalfLabel = 25;
 constexpr double kLetter = 7.4;  // mean width of a letter in the legend, in units of the drawing
-// A forecast is drawn only if its x is less than this multiple of the x of the last point.
+// A forecast is drawn only if its x is less than kFarthestAhead times the x of the last point.
 constexpr double kFarthestAhead = 100;
 
 using Out = std::back_insert_iterator<std::string>;

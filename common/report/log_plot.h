@@ -19,7 +19,7 @@ struct Curve {
   bool dashed = false;
 };
 inline constexpr std::size_t kMostCurves = 8;  // Each curve has its own colour; further curves are not drawn.
-// Largest number of points drawn per curve. Of longer curves, evenly chosen points are drawn.
+// Largest number of points drawn per curve. If a curve has more points, evenly chosen ones are drawn.
 inline constexpr std::size_t kMostCurvePoints = 512;
 
 // A forecast: the x at which the first curve will reach the target.
@@ -40,7 +40,7 @@ struct LogPlot {
 // Returns an SVG element for a page whose style includes plot_css(). If there are no points, the drawing has
 // a note instead.
 std::string svg_of(const LogPlot& plot);
-// Returns the content of a separate SVG file, which follows the reader's dark or light mode.
+// Returns the content of a separate SVG file, which follows the viewer's dark or light mode.
 std::string standalone_svg(const LogPlot& plot);
 std::string_view plot_css();
 

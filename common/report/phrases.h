@@ -35,7 +35,8 @@ inline constexpr std::array kPhrases{
     Phrase{"stoppedUser", "someone stopped it"},
     Phrase{"failed", "The job failed"},
     Phrase{"unwell", "Something is wrong"},
-    // Where the time was spent (the report's field `time`): the unit, and one phrase for each member.
+    // Where the time was spent (the report's field `time`): how the time is measured, and one phrase for each
+    // member of the field.
     Phrase{"timeUnit", "Seconds of threads: of render their CPU time, of the others by the clock."},
     Phrase{"timeLoad", "getting the files that the scene names"},
     Phrase{"timeBuild", "reading them and building the world"},

@@ -13,8 +13,8 @@ namespace ls::scene {
 inline constexpr std::size_t kMaxTextBytes = std::size_t{32} << 20;  // bytes of one scene file
 // Bytes of a scene file and all files that it includes
 inline constexpr std::size_t kMaxTotalTextBytes = std::size_t{64} << 20;
-// Elements of a scene file and all files that it includes; of a pbrt or glTF file, the elements that it is
-// translated to
+// Elements of a scene file and all files that it includes; for a pbrt or glTF file, the elements to which it
+// is translated are counted
 inline constexpr std::size_t kMaxElements = 500'000;
 inline constexpr std::size_t kMaxAttributes = 2'000'000;
 // Attributes of one XML element; no known element has more than 5
@@ -27,7 +27,7 @@ inline constexpr std::size_t kMaxParameterNameBytes = 128;
 // Bytes of an attribute's value after its scene parameters are substituted, and of a word or quoted text in a
 // pbrt file
 inline constexpr std::size_t kMaxValueBytes = std::size_t{64} << 10;
-// Bytes of all attribute values with substituted scene parameters together
+// Total bytes of all attribute values in which scene parameters were substituted
 inline constexpr std::size_t kMaxSubstitutedBytes = std::size_t{64} << 20;
 inline constexpr std::size_t kMaxSearchPaths = 64;  // number of <path> elements
 // Children of one object of a Nori file
@@ -53,9 +53,9 @@ inline constexpr std::size_t kMaxGltfJointSets = 8;
 inline constexpr std::size_t kMaxGltfMeshBytes = std::size_t{1} << 30;
 // Nesting depth of objects; an object that is referred to counts as nested in the object with the reference
 inline constexpr int kMaxReferenceDepth = 64;
-// Nesting depth of bsdfs. A blend has two inner bsdfs, so with 8 levels up to 2^7 bsdfs are innermost.
+// Nesting depth of bsdfs. A blend has two inner bsdfs, so 8 levels allow up to 2^7 innermost bsdfs.
 inline constexpr int kMaxBsdfNesting = 8;
-inline constexpr double kMaxTemperature = 1e6;  // kelvin of a black body
+inline constexpr double kMaxTemperature = 1e6;  // temperature of a black body, in kelvin
 inline constexpr std::size_t kMaxDiagnostics = 20;
 inline constexpr std::size_t kMaxExcerptBytes = 160;  // bytes of a source line that a message shows
 inline constexpr std::size_t kMaxSceneJsonBytes = std::size_t{256} << 20;

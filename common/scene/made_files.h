@@ -1,5 +1,5 @@
-// Asset files (meshes, volume grids, images) that readers of scene files make from data that is inside a
-// scene file.
+// Asset files (meshes, volume grids, images) that are made from data inside a scene file while that file is
+// read.
 #pragma once
 
 #include <array>

@@ -24,12 +24,12 @@ class AssetSource {
   virtual Result<Asset> find(std::string_view name) = 0;
   // Returns the text of a scene file that another scene file includes. The size of the text is limited.
   virtual Result<std::string> text(std::string_view name) = 0;
-  // Keeps a file that the reader has made from numbers in the scene's text; from then on find() returns it.
-  // If a source keeps no files, the program that uploads the scene must upload this file, too, under the same
-  // name.
+  // Stores a mesh or grid file that read_scene() itself has made from numbers in the scene's text. From then
+  // on find() finds it under this name. A source that does not store such files relies on the program that
+  // uploads the scene to upload them under the same names.
   virtual Result<Asset> keep(std::string_view name, const std::string& bytes);
-  // True if keep() stores files. If false, the program that uploads the scene uploads the files that readers
-  // make, and this reader need not compute them.
+  // True if keep() stores files. If false, read_scene() need not make such files, since the program that
+  // uploads the scene makes and uploads them.
   virtual bool keeps() const { return false; }
 };
 

@@ -88,7 +88,7 @@ struct DiffuseBsdf {
   bool operator==(const DiffuseBsdf&) const = default;
 };
 // A thin sheet that scatters light ideally on both sides, such as a leaf or paper. At every point reflectance
-// + transmittance is at most 1: where textures exceed 1, both are divided by their sum.
+// + transmittance is at most 1: where the two textures add up to more than 1, both are divided by their sum.
 struct DiffuseTransmissionBsdf {
   TextureIndex reflectance, transmittance;
   bool operator==(const DiffuseTransmissionBsdf&) const = default;
@@ -363,7 +363,8 @@ using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, 
 
 // The integrator.
 //
-// The number of pixels that share subpaths if path_reuse is 0 and sharing lowers the error of the scene.
+// The number of pixels that share subpaths if path_reuse (below) is 0 and sharing lowers the error of the
+// scene's image.
 inline constexpr int kUsualPathReuse = 16;
 // Many parameters of IntegratorSettings switch a sampling technique. "Chosen for the scene" means that an
 // analysis of the scene decides whether the technique is used.
@@ -386,9 +387,10 @@ struct IntegratorSettings {
   // 0: chosen for the scene; -1: never; 1: always.
   int light_vertices = 0;
   // Both are for "volpath" only; a lamp is a point, spot or projector light. equiangular: whether next-event
-  // estimation also connects lamps to points on path segments through media, sampled more densely near the
-  // lamp; if not, directions are not sampled towards lamps either. lamp_flights: whether a share of the
-  // free-flight distances is sampled so that paths scatter near lamps. 0: chosen for the scene; -1: never.
+  // estimation connects a lamp not only to the vertices of a path but also to points on its segments through
+  // media, sampled more densely near the lamp; without this, no directions are sampled towards lamps.
+  // lamp_flights: whether a share of the free-flight distances is sampled so that paths scatter near lamps.
+  // 0: chosen for the scene; -1: never.
   int equiangular = 0, lamp_flights = 0;
   // How next-event estimation chooses one of many (32 or more) lights. 0: by a tree of lights, from distance,
   // direction and power; -1: by power alone.
@@ -417,7 +419,7 @@ struct IntegratorSettings {
   bool operator==(const IntegratorSettings&) const = default;
 };
 
-// Names of a shape or an instance, and of its material; used for Cryptomatte only.
+// The name of a shape or an instance, and the name of the shape's material; used for Cryptomatte only.
 struct Label {
   std::string name, material;  // `material` is empty for instances
   bool operator==(const Label&) const = default;

@@ -36,8 +36,7 @@ struct MeshShape {
   AssetIndex file;
   MeshFormat format = MeshFormat::obj;
   bool face_normals = false;
-  // What is done if the file has no vertex normals. true: faces are shaded flat; false: smooth normals are
-  // computed.
+  // Only for files without vertex normals. true: faces are shaded flat; false: smooth normals are computed.
   bool flat_without_normals = false;
   bool flip_tex_coords = false;
   int shape_index = 0;  // index of the mesh in a `serialized` file
@@ -62,7 +61,7 @@ struct Shape {
   bool flip_normals = false;
   BsdfIndex bsdf;
   std::optional<AreaEmitter> emitter;
-  // The media on the two sides: the normal points away from the interior, into the exterior.
+  // The media on the two sides of the surface. Its normal points away from the interior, into the exterior.
   std::optional<MediumIndex> interior, exterior;
   bool is_medium_transition = false;  // true if the file gives an interior or exterior
   // If set, the shape belongs to this group: it is visible only as part of the group's instances, and
@@ -85,7 +84,7 @@ enum class FovAxis { x, y, diagonal, smaller, larger };
 // How the camera projects. orthographic: parallel rays from the rectangle [-1, 1] x [-1/a, 1/a] in the
 // camera's x and y, where a is width / height of the image; to_world may scale this rectangle. spherical: all
 // directions by latitude and longitude, as in Mitsuba 0.x: the top row is +y; on the horizon the left edge is
-// -z, and a quarter of the width further is +x. It ignores near_clip and far_clip.
+// -z, and a quarter of the width further is +x. A spherical camera ignores near_clip and far_clip.
 enum class Projection { perspective, orthographic, spherical };
 struct Sensor {  // looks along the +z axis of to_world, with +y up and +x to the LEFT, as in Mitsuba
   Transform to_world;

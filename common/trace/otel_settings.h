@@ -14,7 +14,8 @@
 
 namespace ls::trace {
 
-// Decides which traces are recorded. The same trace id always gets the same decision, in every process.
+// Decides which traces are recorded. Unless another program's decision is kept, the decision depends only on
+// the trace id and `ratio`, so that all processes decide alike.
 struct Sampler {
   double ratio = 1;            // fraction of the traces that are recorded, 0 to 1
   bool parent_decides = true;  // true: if another program began the trace, that program's decision is kept
@@ -26,7 +27,7 @@ struct Settings {
   std::string url;  // where POST requests with spans are sent
   std::vector<std::pair<std::string, std::string>> headers;
   std::string ca_file;  // file with the trusted CA certificates; empty: those of the system
-  double seconds = 10;  // time limit of a request, until the answer has come
+  double seconds = 10;  // time limit from sending a request to having received its answer
   // The service name: OTEL_SERVICE_NAME or, if it is not set, the attribute service.name in
   // OTEL_RESOURCE_ATTRIBUTES or, without one, the name of the program.
   std::string service;
@@ -34,15 +35,16 @@ struct Settings {
   Sampler sampler;
 };
 
-// Returns the value of an environment variable; null: it is not set.
+// Returns the value of an environment variable; nullptr if it is not set.
 using Environment = std::function<const char*(const char* name)>;
 
 // Reads OTEL_SDK_DISABLED, OTEL_TRACES_EXPORTER, OTEL_SERVICE_NAME, OTEL_RESOURCE_ATTRIBUTES,
-// OTEL_TRACES_SAMPLER with _ARG, and OTEL_EXPORTER_OTLP_ENDPOINT, _HEADERS, _TIMEOUT, _CERTIFICATE and
-// _PROTOCOL. Each OTEL_EXPORTER_OTLP_... is overridden by OTEL_EXPORTER_OTLP_TRACES_... nullopt: nothing is
-// traced, for example because no endpoint is set. Error invalid_argument: a variable has an invalid value.
-// The message names the variable, but does not contain the value of a header. Spans are always sent as JSON:
-// if the protocol is http/protobuf, a warning is logged; any protocol other than these two is an error.
+// OTEL_TRACES_SAMPLER and OTEL_TRACES_SAMPLER_ARG, and OTEL_EXPORTER_OTLP_ENDPOINT, ..._HEADERS, ..._TIMEOUT,
+// ..._CERTIFICATE and ..._PROTOCOL. Each OTEL_EXPORTER_OTLP_... is overridden by
+// OTEL_EXPORTER_OTLP_TRACES_... nullopt: nothing is traced, for example because no endpoint is set. Error
+// invalid_argument: a variable has an invalid value. The message names the variable, but does not contain the
+// value of a header. Spans are always sent as JSON: if the protocol is http/protobuf, a warning is logged;
+// any protocol other than http/json and http/protobuf is an error.
 Result<std::optional<Settings>> settings_from(const Environment& environment, const std::string& program);
 
 }  // namespace ls::trace

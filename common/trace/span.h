@@ -1,5 +1,5 @@
-// Spans: named time intervals of one job, with attributes; the identifiers of traces and spans, and their
-// text in messages between processes: the header `traceparent` of W3C Trace Context
+// Spans: named time intervals of one job, with attributes; the identifiers of traces and spans, and how
+// messages between processes carry them: in the header `traceparent` of W3C Trace Context
 // (https://www.w3.org/TR/trace-context/, version 00).
 #pragma once
 
@@ -42,9 +42,9 @@ std::string to_traceparent(const SpanContext& context);
 // version is later than 00, only the fields of version 00 are read.
 std::optional<SpanContext> parse_traceparent(std::string_view text);
 
-// Return an id that is computed from the text (the first bytes of a SHA-256), so that a restarted process
-// gets the same ids again and continues its trace. Different traces, and different spans of a trace, must
-// have different texts.
+// Both return an id that is computed from the text (the first bytes of a SHA-256), so that a restarted
+// process gets the same ids again and continues its trace. Different traces, and different spans of a trace,
+// must have different texts.
 TraceId trace_id_of(std::string_view text);
 SpanId span_id_of(const TraceId& trace, std::string_view text);
 
@@ -58,7 +58,7 @@ struct SpanEvent {
   std::string name;
 };
 
-enum class SpanKind { internal = 1, client = 3 };  // values as in OTLP
+enum class SpanKind { internal = 1, client = 3 };  // the numbers are OTLP's
 
 // Times are nanoseconds since 1970 (UTC).
 struct Span {

@@ -16,14 +16,14 @@ namespace ls::trace {
 
 inline constexpr std::size_t kMaxWaiting = 8192;  // most spans in the queue; each takes about 0.5 KB
 inline constexpr std::size_t kMaxBatch = 512;     // most spans in one request
-inline constexpr double kCollectSeconds = 1;      // longest time for which a batch of spans is collected
+inline constexpr double kCollectSeconds = 1;      // longest wait for a batch to become full
 inline constexpr int kMaxSendings = 5;            // a batch is dropped after this number of failed attempts
 inline constexpr double kFirstPauseSeconds = 1;   // pause after a failed attempt; further failures double it
 
 struct Figures {
-  std::uint64_t sent = 0;      // spans that the collector took
+  std::uint64_t sent = 0;      // spans that the collector accepted
   std::uint64_t left_out = 0;  // spans dropped because the queue was full
-  std::uint64_t refused = 0;   // spans rejected by the collector, or not taken in kMaxSendings attempts
+  std::uint64_t refused = 0;   // spans that the collector rejected or did not accept in kMaxSendings attempts
 };
 
 class SpanQueue {
@@ -38,7 +38,7 @@ class SpanQueue {
   void hurry() { hurried_ = true; }
 
   // After an attempt to send the batch of due(), call one of these three functions.
-  void taken(std::uint64_t rejected);  // the collector took the batch, except for `rejected` spans
+  void taken(std::uint64_t rejected);  // the collector accepted all but `rejected` spans
   void failed(TimePoint now);          // the attempt failed, but may be repeated
   void refused();                      // the collector refused the batch for good, so it is dropped
   bool in_trouble() const { return in_trouble_; }  // true if the last attempt to send a batch did not succeed

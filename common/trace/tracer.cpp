@@ -36,7 +36,7 @@ std::uint64_t mixed(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-// True for an HTTP status after which OTLP allows the client to send the same request again.
+// True for an HTTP status after which OTLP allows the client to repeat the request.
 bool may_pass(int status) { return status == 429 || status == 502 || status == 503 || status == 504; }
 
 }  // namespace

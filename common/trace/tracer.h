@@ -25,7 +25,8 @@ class Tracer {
   struct Options {
     Settings settings;
     std::string version;  // version of this program
-    // Distinguishes several processes of this program, such as the name of a worker; empty: nothing is sent.
+    // The attribute service.instance.id, which distinguishes several processes of this program, such as the
+    // name of a worker; empty: the attribute is not sent.
     std::string instance;
     std::shared_ptr<const Clock> clock;
     std::function<std::int64_t()> unix_ns;  // reads the wall clock, in nanoseconds since 1970
@@ -65,8 +66,8 @@ class Tracer {
   std::jthread thread_;
 };
 
-// Returns a tracer if environment variables name a collector (otel_settings.h), otherwise null. `program` and
-// `version` are the name and the version of this program.
+// Returns a tracer if environment variables name a collector (otel_settings.h), otherwise a null pointer.
+// `program` and `version` are the name and the version of this program.
 Result<std::shared_ptr<Tracer>> tracer_from_environment(const std::string& program,
                                                         const std::string& version,
                                                         const std::string& instance);

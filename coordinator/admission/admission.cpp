@@ -238,8 +238,8 @@ tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, 
   scene::Pruned pruned = scene::pruned(read.scene, whom);
   const auto missing = [&](const Asset& a) { return read.not_uploaded.contains(a.digest); };
   if (std::ranges::none_of(pruned.scene.assets, missing)) return pruned;
-  // Read again with `strict`, the scene gives an error at each place that names a missing file. Without an
-  // error, the missing files have arrived meanwhile
+  // Read again with `strict`, the scene gives an error at each place that names a missing file. If there is
+  // no error now, the missing files have arrived meanwhile.
   const auto again = read_uploaded(request, blobs, frame, true);
   if (!again) return tl::unexpected(again.error());
   return scene::pruned(again->scene, whom);

@@ -27,7 +27,8 @@ struct Admission {
 tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const BlobStore& blobs,
                                         std::optional<std::uint32_t> frame = {});
 
-// Admits all frames of spec.frames, or returns their errors. limits.h bounds the frames' total size.
+// Admits all frames of spec.frames, or returns their errors. The limits kMaxSequence... in
+// coordinator/base/limits.h apply to all frames together.
 tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitRequest& request,
                                                               const BlobStore& blobs);
 
@@ -48,7 +49,8 @@ std::string replay_of(const StoredJob& job);
 // Returns the least memory, in bytes, that a worker needs for the job.
 std::uint64_t memory_need(const StoredJob& job);
 
-// Returns those settings of the stored job that the farm uses.
+// Returns those settings of the stored job that the farm (coordinator/domain/farm/farm.h) needs to schedule
+// it.
 JobPlan plan_of(const StoredJob& job);
 
 }  // namespace ls::coordinator

@@ -1,7 +1,8 @@
 // The image of one unfinished job: the film (the sums of all folded samples), the accepted partials that wait
-// for an earlier round of their tile, the errors and the costs. A partial is the encoded pixel sums of one
-// unit, that is, of one round (range of samples) of one tile; to fold it is to add it to the film. Not
-// thread-safe; guarded by the service's lock. The film is cheap to copy for work outside the lock.
+// for an earlier round of their tile, the errors of the tiles, and the CPU costs of the units. A partial is
+// the encoded pixel sums of one unit, that is, of one round (range of samples) of one tile; to fold it is to
+// add it to the film. Not thread-safe; guarded by the service's lock. The film is cheap to copy for work
+// outside the lock.
 #pragma once
 
 #include <atomic>
@@ -36,7 +37,8 @@ class HealthTable {
   Health total() const;
 
   std::string save() const;
-  std::string save_tile(TileIndex tile) const;  // load() also reads the joined texts of several tiles
+  // Returns the lines of save() for this tile. load() also reads the joined lines of several tiles.
+  std::string save_tile(TileIndex tile) const;
   static std::optional<HealthTable> load(std::string_view text);  // nullopt: the text is damaged
   bool operator==(const HealthTable&) const = default;
 

@@ -59,8 +59,8 @@ json reference_of(const ReportFacts& facts, const std::optional<ReferenceError>&
 // to that point. Users can compare it with the actual cost, and see how reliable forecasts were.
 void put_forecasts(json& curve, const std::vector<ConvergencePoint>& points, double target) {
   const std::vector<ErrorPoint> all = error_points(points);
-  // A forecast is added each time the samples have doubled. More forecasts would show little more, and each
-  // takes time for all points before it.
+  // A forecast is added each time the samples have doubled. More forecasts would show little more, and the
+  // time of each grows with the number of points before it.
   double next = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (all[i].spp < next) continue;

@@ -58,8 +58,9 @@ std::map<std::string, double> header_figures(const ReportFacts& facts);
 // denoised_rmse_ci95.
 std::map<std::string, std::string> header_notes(const ReportFacts& facts);
 
-// Returns a note that goes with the image of a job that stopped at its target error or its time limit; an
-// empty text for other jobs. `layer` is the layer to which the target error applies.
+// Returns a note, for the report and the EXR header, on the image of a job that stopped at its target error
+// or its time limit. The text is empty for other jobs. `layer` is the layer to which the target error
+// applies.
 std::string note_on(StopReason stopped, TargetLayer layer);
 TimeSplit split_of(const JobTotals& totals);
 ErrorFigures figures_of(const ImageError& error);

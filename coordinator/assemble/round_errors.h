@@ -1,7 +1,7 @@
-// Keeps what checkpoints need of tiles: their error sums (RoundErrors) and, to compare them with a reference
-// image, their pictures (ReferenceTiles). A round is a range of samples. Folding adds a tile's next round to
-// the film (the image in memory). A checkpoint gives a number of rounds for each tile. It shows every tile as
-// it was after these rounds, even if some tiles already have later ones.
+// Keeps for each tile what checkpoints need: its error sums (RoundErrors) and, for comparisons with a
+// reference image, its pictures (ReferenceTiles). A round is a range of samples. Folding adds a tile's next
+// round to the film (the image in memory). A checkpoint gives a number of rounds for each tile. It shows
+// every tile as it was after these rounds, even if some tiles already have later ones.
 #pragma once
 
 #include <cstddef>
@@ -58,7 +58,7 @@ class RoundErrors {
 
  private:
   struct Tile {
-    std::vector<std::pair<RoundIndex, TileError>> rounds;  // kept errors, each after this round; ascending
+    std::vector<std::pair<RoundIndex, TileError>> rounds;  // (round, error after it), by ascending round
     std::vector<double> relative;                          // relative[k]: relative error sum after round k
     bool operator==(const Tile&) const = default;
   };
@@ -96,7 +96,7 @@ class ReferenceTiles {
  private:
   struct Tile {
     PixelRect rect;
-    std::vector<std::pair<RoundIndex, Picture>> rounds;  // kept pictures, each after this round; ascending
+    std::vector<std::pair<RoundIndex, Picture>> rounds;  // (round, picture after it), by ascending round
   };
   std::vector<Tile> tiles_;
 };

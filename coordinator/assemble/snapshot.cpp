@@ -34,7 +34,7 @@ class Source {
   explicit Source(std::filesystem::path path) : path_(std::move(path)) {
     if (auto file = File::open(path_, O_RDONLY)) file_ = std::move(*file);
   }
-  // Returns the next bytes of the file; nullopt if fewer are left.
+  // Returns the next `bytes` bytes of the file; nullopt if fewer are left.
   std::optional<std::vector<std::byte>> take(std::uint64_t bytes) {
     if (!file_ || bytes > kMostPart) return std::nullopt;
     auto read = read_at(file_, at_, static_cast<std::size_t>(bytes), path_);

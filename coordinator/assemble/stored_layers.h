@@ -1,4 +1,4 @@
-// Returns mip levels (reduced versions) of the layers of images that are on disk only, in snapshots. Reading
+// Makes mip levels (reduced versions) of the layers of images that are only on disk, in snapshots. Reading
 // one layer of a tile costs as much as reading all its layers. So for each tile that is read, a small version
 // of all its layers stays in memory and answers later requests. Thread-safe.
 #pragma once
@@ -30,8 +30,8 @@ class StoredLayers {
 
  private:
   // The small version of a tile: the pixels of each layer at mip level kKeptLevel. It is empty if the tile
-  // has no samples. Such a tile is left out of coarser levels, since its identifiers of zero would hide those
-  // of neighbouring tiles.
+  // has no samples. Such a tile is left out of coarser levels, since its object identifiers (cryptomattes)
+  // are all zero and would hide those of neighbouring tiles.
   using Small = std::vector<std::vector<std::byte>>;
   static constexpr int kKeptLevel = 2;
   Result<TileLayers> read(TileIndex tile) const;

@@ -14,8 +14,8 @@ BadResult bad(const UnitResult& result, Errc code, std::string_view why) {
                              result.unit.round, why)}};
 }
 
-// True if the headers `got` and `expected` are equal, except that this round may be truncated at different
-// samples.
+// True if the headers `got` and `expected` are equal, except for the end of the sample range: both sample
+// ranges begin where round `round` begins, but may be truncated at different samples.
 bool same_round(const UnitHeader& got, const UnitHeader& expected, RoundIndex round) {
   UnitHeader other = got;
   other.samples = expected.samples;

@@ -16,9 +16,9 @@ struct OtherRange {
   SampleRange samples;
 };
 // The result is wrong: it is too large, its EXR file cannot be decoded, its header (tile, samples, scene,
-// settings, numeric class), windows or digest differ from the expected ones, its values are not finite, or
-// its CPU time or health is impossible. The error names the fault. A numeric class is a set of machines that
-// compute the same bits.
+// settings, numeric class), EXR windows or digest differ from the expected ones, its values are not finite,
+// or its CPU time or health is impossible. The error names the fault. A numeric class is a set of machines
+// that compute the same bits.
 struct BadResult {
   Error error;
 };

@@ -16,8 +16,8 @@ namespace ls::coordinator::limits {
 inline constexpr std::uint64_t kMaxBlobBytes = std::uint64_t{1} << 36;
 // Bytes that one BlobStore::read() returns
 inline constexpr std::uint64_t kMaxBlobRead = std::uint64_t{256} << 20;
-// Number of interrupted uploads that are kept so that they can be resumed. Beyond it, the one that has not
-// grown for the longest time is removed
+// Number of interrupted uploads that are kept so that they can be resumed. If there are more, the one that
+// has not grown for the longest time is removed
 inline constexpr std::size_t kMaxUnfinishedUploads = 1024;
 // A job is paused while a blob that it needs is missing. This is the time between two checks whether missing
 // blobs have arrived
@@ -51,7 +51,7 @@ inline constexpr std::uint64_t kMaxWokenPixels = std::uint64_t{1} << 26;
 inline constexpr std::size_t kFramesPerEvent = 2500;
 
 // Pictures and videos
-inline constexpr double kMaxExposure = 32;  // stops, brighter or darker
+inline constexpr double kMaxExposure = 32;  // photographic stops, brighter or darker
 inline constexpr double kMinVideoFps = 1, kMaxVideoFps = 120;
 inline constexpr int kMaxVideoSide = 3840;  // pixels; larger images are halved until they fit
 inline constexpr std::uint64_t kMaxVideoBytes = std::uint64_t{2} << 30;

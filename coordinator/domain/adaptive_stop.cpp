@@ -13,16 +13,17 @@ namespace {
 std::int64_t divided_up(std::int64_t a, std::int64_t b) { return (a + b - 1) / b; }
 
 // How the tiles along one side of the frame form blocks. `tiles` is the number of tiles along this side, and
-// `whole` the number of those that the frame's edge does not cut, at least 1. Each `block` whole tiles form a
-// block; the remaining tiles join the last block.
+// `whole` the number of those that the frame's edge does not cut (1 if it cuts all). A block consists of
+// `block` neighbouring whole tiles; the remaining tiles join the last block.
 struct Side {
   int tiles, whole, block;
   int blocks() const { return std::max(1, whole / block); }
   int block_of(int tile) const { return std::min(tile / block, blocks() - 1); }
 };
 
-// Divides a side of `frame` pixels into blocks. A block has as many tiles of `tile` pixels along this side as
-// it needs to have kMinStopPixels pixels; `across` is the extent of a block along the other side, in pixels.
+// Divides a side of `frame` pixels into blocks. A tile has `tile` pixels along this side, and a block has
+// `across` pixels along the other side. A block gets as many tiles as it needs to reach kMinStopPixels
+// pixels, or all whole tiles if they do not suffice.
 Side side_of(int frame, int tile, int across) {
   const int whole = std::max(1, frame / tile);
   const auto wanted = divided_up(kMinStopPixels, std::int64_t{across} * std::min(tile, frame));
@@ -222,8 +223,8 @@ void AdaptiveStop::foresee(double target) {
     return std::clamp(std::sqrt(variance) / root_level, least, most);
   };
   // The error of the image grows with the level (the threshold at which groups of tiles stop). So bisection
-  // finds the square root of the level for `target`. Each step halves the interval of its logarithm; the
-  // middle is sqrt(low * high), since a square root has the same bits on every machine.
+  // finds the square root of the level for `target`. It bisects the logarithm, so the middle is
+  // sqrt(low * high); a square root has the same bits on every machine.
   double low = 0x1p-100, high = 0x1p40;
   for (int i = 0; i < 40; ++i) {
     const double middle = std::sqrt(low * high);
@@ -302,8 +303,8 @@ void DenoisedTarget::add(const DenoisedCheck& check) {
 
 double DenoisedTarget::error_left(double target) const {
   const DenoisedCheck* now = find(due_);
-  // The job cannot end before the next check, for which the samples grow by kDenoisedCheckGrowth. The error
-  // is taken to fall as 1 / samples
+  // The job cannot end before the next check, at which there are kDenoisedCheckGrowth times as many samples.
+  // The error is assumed to fall as 1 / samples.
   const double next = 1 / kDenoisedCheckGrowth;
   return now != nullptr && now->at_most && *now->at_most > 0 ? std::min(next, target / *now->at_most) : next;
 }

@@ -163,8 +163,8 @@ class AdaptiveStop {
 //
 // The job ends when at two successive checks the upper end of the error's 95 % interval is at most the
 // target. One check is not enough, since its estimate may be low by chance; the second one includes further
-// samples. A check without an interval meets no target. An image without noise ends at the first check that
-// meets the target: more samples do not change its pixels.
+// samples. A check without an interval meets no target. A job whose image has no noise ends at the first
+// check that meets the target: more samples would not change its pixels.
 //
 // A denoiser may give different results on different machines. So each check is made once, by the
 // coordinator, and stored with the job: after a restart, or at another coordinator, the stored values decide.

@@ -86,10 +86,10 @@ struct JobStateChanged {
   JobState to = JobState::queued;
 };
 // The image has at least `rounds[tile]` rounds of each tile. The service adds a point to the convergence
-// curve and may take a snapshot. In a job with a target error, the tiles may stop at different rounds; from
-// then on each checkpoint belongs to a level of the stop rule (coordinator/domain/adaptive_stop.h) and has
-// the rounds at which the tiles stop at that level. The checkpoints and their order do not depend on the
-// order in which results arrive.
+// curve and may take a snapshot. In a job with a target error, tiles may stop at different rounds once each
+// has kMinSppBeforeStop samples per pixel. Each later checkpoint belongs to a level of the stop rule
+// (coordinator/domain/adaptive_stop.h) and has the rounds at which the tiles stop at that level. The
+// checkpoints and their order do not depend on the order in which results arrive.
 struct Checkpoint {
   JobId job;
   std::vector<RoundIndex> rounds;  // for each tile, how many of its rounds the checkpoint includes
@@ -115,8 +115,8 @@ struct ReopenRound {
 struct JobFinished {
   JobId job;
   StopReason stopped = StopReason::spp;
-  // Number of results that were chosen for an audit but not audited, since no other worker of the class was
-  // connected
+  // Number of results that were chosen for an audit but not audited, since no other worker of the numeric
+  // class was connected
   std::uint64_t unaudited = 0;
 };
 // The job has failed. `error` is the message for the user: what failed, where, what the workers reported and

@@ -71,7 +71,7 @@ struct JobRestored {
   JobPlan plan;
   JobState state = JobState::queued;
   std::optional<StopReason> stopped;    // set for a job that is done
-  std::optional<Digest> numeric_class;  // the class that rendered its results; nullopt: it has none
+  std::optional<Digest> numeric_class;  // class of the workers that rendered its results; nullopt: none
   std::vector<Unit> accepted;           // accepted results that still exist, in any order
   // For each tile, how many rounds the restored image has. A last round that the job's sample count truncates
   // is included. Empty: no image was restored. Required for a job that is done.
@@ -85,7 +85,7 @@ struct JobRestored {
   struct Audit {
     TileIndex tile = 0;
     RoundIndex round = 0;
-    std::optional<std::pair<WorkerId, Digest>> second;  // another worker's result, if it differs
+    std::optional<std::pair<WorkerId, Digest>> second;  // a second result that differs from the accepted one
     bool operator==(const Audit&) const = default;
   };
   std::vector<Audit> audits;
@@ -131,7 +131,8 @@ struct JobExtended {
   JobId job;
   std::uint64_t spp = 0;
 };
-// Makes the farm forget a job that has ended. Only a JobRestored may bring a job with the same id later.
+// Makes the farm forget a job that has ended. Later only the event JobRestored may add a job with the same
+// id.
 struct JobForgotten {
   JobId job;
 };

@@ -25,9 +25,9 @@ void FairShare::change(Job& job, Change&& change) {
   const auto user_before = turn_of(at.user);
   const auto group_before = turn_of(at.group);
   change(at);
-  // A job is at work while it has units to lease or leased units. When the first job of a user or group
-  // begins to be at work, the share of this user or group is raised to at least the clock, which is the share
-  // of the user or group served most recently.
+  // A job is at work while it has units to lease or leased units. When a user or group had no job at work and
+  // now has one, its share is raised to at least the clock, which is the share of the user or group served
+  // most recently.
   const bool works = job.offered || job.charge_out > 0;
   if (works && at_work_.insert(job.seq).second) {
     if (at.user.share.at_work++ == 0) at.user.share.spent = std::max(at.user.share.spent, at.level.clock);

@@ -70,7 +70,7 @@ struct FarmFigures {
   std::uint64_t not_stored = 0;
   // Folding
   std::uint64_t folded = 0;     // units whose result was added to the image
-  double fold_lag_seconds = 0;  // from a result's arrival to its addition to the image, summed over `folded`
+  double fold_lag_seconds = 0;  // from a result's arrival to its addition to the image, sum over these units
   std::uint64_t arrived_now = 0;            // results that are being verified and stored
   std::uint64_t arrived_bytes = 0;          // bytes of memory that these results occupy
   std::uint64_t waiting_now = 0;            // accepted results that wait for an earlier round of their tile
@@ -105,7 +105,7 @@ struct AuditFigures {
   // Units whose second result had other bits: a third worker had to decide, or the job failed
   std::uint64_t differ = 0;
   std::uint64_t dropped = 0;  // audits given up: no other worker could render the unit, or the job ended
-  // Results chosen for an audit that did not begin: no other worker of the class was connected
+  // Results chosen for an audit that did not begin: no other worker of the numeric class was connected
   std::uint64_t missed = 0;
   std::uint64_t workers_quarantined = 0, tiles_discarded = 0;
 };

@@ -54,7 +54,7 @@ class CostModel {
   }
 
  private:
-  // CPU seconds that any unit costs at least, however few its samples
+  // The least CPU seconds predicted for a unit, however few samples it has
   static constexpr double kLeastSeconds = 1e-4;
   // Each new result multiplies the sums of earlier results by this factor, so that mainly the last few
   // hundred results count
@@ -108,8 +108,9 @@ struct WorkerFailures {
   bool blocked_at(TimePoint now) const { return blocked && !forgiven_at(now); }
 };
 
-// Returns the error message of a failed job for the job's user. It names the unit, the pixel, the signal,
-// what each worker reported, and the command that renders the failed pixel again.
+// Returns the error message of a failed job for the job's user. It names the unit, what each worker reported
+// (the reason, and the signal, pixel and sample if known), and the command that renders the failed pixel
+// again.
 std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
                              const std::vector<FailedAttempt>& attempts, const std::string& replay);
 
@@ -190,7 +191,7 @@ struct Job {
 
   JobSeq seq;
   JobPlan plan;
-  std::uint64_t spp;  // requested samples per pixel, made even; kMaxSppWithoutLimit if none were requested
+  std::uint64_t spp;  // requested samples per pixel (default kMaxSppWithoutLimit), rounded up by even_spp()
   JobState state = JobState::queued;
   // Why the job ends; nullopt: not decided yet. It is set as soon as the last round of every tile is fixed,
   // even if some units are still leased or not in the image yet. It is final once the job is done
@@ -202,12 +203,12 @@ struct Job {
   // When the first ray was traced, plus the total time in which the job's clock was stopped; nullopt: no ray
   // was traced yet
   std::optional<TimePoint> first_ray;
-  // When the job was paused or done, which stops the clock of its time limit; nullopt: the clock runs
+  // When the job was paused or became done, which stops the clock of its time limit; nullopt: the clock runs
   std::optional<TimePoint> still_since;
 
   UnitTable units;
   UnitQueue queue;
-  std::unordered_map<UnitCode, Holders> out;  // leases that hold a unit, by leased unit
+  std::unordered_map<UnitCode, Holders> out;  // for each leased unit, the leases that hold it
   CostModel cost;
   UnitFailures failures;
   std::map<UnitCode, Audit> audits;

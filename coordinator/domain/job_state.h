@@ -9,16 +9,16 @@
 
 namespace ls::coordinator {
 
-// `queued`: no unit (round of a tile) has been assigned to a worker yet. The last three are final, except
-// that more samples or a smaller target error resume a `done` job.
+// `queued`: no unit (round of a tile) has been assigned to a worker yet. The last three are final, with one
+// exception: more samples or a smaller target error resume a `done` job.
 enum class JobState { queued, running, paused, done, failed, cancelled };
 constexpr std::string_view to_string(JobState state) {
   constexpr std::string_view kWords[] = {"queued", "running", "paused", "done", "failed", "cancelled"};
   return kWords[static_cast<std::size_t>(state)];
 }
-// True for states that a job never leaves.
+// True for failed and cancelled: a job never leaves these states.
 constexpr bool is_closed(JobState state) { return state == JobState::failed || state == JobState::cancelled; }
-// True for final states; a job can leave only `done`.
+// True for done, failed and cancelled.
 constexpr bool is_terminal(JobState state) { return state == JobState::done || is_closed(state); }
 
 // Why a job is done: it has its samples per pixel, has reached its target error, has used up its time, or its

@@ -33,8 +33,8 @@ inline constexpr double kLeastCoreShare = 1.0 / 64;
 inline constexpr std::uint32_t kMaxLeaseUnits = 1024;
 // A worker normally holds this many leases: one that it renders, and two that wait
 inline constexpr std::uint32_t kQueuedLeases = 3;
-// A worker holds at least this many units per thread, even if each takes long: one that it renders, and one
-// that waits
+// A worker gets leases until it holds at least this many units per thread, even if each takes long: one unit
+// that the thread renders, and one that waits
 inline constexpr std::uint32_t kUnitsAThread = 2;
 // A speculative unit (the job may end without it) goes only to a worker that holds fewer than kUnitsAThread
 // units per thread, or whose leased work takes less than this many seconds. Without the second condition a

@@ -59,10 +59,10 @@ class UnitQueue {
     counting(tile, [&] { window_[tile] = window; });
     if (!was_open) offer(tile);
   }
-  // Declares the tile's rounds before `before` as certain to be needed. Later rounds are speculative and go
-  // in the order of the error that each removes per sample: `variance` / (n m), where n and m are the samples
-  // per pixel without and with the round. `variance` is the variance per sample of the group of tiles that
-  // stop together with this tile; NaN: unknown.
+  // Declares the tile's rounds before `before` as certain to be needed. Later rounds are speculative: those
+  // that remove more error per sample go first. This error is `variance` / (n m), where n and m are the
+  // samples per pixel without and with the round. `variance` is the variance per sample of the group of tiles
+  // that stop together with this tile; NaN: unknown.
   void set_wanted(TileIndex tile, RoundIndex before, double variance) {
     if (wanted_.empty()) wanted_.assign(next_.size(), {});
     const float weight =

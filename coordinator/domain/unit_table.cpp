@@ -46,7 +46,8 @@ void UnitTable::truncate(TileIndex tile, RoundIndex end) {
 }
 
 void UnitTable::reopen(RoundIndex index) {
-  // Later rounds have no results: the tiles' last rounds were set before them, which discarded their results
+  // Rounds after `index` may still be listed, but have no results: they were discarded when earlier rounds
+  // became the tiles' last ones.
   while (rounds_.size() > index + 1 && rounds_.back().accepted == 0 && rounds_.back().folded == 0)
     rounds_.pop_back();
   if (index >= rounds_.size()) return;

@@ -61,7 +61,8 @@ struct Worker {
   int threads = 1;
   std::vector<std::string> tags;   // tags that the worker has announced, sorted
   std::uint64_t memory_bytes = 0;  // memory that its renderer may use; 0: unknown
-  // For each blob that the worker reports to hold, the first 8 bytes of its digest (head_of()), sorted
+  // The blobs that the worker holds, according to its reports: the first 8 bytes of each digest (head_of()),
+  // sorted
   std::vector<std::uint64_t> blobs;
   bool quarantined = false;  // it rendered wrong pixels
   bool may_begin = true;     // false: it gets no units of jobs without a numeric class
@@ -171,7 +172,7 @@ class WorkerTable {
 
 // Returns the first 8 bytes of a digest, as in Worker::blobs
 std::uint64_t head_of(const Digest& digest);
-// True if the worker has loaded the job's scene, or at least reports to hold its scene file.
+// True if the worker has loaded the job's scene, or at least has reported that it holds the scene file.
 bool holds(const Job& job, const Worker& worker);
 
 // True if the user requests no numeric class for the job, or that of this worker (JobPlan::class_asked).

@@ -237,9 +237,10 @@ void BlobStream::next() {
   StartWrite(&chunk_);
 }
 
-// Ends the call with an error. If the blob is missing or damaged, the coordinator is informed before
-// Finish(): it pauses the jobs that need the blob. Only then does the worker learn of the error and return
-// its units (a unit is one tile and one round of samples), which are therefore not leased again immediately.
+// Ends the call with an error. If the blob is missing or damaged, the coordinator is informed first and
+// pauses the jobs that need the blob. Then Finish() reports the error to the worker, which returns its units
+// (a unit is one tile and one round of samples). Since their job is paused, they are not leased again
+// immediately.
 void BlobStream::refuse(const Error& why) {
   if (why.code == Errc::not_found || why.code == Errc::failed_precondition)
     coordinator_.blob_missing(digest_, why);

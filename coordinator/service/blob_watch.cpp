@@ -15,8 +15,8 @@ namespace ls::coordinator {
 namespace {
 
 constexpr Duration kLongestPause = std::chrono::hours(1);
-// Unused blobs are searched for this many times within the time keep_unused. So an unused blob is removed at
-// the latest 1.25 * keep_unused after its last use.
+// The coordinator searches for unused blobs this many times within the time keep_unused. So an unused blob is
+// removed at the latest 1.25 * keep_unused after its last use.
 constexpr int kSweepsPerTime = 4;
 // The blobs that jobs need are listed for this many jobs at a time; between two such groups the lock is
 // released, so that other threads can take it.
@@ -30,7 +30,7 @@ std::optional<BlobRef> file_of(const StoredJob& job, const Digest& digest) {
 }
 
 // Returns a text that tells the user how to provide the missing file or scene. A file can be uploaded; a
-// scene must be submitted again, since it is stored in our own format, which only a submission makes.
+// scene must be submitted again, since only a submission converts it to the format in which it is stored.
 std::string what_to_do(const StoredJob& job, const BlobRef& file, bool damaged) {
   const bool scene = file.digest == job.scene;
   return fmt::format(
@@ -73,7 +73,8 @@ void BlobWatch::missing(const Digest& digest, const Error& why) {
       waiting.push_back(entry);
   }
   if (waiting.empty()) return;
-  // An error of storing is ignored: after a restart the coordinator notices again that the blob is missing.
+  // If the records cannot be stored, the error is ignored: after a restart the coordinator notices again that
+  // the blob is missing.
   (void)core->records.put_together([&] {
     for (const EntryPtr& entry : waiting) {
       core->records.log(entry->stored.id, why.message);
@@ -133,8 +134,8 @@ void BlobWatch::check_store() {
   trouble_ = trouble;
 }
 
-// Returns the digests of all blobs that jobs need; nullopt: a job's record is damaged, so its files are
-// unknown.
+// Returns the digests of all blobs that jobs need; nullopt: the record of some job is damaged, so it is
+// unknown which blobs that job needs.
 std::optional<std::set<Digest>> BlobWatch::needed_blobs() {
   std::vector<EntryPtr> entries;
   {

@@ -34,8 +34,8 @@ class BlobWatch {
   // Called when a worker has requested a blob that the store lacks or has only with damaged bytes: pauses the
   // jobs that need the blob. `why`: the store's error.
   void missing(const Digest& digest, const Error& why);
-  // If a lookup is due, checks whether blobs that were missing are in the store again. The lookup runs on a
-  // separate thread (look_loop()), since it may wait for the network.
+  // If a lookup is due, starts one: it checks whether blobs that were missing are in the store again. It runs
+  // on a separate thread (look_loop()), since it may wait for the network.
   void look_if_due(Core& core);
   void look_loop(const std::stop_token& token);
 

@@ -56,7 +56,7 @@ struct Coordinator::Parts {
   const Options options;
   const std::shared_ptr<JobStore> store;
   const File lock;
-  const std::uint64_t start;  // number of this start with the job store: 1 for the first, 2 for the second
+  const std::uint64_t start;  // how many times this job store was opened, this time included
   const std::string lease_prefix = fmt::format("l{}", start);
   const Tracing tracing{options.tracer, lease_prefix};
   const Clock& clock = *options.clock;
@@ -171,7 +171,8 @@ Result<std::unique_ptr<Coordinator>> Coordinator::open(Options options) {
 }
 
 Coordinator::Coordinator(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
-// The parts exist until all threads have ended, because listeners may call this object until then.
+// stop() returns when all threads have ended. Only then are the parts destroyed, because listeners may call
+// this object until then.
 Coordinator::~Coordinator() { parts_->stop(); }
 
 // Jobs

@@ -1,8 +1,8 @@
 // The state of the coordinator's jobs and workers. One mutex guards the whole state, which can be reached
 // only through Guarded<Core>::lock(). So a function with a Core& parameter runs under the lock, and a
 // function without one does not need the lock. Members of a JobEntry that never change (id, scene, settings,
-// grid) may also be read without the lock. Slow work has its own threads, which take the lock briefly. The
-// path of a worker's result:
+// grid) may also be read without the lock. Slow work has its own threads, which hold the lock only briefly.
+// The path of a worker's result:
 //   receive() -> [verify threads: decode, digest] -> [commit thread: append to the job's log, one fdatasync
 //     for many results] -> farm (the state machine that decides which worker renders what) -> acknowledge
 // What may be stored later goes to the writer thread: convergence points, logs, snapshots (the image so far,
@@ -38,7 +38,7 @@ class FarmDriver {
   // Gives a stored job to the farm after a restart. No events are published for the results that are added to
   // the image again.
   void replay(JobEntry& entry, JobRestored event);
-  // Quarantines workers that were read from the job store, so that they need not be stored again.
+  // Quarantines workers that were read from the job store and therefore need not be stored again.
   void quarantine(const std::vector<QuarantinedWorker>& workers);
   // Unloads an ended job whose files are complete on disk: frees its image in memory and its state in the
   // farm; only its files and its record remain. Results that still arrive for it are dropped.
@@ -76,8 +76,8 @@ class FarmDriver {
   ImageWriter& images_;
   ReferenceComparer& comparer_;
   std::deque<Event> todo_;  // the farm's next events; carrying out an effect may add some
-  // Jobs to whose images run() has added results so far; at its end it checks whether a snapshot of them is
-  // due
+  // Jobs whose images have got results since run() began. At its end run() checks whether these jobs need a
+  // snapshot
   std::vector<EntryPtr> folded_;
 };
 

@@ -148,8 +148,8 @@ void FarmDriver::on(const Fold& e) {
   const auto error =
       waiting ? entry->assembly->fold(e.unit.tile, e.unit.round, *waiting) : tl::unexpected(waiting.error());
   if (!error) {
-    // The partial cannot be read, or not be added. No UnitFolded event is raised, so that nothing more is
-    // added to the tile, and the job is paused: the image must never have a wrong pixel.
+    // The partial could not be read or could not be added. No UnitFolded event is raised, so that nothing
+    // more is added to the tile, and the job is paused: the image must never have a wrong pixel.
     entry->trouble =
         fmt::format("tile {} round {} cannot be folded: {}; restart the coordinator to render it again",
                     e.unit.tile, e.unit.round, error.error().message);
@@ -331,8 +331,8 @@ void FarmDriver::on(const Checkpoint& e) {
     return;
   }
   // After a tile was rendered again, a checkpoint may come at which the other tiles have more rounds already.
-  // Their errors after fewer rounds are not kept, so the error of this checkpoint is unknown, and the curve
-  // gets no point.
+  // The errors that these tiles had after fewer rounds are not kept, so the error of this checkpoint is
+  // unknown, and the curve gets no point.
   if (!exact) return;
   core_.records.add_point(
       entry, {entry->fold_seconds, entry->assembly->costs().until(e.rounds), error.spp, figures_of(error)});
@@ -375,8 +375,8 @@ void FarmDriver::on(const WorkerBlocked& e) {
 }
 
 // The quarantine of a faulty worker is stored separately from the jobs and outlives them, so that none of its
-// results is accepted after a restart or in a job that is extended later. Until it is stored all jobs are
-// paused, since a restart would accept the worker's results from the log.
+// results is accepted after a restart or in a job that is extended later. Until the quarantine is stored, all
+// jobs are paused: after a restart without it, the worker's results in the logs would be accepted.
 void FarmDriver::on(const WorkerFoundFaulty& e) {
   log_error(fmt::format("worker={} job={} tile={} round={}", e.worker.value, e.unit.job.value, e.unit.tile,
                         e.unit.round),

@@ -157,8 +157,8 @@ void ImageWriter::note_check(const EntryPtr& entry, std::uint64_t curve, double 
   StoredJob& job = entry->stored;
   if (entry->removed || entry->unloaded || entry->curve != curve) return;
   if (made.image.rgb.empty()) {
-    // The check is not needed any more if the job has ended, or if its target error does not concern the
-    // denoised layers now.
+    // The check is not needed any more if the job has ended, or if its target error no longer applies to the
+    // denoised layers.
     if (job.state != JobState::running || job.spec.target_layer != TargetLayer::denoised) return;
     entry->trouble = fmt::format(
         "its target is the error of the denoised layers, which cannot be made: {}; then resume the job",

@@ -265,7 +265,7 @@ Result<void> JobCommands::set_target(Core& core, JobEntry& entry, double target_
 }
 
 // Extends a job (more samples or a smaller target error), in the farm and in its stored record. `possible`:
-// the farm's check of the extension; if it is an error, the job is unloaded again and the error returned.
+// the farm's check of the extension; if it is an error, returns the error and unloads a done job again.
 Result<void> JobCommands::go_on(Core& core, JobEntry& entry, const Result<void>& possible,
                                 const Event& change, std::string log_line) const {
   const JobState state = entry.stored.state;

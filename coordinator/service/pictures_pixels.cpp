@@ -144,9 +144,8 @@ Result<std::vector<std::byte>> Pictures::pixels(const JobId& id, const PixelsAsk
     return mosaic.bytes();
   }
   if ((*entry)->assembly) {
-    // Copies only the rows of tiles that the rectangle touches. The copy is cheap, because it shares the
-    // memory of these tiles with the film. So the film can free its other tiles while the copied ones are
-    // read.
+    // Copies only the rows of tiles that the rectangle touches, so that the film can free its other tiles
+    // while these are read. The copy is cheap, because it shares the memory of its tiles with the film.
     std::vector<TileRow> rows;
     for (int row = wanted.y0 / grid.tile; row * grid.tile < wanted.y1; ++row)
       rows.push_back({row, (*entry)->assembly->film().row(row)});

@@ -15,8 +15,9 @@ namespace {
 // wait, new checkpoints are not compared. The final image is always compared.
 constexpr std::size_t kMaxComparisons = 64;
 
-// True if FLIP (the perceived error) should be computed for this checkpoint. It takes about a second per
-// exposure of an HD frame, so it is computed only each time the samples have doubled, and at the end.
+// True if FLIP (the perceived error) should be computed for this checkpoint. FLIP compares the images at
+// several exposures and takes about a second for each (at HD size), so it is computed only each time the
+// samples have doubled, and at the end.
 bool wants_flip(const std::vector<ConvergencePoint>& points, double spp) {
   return std::none_of(points.begin(), points.end(), [&](const ConvergencePoint& p) {
     return p.reference_error && p.reference_error->flip && p.spp <= spp && spp < 2 * p.spp;
@@ -51,7 +52,8 @@ void ReferenceComparer::compare_last(Core&, const EntryPtr& entry) {
 }
 
 // Returns the job's reference image; null if it cannot be read. Only the reference image that was used last
-// is kept in memory. Comparisons that wait do not hold theirs; it is read when their turn comes.
+// is kept in memory. A comparison that waits in the queue holds no reference image; it is read when the
+// comparison begins.
 std::shared_ptr<const Reference> ReferenceComparer::reference_of(const StoredJob& job) {
   const Digest& digest = *job.spec.reference;
   if (reference_ && reference_digest_ == digest && reference_->size == job.settings.size) return reference_;

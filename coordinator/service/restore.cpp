@@ -105,8 +105,9 @@ Result<void> Restore::take_up(Core& core, JobEntry& entry,
   const bool begins_again =
       entry.assembly->film().samples() == 0 && (!entry.log || entry.log->found().empty());
   // If the log has results of a quarantined worker, the points of the convergence curve and the checks of the
-  // denoised layers may describe wrong pixels: both are dropped. If the image is only lost, the curve is
-  // dropped, since it will be made again; the checks are kept, since rendering again gives the same pixels.
+  // denoised layers may describe wrong pixels: both are dropped. If instead the image and the log have no
+  // results (they were lost), the curve is dropped, since it will be made again; the checks are kept, since
+  // rendering again gives the same pixels.
   if (has_quarantined(core.driver.farm(), entry))
     core.records.forget_wrong_pixels(entry);
   else if (begins_again)
@@ -175,10 +176,10 @@ void Restore::take_up_records(Core& core, JobEntry& entry, JobRestored& event) c
   const std::uint64_t spp = entry.stored.spp.value_or(kMaxSppWithoutLimit);
   JobTotals& totals = entry.stored.totals;
   totals.core_seconds = 0;
-  // The units (one tile and one round of samples) whose results the loop below has counted, since the log may
-  // have several results of a unit. A unit of a full round is identified by its code alone, which needs
-  // little memory for millions of units; a unit of a truncated round by its code and the end of its sample
-  // range.
+  // The units (one tile and one round of samples) of which the loop below has counted a result. The log may
+  // have several results of a unit, and only one is counted. `seen` has the units of full rounds, identified
+  // by their codes alone, which saves memory for millions of units. `seen_cut` has the units of truncated
+  // rounds, identified by the code and the end of the sample range.
   std::unordered_set<UnitCode> seen;
   std::set<std::pair<UnitCode, std::uint64_t>> seen_cut;
   seen.reserve(entry.log->found().size());

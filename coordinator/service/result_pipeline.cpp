@@ -16,7 +16,7 @@
 namespace ls::coordinator {
 namespace {
 
-// While more background writes than this wait for the disk, no results are made durable.
+// While more background writes than this wait for the disk, new results wait too and are not made durable.
 constexpr std::size_t kMaxBackgroundWrites = 4096;
 
 using Verdict = Wanted::Verdict;
@@ -202,11 +202,11 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
           {std::move(std::get<Partial>(item.verified)), place, a.expected.samples, r.digest, r.health, a.at});
     }
   }
-  // Reports the result to the farm, which compares it with other results of the unit. But two kinds of
-  // results must not count as accepted, and the farm only learns that the worker no longer works on the unit.
+  // Reports the result to the farm, which compares it with other results of the unit. Two kinds of results
+  // must not count as accepted; for these the farm only learns that the worker no longer works on the unit.
   // The first is a result that the farm needs now but that is not in the log (`lost`). The second is a result
-  // of another numeric class than the job's: the farm knows only the worker's present class, and if the
-  // worker has joined again with the job's class meanwhile, the farm would take the result for one of the
+  // of another numeric class than the job's: the farm knows only the worker's present class, and the worker
+  // may have joined again with the job's class meanwhile; then the farm would take the result for one of the
   // job's class.
   if ((accepted && lost) || wanted.verdict == Verdict::other_class)
     core.driver.run(LeaseCameBack{a.from->worker, {r.lease, {r.unit}}});

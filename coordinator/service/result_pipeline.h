@@ -40,7 +40,7 @@ class ResultPipeline {
     UnitResult result;
     EntryPtr job;
     UnitHeader expected;
-    std::size_t bytes = 0;  // memory in bytes that it takes from budget_
+    std::size_t bytes = 0;  // memory reserved for the result in budget_, in bytes
     TimePoint at{};         // time of arrival
   };
   struct Checked {

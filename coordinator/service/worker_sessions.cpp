@@ -105,7 +105,7 @@ Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello
   if (worker.connection) worker.connection->close();
   worker.hello = hello;
   worker.hello.join_token.clear();
-  worker.hello.blobs_held.clear();  // not needed in the table; the farm gets the list of `hello`
+  worker.hello.blobs_held.clear();  // not needed in the table; the farm gets the list from `hello`
   worker.connection = connection;
   worker.last_seen = clock_.now();
   connection->sink->send(Welcome{id, connection->epoch});

@@ -237,7 +237,7 @@ std::string job_removed_json(const JobId& job) { return dump(json{{"id", job.val
 
 namespace {
 
-// No other id can contain this: ids consist of "j-" and hexadecimal digits
+// Only the ids of frames contain this: other ids consist of "j-" and hexadecimal digits
 constexpr std::string_view kMark = "-frame";
 
 }  // namespace

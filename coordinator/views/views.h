@@ -37,7 +37,7 @@ namespace ls::coordinator {
 struct TimeSplit {
   double load = 0;      // fetching files
   double build = 0;     // parsing files, building worlds
-  double render = 0;    // CPU time of units (rounds of tiles): JobView::core_seconds
+  double render = 0;    // CPU time of rendering units (rounds of tiles); see JobView::core_seconds
   double transfer = 0;  // packing results
   double merge = 0;     // on the coordinator: verifying results and adding them to the image
   double idle = 0;      // time of worker threads between two units of the job
@@ -129,11 +129,11 @@ struct JobView {
   std::string owner;
   JobState state = JobState::queued;
   // What ended the job: "spp" (it has its samples), "error" (it reached its target error), "time" (its time
-  // was used up) or "user" (a user cancelled it). Empty: it is not done or cancelled, or the frames of a
-  // sequence ended for different reasons.
+  // was used up) or "user" (a user cancelled it). Empty: the job is neither done nor cancelled, or the frames
+  // of a sequence ended for different reasons.
   std::string stopped;
   double progress = 0;    // from 0 to 1
-  std::uint64_t spp = 0;  // samples per pixel that were requested; if none were, the limit
+  std::uint64_t spp = 0;  // requested samples per pixel; if no number was requested, the limit
   bool spp_asked = true;  // false: no number of samples was requested; a target error or a time ends the job
   std::optional<double> target_error;  // relMSE at which the job ends; nullopt: none was requested
   // The layers to which target_error applies
@@ -144,14 +144,15 @@ struct JobView {
   bool denoise = false;  // true: its image also gets denoised layers
   double spp_done = 0;   // samples per pixel so far, mean over all pixels
   std::optional<ErrorFigures> error_now;
-  // Error against the reference image, at the last checkpoint that was compared with it; nullopt: none was
+  // Error against the reference image, at the last checkpoint that was compared with it; nullopt: no
+  // checkpoint was compared yet
   std::optional<ReferenceError> reference_error;
   // True if the reference and the image share scene and seed. They then share their noise as well, so
   // reference_error is meaningless (common/image/reference/reference.h: same_noise())
   bool reference_same_seed = false;
   std::optional<ConvergenceStatus> convergence_status;  // nullopt: no checkpoint yet
-  // Number of pixels that too few samples with light have hit for a reliable error estimate
-  // (error_estimate.h) at the last checkpoint; nullopt: no checkpoint yet
+  // Number of pixels in which too few samples found light for a reliable error estimate (error_estimate.h),
+  // at the last checkpoint; nullopt: no checkpoint yet
   std::optional<std::uint64_t> few_hits;
   std::optional<Trend> trend;                           // nullopt: too few checkpoints
   std::optional<double> efficiency;                     // 1 / (relMSE * core seconds) at the last checkpoint
@@ -164,7 +165,7 @@ struct JobView {
   std::optional<double> eta_with_more;
   // 95 % interval of eta_with_more; nullopt unless the target error is predicted to end the job
   std::optional<std::pair<double, double>> eta_with_more_ci95;
-  std::string error;                  // why the job failed, or why it waits; empty: neither
+  std::string error;                  // why the job failed or waits; empty: it does neither
   std::vector<std::string> warnings;  // warnings about the scene
   FrameSize size;
   int tile = 32;
@@ -183,7 +184,7 @@ struct JobView {
   Health health;
   std::vector<HealthNote> notes;  // `health` as sentences for users; empty: no problems
   // The numeric class (the set of machines that compute the same bits) to which the job is pinned; nullopt:
-  // to none. `platform`: the machines and build of this class in words
+  // it is pinned to none. `platform` names the machines and the build of this class
   std::optional<Digest> numeric_class;
   std::string platform;
   // The part of the farm that belongs to that class; nullopt: the job is pinned to no class, has ended, or is
@@ -210,8 +211,8 @@ struct JobChange {
 };
 
 // How a list of jobs is sorted. `order`: in order of submission. `active`: running jobs first, then paused,
-// queued and ended ones; in each of these groups the newest job first. The other names: by this value,
-// ascending.
+// queued and ended ones; in each of these groups the newest job first. Every other name is that of the value
+// to sort by, ascending.
 enum class JobOrder { order, active, submitted, name, owner, state, progress, relmse };
 inline constexpr std::array<std::string_view, 8> kJobOrders = {"order", "active", "submitted", "name",
                                                                "owner", "state",  "progress",  "relmse"};
@@ -221,7 +222,7 @@ struct JobsAsked {
   std::function<bool(const std::string& owner)> visible;
   std::set<JobState> states;  // states to list; empty: all
   std::optional<std::string> owner;
-  std::string search;     // text that the name or id must contain, in any case; empty: all jobs
+  std::string search;     // text that the name or id must contain (case is ignored); empty: all jobs
   double since_unix = 0;  // earliest time of submission, in seconds since 1970
   JobOrder by = JobOrder::order;
   bool descending = false;
@@ -291,7 +292,7 @@ struct StreamEvent {
   std::string type;  // "job", "tile", "worker"
   std::string data;
   // Id of the job that a `job` or `tile` event reports. Empty: the event does not concern a single job and is
-  // sent to every reader
+  // sent to every client
   std::string job;
   // Owner of that job; for a `worker` event: the owner of the job that the worker works on
   std::string owner = {};
@@ -331,7 +332,7 @@ std::string convergence_csv(const std::vector<ConvergencePoint>& points);  // st
 std::string tile_event_json(const JobId& job, TileIndex tile, const PixelRect& rect, std::string_view state,
                             std::uint64_t spp, std::string_view worker);
 std::string worker_gone_json(const WorkerId& worker);
-std::string job_removed_json(const JobId& job);  // of the last `job` event: the job is removed
+std::string job_removed_json(const JobId& job);  // data of a job's last event, sent when it is removed
 // Returns the data of the last `job` event that this coordinator sends for the job, when another coordinator
 // has taken the job over.
 std::string job_moved_json(const JobId& job);

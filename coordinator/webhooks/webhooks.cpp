@@ -136,16 +136,16 @@ class Webhooks::Impl {
   }
 
  private:
-  // Reports the jobs that have ended, but whose end the previous process could not report because it was
-  // killed. Then notes the present states of all jobs, so that only later changes are reported.
+  // Reports the end of those jobs whose end the previous process could not report because it was killed. Then
+  // notes the present states of all jobs, so that only later changes are reported.
   void catch_up(Coordinator& coordinator) {
     const std::set<JobId> open = state_.lock()->outbox.open_jobs();
     for (const JobId& job : open) {
       const auto view = coordinator.job(job);
       const std::string word(view ? to_string(view->state) : "");
-      // The end of the job is recorded without a notification in two cases. In the first, the previous
-      // process was killed after it had stored the notification of the end, but before it recorded the end:
-      // then this notification is among the pending ones. In the second, the job does not exist any more.
+      // In two cases the end of the job is recorded without a new notification. Either the job does not exist
+      // any more, or the previous process was killed after it had stored the notification of the end, but
+      // before it recorded the end. In the latter case the notification is in kept_.
       if (!view || kept_.contains(job.value + "/" + word)) {
         const auto state = state_.lock();
         state->mark_ended(job);
@@ -176,7 +176,7 @@ class Webhooks::Impl {
   }
 
   void changed(const std::string& job, const std::string& data, std::uint64_t event) {
-    if (frame_of(JobId{job})) return;  // of a sequence only the whole is reported, not each frame
+    if (frame_of(JobId{job})) return;  // a sequence is reported as a whole, not frame by frame
     json view = json::parse(data, nullptr, false);
     if (!view.is_object() || !view.contains("state") || !view["state"].is_string()) return;
     const std::string word = view["state"].get<std::string>();
@@ -254,7 +254,7 @@ class Webhooks::Impl {
 
   Options options_;
   Coordinator* coordinator_ = nullptr;
-  std::set<std::string> kept_;  // "JOB/STATE" of each delivery that was pending at the start
+  std::set<std::string> kept_;  // "JOB/STATE" (id and new state) of each delivery found on disk at start-up
   mutable Guarded<webhooks::State> state_;
   std::condition_variable_any woken_;
   std::shared_ptr<void> subscription_;

@@ -1,7 +1,7 @@
 // Notifies receivers of changes to jobs: each change of a job's state is sent as a signed POST to every
 // receiver. A notification is sent again until the receiver accepts it or 20 attempts have failed.
-// Notifications are stored on disk, so they survive a killed coordinator; one may then arrive twice. Only the
-// operator names receivers (--webhook): no job, scene or user can.
+// Notifications are stored on disk, so they survive if the coordinator is killed; a notification may then
+// arrive twice. Only the operator names receivers (--webhook): no job, scene or user can.
 //
 //   POST URL
 //   Content-Type: application/json
@@ -42,7 +42,7 @@ class Webhooks {
     std::filesystem::path folder;  // where pending notifications are stored (DIR in webhook_outbox.h)
     std::shared_ptr<const Clock> clock;
     std::function<double()> unix_time;  // returns the time in seconds since 1970
-    // Sends a request and returns the answer; empty: ls::post sends it.
+    // Sends a request and returns the answer; if empty, ls::post() is used.
     std::function<Result<HttpAnswer>(const HttpPost&)> send = {};
     // Records a span for each attempt to deliver a notification of a traced job; null: no spans are recorded.
     std::shared_ptr<trace::Tracer> tracer = nullptr;

@@ -1,6 +1,6 @@
 // Cases for three bugs that other renderers have had: a phase function clamped to |g| = 0.99, the
 // cancellation in 1 - exp(-tau) at small optical depths tau, and 0 / 0 at null collisions. Each case fails
-// for a renderer with its bug (docs/design/validation.md describes how this is checked).
+// for a renderer that has the bug of this case (docs/design/validation.md describes how this is checked).
 #include <fmt/format.h>
 
 #include <cmath>

@@ -8,7 +8,7 @@
 namespace ls::cases {
 namespace {
 
-constexpr double kSheet = 2 * .04 / 1.04;  // reflectance of a thin sheet, index 1.5, normal incidence
+constexpr double kSheet = 2 * .04 / 1.04;  // reflectance of a thin sheet of index 1.5 at normal incidence
 
 BsdfIndex two_sided(SceneBuilder& builder, double reflectance) {
   const BsdfIndex one = builder.diffuse(reflectance);

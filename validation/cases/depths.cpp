@@ -41,10 +41,10 @@ void nothing(Table& t) {
   }
 }
 
-// A medium that emits eps per length and has the extinction sigma, seen along a ray of length 1, so of
-// optical depth tau = sigma. The radiance is eps (1 - e^-tau) / sigma. The estimate has no variance, except
-// in those macro cells of grids (blocks of voxels with a common majorant) in which a tracker, an algorithm
-// that steps from collision to collision, samples free flights.
+// A medium that emits eps per length and has the extinction sigma, seen along a ray of length 1: the optical
+// depth tau equals sigma. The radiance is eps (1 - e^-tau) / sigma. The estimate has no variance, except in
+// those macro cells of grids (blocks of voxels with a common majorant) in which a tracker, an algorithm that
+// steps from collision to collision, samples free flights.
 void emission(Table& t) {
   const auto emitting = [](const Configuration& configuration, double tau) {
     SceneBuilder builder = unit_cube(configuration, rgb(tau));
@@ -96,10 +96,11 @@ void opaque(Table& t) {
   // The answer is 1 - sqrt(1 - a) H(1), to six digits, with the albedo a = 0.9 and Chandrasekhar's function H
   // (1950). The mean free path is 1e-5 at depth 1e5 and 1e-6 at depth 1e6, while rays start about 2e-6 from
   // the surface that they leave (2^-20 of the scene's largest coordinate). So the distance to the face must
-  // be measured from the path's true position, not from the offset one. At depth 1e6 the mean free path is 17
-  // ulps of float32 at the face's height. Next to the face the renderer then computes a trapezoidal sum over
-  // float32 positions z instead of an integral over z. For isotropic scattering the integrand is E_2(z), the
-  // second exponential integral, and the sum is larger than the integral by a share of 3.1e-3.
+  // be measured from the path's true position, not from the offset origin of the ray. At depth 1e6 the mean
+  // free path is 17 ulps of float32 at the face's height. Next to the face the renderer then computes a
+  // trapezoidal sum over float32 positions z instead of an integral over z. For isotropic scattering the
+  // integrand is E_2(z), the second exponential integral, and the sum is larger than the integral by a share
+  // of 3.1e-3.
   constexpr double kDigits = 2e-6, kPlaces = 3.1e-3;
   for (const Configuration& configuration : all_configurations()) {
     for (const double tau : {1e3, 1e5, 1e6}) {

@@ -130,8 +130,8 @@ void on_a_floor(Table& t) {
 }
 
 // The point of the floor that is seen is the centre of a ball of radius 1 whose medium only absorbs. Light
-// from any direction enters the ball through a null boundary and travels one radius. The camera is in the
-// ball, close to the floor.
+// from any direction enters the ball through a surface with a null (pass-through) BSDF and travels one
+// radius. The camera is in the ball, close to the floor.
 void through_a_ball(Table& t) {
   SceneBuilder builder = floor_point(.5);
   const Rgb sigma{.3, .6, 1.1};

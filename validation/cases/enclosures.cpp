@@ -66,8 +66,8 @@ void closed(Table& t) {
 // The mean path length of light through a body in uniform light is 4 V / S, with V its volume and S its
 // surface, however it scatters (Blanco and Fournier 2003). For the unit ball it is 4/3. A medium that emits 1
 // per length and absorbs nothing measures it: the radiance of the body, averaged over all rays, is the mean
-// path length. The rays of the view are spread evenly over the disk of the ball, which fills pi / 4 of the
-// view.
+// path length. The rays of the view are spread evenly over the silhouette of the ball, a disk with a share of
+// pi / 4 of the view.
 SceneBuilder ball(bool grid, double sigma_s, double g) {
   SceneBuilder builder;
   MediumIndex m;
@@ -99,8 +99,8 @@ void paths(Table& t) {
       }
 }
 
-// A body that absorbs nothing in a white sky (a white furnace): every pixel has the radiance of the sky,
-// whatever the phase function, and with a glass surface or without.
+// A white furnace: a body without absorption in a white sky. Every pixel has the radiance of the sky,
+// whatever the phase function, and whether or not the body has a glass surface.
 void furnaces(Table& t) {
   for (const bool grid : {false, true})
     for (const double g : {-.5, .9})

@@ -76,7 +76,7 @@ void mean_paths(Table& t) {
                builder.container(SphereShape{}, {}, builder.null(), m);
                builder.environment();
                builder.scene.integrator.rr_depth =
-                   1000;  // late, since roulette would cause nearly all of the noise
+                   1000;  // Russian roulette starts late: it would cause nearly all of the noise
                builder.look({0, -kDistance, 0}, {0, 0, 0}, 2 * std::atan(kMargin / kDistance) * 180 / kPi);
                return builder;
              },
@@ -132,7 +132,7 @@ void endless_medium(Table& t) {
   }
 }
 
-// A point light, which a camera does not see directly: so the answer is the fluence without the direct part
+// A camera does not see a point light directly, so the answer is the fluence minus its direct part
 // e^-r / (4 pi r^2). The lower the albedo, the heavier are the tails of the estimates, so only high albedos
 // are tested.
 void endless_lamp(Table& t) {

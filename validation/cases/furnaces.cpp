@@ -100,8 +100,8 @@ void shining_walls(Table& t) {
     for (int i = 0; i < 6; ++i) {  // six rectangles at distance 1 from the origin, facing it
       const Transform to_world = sides[i] * translate({0, 0, -1});
       if (i == 5) {
-        // The window. The medium ends at it; its normal points inwards, so the medium is on its exterior
-        // side.
+        // The window. The medium ends here. The window's normal points inwards, so the medium is on its
+        // exterior side.
         Shape& window = builder.shape(RectangleShape{}, to_world, open);
         window.exterior = m;
         window.is_medium_transition = true;

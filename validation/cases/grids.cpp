@@ -224,8 +224,8 @@ void along_faces(Table& t) {
   }
 }
 
-// Returns the scene with `pieces` - 1 null boundaries that cut a unit cube of its first medium into pieces
-// along x.
+// Returns the scene with `pieces` - 1 additional surfaces, which have a null (pass-through) BSDF and cut a
+// unit cube of its first medium into pieces along x.
 SceneBuilder cut(SceneBuilder builder, int pieces) {
   const BsdfIndex null = builder.null();
   for (int i = 1; i < pieces; ++i)

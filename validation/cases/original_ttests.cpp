@@ -1,7 +1,7 @@
-// The five t-tests (statistical tests of a mean) of light in media that scenes/validate/make_tests.py writes
-// as scenes, with a closed form for each channel. The scene is a cube [-1, 1]^3 seen along z through its
-// middle, so the path length is 2. Both integrators render it, volpath_distant_mis with two ways of sampling
-// distances.
+// The five t-tests (statistical tests of a mean) that scenes/validate/make_tests.py writes as scene files.
+// They test light in media, for which each channel has a closed form. The scene is a cube [-1, 1]^3 seen
+// along z through its middle, so the path length is 2. Both integrators render it, volpath_distant_mis with
+// two ways of sampling distances.
 #include <fmt/format.h>
 
 #include <cmath>

@@ -197,7 +197,7 @@ void add_slab(Table& t, const std::string& name, bool transmitted, const Configu
          "A slab of albedo .9 made of media in one place, or of boxes that touch: as one of them.", builder,
          grey(transmitted ? .591625 : .267410), {.slack = 2e-5});
 }
-// Adds a box as wide as the column and a little more, from z = 0 up to `height`.
+// Adds a box a little wider than the column, from z = 0 up to `height`.
 void add_layer(SceneBuilder& builder, MediumIndex m, double height = 1) {
   builder.container(CubeShape{}, translate({0, 0, height / 2}) * scale(.6, .6, height / 2), builder.null(),
                     m);
@@ -234,7 +234,7 @@ void slabs_of_parts(Table& t) {
           translate({i & 1 ? .3 : -.3, i & 2 ? .3 : -.3, i & 4 ? .75 : .25}) * scale(.3, .3, .25), null, m);
   });
   // Extinction 1.5 fills the slab. In its lower half, a medium of extinction 0.5 and higher priority replaces
-  // it, so the mean is 1.
+  // it, so the mean extinction is 1.
   add_slab(t, "by-priority-R", false, {}, [](SceneBuilder& builder) {
     add_layer(builder, builder.homogeneous(rgb(1.5), kAlbedo));
     add_layer(builder, ranked(builder, rgb(.5), kAlbedo, 2), .5);

@@ -87,8 +87,8 @@ void anywhere(Table& t) {
   }
 }
 
-// Renders one sample in each half of the samples, with seed 0: these samples use the first point of every
-// sample sequence.
+// Renders two samples per pixel, one for each of the two independent halves of the samples, with seed 0. They
+// use the first point of every sample sequence.
 void first_samples(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     t.exact("N70-first-samples-of-seed-0" + configuration.name(), "N70 N6",

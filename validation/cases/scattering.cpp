@@ -23,9 +23,9 @@ void white(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     for (const double tau : {1e-6, 1., 64.}) {
       for (const double g : {0., .9999}) {
-        // Russian roulette acts on paths of more than 1024 vertices, and changes their weights from exactly
-        // 1. At depth 64 with g = 0 such paths occur, so that case is left out; in the others nearly all
-        // paths are shorter.
+        // Russian roulette acts on paths of more than 1024 vertices, so that their weights are no longer
+        // exactly 1. At depth 64 with g = 0 such paths occur, so that case is left out; in the others nearly
+        // all paths are shorter.
         if (tau > 1 && g == 0) continue;
         t.exact(fmt::format("N16-white-depth-{:g}-g-{:g}{}", tau, g, configuration.name()), "N16 N17 7.6c",
                 "Albedo 1 in a white sky: every path weighs 1 exactly, in every sample.",
@@ -73,7 +73,7 @@ void deep(Table& t) {
           fmt::format("N17-white-slab-{:g}{}", tau, configuration.name()), "N17 N16 7.2",
           "A white slab this deep: paths of hundreds of vertices, ended by no cap.",
           [=] { return column(configuration, {.tau = tau}, false); }, grey(1 - white_transmittance(tau)),
-          // At depth 256 most of the variance comes from a few very long paths, which few pixels have. A
+          // At depth 256 most of the variance comes from a few very long paths, which occur in few pixels. A
           // short pilot run would find no such path, or overestimate their share.
           {.slack = 1e-6, .slow = true, .paths = tau < 100 ? 0u : 1u << 17, .frames = tau < 100 ? 0u : 64u});
     }
@@ -125,7 +125,7 @@ void phase_peaks(Table& t) {
 // camera measures it by looking through the medium at a sun of angular radius q, which phase function
 // sampling and light sampling both find.
 double share_within(double g, double degrees) {
-  const double h = std::sin(degrees * kPi / 360), x = 2 * h * h;  // 1 - cos q
+  const double h = std::sin(degrees * kPi / 360), x = 2 * h * h;  // x is 1 - cos q
   return (1 - g) * (1 + g) / (2 * g) * (1 / (1 - g) - 1 / std::sqrt((1 - g) * (1 - g) + 2 * g * x));
 }
 

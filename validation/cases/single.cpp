@@ -92,8 +92,8 @@ double square_answer(double h, double a, double sigma) {
         -a, a, 80);
   });
 }
-// The answer for a spot light at distance h from the ray that points at the middle of the ray. Its intensity
-// is 1 up to 30 degrees off its axis and falls linearly with the angle to 0 at 60 degrees.
+// The answer for a spot light that is at distance h from the ray and points at its middle. The intensity is 1
+// up to 30 degrees off its axis and falls linearly with the angle to 0 at 60 degrees.
 double spot_answer(double h, double sigma) {
   return along(sigma, [=](double t) {
     const double d2 = h * h + t * t, degrees = std::abs(std::atan2(t, h)) * 180 / kPi;

@@ -58,9 +58,9 @@ void add_small_plate(SceneBuilder& builder, const Vec3& foot, double height) {
 }
 
 // The spherical albedo of a half space (its reflectance in uniform light), measured on a cube of side 1 and
-// optical depth 40. The disk is 0.001 above the face, which is 0.04 mean free paths. The radius of the disk
-// is 0.002 mean free paths, so it shadows a share of about (0.002)^2 of the light that it receives. A share
-// of (2 x 0.001)^2 of its cosine-weighted view lies beside the cube.
+// optical depth 40. The disk is 0.001 (0.04 mean free paths) above the face. The radius of the disk is 0.002
+// mean free paths, so it shadows a share of about (0.002)^2 of the light that it receives. A share of
+// (2 x 0.001)^2 of its cosine-weighted view lies beside the cube.
 void spherical(Table& t) {
   struct Row {
     double albedo, reflected;

@@ -16,9 +16,9 @@ constexpr double kAbove = .5;  // distance of the lamps from the middle of the r
 constexpr Configuration kGrid{true, false}, kGridDistant{true, true},
     kExponential{true, true, DistanceSampling::exponential};
 
-// A density for each channel: level (1 + slope z / 6) for the level and slope of the channel, as a grid of
-// two voxels with their centres at z = -6 and 6. Since the density is linear, its integral over a straight
-// path is the length times the mean of the values at both ends.
+// In each channel the density is level (1 + slope z / 6), with the level and slope of that channel. The grid
+// has two voxels with their centres at z = -6 and 6. Since the density is linear, its integral over a
+// straight path is the length times the mean of the values at both ends.
 struct Slopes {
   std::size_t channels;
   Channels level, slope;

@@ -25,7 +25,7 @@ SceneBuilder sheet(double degrees, auto make) {
   builder.look({5 * std::sin(a), 0, 5 * std::cos(a)}, {0, 0, 0}, 1e-3, {0, 1, 0});
   return builder;
 }
-// Adds a checkered wall of two colours behind the scene's shapes and an environment, so that a ray with a
+// Adds an environment and, behind the scene's shapes, a checkered wall of two colours, so that a ray with a
 // wrong direction changes the image.
 SceneBuilder before_a_wall(SceneBuilder builder) {
   const TextureIndex dark = builder.texture(rgb(.25)), bright = builder.texture({1, .75, .5});

@@ -28,7 +28,7 @@ double chi2_tail(double x, double freedom);
 struct ChiSquare {
   double statistic = 0, p = 1;
   int freedom = 1;
-  double impossible = 0;  // samples in a cell where none is expected; 0 if at most `least`
+  double impossible = 0;  // number of samples in a cell where none is expected; 0 if it is at most `least`
 };
 ChiSquare chi_square(std::span<const double> expected, std::span<const double> observed, double least);
 

@@ -54,8 +54,8 @@ struct ValidateCase {
   double z = 0;
   // Systematic deviation that is accepted: float32 rounding, and the uncertainty of the expected value.
   double allowance = 0;
-  // p: the probability that a correct program gives a figure that is at least as far from `expected`. level:
-  // if p is below it, the case fails.
+  // p: the probability that a correct program gives a figure at least as far from `expected` as `got` is.
+  // level: the case fails if p is below this level.
   double p = 1, level = 0;
   // Statistical cases of the table are judged by two confidence intervals. The one at `band_level` must lie
   // within the band (the tolerated deviation around the answer), the one at `level` must contain the answer.
@@ -64,7 +64,7 @@ struct ValidateCase {
   double seconds = 0;
   std::string why;  // reason of a failure; empty: the case passed
   // Only for the cases of the table, not for those of Nori files. rows: the rows of
-  // docs/measurements/stability.md that the case covers. about: a description of one sentence. kind:
+  // docs/measurements/stability.md that the case covers. about: a description in one sentence. kind:
   // "statistical" (then `band` is the share of the answer by which the confidence interval may deviate) or
   // "exact" (then `band` is the tolerance).
   std::string rows, about, kind;

@@ -27,8 +27,8 @@ FrameSize enough(FrameSize size) {
   return {size.width * factor, size.height * factor};
 }
 
-// Sums over the pixels of a frame. mean: of the means of the pixels; square: of their estimated squared
-// errors; fourth: of the squares of these squared errors.
+// Sums over the pixels of a frame: `mean` sums the means of the pixels, `square` their estimated squared
+// errors, `fourth` the squares of these squared errors.
 struct Sums {
   double mean = 0, square = 0, fourth = 0;
   void add(double weight, double a, double b) {

@@ -180,7 +180,7 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
   table.add(
       assign.lease, [this](const UnitKey& key) { return outbox.has_result(key); },
       traced ? assign.trace : std::nullopt, traced ? options.tracer->unix_ns(clock.now()) : 0);
-  // If the worker knows more than kJobsRemembered jobs, it forgets those whose last use is longest ago. Each
+  // If the worker knows more than kJobsRemembered jobs, it forgets the least recently used ones. Each job
   // takes little memory, but a worker may run for years.
   while (jobs.size() > kJobsRemembered) {
     auto oldest = jobs.end();

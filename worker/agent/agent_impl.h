@@ -150,7 +150,7 @@ struct Agent::Impl {
   WorkerProgress progress() const;
   void end_threads();
 
-  // Functions that the loader thread calls, except trouble().
+  // Functions that the loader thread calls, except trouble(), which the control thread calls.
   void load_loop(std::stop_token token);
   std::optional<JobId> next_to_load();
   bool make_room();  // frees an unused world if too many are kept; false: all are in use
@@ -159,8 +159,8 @@ struct Agent::Impl {
   void loading_failed(const JobId& id, UnitFailure failure);
   void postpone(const JobId& id, const Error& why);
   void hold_off(const JobId& id, const std::string& trouble);
-  // Returns a recent fault of this machine because of which a job could not be loaded; empty: there is none.
-  // Call with the mutex held.
+  // Returns a recent fault of this machine that prevented loading a job; empty: there is none. Call with the
+  // mutex held.
   std::string trouble() const;
 
   // Functions that the render threads call, except those of tracing, which all threads call.
@@ -234,7 +234,7 @@ struct Agent::Impl {
     TimePoint since{};
   };
   std::map<UnitKey, Unsent> unsent;
-  std::deque<FromWorker> outgoing;  // returned units and notices of draining, sent when the connection is up
+  std::deque<FromWorker> outgoing;  // returned units and Draining messages, sent when the connection is up
   std::vector<std::unique_ptr<RenderSlot>> slots;
   Connection connection = Connection::down;
   bool draining = false;

@@ -10,14 +10,14 @@
 
 namespace ls::worker {
 namespace {
-// Number of worlds kept in memory: that of the job being rendered and that of the next job. So render threads
-// need not wait between two jobs, and memory stays bounded.
+// Number of worlds kept in memory: the world of the job being rendered and that of the next job. So render
+// threads need not wait between two jobs, and memory stays bounded.
 constexpr std::size_t kWorldsKept = 2;
-constexpr std::size_t kBlobsTraced = 64;  // most blobs of a scene whose transfers are traced
+constexpr std::size_t kBlobsTraced = 64;  // at most this many blob transfers of a scene are traced
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
 // If this machine could not load a job, progress reports state the reason until this long after
 // Job::retry_at, the time at which loading may be tried again. A worker that still has units of the job tries
-// again by then, so an older reason concerns a job of which it has no units.
+// again by then, so an older reason concerns a job of which it has no units any more.
 constexpr Duration kTroubleShown = std::chrono::seconds(30);
 
 // True if the error is a problem of this machine, such as a full disk. Such an error must not count as a
@@ -39,8 +39,8 @@ void Agent::Impl::load_loop(std::stop_token token) {
       try_to_load(brief);
       lock.lock();
     } else {
-      // The timeout is needed because jobs become loadable again when their retry_at has passed, of which
-      // nothing notifies this thread. All other changes notify it.
+      // The timeout is needed because a job becomes loadable again when its retry_at has passed, and nothing
+      // notifies this thread of that. It is notified of all other changes.
       work.wait_for(lock, token, kTransferRetry, [&] { return next_to_load().has_value() && make_room(); });
     }
   }
@@ -168,8 +168,8 @@ void Agent::Impl::load(const JobBrief& brief) {
   work.notify_all();
 }
 
-// Reports one unit of the job as failed and returns its other units to the coordinator. A job that this
-// worker cannot load thereby costs one failed attempt instead of hundreds.
+// Reports one unit of the job as failed and returns its other units to the coordinator. So a job that this
+// worker cannot load costs one failed attempt instead of hundreds.
 void Agent::Impl::loading_failed(const JobId& id, UnitFailure failure) {
   const std::lock_guard lock(mutex);
   loading.clear();

@@ -5,7 +5,7 @@
 
 namespace ls::worker {
 namespace {
-constexpr std::size_t kEntryOverhead = 256;  // approximate bytes of an outbox entry besides its result
+constexpr std::size_t kEntryOverhead = 256;  // approximate size of an outbox entry without its result
 }  // namespace
 
 void HeldLeases::add(const Lease& lease, const std::function<bool(const UnitKey&)>& handed_in,

@@ -1,5 +1,5 @@
-// The work that a worker holds: units of leases, and results on their way to the coordinator. A unit is one
-// tile and one round (range of samples) to render. The classes have no locks and no clock.
+// The work that a worker holds: the units of its leases, and the results on their way to the coordinator. A
+// unit is one tile and one round (range of samples) to render. The classes have no locks and no clock.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ class HeldLeases {
     State state = State::waiting;
     // The trace span of the unit's present lease; nullopt: the lease is not traced
     std::optional<trace::SpanContext> trace = std::nullopt;
-    std::int64_t since_unix_ns = 0;  // arrival of the unit, in ns since 1970; 0: not recorded
+    std::int64_t since_unix_ns = 0;  // when the unit arrived, in ns since 1970; 0: not recorded
   };
 
   // Adds the units of a lease. `handed_in(key)` returns whether the outbox already has a result of that unit.
@@ -81,7 +81,8 @@ class HeldLeases {
   std::map<UnitKey, Entry> units_;
   // The waiting units by Entry::order, that is, in the order in which they will be rendered.
   std::map<std::uint64_t, UnitKey> queue_;
-  // Numbers of unfinished and of finished units, by lease; contains only leases with unfinished units.
+  // How many units of each lease are unfinished, and how many are finished. Leases without unfinished units
+  // are not in the map.
   std::map<LeaseId, LeaseState> leases_;
   std::uint64_t next_order_ = 0;
   std::size_t running_ = 0;

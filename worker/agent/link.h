@@ -19,8 +19,9 @@ using BlobSink = std::function<Result<void>(std::span<const std::byte>)>;
 class LinkObserver {
  public:
   virtual ~LinkObserver() = default;
-  virtual void received(ToWorker message) = 0;  // called in order, by any thread
-  // Called once per connection. connect() and close() wait for it to return, so it must not call them.
+  virtual void received(ToWorker message) = 0;  // called in the order of arrival, on any thread
+  // Called once for each connection, when it has ended. An implementation must not call connect() or close(),
+  // since they wait until lost() has returned.
   virtual void lost(Error why) = 0;
 };
 
@@ -61,11 +62,11 @@ class BlobFile {
 class BlobFiles {
  public:
   virtual ~BlobFiles() = default;
-  // Returns the blob's file, and blocks while it is fetched. unavailable: the transfer was interrupted; the
-  // bytes received are kept, and the caller should try again later. resource_exhausted, internal: this
-  // machine or its coordinator has a problem (a full disk, the cache limit, a blob missing at the
-  // coordinator) that is not the job's fault and may pass. Other errors are final: for example not_found, if
-  // no source has the blob.
+  // Returns the blob's file, and blocks while it is fetched. The error unavailable means that the transfer
+  // was interrupted; the bytes received are kept, and the caller should try again later. The errors
+  // resource_exhausted and internal mean that this machine or its coordinator has a problem (a full disk, the
+  // cache limit, a blob missing at the coordinator) that is not the job's fault and may pass. Other errors
+  // are final: for example not_found, if no source has the blob.
   virtual Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob) = 0;
   // Returns the digests of the blobs on this machine, at most `limit`, most recently used first. The worker's
   // hello sends this list to the coordinator.

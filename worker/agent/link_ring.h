@@ -1,7 +1,7 @@
 // Combines links to several coordinators into one, for farms in which several coordinators, each with its own
 // jobs, share the workers. The worker has a stream to one coordinator at a time. It moves to the next
-// coordinator if the current one does not accept it or has had no work for it for a while. Idle workers
-// thereby find any coordinator that has work, including one that has taken over the jobs of another.
+// coordinator if the current one does not accept it or has had no work for it for a while. So idle workers
+// find any coordinator that has work, including one that has taken over the jobs of another.
 #pragma once
 
 #include <cstddef>

@@ -99,7 +99,7 @@ Result<std::shared_ptr<const BlobFile>> BlobCache::open_verified(const Digest& d
     }
     verified_.insert(digest);
   }
-  ::futimens(fd, nullptr);  // sets the time of last use
+  ::futimens(fd, nullptr);  // the time of the last change counts as the time of last use
   return file;
 }
 

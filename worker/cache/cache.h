@@ -6,8 +6,8 @@
 // reported to the coordinator and fetched again; no transfer error is ever counted as the job's fault. When
 // blobs and transfers in progress exceed the size limit, the least recently used blobs are removed, but never
 // one in use: a BlobFile holds a shared flock on its file, which also protects it from other workers that use
-// the same folder. Only files with the cache's own names in their own places are ever removed; CACHEDIR.TAG
-// makes backups skip the folder.
+// the same folder. A file in the folder is removed only if it has a name and a place that the cache gives to
+// its files; CACHEDIR.TAG makes backups skip the folder.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
-// The files in a cache folder (see cache.h): complete blobs, and blobs in transfer. Only files with the
-// cache's own names in their own places are listed and removed, so that other files in the folder are safe.
+// The files in a cache folder (see cache.h): complete blobs, and blobs in transfer. Files are listed and
+// removed only if they have a name and a place that the cache gives to its files, so other files in the
+// folder are safe.
 #pragma once
 
 #include <sys/stat.h>
@@ -72,8 +73,8 @@ class PartialFile {
   std::uint64_t size() const { return size_; }
   Result<void> append(std::span<const std::byte> bytes);
   // Checks the digest, syncs the file and moves it to `place`. Returns false if `place` already has a file,
-  // which is kept, since it may be in use. invalid_argument: the digest is not `expected`; the file is
-  // removed.
+  // which is kept, since it may be in use. Fails with invalid_argument if the digest is not `expected`; the
+  // file is then removed.
   Result<bool> finish(const Digest& expected, const std::filesystem::path& place);
   void discard();
 

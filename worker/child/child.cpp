@@ -22,10 +22,10 @@ using child::Reply;
 using child::Request;
 using child::Slot;
 
-// A unit is innocent of the death of its child if another unit caused the death. The next child then renders
-// it again. After this many such deaths in a row the unit is reported as failed all the same. Normally that
-// does not happen: each death is reported as a failure of the unit that caused it, and after three failures
-// in a job the coordinator gives this worker no more units of that job.
+// A unit is innocent of the death of the child process that was rendering it if another unit caused the
+// death. The next child then renders it again. After this many such deaths in a row the unit is reported as
+// failed all the same. Normally that does not happen: each death is reported as a failure of the unit that
+// caused it, and after three failures in a job the coordinator gives this worker no more units of that job.
 constexpr int kInnocentDeaths = 64;
 
 std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {
@@ -41,7 +41,7 @@ constexpr Duration kStartLimit = std::chrono::minutes(2);
 // killed
 constexpr Duration kStopLimit = std::chrono::seconds(10);
 
-// Copies the pixel and number of the sample that the slot was rendering to the failure; copies nothing if the
+// Sets in `failure` the pixel and the number of the sample that the slot was rendering. Sets nothing if the
 // slot had not begun a sample.
 void note_place(const Slot& slot, UnitFailure& failure) {
   if (slot.where.x < 0) return;

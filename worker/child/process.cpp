@@ -136,8 +136,8 @@ std::optional<Process::Answer> Process::ask(int fd, Request request, const std::
                                             const Watch& watch) {
   request.text_bytes = static_cast<std::uint32_t>(text.size());
   auto answer = exchange(fd, request, text, watch);
-  // Without an answer the child is not always dead: it may only have closed its end of the channel. It is
-  // killed, because otherwise end() could wait forever.
+  // A missing answer does not prove that the child is dead: it may only have closed its end of the channel.
+  // So it is killed, because otherwise end() could wait forever.
   if (!answer) kill();
   return answer;
 }

@@ -46,8 +46,8 @@ inline constexpr std::size_t kSlotFloats = 202 * 202 * 6;
 
 enum class Kind : std::uint32_t { hello, prepare, forget, render };
 
-// A request of the agent to the child, followed by `text_bytes` bytes of text. The members after `job` are
-// the unit, for `render` only.
+// A request of the agent to the child, followed by `text_bytes` bytes of text. The members after `job`
+// describe the unit and are used by `render` only.
 struct Request {
   Kind kind{};
   // Length of the text that follows: for `prepare` the text of the job (to_text()); for other kinds 0

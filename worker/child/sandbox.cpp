@@ -171,12 +171,13 @@ constexpr std::uint64_t kWrite = LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS
                                  LANDLOCK_ACCESS_FS_MAKE_DIR | LANDLOCK_ACCESS_FS_MAKE_REG |
                                  LANDLOCK_ACCESS_FS_MAKE_SOCK | LANDLOCK_ACCESS_FS_MAKE_FIFO |
                                  LANDLOCK_ACCESS_FS_MAKE_BLOCK | LANDLOCK_ACCESS_FS_MAKE_SYM;
-constexpr std::uint64_t kTruncate = std::uint64_t{1} << 14;  // truncate a file: since ABI 3 (Linux 6.2)
+// The right to truncate files; since ABI 3 (Linux 6.2)
+constexpr std::uint64_t kTruncate = std::uint64_t{1} << 14;
 constexpr std::uint64_t kFileRights =  // rights that apply to files; the rest apply to folders
     LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_EXECUTE | kTruncate;
 
 // Adds a rule that allows `rights` for the file `path`, or for everything in the folder `path`. A path that
-// does not exist needs no rule; then it returns true.
+// does not exist needs no rule, so the result is then true.
 bool allow(int rules, const std::filesystem::path& path, std::uint64_t rights) {
   const Descriptor place{::open(path.c_str(), O_PATH | O_CLOEXEC)};
   struct stat info {};
@@ -189,7 +190,7 @@ bool allow(int rules, const std::filesystem::path& path, std::uint64_t rights) {
 // The kernel's landlock_ruleset_attr, including fields that are newer than the kernel headers of the build.
 struct Ruleset {
   std::uint64_t files = 0;    // file rights that are denied unless a rule allows them; since ABI 1
-  std::uint64_t network = 0;  // the same for network rights, none here; since ABI 4
+  std::uint64_t network = 0;  // the same for network rights; always 0 here; since ABI 4
   std::uint64_t scoped = 0;   // actions limited to processes in the sandbox; since ABI 6
 };
 // A bit of Ruleset::scoped: the process can send signals only to processes within the sandbox. This also

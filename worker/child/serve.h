@@ -14,9 +14,9 @@ namespace ls::worker::child {
 // error, and those of child/protocol.h.
 void confine(std::uint64_t memory_limit);
 
-// Serves requests by calling `backend`: on this thread those of the control channel, and on `slots` render
-// threads those of one channel each. When the agent is gone, it ends the process and does not return. It
-// returns only if it cannot start serving: the exit code, 1 or 2.
+// Serves requests by calling `backend`: those of the control channel on this thread, and those of each render
+// channel on a thread of its own (`slots` threads). When the agent is gone, it ends the process and does not
+// return. It returns only if it cannot start serving; the result is then the exit code, 1 or 2.
 int serve(LocalBackend& backend, int slots);
 
 }  // namespace ls::worker::child

@@ -80,9 +80,10 @@ class WorkCall final : public grpc::ClientBidiReactor<pb::FromWorker, pb::ToWork
   struct State {
     std::deque<pb::FromWorker> queue;
     bool writing = false, closing = false, writes_done = false, held = true, done = false;
-    std::optional<Error> broken;  // why a message could not be parsed; nullopt: all could
+    std::optional<Error> broken;  // error in parsing a message; nullopt: none so far
   };
-  // Starts the next write. If no message is left and the stream is closing, tells gRPC that no more follow.
+  // Starts the next write. If no message is left and the stream is closing, tells gRPC that no more messages
+  // follow.
   void pump(State& state);
   void release_hold(State& state);
 

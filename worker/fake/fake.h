@@ -29,7 +29,7 @@ Digest fake_numeric_class();  // returns the SHA-256 of "fake"
 
 struct FakeOptions {
   Duration delay{};           // how long the renderer sleeps for each unit
-  double sample_seconds = 0;  // sleeps this much more per sample of a pixel; counted as CPU time
+  double sample_seconds = 0;  // further sleep per sample of a pixel; it counts as CPU time
   FakeFault fault;
   // Identifies machines that render the same bits. Tests set another value to simulate a different machine.
   Digest numeric_class = fake_numeric_class();

@@ -39,7 +39,7 @@ std::shared_ptr<void> limit_threads(int threads);
 
 // The sample that a thread is rendering, for crash reports: its pixel (-1: none yet) and its index among the
 // pixel's samples. With path reuse (path_reuse.h) a thread renders squares of 16 x 16 pixels as a whole, and
-// the pixel is one of the square. The thread writes with relaxed atomic stores.
+// x and y are those of some pixel of the square. The thread writes with relaxed atomic stores.
 struct Breadcrumb {
   std::atomic<std::int32_t> x{-1}, y{-1};
   std::atomic<std::uint64_t> sample{0};
@@ -49,7 +49,8 @@ struct TileResult {
   // The tile's planes, as in Partial::sums (common/image/film/partial.h): six of colour, then those of the
   // requested AOVs
   std::vector<float> sums;
-  // Number and places of the bad samples, by cause. Corrected inputs of the scene are not included.
+  // The problems of samples, by cause: their number, and the pixels and samples at which they occurred.
+  // Corrected inputs of the scene are not included.
   Health health;
   bool stopped = false;  // true if `stop` ended render_tile() early: `sums` is then not valid
 };

@@ -2,10 +2,10 @@
 // sums of one tile over one range of samples; the film is the sum of all partials. docs/reference/aovs.md
 // defines each AOV.
 //
-// After its six colour planes (A.R A.G A.B B.R B.G B.B, where A and B are the halves of the samples) a
-// partial has the planes of sums of the requested AOVs, sorted by channel name, then the planes of
+// After its six colour planes (A.R A.G A.B B.R B.G B.B: half A or B of the samples, then red, green or blue)
+// a partial has the planes of sums of the requested AOVs, sorted by channel name, then the planes of
 // identifiers (identifiers.h), sorted by the AOV's name. The partial's EXR file has these planes in the same
-// order, except that its colour planes are B before G before R.
+// order, except that it sorts the colour planes by name, too: A.B A.G A.R B.B B.G B.R.
 #pragma once
 
 #include <cstddef>
@@ -108,8 +108,8 @@ struct AovPlanes {
 };
 AovPlanes planes_of(AovSet set);
 
-// Returns the bytes per pixel of a partial. The film keeps the last round (range of samples) of a tile in the
-// same form, if that round is truncated.
+// Returns the bytes per pixel of a partial. If the last round (range of samples) of a tile is truncated, the
+// film keeps the sums of this round separately, in the same form.
 std::size_t partial_bytes_per_pixel(AovSet set);
 // Returns the bytes per pixel of the sums that a film holds.
 std::size_t film_bytes_per_pixel(AovSet set);

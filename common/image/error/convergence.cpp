@@ -13,14 +13,15 @@ namespace ls {
 namespace {
 
 constexpr double kNormal95 = 1.959964;
-// Points with fewer samples per pixel are not used: each half of the samples would have only one or two per
-// pixel and be too noisy.
+// Points with fewer samples per pixel than this are not used: each half of the samples would have only one or
+// two per pixel and be too noisy.
 constexpr double kLeastSpp = 8;
 constexpr double kPriorSpread = .15;
 // The standard deviation of the slope's change per square root of log time, for forecasts; it is b in
 // convergence.h.
 constexpr double kBend = .06;
-// The verdict is "slower" if the slope's interval is below kSlow, and "faster" if it is above kFast.
+// The verdict is "slower" if the whole interval of the slope is below kSlow, and "faster" if it is above
+// kFast.
 constexpr double kSlow = .85, kFast = 1.1;
 // The line is fitted to at most this many points, at doubling sample counts.
 constexpr std::size_t kMostPoints = 32;

@@ -21,7 +21,8 @@ constexpr double k95 = 1.959963984540054;  // two-sided 95 % point of the normal
 // deviation of sqrt(4/3/100) = 12 %. In a small image 1 / kPartOfSmall of its pixels suffices, because object
 // edges alone sometimes carry the error of a 32 x 32 image.
 constexpr double kFewPixels = 100, kPartOfSmall = 48;
-// In images with many pixels the figures are not trusted if one pixel has a larger share of the error.
+// In images with many pixels the figures are not trusted if one pixel has a larger share of the error than
+// this.
 constexpr double kLargeShare = 0.1;
 // In smooth parts of the image tr(V^2) is estimated in two ways, from fourth powers of D and from pairs of
 // neighbours. The figures are not trusted if the first estimate is more than this factor times the second.
@@ -327,7 +328,7 @@ void Checkpoints::folded(TileIndex index, RoundIndex round, const TileError& err
   change(index, [&](Tile& tile) {
     if (round >= complete()) {
       // Replaces the figures of the tile from this round on. If the tile had stopped and its rounds before
-      // this one are missing, each missing round gets the figures of the tile's previous round.
+      // this one are missing, each missing round gets the figures that the tile had when it stopped.
       tile.pending.resize(round - complete(), tile.last);
       tile.pending.push_back(error);
     } else {

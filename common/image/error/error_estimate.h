@@ -57,8 +57,8 @@
 //
 // If the last round, or the rounds before it, have too few samples for this, tr(V^2) is a weighted mean of
 // those two other estimates, with the weights g^2 and 1 - g^2 in each pixel:
-//   From its own fourth powers, for Gaussian D: E[D_c^4] = 3 V_cc^2 and E[D_c^2 D_k^2] = V_cc V_kk (1 + 2
-//   r^2), where r is the correlation of two channels. Hence
+//   From the pixel's own fourth powers. Let D_c be the D of channel c. For Gaussian D, E[D_c^4] = 3 V_cc^2
+//   and E[D_c^2 D_k^2] = V_cc V_kk (1 + 2 r^2), where r is the correlation of the channels c and k. Hence
 //     tr V^2 = sum_c E[D_c^4] / 3  +  sum_{c != k} E[D_c^2 D_k^2] r^2 / (1 + 2 r^2).
 //   With grey noise (r = 1) this is E[x^2]/3 for x = sum_c D_c^2. r^2 is taken from products of neighbouring
 //   pixels p, q, E[D_c D_k (p) D_c D_k (q)] / E[D_c^2 (p) D_k^2 (q)], a ratio in which image structure
@@ -100,7 +100,7 @@ struct NoiseSums {
   // like channel_fourth and pixel_fourth, but with the weight g^2 for each pixel
   double edge_channel_fourth = 0, edge_pixel_fourth = 0;
   double flat_pairs = 0;  // sum over pixels p: (1 - g^2) times the mean over neighbours q of (D(p) . D(q))^2
-  double largest = 0;     // largest value of any pixel of (sum over channels of D^2)
+  double largest = 0;     // largest (sum over channels of D^2) in any pixel
   // The sums from which the interval of a trusted image is computed. If the last round has too few samples,
   // changes.squares is equal to NoiseSums::squares, and changes.products is the sum of tr(V^2) estimated from
   // the sums above.
@@ -147,7 +147,7 @@ struct EarlierMeans {
 // Estimates the error of a tile. `spp` is the number of samples per pixel of both halves together. Without
 // `earlier`, skewed noise is not corrected, and the interval assumes Gaussian noise.
 TileError estimate_error(const HalfMeans& halves, std::uint64_t spp, const EarlierMeans* earlier = nullptr);
-// Returns 1 / (m^2 + 0.01), minus the bias that noise in m of variance s2 causes.
+// Returns 1 / (m^2 + 0.01), minus the bias that is caused by noise of variance `s2` in `m`.
 double relative_weight(double m, double s2);
 // Returns true if TileError::few_hits counts the pixel (x, y).
 bool has_few_hits(const HalfMeans& halves, int x, int y);

@@ -11,7 +11,7 @@ namespace ls {
 namespace {
 
 constexpr std::size_t kWindowReach = 2;  // radius of the 5 x 5 window
-// limit of a squared deviation in variances: the square of three standard deviations
+// A squared deviation counts as significant if it exceeds this many variances (three standard deviations).
 constexpr double kSignificant = 9;
 
 // Memory for doubles that is not initialised. Every value is written before it is read, and initialising
@@ -203,8 +203,8 @@ struct Columns {
                 edge_pixel_fourth.data());
   }
 
-  // Adds the products of each pixel and the previous one in the row, from which r^2 is computed
-  // (error_estimate.h).
+  // Adds the products of each pixel and the previous one in the row, from which the squared correlation of
+  // two channels (r^2 in error_estimate.h) is computed.
   void add_pairs(const Values& v) {
     double* __restrict covariance = pair_covariance.data(), * __restrict variance = pair_variance.data();
     const std::size_t width = squares.size();

@@ -20,8 +20,8 @@ struct RelativeWeights {
 };
 RelativeWeights relative_weights(const HalfMeans& halves);
 
-// Returns sums over one tile. `values` has three planes of width x height values: D, or sqrt(w) D. `edges`
-// has one plane, as in RelativeWeights.
+// Returns sums over one tile. `values` has three planes of width x height values: D, or sqrt(w) D
+// (error_estimate.h). `edges` has one plane, as in RelativeWeights.
 NoiseSums noise_sums(const std::vector<double>& values, const std::vector<double>& edges, int width,
                      int height);
 

@@ -43,13 +43,13 @@ Result<std::vector<std::byte>> read_exr_bytes(const std::filesystem::path& path,
                                               const ExrLimits& limits = {});
 Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits& limits = {});
 
-// An image, and the standard error of each of its values. These come from the layers stderr.R, stderr.G and
-// stderr.B at full resolution; if the part of the image lacks any of these layers, `error` is empty.
+// An image and the standard error of each of its values, from the layers stderr.R, stderr.G and stderr.B at
+// full resolution. If the EXR part with the image lacks any of these layers, `error` is empty.
 struct RgbWithError {
   RgbImage image;
   // standard errors of the values of image.rgb, in the same order
   std::vector<float> error;
-  // values of the part's header attributes of type string, by name
+  // values of the EXR part's header attributes of type string, by name
   std::map<std::string, std::string> strings;
 };
 Result<RgbWithError> read_exr_with_error(std::span<const std::byte> bytes, const std::string& name,
@@ -78,7 +78,8 @@ struct ExrPicture {
 // Encodes an image as a scanline EXR with ZIP compression. The bytes depend only on the image.
 Result<std::vector<std::byte>> write_exr(const ExrPicture& picture);
 
-// The destination of a file that is too large for memory. write() writes the bytes at the offset `at`.
+// The destination of a file that is too large for memory. write() writes bytes at the offset `at` of the
+// file.
 class ByteSink {
  public:
   virtual ~ByteSink() = default;

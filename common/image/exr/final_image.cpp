@@ -30,7 +30,8 @@ Gathered gather(const Film& film) {
   for (TileIndex t = 0; t < film.grid().count(); ++t) {
     if (film.spp(t) == 0) continue;
     const TilePixels tile = film.pixels(t);
-    // Values of a UINT layer are at most 2^32 - 1. The limits of jobs are lower, so nothing is lost.
+    // Values of a UINT layer are at most 2^32 - 1. A job has at most kMaxSpp = 2^24 samples per pixel, so
+    // nothing is lost.
     const auto spp = static_cast<std::uint32_t>(
         std::min<std::uint64_t>(tile.spp, std::numeric_limits<std::uint32_t>::max()));
     each_pixel(tile.rect, frame, [&](std::size_t to, std::size_t from) {
@@ -69,8 +70,9 @@ class Layers {
   explicit Layers(const Film& film)
       : film_(film), frame_(film.grid().frame), planes_(planes_of(film.aovs())) {
     sums_.assign(planes_.sums.size(), {});
-    // Two kinds of planes have no layer of their own: the number of hits, and half B of a guide (an AOV for
-    // the denoiser), whose planes follow those of half A. The layer of a guide is the sum of both halves.
+    // Two kinds of planes get no layer of their own. One is the plane that counts the samples that hit a
+    // surface. The others are the planes of half B of a guide (an AOV for the denoiser); they are added to
+    // the planes of half A.
     for (std::size_t p = 0; p < sums_.size(); ++p)
       if (p != planes_.hits && planes_.sums[p].half == 0) sums_[p].resize(frame_.pixels());
     ids_.assign(planes_.ids.size() * 2 * kCryptomatteRanks, std::vector<float>(frame_.pixels()));
@@ -248,8 +250,8 @@ std::map<std::string, std::string> strings_of(const Film& film, const Provenance
                                                 {"lightshaft:class", from.numeric_class.hex()},
                                                 {"lightshaft:tiles", tile_digests(film)}};
   strings.merge(error_strings(film.error(), film.pixels_without_samples()));
-  // The error over time may show problems that the film alone does not show. In this case the words about the
-  // convergence replace the verdict "trusted".
+  // The error over time (`convergence_status`) may show problems that the film alone does not show. Then its
+  // text replaces the verdict "trusted".
   if (auto verdict = strings.find("lightshaft:verdict");
       verdict != strings.end() && verdict->second == "trusted" && from.convergence_status &&
       !from.convergence_status->trusted)

@@ -34,10 +34,10 @@ struct CryptomatteManifests {
 inline constexpr const char* kFakePixels = "the pixels are made up by fake workers (--fake), not rendered";
 
 // The values of those header strings `lightshaft:...` of the final EXR that do not come from the film.
-// docs/design/error.md lists all header strings. From the film come `:relmse`, `:relmse_ci95` ("LOW HIGH"),
-// `:rmse`, `:rmse_ci95`, `:few_hits` (pixels), `:verdict` ("trusted", or the reason why not),
-// `:pixels_without_samples` and `:tiles`. If the film has no samples, only the last two of these are written.
-// `:pixels_without_samples` is written only if there are such pixels.
+// docs/design/error.md lists all header strings. These come from the film: `:relmse`, `:relmse_ci95` ("LOW
+// HIGH"), `:rmse`, `:rmse_ci95`, `:few_hits` (a number of pixels), `:verdict` ("trusted", or the reason why
+// not), `:pixels_without_samples` and `:tiles`. If the film has no samples, only the last two of these are
+// written. `:pixels_without_samples` is written only if there are such pixels.
 struct Provenance {
   Digest scene;
   std::string settings_json;  // canonical JSON of the RenderSettings
@@ -52,12 +52,13 @@ struct Provenance {
   double core_seconds = 0;  // CPU seconds of all rendering; 0: unknown, and not written
   // why sampling stopped before the requested number of samples, and the consequences; empty: not written
   std::string stopped = {};
-  // A judgement based on the error over time, which the film does not contain. If the film's own verdict is
-  // "trusted" but this judgement is not trusted, `:verdict` becomes the `words` of the judgement.
+  // How far the error figures can be trusted, judged by the error over time, which the film does not contain.
+  // If the verdict from the film is "trusted", but `trusted` is false in this status, `:verdict` becomes the
+  // `words` of the status.
   std::optional<ConvergenceStatus> convergence_status = {};
-  // further numbers, by header string name without "lightshaft:"
+  // further header strings that are numbers; the keys are their names without "lightshaft:"
   std::map<std::string, double> figures = {};
-  // further texts, by header string name without "lightshaft:"
+  // further header strings that are texts; the keys are their names without "lightshaft:"
   std::map<std::string, std::string> notes = {};
 };
 struct FinalImage {
@@ -131,15 +132,17 @@ Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_sto
 //
 // Both use the same ramp from dark blue over green to yellow, on a logarithmic scale:
 //   error: each pixel's relative standard error. Its square is the mean over channels of D^2 / (S^2 + 0.01),
-//     with D the standard error and S the value of the pixel. The square is averaged over 3 x 3 pixels of the
-//     tile, because a single pixel's difference of two halves is unreliable.
-//     An error of 10^-3 or less has the lowest colour, 1 or more the highest: three decades.
-//   samples: 2 samples per pixel have the lowest colour, 2^14 the highest: thirteen doublings.
-// Magenta in the error map: pixels with too few hits (error_estimate.h). Tiles without samples are grey. The
-// maps have the image's size, so that they can be overlaid on it.
-// range of the colours: relative standard errors
+//     where D is the standard error of the pixel and S its value. The square is averaged over 3 x 3 pixels of
+//     the tile, because the D of a single pixel is unreliable.
+//     An error of 10^-3 or less has the lowest colour, an error of 1 or more the highest.
+//   samples: 2 samples per pixel have the lowest colour, 2^14 the highest.
+// In the error map, pixels in which too few samples found light (has_few_hits() in error_estimate.h) are
+// magenta. Tiles without samples are grey. The maps have the image's size, so that they can be overlaid on
+// it.
+
+// relative standard errors of the lowest and the highest colour
 inline constexpr double kMapLeastError = 1e-3, kMapMostError = 1;
-// range of the colours: samples per pixel
+// samples per pixel of the lowest and the highest colour
 inline constexpr double kMapLeastSamples = 2, kMapMostSamples = 16384;
 
 // Maps t from 0 to 1 to a colour. Lightness increases with t, so the map can be read without distinguishing

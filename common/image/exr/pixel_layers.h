@@ -23,7 +23,8 @@ enum class BlockRule {
   mean,              // mean of the values; used for most layers
   error_of_mean,     // standard error of the mean of the block; used for standard errors
   root_mean_square,  // root of the mean of the squares; used for relative errors
-  // value of the block's first pixel, row by row; used for identifiers, which have no mean
+  // value of the first pixel of the block that has samples, in row order; used for identifiers, which have no
+  // mean
   first
 };
 std::string_view to_string(BlockRule rule);

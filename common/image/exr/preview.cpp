@@ -114,7 +114,8 @@ double ramp(double value, double least, double most) {
   return value > least ? std::log(value / least) / std::log(most / least) : 0;
 }
 
-// For each pixel, the mean over channels of the squared relative error, and whether the pixel has few hits.
+// For each pixel, the mean over channels of the squared relative error, and whether too few of its samples
+// found light for a reliable error (has_few_hits()).
 struct PixelErrors {
   std::vector<double> squared;
   std::vector<char> few_hits;

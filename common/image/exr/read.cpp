@@ -172,7 +172,7 @@ Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits
 namespace {
 
 constexpr const char* kColours[3] = {"R", "G", "B"};
-// limit of the layers of a final EXR: all AOVs together have 74, denoising adds 3
+// largest number of layers of a final EXR; all AOVs together have 74, denoising adds 3
 constexpr std::size_t kMaxLayers = 128;
 
 tl::unexpected<Error> bad(const std::string& name, const std::string& what) {

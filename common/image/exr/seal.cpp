@@ -75,8 +75,8 @@ std::vector<std::string> differences(const std::string& sealed, const std::strin
       if (found == theirs->end() || found->second != digest) names.insert(name);
     }
   std::vector<std::string> out(names.begin(), names.end());
-  // Both seals have the same names and digests, but their texts differ, for example in the order of lines. So
-  // somebody edited the seal; it is reported as the header that differs.
+  // If all names and digests are equal but the texts differ (for example in the order of lines), somebody has
+  // edited the seal. Then the seal itself is reported as the header that differs.
   if (out.empty() && sealed != now) out.emplace_back(fmt::format("header {}", kSealName));
   return out;
 }

@@ -1,9 +1,10 @@
-// The seal of a final EXR is the header string `lightshaft:seal`. It has a line "SHA-256 header NAME" for
-// every header attribute that it covers, then a line "SHA-256 layer NAME" for every layer, both sorted by
-// name. A layer's digest is over its values row by row, as 32-bit little-endian numbers (halves as floats).
-// An attribute's digest is over its type, a zero byte and its bytes in the file. The seal does not cover
-// itself, nor the attributes "compression" and "lineOrder", so it stays valid if a program stores the same
-// pixels with another compression or order of lines. Used by the files of this folder only.
+// The seal of a final EXR is the header string `lightshaft:seal`. It has a line "DIGEST header NAME" for
+// every header attribute that it covers, then a line "DIGEST layer NAME" for every layer, both sorted by
+// name. DIGEST is a SHA-256 in hexadecimal. A layer's digest is over its values row by row, as 32-bit
+// little-endian numbers (halves as floats). An attribute's digest is over its type, a zero byte and its bytes
+// in the file. The seal does not cover itself, nor the attributes "compression" and "lineOrder", so it stays
+// valid if a program stores the same pixels with another compression or order of lines. Used by the files of
+// this folder only.
 #pragma once
 
 #include <ImfHeader.h>

@@ -33,8 +33,8 @@ enum class HealthCause : std::uint8_t {
   nested_media,  // the path was inside more media at once than it can store
   // Causes of samples that are counted but kept, because rejecting them would bias the result.
   negative,
-  // The density of a medium exceeded the upper bound (majorant) of its grid cell. The count is the number of
-  // occurrences, of which one sample may have several.
+  // The density of a medium exceeded the upper bound (majorant) of its grid cell. Each occurrence is counted,
+  // so one sample may count several times.
   majorant_violation,
   // Corrected input values: values in the scene or its files that were invalid and were replaced. Their
   // number is the same for all units of a job, and they belong to no pixel.

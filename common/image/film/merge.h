@@ -1,5 +1,5 @@
-// Adds partials to a film, exactly as the coordinator does; for `lightshaft merge`. A partial is a file with
-// the pixel sums of one tile and one round (a range of samples).
+// Adds partials to a film, exactly as the coordinator does. `lightshaft merge` uses it. A partial is a file
+// with the pixel sums of one tile and one round (a range of samples).
 #pragma once
 
 #include <cstddef>

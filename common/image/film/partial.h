@@ -42,7 +42,7 @@ struct Partial {
   // the kind AovKind::guide, which have sums of each half. Every value is finite: non-finite samples are
   // counted in the health (health.h) and add zero here.
   std::vector<float> sums;
-  AovSet aovs;  // the AOVs of the planes; those that the settings request
+  AovSet aovs;  // the AOVs whose planes are in `sums`: those that the settings request
   bool operator==(const Partial&) const = default;
 };
 
@@ -63,7 +63,7 @@ Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader&
                                AovSet aovs = {});
 
 // A partial and its frame size as found in a file. decode_partial_file() takes the header and the AOVs from
-// the file, without expected values; for `lightshaft merge`.
+// the file, without expected values. `lightshaft merge` uses it.
 struct PartialFile {
   Partial partial;
   FrameSize frame;

@@ -9,7 +9,7 @@
 namespace ls {
 namespace {
 
-// Largest size in bytes; the texts of canonical_json() have about 320.
+// Largest size of a header's JSON text, in bytes. The texts of canonical_json() have about 320.
 constexpr std::size_t kMaxHeaderJson = 1024;
 
 tl::unexpected<Error> bad(std::string_view what) {

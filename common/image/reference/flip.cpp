@@ -10,6 +10,8 @@
 namespace ls {
 namespace {
 
+// [LDR] and [HDR] below are the papers listed in flip.h.
+
 // ---- spatial filters: each is a sum of separable filters ----
 
 class Planes {  // three planes: Y, Cx, Cz

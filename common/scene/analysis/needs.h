@@ -42,8 +42,8 @@ struct Needs {
   // True if the density of a heterogeneous medium is in a file. The file may have three channels, which makes
   // the medium chromatic; this is known only after reading it.
   bool density_files = false;
-  // True if the scene has lights and none of them has an extent, so that no ray can hit one: they are
-  // points, spots, projectors or directions.
+  // True if the scene has lights, but none that a ray can hit: all are without extent, such as point, spot
+  // and directional lights.
   bool only_delta_lights = false;
   // The files that the scene needs, in the order of Scene::assets.
   std::vector<FileNeed> files;

@@ -204,8 +204,7 @@ void Pruner::materials() {
     for (int step = 0; step < kMaxBsdfNesting && simplify(b); ++step) {
     }
   // After a blend was replaced by one of its parts, the front or the back of a two-sided material may itself
-  // be two-sided. Both the front and the back then show the front of that inner material, so the inner
-  // two-sided material is replaced by its front.
+  // be two-sided. Such an inner material always shows its front, so it is replaced by its front.
   for (Bsdf& b : s_.bsdfs)
     if (auto* two = std::get_if<TwoSidedBsdf>(&b))
       for (BsdfIndex* side : {&two->front, &two->back})

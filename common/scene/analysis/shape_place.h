@@ -21,7 +21,7 @@ double largest_coordinate(const Box& b);
 // in the group's space. nullopt: the shape is a mesh, or the box is not finite.
 std::optional<Box> box_of(const Shape& shape);
 
-// True if the point is inside a sphere or cube, whose to_world must be invertible; false for other shapes.
+// True if `shape` is a sphere or a cube and the point is inside it. Its to_world must be invertible.
 bool holds(const Shape& shape, const Vec3& p);
 
 }  // namespace ls::scene

@@ -60,8 +60,8 @@ class Search {
   bool emits(MediumIndex m) const { return traits_of(s_.media[m.value], s_.volumes).emits; }
   static std::optional<Box> place_in_scene(const Shape& s) { return s.group ? std::nullopt : box_of(s); }
 
-  // True if light may enter through the shape or come from it. A null surface that bounds no medium does not
-  // count: prune.cpp removes it later.
+  // True if light may enter through the shape or come from it. A surface that light passes unchanged (bsdf
+  // "null") and that bounds no medium does not count, since prune.cpp removes it later.
   bool is_entrance(const Shape& s) const {
     const auto glowing = [&](const std::optional<MediumIndex>& m) { return m && emits(*m); };
     if (s.emitter || glowing(s.interior) || glowing(s.exterior)) return true;

@@ -1,5 +1,5 @@
-// Reads a file of glTF 2.0 and translates it to a Document, a tree of elements in Mitsuba's format. The
-// readers of all scene formats produce such a tree.
+// Reads a file of glTF 2.0 and translates it to a Document, a tree of elements in Mitsuba's format. Files of
+// all other scene formats become such a tree, too.
 #pragma once
 
 #include <string>

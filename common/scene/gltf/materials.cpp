@@ -283,8 +283,8 @@ class MaterialTranslator {
   double ior_ = 1.5, seen_ior_ = 1.5;
 };
 
-// Returns all textures of the material that this reader uses. An item is not given (Item::given()) if the
-// material lacks that texture.
+// Returns all textures of the material that affect its translation. Item::given() is false for a texture that
+// the material lacks.
 std::vector<Item> textures_of(const Item& m) {
   const Item pbr = m["pbrMetallicRoughness"];
   return {pbr["baseColorTexture"],

@@ -43,8 +43,8 @@ class Sampler {
     if (!is_new) return known->second;
     Values values = read(sampler, is_rotation);
     numbers_ += values.size();
-    // The number of animated values is limited, as is the number of values in the JSON of the file, by
-    // kMaxGltfValues.
+    // kMaxGltfValues limits the number of animated values, and separately the number of values in the file's
+    // JSON.
     if (numbers_ > kMaxGltfValues)
       values = wrong(sampler, fmt::format("animations give more than {} numbers at a time: split the scene",
                                           kMaxGltfValues));

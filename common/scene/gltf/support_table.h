@@ -1,5 +1,5 @@
-// The objects and extensions of glTF, and how they are translated. The reader looks up extensions in this
-// table, and docs/reference/gltf.md is generated from it.
+// The objects and extensions of glTF, and how they are translated. The translation looks up extensions in
+// this table, and docs/reference/gltf.md is generated from it.
 #pragma once
 
 #include <span>

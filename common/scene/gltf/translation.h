@@ -64,7 +64,7 @@ bool add_targets(Translation& t, const Item& primitive, const std::vector<double
 // joint, from the space of the stored mesh to the world.
 bool add_skin(Translation& t, const Item& primitive, const std::vector<Transform>& joints, MadeMesh& mesh);
 
-// In placing.cpp: transforms.
+// In placing.cpp: functions that make transforms. composed() and local_transform() are described there.
 Transform composed(const Vec3& move, const std::array<double, 4>& rotation, const Vec3& scale);
 Transform matrix_of(const std::array<double, 16>& by_columns);
 Transform local_transform(const Item& node, const Pose& pose);
@@ -183,10 +183,10 @@ struct Stage {
 };
 Stage read_nodes(Translation& t, const Poses& poses);
 
-// In lights.cpp.
+// In lights.cpp: translates a light and adds it to the scene.
 void add_light(Translation& t, const Standing& light);
 
-// In camera.cpp. Adds the camera with this name (empty: the first one); if there is none, adds a camera that
+// In camera.cpp: adds the camera with this name (empty: the first one); if there is none, adds a camera that
 // frames `box`.
 void add_camera(Translation& t, const std::vector<Standing>& cameras, const std::string& name,
                 const Box& box);

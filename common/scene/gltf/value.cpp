@@ -12,7 +12,7 @@
 namespace ls::scene::gltf {
 namespace {
 
-// An input iterator over the JSON text. It stores the position up to which the parser has read in *reached.
+// An input iterator over the JSON text. In *reached it stores the position up to which the parser has read.
 class Reading {
  public:
   using iterator_category = std::input_iterator_tag;

@@ -49,7 +49,7 @@ class Item {
   // given.
   Item operator[](std::string_view name) const;
   Item extension(std::string_view name) const { return (*this)["extensions"][name]; }
-  std::vector<Item> list() const;  // the values of a list
+  std::vector<Item> list() const;  // returns the values of this list; none if this is not a list
   bool is_true(bool fallback) const;
   double number(double fallback) const;
   std::string text(std::string_view fallback) const;

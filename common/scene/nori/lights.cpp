@@ -76,8 +76,8 @@ Element environment(Object& o) {
   Element out = light("envmap", o);
   add_as(out, o.take("filename"), "filename");
   add_as(out, o.take("strength"), "scale");
-  // Rotates from Mitsuba's convention (+y at the top, -z at the left edge, +x a quarter further) to Nori's
-  // (+z at the top, +x at the left edge, +y a quarter further).
+  // Rotates the map, because the directions of its pixels differ. In Mitsuba +y is at the top of the map, -z
+  // at its left edge and +x a quarter of the width further; in Nori these are +z, +x and +y.
   add_transform(out, o.take("toWorld"), "to_world",
                 {matrix_step({0, 0, -1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1}, o.element().at)});
   return out;

@@ -17,8 +17,8 @@ TagKind object_kind(const Element& e);
 // Checks elements, their attributes and nesting; false if errors were reported.
 bool check_objects(const Element& root, Report& report);
 
-// Returns the table's row for the type of `e`. If the type is unknown or unsupported, reports this and
-// returns nullptr; for an unknown type the message has a suggestion.
+// Returns the row for the type of `e` in the table of Nori's object types. If the type is unknown or
+// unsupported, reports this and returns nullptr; for an unknown type the message has a suggestion.
 const Plugin* known_plugin(const Element& e, Report& report);
 
 // Returns a colour of three numbers, or a grey of one.
@@ -81,7 +81,7 @@ struct Mesh {
 };
 
 std::optional<Element> bsdf(const Element& e, const Mesh& mesh, Report& report);
-// Translates a parameter of a bsdf that is a colour or a <texture>. The result is an element called `name`.
+// Translates a bsdf's parameter, which is a colour or a <texture>, to an element called `name`.
 std::optional<Element> texture(const Element& given, std::string name, const Mesh& mesh, Report& report);
 
 std::optional<Element> medium(const Element& e, const Mesh& mesh, Report& report);

@@ -165,7 +165,7 @@ Element principled(Object& o, const Mesh& mesh, Report& report) {
                            "sheen_tint", "spec_tint", "spec_trans"})
     add_as(out, o.take(name), name);
   const double specular = o.number("specular", .5);
-  // For glass without specular reflection Kombu, a descendant of Nori, uses 0.001, too.
+  // If glass has no specular reflection, 0.001 is used instead of 0, as in Kombu (a descendant of Nori).
   add(out, "specular", glass && specular == 0 ? 1e-3 : specular, o.element().at);
   return out;
 }

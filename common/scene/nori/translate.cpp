@@ -98,8 +98,8 @@ class SceneTranslator {
     add(out_, std::move(out));
   }
 
-  // Adds the bsdf. A mesh that only bounds a medium gets a null bsdf; any other mesh without a bsdf is grey,
-  // even if it emits.
+  // Adds the bsdf and the emitter. A mesh without a bsdf gets the bsdf "null", which light passes unchanged,
+  // if it only bounds a medium; otherwise it is grey, even if it emits.
   void surface(Object& o, const Mesh& m, bool bounds_medium, Element& out) {
     const Span at = o.element().at;
     if (const Element* given = o.only("bsdf")) {

@@ -14,7 +14,7 @@ namespace {
 
 // Returns the luminance Y of a linear sRGB colour, a weighted sum of its channels. The weights, a vector w,
 // follow from linear_srgb(), which converts (X, Y, Z) to sRGB: the dot product of w with the result must be
-// Y. So it is 0 for the sRGB colours of (1, 0, 0) and (0, 0, 1), and 1 for that of (0, 1, 0).
+// Y. So this product is 0 for the sRGB colours of (1, 0, 0) and (0, 0, 1), and 1 for that of (0, 1, 0).
 double luminance(const Rgb& c) {
   static const Vec3 weights = [] {
     const auto column = [](const std::array<double, 3>& xyz) {

@@ -86,9 +86,9 @@ class Loader {
     tokens_ = outer;
   }
 
-  // Counts the elements of the translated scene, and reports if there are more than kMaxElements, the limit
-  // for an XML file, too. The elements in a group are not counted here: each was counted when it was added to
-  // the group.
+  // Counts the elements of the translated scene, and reports an error if there are more than kMaxElements,
+  // which is also the limit for an XML file. The elements in a group are not counted here: each was counted
+  // when it was added to the group.
   bool count_elements(const Token& token) {
     for (; counted_ < t_.scene.children.size(); ++counted_)
       if (t_.scene.children[counted_].get("type") != "shapegroup")
@@ -186,8 +186,8 @@ class Loader {
                                                 suggestion(type, types_of(directive))));
   }
 
-  // Reads the parameters of a named object, such as a MakeNamedMaterial. The object's type is the parameter
-  // "type".
+  // Reads the parameters of a directive that defines a named object, such as MakeNamedMaterial. The object's
+  // type is in the parameter "type".
   std::optional<Params> named(std::string_view directive, const Span& at) {
     auto params = parameters();
     if (!params) return std::nullopt;

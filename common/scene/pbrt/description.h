@@ -1,5 +1,5 @@
-// Reads a file of pbrt-v4 and translates it to a Document in Mitsuba's format, the common form of all
-// readers.
+// Reads a file of pbrt-v4 and translates it to a Document in Mitsuba's format, as is done with files of
+// all other scene formats.
 #pragma once
 
 #include "common/scene/xml/document.h"

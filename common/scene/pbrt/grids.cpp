@@ -89,9 +89,9 @@ class GridLight {
   }
 
  private:
-  // Adds factor(channel) times Lescale as a volume. Without Lescale pbrt uses a grid of one voxel with the
-  // value 1 (GridMedium::Create). Like every grid it falls to 0 half a voxel outside the box: it is 1 in the
-  // middle of the box, 1/2 in the middle of a face, and 1/8 in a corner.
+  // Adds factor(channel) times Lescale as a volume. If the file gives no Lescale, pbrt uses a grid of a
+  // single voxel with the value 1 (GridMedium::Create). Like every grid it falls to 0 half a voxel outside
+  // the box: it is 1 in the middle of the box, 1/2 in the middle of a face, and 1/8 in a corner.
   template <class F>
   bool add_scales(Element& out, const char* name, int channels, F factor) {
     const std::array<int, 3> sides = scales_ ? sides_ : std::array{1, 1, 1};

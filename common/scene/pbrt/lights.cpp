@@ -114,8 +114,9 @@ class LightTranslator {
     return out;
   }
 
-  // pbrt shows nothing of the map in other directions than through the portal. In a closed room whose only
-  // opening is the portal, the walls hide these directions anyway. So the map is read as a whole.
+  // Ignores the portal, with a warning. In pbrt the map is visible only through the portal, here in all
+  // directions. In a closed room with the portal as its only opening this is the same, since the walls hide
+  // the rest of the map.
   void read_portal() {
     if (!p_.has("portal")) return;
     const Param* portal = p_.take("portal");

@@ -101,7 +101,7 @@ class MaterialTranslator {
     add(out, "alpha_u", is_smooth(metal) ? 0. : metal.first, p_.at());
     add(out, "alpha_v", is_smooth(metal) ? 0. : metal.second, p_.at());
     // pbrt divides eta and k by the coat's index of refraction, even if it computes them from a reflectance.
-    // Our bsdf divides them, too, so it gets the undivided values.
+    // Our `coatedconductor` also divides them, so it gets the undivided values here.
     if (p_.has("reflectance"))
       by_reflectance(out);
     else
@@ -114,7 +114,8 @@ class MaterialTranslator {
     return out;
   }
 
-  // Uses pbrt's formulas eta = 1, k = 2 sqrt(r / (1 - r)), with r at most 0.9999.
+  // Adds the eta and k of a metal with the reflectance r, by pbrt's formulas: eta = 1, k = 2 sqrt(r / (1 -
+  // r)), with r at most 0.9999.
   void by_reflectance(Element& out) {
     const auto r = surface_colour(t_, *p_.take("reflectance"));
     if (!r) return;
@@ -213,7 +214,8 @@ class MaterialTranslator {
 
   void add_alpha(Element& out, const Alpha& a) {
     add(out, "string", "distribution", "ggx", p_.at());
-    // The lower bound is for a surface that is smooth along one of u and v and rough along the other.
+    // If the surface is rough along only one of u and v, the other alpha may be 0, which the bsdf does not
+    // allow.
     add(out, "alpha_u", std::max(a.first, 1e-4), p_.at());
     add(out, "alpha_v", std::max(a.second, 1e-4), p_.at());
   }
@@ -247,7 +249,7 @@ class MaterialTranslator {
     return 1.5;
   }
 
-  // Wraps a bsdf in the maps that change its normal.
+  // Wraps a bsdf in the bump map and in the normal map of the material, if it has them.
   Element shaped(Element inner) {
     const auto words = {std::pair{"displacement", "bumpmap"}, {"bumpmap", "bumpmap"}};
     for (const auto& [theirs, ours] : words) {
@@ -280,7 +282,7 @@ class MaterialTranslator {
   Params& p_;
 };
 
-// True if a texture is in the element or is referred to by name.
+// True if the element, or an element below it, is a texture or a named reference to one.
 bool has_texture(const Element& e) {
   if (e.tag == "texture" || (e.tag == "ref" && e.find("name"))) return true;
   return std::any_of(e.children.begin(), e.children.end(), has_texture);

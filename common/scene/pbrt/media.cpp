@@ -29,7 +29,7 @@ constexpr Substance kSubstances[] = {
     {"Spectralon", {0, 0, 0}, {11.6, 20.4, 14.9}},
     {"Wholemilk", {0.0011, 0.0024, 0.014}, {2.55, 3.21, 3.77}},
     // S. G. Narasimhan, M. Gupta, C. Donner, R. Ramamoorthi, S. K. Nayar, H. W. Jensen: Acquiring Scattering
-    // Properties of Participating Media by Dilution, SIGGRAPH 2006; the dilutions as pbrt-v4 has them.
+    // Properties of Participating Media by Dilution, SIGGRAPH 2006; with the dilutions that pbrt-v4 uses.
     {"Lowfat Milk", {0.002875, 0.00575, 0.0115}, {0.89187, 1.5136, 2.532}},
     {"Reduced Milk", {0.0025556, 0.0051111, 0.012778}, {2.4858, 3.1669, 4.5214}},
     {"Regular Milk", {0.0015333, 0.0046, 0.019933}, {4.5513, 5.8294, 7.136}},

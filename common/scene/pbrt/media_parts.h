@@ -30,7 +30,7 @@ void add_albedo(MediumSource& m, Element& out, const Rgb& albedo);
 // colour `tint` if the factor differs between channels.
 void add_extinction(MediumSource& m, Element& out, const Rgb& extinction);
 
-// Measured coefficients of a substance, by the name that pbrt-v4 has for it.
+// Measured coefficients of a substance. `name` is pbrt-v4's name for the substance.
 struct Substance {
   std::string_view name;
   Rgb absorption, scattering;  // in 1/mm; `scattering` is the reduced scattering coefficient
@@ -63,11 +63,11 @@ void add_volume(MediumSource& m, Element& out, const char* name, const std::stri
 bool add_grid(MediumSource& m, Element& out, const char* name, const MadeGrid& grid, const Box& box,
               Filling filling);
 
-// grids.cpp
+// These two are in grids.cpp. Each translates a medium type of pbrt: "uniformgrid" and "rgbgrid".
 bool uniform_grid(MediumSource& m, Element& out);
 bool rgb_grid(MediumSource& m, Element& out);
 
-// cloud.cpp
+// In cloud.cpp. Translates pbrt's medium type "cloud".
 bool cloud(MediumSource& m, Element& out);
 
 }  // namespace ls::scene::pbrt

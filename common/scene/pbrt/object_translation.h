@@ -15,8 +15,8 @@
 
 namespace ls::scene::pbrt {
 
-// A transform `to` and its inverse `from`. Each step, such as a translation, updates both, so `from` is as
-// exact as the inverses of the steps.
+// A transform `to` and its inverse `from`. `from` is the product of the inverses of the steps (such as
+// translations) that make up `to`, which is more exact than an inverse computed from `to`.
 struct Placed {
   Transform to, from;
 };
@@ -47,8 +47,8 @@ struct Material {
   bool has_texture = false;
 };
 struct AreaLight {
-  // The radiance of a shape, if `power` is nullopt. Otherwise the radiance is this colour times power / (pi
-  // A), where A is the area of the shape's emitting sides.
+  // The light's radiance, if `power` is nullopt. Otherwise the light's radiance is this colour times power /
+  // (pi A), where A is the area of the shape's emitting sides.
   Rgb radiance;
   std::optional<double> power;
   bool two_sided = false;
@@ -100,7 +100,7 @@ std::optional<Rgb> surface_colour(Translation& t, const Param& p);
 // Takes the parameter `name`, the colour of a light. Returns white if it is not given or is wrong.
 Rgb light_colour(Translation& t, Params& params, std::string_view name);
 
-// textures.cpp
+// Defined in textures.cpp.
 void add_texture(Translation& t, const std::string& name, Params& p);
 struct Names {
   std::string_view theirs, ours;
@@ -117,18 +117,19 @@ void refer(Element& parent, std::string_view name, std::string id, const Span& a
 // In materials.cpp. Adds the material to the scene under this id. nullopt: it was reported as wrong.
 std::optional<Material> add_material(Translation& t, const std::string& id, Params& p);
 
-// lights.cpp
+// Defined in lights.cpp.
 void add_light(Translation& t, Params& p, const Placed& ctm);
 AreaLight area_light(Translation& t, Params& p);
 
-// media.cpp
+// Defined in media.cpp.
 void add_medium(Translation& t, const std::string& name, Params& p, const Placed& ctm);
 std::string medium_id(const std::string& name);
 
 // In shapes.cpp. nullopt: the shape was reported as wrong.
 std::optional<Element> shape(Translation& t, Params& p, const Attributes& attributes);
 
-// In camera.cpp: the directives that stand before WorldBegin. nullopt: the file does not have the directive.
+// In camera.cpp. The directives before WorldBegin that set up the camera and the rendering. nullopt: the file
+// does not have the directive.
 struct Settings {
   std::optional<Params> film, camera, filter, sampler, integrator;
   Placed camera_ctm;

@@ -44,14 +44,15 @@ struct Param {
   std::string type, name;  // for example "rgb" and "reflectance"
   Span at;                 // place of the declaration
   std::vector<double> numbers;
-  std::vector<std::string> texts;  // the values that are quoted texts, true or false
+  std::vector<std::string> texts;  // values that are quoted texts, and the words true and false
 };
 
 // Reads the parameters that follow a directive. nullopt: they are wrong, which was reported.
 std::optional<std::vector<Param>> read_params(Tokens& tokens, Report& report);
 
-// The parameters of one object. The object's reader takes each parameter by its name. finish() reports the
-// parameters that were not taken, except those that the table in vocabulary.h marks as ignored.
+// The parameters of one object. The code that translates the object takes each parameter by its name.
+// finish() reports the parameters that were not taken, except those that the table in vocabulary.h marks as
+// ignored.
 class Params {
  public:
   Params(const Row& row, const Span& at, std::vector<Param> params, Report& report);

@@ -1,4 +1,4 @@
-// Translates shapes, with the current material, light and media.
+// Translates shapes, and assigns to them the current material, area light and media.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -189,9 +189,9 @@ class ShapeTranslator {
     return kept(with_default_uv(mesh));
   }
 
-  // Largest number of corners that are made from a shape's list of indices. An index takes as little as 2
-  // bytes of text, but the corner that is made from it takes up to 200 bytes of memory until the mesh's file
-  // is written.
+  // The most corners that a mesh may have if each triangle or patch gets corners of its own. An index takes
+  // as little as 2 bytes of text, but the corner that is made from it takes up to 200 bytes of memory until
+  // the mesh's file is written.
   static constexpr std::size_t kMaxOwnCorners = std::size_t{1} << 22;
   std::optional<Element> too_many_corners() {
     return p_.refuse(
@@ -246,8 +246,9 @@ class ShapeTranslator {
   }
 
   // In pbrt ReverseOrientation flips the normal, and mirroring a mesh leaves its normal on the original side.
-  // The normals of our meshes without vertex normals follow the order of corners, which mirroring reverses,
-  // and the normals of our mirrored spheres point inwards.
+  // Here mirroring reverses the order of a mesh's corners and so its normal, if the mesh has no vertex
+  // normals; and the normals of a mirrored sphere point inwards. Adds flip_normals if the normals would
+  // otherwise be on the other side than in pbrt.
   void orient(Element& out) {
     const bool mirrored = determinant3(a_.ctm.to) < 0;
     const std::string_view type = p_.row().type;

@@ -1,6 +1,6 @@
 // The vocabulary of pbrt's files: each directive with its types and their parameters, and how they are
-// translated. The reader checks parameters against this table, and docs/reference/pbrt.md is generated from
-// it.
+// translated. The class Params (parameters.h) checks parameters against this table, and
+// docs/reference/pbrt.md is generated from it.
 #pragma once
 
 #include <span>

@@ -62,8 +62,8 @@ void Reader::read_projection(const Element& e, Params& p, Sensor& s) {
   }
 }
 
-// Reads the sensor's medium. Its name is "medium" or absent; any other name is an error, since "interior" and
-// "exterior" are names for the media of shapes.
+// Reads the sensor's medium. The name of this parameter is "medium" or absent; any other name is an error,
+// since "interior" and "exterior" are names for the media of shapes.
 void Reader::read_sensor_medium(Params& p, Sensor& s) {
   const Element* use = p.take("medium");
   if (const Element* object = use ? resolve(*use) : nullptr) s.medium = medium(*object, *use);

@@ -56,7 +56,7 @@ class Parameters {
     if (values_.size() >= kMaxParameters)
       return complain(e.at, fmt::format("more than {} parameters", kMaxParameters));
     note_length(name);
-    values_.emplace(std::move(name), std::move(value));  // keeps a value of -D or an earlier <default>
+    values_.emplace(std::move(name), std::move(value));  // no effect if -D or an earlier <default> set it
     return true;
   }
 
@@ -175,8 +175,8 @@ class Loader {
     return false;
   }
 
-  // Substitutes parameters, and replaces <include>, <default> and <path>. The depth of recursion is bounded
-  // by kMaxNesting and kMaxIncludeDepth.
+  // Substitutes parameters, inserts the files of <include>, and applies and removes <default> and <path>. The
+  // depth of recursion is bounded by kMaxNesting and kMaxIncludeDepth.
   bool expand(Element& e, bool old) {
     for (Attribute& a : e.attributes)
       if (!parameters_.substitute(a)) return false;

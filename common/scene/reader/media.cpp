@@ -45,9 +45,9 @@ void need_inverse(const Transform& to_world, const Element& e, Report& report) {
     report.error(e.at, "to_world flattens this volume or leaves the range of numbers: it can't be inverted");
 }
 
-// Records which parameters are given that have no effect alone: emission_scale (`light`) needs an emission;
-// temperature_scale, temperature_offset (`heat`), peak_one and emission_weight (`of_heat`) need a
-// temperature. Must be constructed before parameters are taken from `p`.
+// Records which of those parameters are given that have no effect on their own: emission_scale (`light`)
+// needs an emission; temperature_scale, temperature_offset (`heat`), peak_one and emission_weight (`of_heat`)
+// need a temperature. Must be constructed before parameters are taken from `p`.
 struct Factors {
   explicit Factors(const Params& p)
       : light(p.has("emission_scale")), heat(p.has("temperature_scale") || p.has("temperature_offset")) {

@@ -14,7 +14,7 @@ namespace ls {
 namespace scene {
 namespace {
 
-constexpr std::size_t kMaxTested = 1000;  // most scenes or bsdfs of a test, and most numbers in a list
+constexpr std::size_t kMaxTested = 1000;  // most scenes or bsdfs in a test; most numbers in a list
 constexpr double kMaxSamples = 1e9;
 
 const nori::Parameter kSignificanceLevel{

@@ -15,7 +15,7 @@ enum class NoriTestKind { t_test, chi2_test };
 
 struct NoriTest {
   NoriTestKind kind = NoriTestKind::t_test;
-  double significance_level = .01;  // in (0, 1); for all tests of the file together
+  double significance_level = .01;  // in (0, 1); holds for all tests of the file together
   // Number of paths or directions drawn per scene or bsdf. For chi2_test, 0 means 5,000 per cell of the table
   // of directions (see `resolution`).
   std::uint64_t sample_count = 100'000;

@@ -1,5 +1,5 @@
-// The parameters of one object. The object's reader takes parameters by name; finish() reports those that
-// were not taken.
+// The parameters of one object. The code that reads the object takes parameters by name; finish() reports
+// those that were not taken.
 #pragma once
 
 #include <fmt/format.h>
@@ -24,7 +24,7 @@ class Params {
   std::string title() const;  // for example: bsdf "diffuse"
   bool has(std::string_view name) const;
   // Returns the child of that name (a property, an object or a reference), and marks it as taken. nullptr:
-  // there is none. The name becomes one that messages may suggest.
+  // there is none. From then on, a message about an unknown parameter may suggest this name.
   const Element* take(std::string_view name);
   // A nested object that was not taken by name. `use` is the element in the parent: the object itself, or a
   // reference to it.
@@ -37,7 +37,7 @@ class Params {
   // Returns the only nested object with this tag; nullopt if there is none. A second one is reported as
   // "{owner} has a second {kind}".
   std::optional<Nested> take_only(std::string_view tag, std::string_view owner, std::string_view kind);
-  // Reports the parameters that no reader took.
+  // Reports the parameters that were not taken.
   void finish();
 
   // Each function returns the value of a parameter that is a string or a transform. nullopt: the parameter is

@@ -84,7 +84,7 @@ void Reader::read_child(const Element& child) {
   if (e->tag == "volume") return void(volume(*e, child));
   if (e->tag == "phase") return void(phase(*e, child));
   if (e->tag == "medium") return void(medium(*e, child));
-  // A film, filter or sampler with an id is kept for the sensor that refers to it
+  // A film, filter or sampler with an id is kept for a sensor that refers to it.
   if (e->find("id")) return parts_.push_back(e);
   report_.error(e->at, fmt::format("a <{}> belongs into a <sensor>", e->tag));
 }
@@ -251,7 +251,7 @@ ReadResult read_scene(std::string_view file_name, std::string_view text, AssetSo
   scene::Report report(options.strict);
   ReadResult result;
   // The Python package converts a USD stage to XML and sends the XML under the stage's name. So a text with a
-  // <scene> is read even if its name is that of another format
+  // <scene> is read even if its name has the ending of another format.
   const bool has_scene_element = text.substr(0, 4096).find("<scene") != text.npos;
   if (std::string why = scene::why_no_scene(file_name); !why.empty() && !has_scene_element) {
     const std::uint32_t file = report.add_file(scene::SourceText(std::string(file_name), ""));

@@ -1,5 +1,5 @@
-// Converts a Document to a Scene. The class Reader reads all kinds of objects, each kind in a .cpp file of
-// its own, and holds the state that they share.
+// Converts a Document to a Scene. The class Reader has the functions that read the objects, with a .cpp file
+// for each kind of object, and the data that these functions share.
 #pragma once
 
 #include <initializer_list>
@@ -154,7 +154,7 @@ class Reader {
   const Element* integrator_ = nullptr;
   const Element* material_ = nullptr;  // material of the last shape read; nullptr: the default material
   std::unordered_set<std::string> labels_;
-  std::unordered_map<std::string, std::size_t> label_numbers_;  // next number to append to a name, by name
+  std::unordered_map<std::string, std::size_t> label_numbers_;  // by name: next number to append to it
   // parts_: the films, filters and samplers at the top level. used_parts_: the films, filters and samplers
   // that have been read for a sensor.
   std::vector<const Element*> parts_;
@@ -165,7 +165,7 @@ class Reader {
   std::vector<BsdfTraits> bsdf_traits_;
 
   bool reads_attributes_ = false;  // true if some texture read so far is a mesh attribute
-  // For each texture for which old_number() has made a texture with swapped colours: the made texture.
+  // Maps a texture to the copy with swapped colours that old_number() has made of it.
   std::map<TextureIndex, TextureIndex> old_numbers_;
   Memo<TextureIndex> textures_;
   Memo<Spectrum> spectra_;

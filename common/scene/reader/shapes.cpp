@@ -161,7 +161,7 @@ void Reader::read_shape_parts(Params& p, Shape& shape) {
     if (const auto index = bsdf(*given->object, *given->use)) shape.bsdf = *index;
     return;
   }
-  // In Mitsuba 0.x a shape that only bounds a medium has a null bsdf.
+  // In Mitsuba 0.x a shape that bounds a medium and has no bsdf lets all light pass unchanged (NullBsdf).
   if (p.object().old && !emitter && shape.is_medium_transition) {
     shape.bsdf = added<BsdfIndex>(NullBsdf{});
     return;

@@ -103,7 +103,7 @@ const BsdfTraits& Reader::traits(BsdfIndex bsdf) {
 // Checks that the roughness is constant: the energy table of multiple scattering is for a single roughness.
 void Reader::check_multiple_scattering(const Element& e, TextureIndex alpha_u, TextureIndex alpha_v) {
   const std::size_t n = scene_.textures.size();
-  if (alpha_u.value >= n || alpha_v.value >= n) return;  // already reported
+  if (alpha_u.value >= n || alpha_v.value >= n) return;  // the error was reported before
   const auto* u = std::get_if<ConstantTexture>(&scene_.textures[alpha_u.value]);
   const auto* v = std::get_if<ConstantTexture>(&scene_.textures[alpha_v.value]);
   if (!u || !v)
@@ -247,9 +247,9 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<TwoSidedBsdf>(const Element& e) {
   return add_bsdf(e, TwoSidedBsdf{sides->front(), sides->back()});
 }
 
-// In version 3 a checkerboard that is used as a scalar has its two values on other squares than one that is
-// used as a colour (see CheckerboardTexture in scene.h). In version 0.x both have the same squares. So in
-// files of version 0.x a checkerboard that is used as a scalar is replaced by one with swapped colours.
+// In version 3 a checkerboard that is used as a scalar has its two values exchanged, compared with one that
+// is used as a colour (see CheckerboardTexture in scene.h). In version 0.x the values are not exchanged. So
+// in files of version 0.x a checkerboard that is used as a scalar is replaced by one with swapped colours.
 TextureIndex Reader::old_number(const Element& e, TextureIndex t) {
   if (!e.old || t.value >= scene_.textures.size()) return t;
   const auto* given = std::get_if<CheckerboardTexture>(&scene_.textures[t.value]);

@@ -16,7 +16,7 @@ std::vector<std::string> meaningless_parameters(std::string_view tag, std::strin
 std::string_view replacement(std::string_view tag, std::string_view parameter);
 
 struct MeaninglessRow {
-  std::string_view tag, plugin;  // `plugin` is "" for all plugins of this tag
+  std::string_view tag, plugin;  // `plugin` "": the row holds for all plugins of this tag
   std::vector<std::string> parameters;
   std::string_view because;
 };

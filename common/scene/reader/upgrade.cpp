@@ -18,8 +18,8 @@ constexpr Renamed kRenamed[] = {
     {"medium", "heterogeneous", "density", "sigma_t"},
 };
 
-// Values that have new names. `trilinear` and `ewa` also filtered minified textures; `bilinear` does not, so
-// minified textures need more samples.
+// Values of parameters, with the values that replace them in Mitsuba 3. In old versions `trilinear` and `ewa`
+// also filter minified textures; `bilinear` does not, so minified textures need more samples.
 constexpr struct {
   std::string_view tag, plugin, parameter, before, now;
 } kValues[] = {
@@ -70,7 +70,7 @@ void rename_parameters(Element& e) {
         if (Attribute* value = find(*c, "value"); value && value->value == row.before) value->value = row.now;
 }
 
-// Moves the value of a parameter to one component of a transform step.
+// Moves the value of a texture's parameter to one component (`axis`) of a transform step.
 void move_part(Element& texture, std::string_view parameter, Element& step, std::string_view axis) {
   Element* c = child(texture, parameter);
   if (!c) return;

@@ -172,7 +172,8 @@ class Writer {
   static std::string id_of(MediumIndex i) { return fmt::format("medium{}", i.value); }
   static std::string id_of(GroupIndex i) { return fmt::format("group{}", i.value); }
 
-  // Writes only the fields that the plugin of the shape has: "serialized" has no flip_tex_coords.
+  // Writes the fields of a geometry, except flip_tex_coords for a mesh of the plugin "serialized", which does
+  // not have this parameter.
   struct GeometryFields {
     Writer& writer;
     const Geometry& geometry;
@@ -295,7 +296,7 @@ class Writer {
   template <class E>
   requires std::is_enum_v<E>
   void property(const Field& f, E e) { value("string", f.name, name_of(e)); }
-  void property(const Field& f, GridOrder o) {  // not in Mitsuba 3: the default is left out
+  void property(const Field& f, GridOrder o) {  // not in Mitsuba 3: written only if not the default
     if (o != GridOrder{}) value("string", f.name, name_of(o));
   }
   void property(const Field& f, const Vec3& x) {

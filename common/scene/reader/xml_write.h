@@ -1,4 +1,4 @@
-// Writes a Scene as canonical Mitsuba 3 XML, from the same table that reads it (describe.h).
+// Writes a Scene as canonical Mitsuba 3 XML, by the same table by which scenes are read (describe.h).
 #pragma once
 
 #include <string>

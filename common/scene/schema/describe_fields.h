@@ -140,7 +140,8 @@ concept Described = requires(AnyVisitor& v, T& t) {
   describe(v, t);
 };
 
-// Returns that list of the scene s into which an index of this type points: s.textures for a TextureIndex.
+// Returns the list of the scene s into which this type of index points, such as s.textures for a
+// TextureIndex.
 template <class S, class Tag>
 auto& pool(S& s, Index<Tag>) {
   if constexpr (std::is_same_v<Tag, AssetTag>)

@@ -18,7 +18,7 @@ class Walk {
   template <class T>
   void field(const Field& f, const T& value) {
     const As before = as_;
-    // Textures nested in a texture are read in the same way as the outer texture.
+    // A nested texture is read as the same type (scalar, colour or either) as the texture that contains it.
     if (in_texture_ == 0) as_ = f.number ? As::number : f.name == "normalmap" ? As::colour : As::any;
     go(value);
     as_ = before;

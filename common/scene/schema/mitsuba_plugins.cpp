@@ -239,12 +239,13 @@ bool has_row(const std::vector<PluginRow>& rows, std::string_view tag, std::stri
   return std::ranges::any_of(rows, [&](const PluginRow& r) { return r.tag == tag && r.name == name; });
 }
 
-// Adds a row for each alternative of the variant that Mitsuba does not have. The row is inserted after the
-// rows with the same tag.
+// Adds a row for each alternative of the variant (a kind of object) that Mitsuba does not have. The row is
+// inserted after the rows with the same tag.
 template <class... Kinds>
 void add_ours(std::vector<PluginRow>& rows, std::type_identity<std::variant<Kinds...>>) {
   for (const TypeInfo& kind : {kInfo<Kinds>...}) {
-    // A kind whose `plugins` is not empty is read under those names only, and Mitsuba has them all.
+    // A kind with a list `plugins` is read under the names in this list only. All of these are Mitsuba's, so
+    // they have rows already.
     if (!kind.plugins.empty() || has_row(rows, kind.kind, kind.name)) continue;
     const auto last =
         std::find_if(rows.rbegin(), rows.rend(), [&](const PluginRow& r) { return r.tag == kind.kind; });

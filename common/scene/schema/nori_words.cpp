@@ -251,7 +251,7 @@ constexpr IntegratorRow kIntegrators[] = {
     {"photonmapper", "path", {}, "light is followed exactly, without the blur of gathered photons"},
 };
 
-// The reason for which integrators that show something other than light (normals, ...) are rejected.
+// Why integrators that show something other than light (normals, ...) are rejected.
 constexpr std::string_view kNoLight =
     "what it draws is not light: choose path_mis, or vol_path_mis if there are media";
 

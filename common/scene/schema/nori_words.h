@@ -52,7 +52,7 @@ struct Refused {
   std::string_view tag, type, because;
 };
 std::span<const Refused> refused_plugins();
-// Returns the reason for which the object is rejected; empty: it is not in the table of rejected objects.
+// Returns why the object is rejected; empty: it is not in the table of rejected objects.
 std::string_view refused_because(std::string_view tag, std::string_view type);
 
 struct IntegratorRow {

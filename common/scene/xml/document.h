@@ -16,7 +16,7 @@ namespace ls::scene {
 
 struct Attribute {
   std::string name, value;  // value: with entities decoded and parameters substituted
-  Span name_at, value_at;   // their places in the file; value_at: the text between the quotes
+  Span name_at, value_at;   // places of both in the file; value_at: between the quotes
 };
 
 struct Element {

@@ -19,7 +19,7 @@ struct TagRow {
   TagKind kind;
   std::vector<std::string> required, optional;
 };
-// Reports attributes that the row does not have, and required ones that are missing.
+// Reports attributes of `e` that are not in the row, and required attributes of the row that `e` lacks.
 void check_attributes(const Element& e, const TagRow& row, Report& report);
 
 TagKind kind_of(const Element& e);  // for example, a <spectrum type="..."> is an object

@@ -26,8 +26,8 @@ struct Span {
 
 class SourceText {
  public:
-  // Used if the text is JSON, otherwise empty. Returns the JSON path of the value at an offset in the text; a
-  // diagnostic about this offset begins with the path.
+  // A function that returns the JSON path of the value at an offset in the text; a diagnostic about this
+  // offset begins with the path. It is empty if the text is not JSON.
   using PathOf = std::function<std::string(std::size_t)>;
   SourceText(std::string name, std::string text, PathOf path_of = {});
 

@@ -24,7 +24,8 @@ Rgb srgb_of(const Xyz& c) {
           .055648 * c[0] - .204043 * c[1] + 1.057311 * c[2]};
 }
 
-// Observer and illuminant at one wavelength, interpolated between the rows of the table.
+// The values of observer and illuminant at one wavelength, interpolated between the rows of the CIE table
+// (cie.h).
 struct Seen {
   Xyz observer;
   double light;

@@ -189,7 +189,8 @@ bool is_rigid(const Transform& t) {
 bool is_similarity(const Transform& t) {
   const Vec3 columns[3] = {column(t, 0), column(t, 1), column(t, 2)};
   const double size = dot(columns[0], columns[0]);
-  // Files often give numbers with six digits, so that relative differences of squares are a few 1e-6.
+  // Files often give numbers with six digits, so the squares of equal lengths may differ by a few 1e-6 of
+  // their value.
   const double slack = 1e-5 * size;
   return std::abs(dot(columns[1], columns[1]) - size) <= slack &&
          std::abs(dot(columns[2], columns[2]) - size) <= slack &&

@@ -18,7 +18,7 @@ std::optional<Vec3> unit(const Vec3& v);
 inline Vec3 column(const Transform& t, std::size_t i) { return {t.m[i], t.m[4 + i], t.m[8 + i]}; }
 Transform of_columns(const Vec3& x, const Vec3& y, const Vec3& z, const Vec3& origin);
 Transform multiply(const Transform& a, const Transform& b);
-Vec3 transform_point(const Transform& t, const Vec3& p);  // without the last row, which is 0 0 0 1
+Vec3 transform_point(const Transform& t, const Vec3& p);  // assumes that the last row is 0 0 0 1
 Vec3 transform_vector(const Transform& t, const Vec3& v);
 double determinant3(const Transform& t);  // returns the determinant of the linear part
 

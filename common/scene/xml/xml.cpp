@@ -90,7 +90,8 @@ class TreeBuilder {
   bool read_attributes(pugi::xml_node node, Element& out) {
     AttributePlaces places(file_, text_, out.at.offset);
     for (const pugi::xml_attribute attribute : node.attributes()) {
-      // The limit bounds the time of the search for duplicate names below, which is quadratic.
+      // The limit bounds the time of the search for duplicate names below, which is quadratic in their
+      // number.
       if (out.attributes.size() == kMaxElementAttributes)
         return report_.error(out.at,
                              fmt::format("<{}> has more than {} attributes", out.tag, kMaxElementAttributes)),

@@ -64,9 +64,9 @@ struct JobFigures {
   // Predicted CPU seconds of the units that are not done, from measured cost. 0: nothing has been measured
   // yet, or the end of an adaptive job (one with a target error) is not predicted yet.
   double core_seconds_left = 0;
-  double core_seconds_to_limit = 0;  // predicted CPU seconds if all tiles get all their samples
-  // Number of cores that work for the job. For each worker these are its cores times a fraction: the leases
-  // of this job, divided by all leases that the worker holds
+  double core_seconds_to_limit = 0;  // predicted CPU seconds left if all tiles get all their samples
+  // Number of cores that work for the job. A worker that also holds leases of other jobs counts in part: its
+  // cores times the number of its leases of this job, divided by the number of all its leases.
   double cores = 0;
   double core_seconds_queued = 0;  // predicted CPU seconds of the units that wait for a worker
   std::optional<TimePoint> first_ray;
@@ -101,8 +101,8 @@ class Farm {
 
   std::vector<Effect> handle(const Event& event, TimePoint now);
 
-  // Queries. For an unknown id they return nullopt, an empty container or Verdict::no. `numeric_class` is the
-  // class of the worker that rendered the result.
+  // Queries. For an unknown id they return nullopt, an empty container or Verdict::no. wanted() concerns a
+  // result of `unit` that has arrived; `numeric_class` is that of the worker that rendered it.
   Wanted wanted(const UnitKey& unit, const Digest& numeric_class) const;
   std::optional<JobFigures> job(const JobId& id) const;
   // Returns the job's current plan, for storage: with changed priority and samples, and without a target

@@ -153,8 +153,8 @@ void Farm::State::on(const JobFocused& event) {
   job->look_at_focus();
 }
 
-// Forgets the job. The record of workers' failures in it remains until the failures are forgiven: a worker
-// that fails in two jobs is unhealthy, even if the first job is gone.
+// Forgets the job. The workers' failures in it stay recorded until they are forgiven: a worker that fails in
+// two jobs is unhealthy, even if the first job is gone.
 void Farm::State::on(const JobForgotten& event) {
   Job* job = find(event.job);
   if (job == nullptr || !job->ended()) return;

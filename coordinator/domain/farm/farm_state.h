@@ -19,7 +19,7 @@
 
 namespace ls::coordinator {
 
-// Returns the smaller of two limits, of which 0 means no limit.
+// Returns the smaller of two limits; a limit of 0 means no limit.
 std::uint32_t tighter(std::uint32_t a, std::uint32_t b);
 
 struct Farm::State {
@@ -32,7 +32,7 @@ struct Farm::State {
   std::unordered_map<JobId, Job*> by_id;
   JobSeq last_job = 0;
   FairShare shares;                    // the order in which jobs get workers
-  std::map<std::string, Load> users;   // leased units by owner of the jobs, without the administrator's
+  std::map<std::string, Load> users;   // leased units by owner of the jobs, except the administrator
   std::map<std::string, Load> groups;  // leased units by sequence (JobPlan::group)
   std::map<WorkerId, std::string> quarantined;
   AuditFigures audited;
@@ -103,7 +103,7 @@ struct Farm::State {
   void on(const UnitFolded& event);
   void on(const DenoisedChecked& event);
   void on(const UnitFailed& event);
-  void charge(Job& job, double cpu_seconds);  // adds a result's CPU seconds to its user's and group's shares
+  void charge(Job& job, double cpu_seconds);  // adds CPU seconds to the shares of the job's owner and group
   void issue_folds(Job& job, TileIndex tile);
   void issue_folds(Job& job) {
     for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
@@ -121,7 +121,8 @@ struct Farm::State {
   // none.
   std::optional<UnitCode> audit_for(const Job& job, const Worker& worker) const;
   bool audit_from(Job& job, Worker& worker);
-  // True if this worker holds or held a lease on this unit. Only then its result counts as a vote.
+  // True if this worker holds or held a lease on this unit. Only the result of such a worker counts as a
+  // vote.
   bool was_asked(const Job& job, UnitCode code, WorkerIndex worker) const;
   void agreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
   void disagreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
@@ -170,7 +171,8 @@ struct Farm::State {
   void grant(Job& job, Worker& worker, std::vector<UnitCode> units, bool audit = false);
   void load(Job& job, const Worker& worker, std::uint32_t units);
   void unload(Job& job, std::uint32_t units);
-  // Notes that the worker holds one lease less of this job, and so of the job's owner and group
+  // Notes that the worker holds one lease fewer of this job. The counts of the job's owner and group fall,
+  // too
   void leave_load(Job& job, const Worker& worker);
   // Returns how many more of the job's units may be leased to the worker under the limits on workers and
   // units. The limits do not apply to audits: the farm orders them, not the user, and an audit that waited

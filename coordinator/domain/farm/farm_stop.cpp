@@ -114,12 +114,12 @@ void Farm::State::stop_at_level(Job& job) {
   issue_folds(job);
 }
 
-// Decides which units are still rendered before the time limit. The time available is the CPU time, until the
-// limit, of all workers that may render the job, minus the predicted cost of the job's leased units. Queued
-// units are kept, in the order of rounds, until their predicted cost uses up this time; a last unit that fits
-// only in part is kept if at least half of its cost fits. So the job ends as often before the limit as after
-// it. Leased units stay leased, however long they take: dropping slow units would bias the image. This
-// function is called again at every tick until the limit, since predictions improve.
+// Decides which units are still rendered before the time limit. The available time is the CPU time that all
+// workers that may render the job have until the limit, minus the predicted cost of the job's leased units.
+// Queued units are kept, in the order of rounds, until their predicted cost uses up this time; a last unit
+// that fits only in part is kept if at least half of its cost fits. So the job ends as often before the limit
+// as after it. Leased units stay leased, however long they take: dropping slow units would bias the image.
+// This function is called again at every tick until the limit, since predictions improve.
 void Farm::State::plan_end(Job& job, TimePoint limit) {
   if (job.adaptive_running() || !job.cost.known()) return;
   if (job.stopping == StopReason::time) {

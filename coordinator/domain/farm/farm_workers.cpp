@@ -133,7 +133,8 @@ void Farm::State::on(const Tick&) {
     if (!job->leasable() || job->frozen) continue;
     const auto limit = job->time_limit(now);
     if (limit && now >= *limit) freeze(*job, StopReason::time);
-    // The last units are chosen early, before any lease could extend beyond the limit
+    // The units that are rendered before the time limit are chosen early, because leases granted later might
+    // extend beyond the limit
     else if (limit && seconds(*limit - now) <= 2 * kTimePlanned)
       plan_end(*job, *limit);
   }

@@ -58,7 +58,7 @@ class Api {
   // Returns the sink for a body that is streamed (BodyKind::blob and archive), or the response that rejects
   // the request.
   std::variant<Response, std::unique_ptr<BodySink>> open_upload(const Match& match, const Request& request);
-  // Requests that long-running work end at its next step; called when the coordinator stops.
+  // Asks long-running work to end at its next step; called when the coordinator stops.
   void ask_to_stop() { stop_.request_stop(); }
   std::stop_token stop_token() const { return stop_.get_token(); }
 

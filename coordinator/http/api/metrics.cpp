@@ -30,7 +30,7 @@ std::uint64_t files_in(const char* folder) {
   for (std::filesystem::directory_iterator at(folder, failed), end; !failed && at != end;
        at.increment(failed))
     ++count;
-  // The iterator that lists the descriptors has one open itself, which is not counted
+  // In /proc/self/fd, directory_iterator also lists its own open descriptor, which is not counted
   return failed || count == 0 ? 0 : count - 1;
 }
 
@@ -52,7 +52,7 @@ namespace {
 
 using coordinator::JobState;
 
-// A metric whose name ends with _total is a counter, any other a gauge.
+// Writes the lines HELP and TYPE of a metric. Its type is counter if the name ends with _total, else gauge.
 void head(std::string& out, std::string_view name, std::string_view help) {
   fmt::format_to(std::back_inserter(out), "# HELP {} {}\n# TYPE {} {}\n", name, help, name,
                  name.ends_with("_total") ? "counter" : "gauge");
@@ -64,7 +64,7 @@ void single(std::string& out, std::string_view name, std::string_view help, Valu
   fmt::format_to(std::back_inserter(out), "{} {}\n", name, value);
 }
 
-// A metric with one value for each value of its label.
+// The values of a metric, each with the label value to which it belongs.
 using LabelledValues = std::vector<std::pair<std::string_view, std::uint64_t>>;
 void labelled(std::string& out, std::string_view name, std::string_view help, std::string_view label,
               const LabelledValues& values) {
@@ -129,8 +129,8 @@ void write_leases(std::string& out, const coordinator::FarmFigures& f) {
   single(out, "lightshaft_leases_granted_total", "Leases given to workers.", f.leases_granted);
   single(out, "lightshaft_units_leased_total", "Units of these leases.", f.units_leased);
   single(out, "lightshaft_units_lent_total", "Older name of lightshaft_units_leased_total.", f.units_leased);
-  // Causes with count 0 are listed, too: Prometheus computes the rate of a counter only from values that it
-  // has seen, so a counter that first appeared with 1 would lose that event.
+  // Causes that freed no unit are listed, too, with the value 0: Prometheus computes the rate of a counter
+  // only from values that it has seen, so a counter that first appeared with 1 would lose that event.
   LabelledValues freed;
   for (const auto& [cause, word] : coordinator::kFreedCauses) {
     const auto count = f.units_freed.find(cause);

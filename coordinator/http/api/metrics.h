@@ -28,7 +28,7 @@ class Counters {
 
   std::atomic<std::uint64_t> connections{0};    // connections that are open now
   std::atomic<std::uint64_t> event_streams{0};  // event streams that are open now
-  // Number of event streams that were closed because their readers were too slow
+  // Number of event streams that were closed because their clients read too slowly
   std::atomic<std::uint64_t> events_dropped{0};
   std::atomic<std::uint64_t> body_bytes{0};  // bytes received in request bodies
 

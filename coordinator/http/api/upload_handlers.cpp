@@ -38,7 +38,7 @@ std::optional<std::uint64_t> number(std::string_view text) {
   return value && *value <= kMost ? value : std::nullopt;
 }
 
-// Returns nullopt if the value has neither of the two forms.
+// Parses the value of a Content-Range header; nullopt: it has neither of the two forms of ContentRange.
 std::optional<ContentRange> parse_content_range(std::string_view value) {
   constexpr std::string_view kUnit = "bytes ";
   if (!value.starts_with(kUnit)) return std::nullopt;
@@ -295,8 +295,8 @@ std::variant<Response, std::unique_ptr<BodySink>> open_blob(Api& api, const Requ
   if (!request.header("content-range").empty()) return open_part(api, request, *digest);
   auto& blobs = api.coordinator().blobs();
   if (blobs.prove(*digest)) {
-    // A client that sent 'Expect: 100-continue' waits with the body, and need not send it, because the blob
-    // is stored.
+    // A client that sent 'Expect: 100-continue' has not sent the body yet. It need not send it, because the
+    // blob is stored already.
     if (!request.header("expect").empty()) return stored(*digest, 204);
     return std::make_unique<CompareSink>(*digest, api.limits().blob_bytes);
   }
@@ -350,7 +350,7 @@ Response post_blobs_missing(Api& api, const Request& request, const Params&) {
 std::variant<Response, std::unique_ptr<BodySink>> open_bundle(Api& api, const Request& request) {
   if (!request.header("content-encoding").empty())
     return problem(415, "send the bundle as it is: Content-Encoding is not decoded");
-  // The query is checked before the body, which may have gigabytes, is received.
+  // The query is checked before the body is received, since the body may be gigabytes long.
   const auto spec = spec_from_query(request.query, "");
   if (!spec) return problem(spec.error());
   if (auto refused = refuse_priority(api, request.caller, spec->priority)) return std::move(*refused);

@@ -15,8 +15,8 @@ constexpr std::size_t kGroupsOfPrefix = 4;  // number of 16-bit groups in the /6
 Throttle::Bucket& Throttle::fill(Buckets& buckets, std::string_view who, const Pace& pace, std::int64_t now) {
   auto found = buckets.find(who);
   if (found == buckets.end()) {
-    // Bounds the memory. First, buckets that are full again and know no token are dropped: a new bucket would
-    // be equal. If there are still too many, all are dropped.
+    // Bounds the memory. First, buckets that are full again and whose `known` is empty are dropped: a new
+    // bucket would be equal. If there are still too many, all are dropped.
     if (buckets.size() >= kMaxBuckets)
       std::erase_if(buckets, [&](const auto& b) {
         return b.second.known.empty() &&

@@ -1,6 +1,7 @@
-// Rate limits by token buckets. Each token has a bucket for its requests. Each address has one for its
-// requests without a token, and another for its wrong tokens. A bucket refills by Pace::per_second for every
-// second of the wall clock; if the clock jumps back, nothing is refilled.
+// Rate limits by the token-bucket algorithm. (The word "token" means an access token below.) Each token has a
+// bucket for its requests. Each address has a bucket for its requests without a token, and another for its
+// wrong tokens. A bucket refills by Pace::per_second for every second of the wall clock; if the clock jumps
+// back, nothing is refilled.
 #pragma once
 
 #include <cstdint>

@@ -22,7 +22,8 @@ namespace ls::http {
 
 // Returns the secret (a token, or the key that signs webhooks) in `file`; creates the file (mode 0600) with a
 // new secret if it does not exist. Rejects a file that others may read, or with fewer than 16 characters. The
-// caller must hold the data folder's lock, so that two starts do not race.
+// caller must hold the data folder's lock, so that two coordinators that start at the same time do not both
+// create the file.
 Result<std::string> read_or_make_token(const std::filesystem::path& file);
 
 // Returns 256 random bits in hexadecimal.

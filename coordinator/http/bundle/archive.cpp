@@ -42,7 +42,7 @@ class Utf8Names {
 
 enum class Trouble { none, stopped, unreadable, list_too_long };
 
-// The input of libarchive's callbacks: the archive's bytes.
+// The archive's bytes, which libarchive reads through callbacks.
 struct Source {
   int fd = -1;
   std::int64_t size = 0, at = 0;

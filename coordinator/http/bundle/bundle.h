@@ -35,10 +35,11 @@ struct Bundle {
 // in one folder, that folder is the top. Names are normalised ("./a//b" is "a/b").
 //
 // An archive is rejected for the following reasons, and the message names the entry: names that are absolute,
-// lead out by "..", are not UTF-8, or have control characters or backslashes; links and devices; duplicate
-// names; encrypted entries and unusual compression; more entries or bytes than allowed; archives that unpack
-// to more than kBundleSlack + kMaxBundleRatio times their own size; damaged or truncated archives. These
-// errors are invalid_argument. Other errors are those of the store, and `unavailable` after a stop.
+// lead out of the archive by "..", are not UTF-8, or have control characters or backslashes; links and
+// devices; duplicate names; encrypted entries and unusual compression; more entries or bytes than allowed;
+// archives that unpack to more than kBundleSlack + kMaxBundleRatio times their own size; damaged or truncated
+// archives. These errors are invalid_argument. Other errors are those of the store, and `unavailable` after a
+// stop.
 Result<Bundle> read_bundle(int fd, std::uint64_t archive_bytes, ArchiveKind kind, const BundleLimits& limits,
                            coordinator::BlobStore& blobs, const std::stop_token& stop);
 

@@ -10,7 +10,7 @@
 
 namespace ls::http {
 
-// Greatest size of the request body, by route. Other bodies: see Limits below
+// Greatest size of a request body, by route. The limits of the other routes are in the struct Limits below
 
 // POST /jobs with application/json, which has the names and digests of the scene's files
 inline constexpr std::uint64_t kMaxJobJson = 4u << 20;
@@ -20,7 +20,7 @@ inline constexpr std::uint64_t kMaxSessionJson = 4u << 10;   // POST /session
 
 // Contents of requests
 
-// Greatest depth of nested JSON, because the function that prints JSON is recursive
+// Greatest depth of nested JSON. There is a limit because the function that prints JSON is recursive
 inline constexpr int kMaxJsonDepth = 16;
 inline constexpr std::size_t kMaxDigests = 100'000;  // number of digests in one POST /blobs/missing
 inline constexpr std::size_t kMaxAssetName = 1024;   // length of a file name in a bundle
@@ -35,8 +35,8 @@ inline constexpr std::size_t kMaxBundleEntries = coordinator::limits::kMaxAssets
 inline constexpr std::size_t kMaxBundleNames = 16u << 20;  // length of all file names of a bundle together
 // Size of a zip's directory, which is held in memory as a whole
 inline constexpr std::uint64_t kMaxArchiveList = 32u << 20;
-// An archive of n bytes may unpack to at most n kMaxBundleRatio + kBundleSlack bytes. The second term is
-// there because a small archive of empty grids may compress even better than by kMaxBundleRatio
+// An archive of n bytes may unpack to at most n * kMaxBundleRatio + kBundleSlack bytes. kBundleSlack is for
+// small archives of empty grids, which may be compressed by a higher ratio than kMaxBundleRatio
 inline constexpr std::uint64_t kMaxBundleRatio = 200;
 inline constexpr std::uint64_t kBundleSlack = 64u << 20;
 
@@ -58,13 +58,13 @@ inline constexpr std::uint64_t kSmallAnswer = 64u << 10;
 inline constexpr std::uint64_t kLingerBytes = 16u << 20;
 
 inline constexpr std::int64_t kSessionSeconds = 12 * 3600;
-inline constexpr std::size_t kMaxClosedSessions = 1000;  // closed sessions that are remembered for each token
+inline constexpr std::size_t kMaxClosedSessions = 1000;  // closed sessions remembered per token, at most
 
 // Limits that tests and the operator's config file may change
 struct Limits {
-  // Greatest size of a blob: of the body of PUT /blobs/SHA256, and of each file in a bundle
+  // Greatest size of a blob, whether it is the body of PUT /blobs/SHA256 or a file in a bundle
   std::uint64_t blob_bytes = coordinator::limits::kMaxBlobBytes;
-  // Size of a bundle: the body of POST /jobs with an archive
+  // Greatest size of a bundle, which is the body of a POST /jobs with an archive
   std::uint64_t bundle_bytes = std::uint64_t{16} << 30;
   std::uint64_t unpacked_bytes = std::uint64_t{64} << 30;  // size of all files of a bundle together, unpacked
   std::size_t header_bytes = 16u << 10;
@@ -85,11 +85,11 @@ struct Limits {
   // If a request is rejected before its body was read, the rest of the body is still read for this long: if
   // the server closed the connection at once, the client could lose the answer
   double linger_seconds = 3;
-  // Allowed requests per second with one token or, without a token, from one address; 0: no limit. Twice this
-  // number may come at once
+  // Allowed requests per second in the long run, with one token or (without a token) from one address; 0: no
+  // limit. A burst of up to twice this number is allowed
   double requests_per_second = 500;
-  // Allowed requests per minute with a wrong token from one address; all of them may come at once. Further
-  // ones are answered with 429. 0: no limit
+  // Allowed requests per minute with a wrong token from one address, even if all of them come at once.
+  // Further ones are answered with 429. 0: no limit
   double wrong_tokens_per_minute = 20;
   double stop_seconds = 5;  // how long a stopping coordinator waits for open requests
   int quick_threads = 2;    // threads for requests that are answered from memory

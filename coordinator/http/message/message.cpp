@@ -99,7 +99,8 @@ constexpr std::pair<Errc, int> kStatus[] = {
     {Errc::unauthenticated, 401},     {Errc::unavailable, 503},        {Errc::internal, 500}};
 
 Response problem_of(int status, const nlohmann::ordered_json& json, Fields headers = {}) {
-  // Texts may quote bytes of a scene. Invalid UTF-8 is replaced, so that dump() never throws.
+  // The texts in `json` may quote bytes of a scene that are not valid UTF-8. Such bytes are replaced, so that
+  // dump() never throws.
   Response response =
       text_response(status, "application/problem+json",
                     json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));

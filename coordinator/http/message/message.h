@@ -32,7 +32,7 @@ std::optional<Role> parse_role(std::string_view name);
 struct Caller {
   Role role = Role::join;  // the role with the fewest rights, until the caller is identified
   // The user that the caller's token belongs to, who becomes the owner of the jobs that the caller submits;
-  // empty: the token belongs to no user, as the administrator's token in the file `token`
+  // empty: the token belongs to no user, like the administrator's token (in the file `token`)
   std::string user;
   std::string token_id;
   // True if the caller may see the jobs of the user `owner`.
@@ -64,7 +64,8 @@ using Fields = std::vector<std::pair<std::string, std::string>>;
 
 // Returns the text with the letters A to Z in lower case.
 std::string lower_case(std::string_view text);
-// Removes the text up to `separator`, and the separator, from `rest`, and returns that text.
+// Returns the text of `rest` up to the first `separator`, and removes both from `rest`. Without a separator,
+// returns all of `rest`.
 std::string_view take_part(std::string_view& rest, char separator);
 
 struct Request {
@@ -76,7 +77,7 @@ struct Request {
   bool has_body = false;  // true for a Content-Length above zero or a chunked body
   std::string body;
   std::string peer;  // the client's address without port; empty: unknown
-  Caller caller;     // set by Api::admit for routes that identify the caller; until then the default role
+  Caller caller;     // set by Api::admit on routes that identify the caller; before, the default Caller
 
   std::string_view header(std::string_view lower_case_name) const;  // empty if absent
   // Value of the first parameter of the query with this name; nullopt: there is none
@@ -96,7 +97,7 @@ struct Response {
   int status = 200;
   std::string content_type;  // empty: no body
   Fields headers;
-  // The body. If it is a span, its bytes exist until the program ends (files built into the program).
+  // The body. A span is a file that is built into the program, so its bytes exist until the program ends.
   std::variant<std::string, std::vector<std::byte>, std::span<const std::byte>, FileBody> body;
   std::optional<EventStream> events;
 

@@ -84,8 +84,8 @@ void Stream::close() {
 net::awaitable<void> Stream::send_goodbye() {
   error_code ec;
   if (through_tls_) {
-    // Does not wait for the client's close_notify (the end of the stream in TLS), since the end of the socket
-    // is sufficient. Bytes that still arrive are read without TLS and discarded.
+    // Does not wait for the client's close_notify (the end of the stream in TLS), since the end of the TCP
+    // connection is sufficient. Bytes that still arrive are read without TLS and discarded.
     SSL* raw = tls_->native_handle();
     SSL_set_shutdown(raw, SSL_get_shutdown(raw) | SSL_RECEIVED_SHUTDOWN);
     co_await tls_->async_shutdown(awaiting(ec));

@@ -1,5 +1,5 @@
-// A client's socket, plain or with TLS, as a stream that the algorithms of Asio and Beast read and write; the
-// only user of libssl in the HTTP server. Without TLS no libssl code runs. Includes Boost.
+// A client's socket, plain or with TLS, as a stream that the algorithms of Asio and Beast read and write. No
+// other part of the server loop uses libssl, and without TLS no libssl code runs. Includes Boost.
 #pragma once
 
 #include <boost/asio/async_result.hpp>

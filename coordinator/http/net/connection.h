@@ -49,7 +49,8 @@ net::awaitable<std::invoke_result_t<Work&>> run_on(net::thread_pool& pool, net::
 
 class Connection;
 
-// State that all connections share. Used by the network thread only, except for the thread pools.
+// State that all connections share. Only the network thread uses it; work that may block is passed to the
+// thread pools.
 struct Shared {
   net::io_context& io;
   net::thread_pool& quick;

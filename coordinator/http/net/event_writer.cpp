@@ -28,8 +28,8 @@ struct Undo {
 
 struct Start {
   std::uint64_t after = 0;
-  // True if the request's id is higher than the id of every event here. The id then comes from a coordinator
-  // with another data folder, and the client must load its state again.
+  // True if the event id in the request is higher than the ids of all events of this coordinator. It then
+  // comes from a coordinator with another data folder, and the client must load its state again.
   bool reset = false;
 };
 

@@ -42,8 +42,8 @@ Result<Address> parse_address(const std::string& text) {
 }  // namespace
 
 struct Server::State {
-  // The order of these members matters: destroying the io_context destroys the frames of coroutines. What
-  // these frames use is declared before `io`, so that it is destroyed after it.
+  // The order of these members matters: destroying `io` destroys the coroutines' frames, which may use the
+  // members declared before `io`. Those are destroyed after `io`.
   std::unique_ptr<net::thread_pool> quick, slow, bundles, remote;
   std::unique_ptr<Shared> shared;
   net::io_context io{1};
@@ -185,7 +185,7 @@ void Server::stop() {
   s.io.stop();
   s.thread.join();
   for (const auto* pool : {&s.quick, &s.slow, &s.bundles, &s.remote}) (*pool)->join();
-  state_.reset();  // destroys the frames of closed connections, which use the api
+  state_.reset();  // destroys the coroutine frames of closed connections, which use the Api
 }
 
 }  // namespace ls::http

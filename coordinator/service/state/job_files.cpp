@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 constexpr const char* kRemovedExtension = ".removed";  // suffix of a removed job's folder
 
 // Returns a text that is stored in every snapshot and changes with the size of TileError, which snapshots
-// contain as raw bytes. A build reads only snapshots that have its own text.
+// contain as raw bytes. A build of the coordinator reads only snapshots with the same text as its own.
 std::string snapshot_format() { return fmt::format("1-{}", sizeof(TileError)); }
 
 void remove_folders_if(const fs::path& in, const std::function<bool(const fs::path&)>& unwanted) {

@@ -1,6 +1,6 @@
 // The folders of jobs in --data. DATA/jobs/ID contains the log of partials (the stored results of units) and
 // the snapshot film.snap (the image so far), and for a done job image.exr, report.json and the thumbnails
-// made so far. There are no folders if everything is in memory. The object does not change, so several
+// made so far. There are no folders if everything is in memory. A JobFiles object never changes, so several
 // threads may use it.
 #pragma once
 

@@ -84,7 +84,7 @@ class JobTrace {
 
   const Tracing tracing_;
   const std::string job_;
-  const std::string identity_;  // makes span ids; unique to this job among all jobs of all farms
+  const std::string identity_;  // span ids are derived from it; no other job of any farm has the same text
   const std::optional<trace::SpanId> parent_;
   trace::SpanContext context_;
   std::int64_t start_ns_ = 0;

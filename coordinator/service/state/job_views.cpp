@@ -42,10 +42,10 @@ std::optional<CoreSeconds> core_seconds_left(const EtaInputs& facts, std::span<c
 //
 // kEven is for a job that ends at its number of samples: its units are known in advance, and all threads
 // finish at about the same time. The others are the least, mean and greatest extra time of a job that ends at
-// a target error. While the last needed unit is rendered, the other threads wait between 0 and 1 u (Graham
-// 1969: a list schedule of work W on P threads takes at most W / P + (1 - 1 / P) u). Meanwhile they render
-// units that will be dropped, so the last needed unit may itself have waited up to 1 u for a free thread;
-// this makes up to 2 u.
+// a target error. While the last needed unit is rendered, the other threads have no needed unit for between 0
+// and 1 u (Graham 1969: a list schedule of work W on P threads takes at most W / P + (1 - 1 / P) u). Threads
+// without a needed unit render others, which will be dropped. So the last needed unit may itself have waited
+// up to 1 u for a free thread; together this is up to 2 u.
 constexpr double kEven = 0, kLeastWait = 0, kMeanWait = .5, kMostWait = 2;
 
 // Returns the wall-clock seconds that `core` core seconds of work take on `cores` cores. A unit runs on one

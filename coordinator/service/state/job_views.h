@@ -52,8 +52,8 @@ struct Eta {
 // those spent since the last point are subtracted. Without a forecast, for example before the first
 // checkpoint, the scheduler's prediction is used, and there is no interval. The prediction also considers
 // that a unit runs on one thread: the job cannot use more threads than it has units, and at the end of a job
-// with a target error the threads wait for the last units. An interval is clipped where all requested samples
-// would be done.
+// with a target error the threads wait for the last units. The ends of an interval include at most the work
+// until all requested samples are rendered.
 Eta eta_of(const EtaInputs& facts, std::span<const ErrorPoint> points);
 
 // Returns the state of the sequence. While frames are open (have not ended), it is paused if all of them are
@@ -69,11 +69,11 @@ struct SequenceFacts {
   double cores = 0;  // number of cores of the connected workers
   int workers = 0;   // number of connected workers
 };
-// Makes the view of a sequence from the views of its frames, which must be in ascending order and at least
-// one. The sequence's error is the mean over the pixels of all frames that have an error estimate; its
-// interval treats these estimates as independent. The cost of the remaining frames is extrapolated from the
-// work so far. The remaining time assumes as many cores as the sequence's limits allow and its units (rounds
-// of tiles) can keep busy.
+// Makes the view of a sequence from the views of its frames (at least one, in ascending order). The
+// sequence's error is the mean over the pixels of all frames that have an error estimate; its interval treats
+// these estimates as independent. The cost of the remaining frames is extrapolated from the work so far. The
+// remaining time assumes as many cores as the sequence's limits allow and its units (rounds of tiles) can
+// keep busy.
 JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frames);
 
 FrameView frame_view(const JobView& frame);

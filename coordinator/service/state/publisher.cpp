@@ -30,8 +30,8 @@ struct EventHub::State {
   std::thread::id thread;
 
   // Makes sure that next_id is reserved in the store, in blocks of kEventIdBlock ids. If the store cannot
-  // reserve a block now, its ids are used without a reservation; then the coordinator may use them a second
-  // time after a crash.
+  // reserve a block now, the ids of the block are used without a reservation; after a crash the coordinator
+  // may then use the same ids again.
   void reserve_ids() {
     while (next_id >= reserved_end) {
       const auto first = reserve(limits::kEventIdBlock);

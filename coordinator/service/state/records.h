@@ -34,7 +34,7 @@ class Records {
   void add_quarantined(QuarantinedWorker worker) { quarantined_.push_back(std::move(worker)); }
   // Stores the quarantined workers that are not stored yet. Until they are, no result may be stored.
   Result<void> put_quarantined();
-  // Why a record or a result could not be stored; empty if a result has been stored since
+  // Why a record or a result could not be stored; empty: no attempt has failed since a result was last stored
   const std::string& trouble() const { return trouble_; }
   void set_trouble(std::string why) { trouble_ = std::move(why); }
 

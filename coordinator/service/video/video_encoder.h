@@ -1,6 +1,6 @@
 // Runs ffmpeg as a child process that makes a video file of pictures. The program gets raw pixels through a
-// socket, so it never reads a file of a job. It is killed when it reads no pixels for too long, when the
-// video's time is up, or when the coordinator stops.
+// socket, so it never reads a file of a job. It is killed when it reads no pixels for too long, when it
+// reaches the time limit for a video, or when the coordinator stops.
 #pragma once
 
 #include <sys/types.h>

@@ -14,7 +14,8 @@
 namespace ls::coordinator {
 
 // Stores blobs (files as plain bytes) under their SHA-256 digests. put() and Upload::finish() verify the
-// digest, and a blob can be seen only when it is complete. A damaged blob is never read: see prove().
+// digest, and a blob can be seen only when it is complete. The bytes of a damaged blob are not returned: see
+// prove().
 class BlobStore {
  public:
   virtual ~BlobStore() = default;
@@ -47,7 +48,8 @@ class BlobStore {
   // Returns up to `length` bytes from `offset` on, and at most limits::kMaxBlobRead; fewer at the blob's end.
   virtual Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
                                               std::uint64_t length) const = 0;
-  // Returns the first `bytes` bytes of the blob by as many calls of read() as they take; fewer if it ends.
+  // Returns the first `bytes` bytes of the blob, or all bytes of a shorter blob. Calls read() as often as
+  // needed.
   Result<std::vector<std::byte>> read_whole(const Digest& digest, std::uint64_t bytes) const {
     auto whole = read(digest, 0, bytes);
     while (whole && whole->size() < bytes) {

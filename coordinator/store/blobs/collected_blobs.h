@@ -89,7 +89,7 @@ class CollectedBlobs final : public BlobStore {
   // Blobs that are being removed, which may take a while. A request for such a blob waits until the blob is
   // removed.
   std::set<Digest> going_;
-  mutable std::map<Digest, TimePoint> idle_;  // blobs that no job needs, with the time since when
+  mutable std::map<Digest, TimePoint> idle_;  // blobs that no job needs, and when each became unused
   std::map<Digest, Unfinished> unfinished_;   // interrupted uploads; used only by sweep_unfinished()
 };
 

@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::string_view kScheme = "s3://";
 
-// Allows only characters that need no escaping in an address, so that the signed address equals the sent one.
+// True if the text has only letters, digits and the characters in `also`, which must need no escaping in an
+// address. So the address that is signed equals the one that is sent.
 bool plain(std::string_view text, std::string_view also) {
   return std::all_of(text.begin(), text.end(), [&](unsigned char c) {
     return std::isalnum(c) != 0 || also.find(static_cast<char>(c)) != std::string_view::npos;

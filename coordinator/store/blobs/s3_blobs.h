@@ -1,8 +1,8 @@
 // Keeps blobs as objects PREFIX/ab/<64 hex digits> in an S3-compatible store, so that they outlive this
 // machine and other machines can read them. A local folder holds uploads until they are complete and
 // verified. It also keeps copies of the blobs that were read, up to S3Address::copies_bytes. An object is
-// fetched only if it has no copy; its digest is checked then. A blob exists if the S3 store has an undamaged
-// object for it.
+// fetched only if there is no local copy of it; the digest of the fetched bytes is checked. A blob exists if
+// the S3 store has an undamaged object for it.
 #pragma once
 
 #include <condition_variable>

@@ -28,7 +28,7 @@ constexpr std::uint64_t kMostParts = 10'000;  // the protocol's limit on the par
 constexpr std::uint64_t kChunk = 1u << 20;    // a part is hashed in chunks of this many bytes
 // SHA-256 of an empty payload
 constexpr const char* kNoBytes = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
-constexpr std::size_t kMaxListed = 10'000'000;  // a list has at most this many keys
+constexpr std::size_t kMaxListed = 10'000'000;  // list() requests no more keys once it has this many
 
 using InputFile = std::unique_ptr<std::FILE, decltype([](std::FILE* file) { std::fclose(file); })>;
 using Headers = std::unique_ptr<curl_slist, decltype([](curl_slist* list) { curl_slist_free_all(list); })>;
@@ -330,8 +330,8 @@ Result<void> S3Link::send_parts(const std::string& key, const std::string& uploa
   // error.
   if (answer->status / 100 == 2 && xml_element(answer->text, "Code").empty()) return {};
   // An earlier attempt may have completed the upload although its answer was lost. Then the store no longer
-  // knows the upload's id, but the object exists. After any other error an object may be older than this
-  // upload.
+  // knows the upload's id, but the object exists. After any other error, an existing object proves nothing,
+  // since it may be older than this upload.
   if (xml_element(answer->text, "Code") == "NoSuchUpload")
     if (const auto there = look_at(key); there && there->bytes == bytes) return {};
   return tl::unexpected(error_of(end, *answer));

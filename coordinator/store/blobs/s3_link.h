@@ -70,7 +70,7 @@ class S3Link {
   // bytes. A part that fails is sent again without the others.
   Result<void> put(const std::string& key, const std::filesystem::path& file, std::uint64_t bytes,
                    const Digest& digest) const;
-  Result<void> remove(const std::string& key) const { return remove(key, ""); }  // succeeds if there is none
+  Result<void> remove(const std::string& key) const { return remove(key, ""); }  // no error if it is missing
   Result<std::vector<std::string>> list() const;  // returns the keys of all objects under S3Address::prefix
 
   std::string shown() const { return options_.address.shown(); }

@@ -1,7 +1,7 @@
 // Stores everything about jobs except their pixels, which are in the log of partials (store/log). There are
-// two basic implementations: SQLite, and memory (for `lightshaft render`). A third, in store/redis, also
-// copies the data of another store to Redis. Thread-safe. With SQLite, data survive kill -9 and power loss
-// once a put or add has returned.
+// two basic implementations: SQLite, and memory (for `lightshaft render`). A third, in store/redis, keeps the
+// data in an SQLite store and copies them to Redis. Thread-safe. With SQLite, data survive kill -9 and power
+// loss once a put or add has returned.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@
 
 namespace ls::coordinator {
 
-// The state of a job store's mirror, a Redis to which every change is copied
+// The state of a job store's mirror, which is a Redis server to which every change is copied
 struct StoreStatus {
   std::string mirror;  // address of the mirror; empty: there is none
   // Why the mirror cannot be updated now; empty: updates succeed
@@ -57,7 +57,7 @@ struct JobTotals {
   // Why the image's error figures at the last checkpoint cannot be trusted (ImageError::verdict); empty: they
   // can, or there was no checkpoint yet
   std::string doubt;
-  // Number of pixels that too few samples with light had hit for a reliable error estimate at the last
+  // Number of pixels in which too few samples had found light for a reliable error estimate at the last
   // checkpoint (ImageError::few_hits); nullopt: there was no checkpoint yet
   std::optional<std::uint64_t> few_hits;
   bool operator==(const JobTotals&) const = default;
@@ -80,7 +80,7 @@ struct StoredJob {
   std::vector<std::string> warnings;
   bool reference_same_seed = false;  // true: its reference image was rendered with this scene and seed
   std::vector<std::string> features_used, features_left_out;
-  std::string needs;  // canonical JSON (common/scene/analysis/needs.h)
+  std::string needs;  // what the scene needs, as canonical JSON (common/scene/analysis/needs.h)
   // JSON for the report: which features of the renderer the scene needs and why, and which parts of the scene
   // are not rendered and why
   std::string analysis;
@@ -88,9 +88,9 @@ struct StoredJob {
   std::optional<StopReason> stopped;
   std::string error;
   std::optional<Digest> numeric_class;
-  // About the numeric class to which the job is pinned (the set of machines that compute the same bits).
-  // `build`: build of one of its workers; `platform`: its machine and build in words. Both are from a
-  // WorkerHello.
+  // `build` and `platform` describe the numeric class (machines that compute the same bits) to which the job
+  // is pinned: the build of one of its workers, and that worker's machine and build in words. Both are from
+  // its WorkerHello.
   std::string build, platform;
   bool fake = false;  // true if pinned to a fake worker; then only fake workers may render its units
   JobTotals totals;
@@ -132,7 +132,7 @@ struct QuarantinedWorker {
 class JobStore {
  public:
   virtual ~JobStore() = default;
-  // Inserts or replaces all of these jobs or, on an error, none.
+  // Inserts the jobs and replaces those that exist already. On an error, none of them is changed.
   Result<void> put_job(const StoredJob& job) { return put_jobs({&job, 1}); }
   virtual Result<void> put_jobs(std::span<const StoredJob> jobs) = 0;
   // Returns all jobs, in the order in which they were first put. A job whose record is damaged is returned
@@ -149,12 +149,13 @@ class JobStore {
   virtual Result<std::vector<ConvergencePoint>> points(const JobId& job) const = 0;
   virtual Result<void> remove_points(const JobId& job) = 0;  // also removes their reference errors
 
-  // Adds a line to the job's log. Of a longer log only the last kLogLinesKept lines are certain to stay.
+  // Adds a line to the job's log. If the log gets longer than kLogLinesKept lines, older lines may be
+  // removed.
   virtual Result<void> add_log(const JobId& job, const LogLine& line) = 0;
   virtual Result<std::vector<LogLine>> log(const JobId& job) const = 0;
 
-  // Stores that a worker is quarantined. The entry is permanent: it stays when the jobs are removed whose
-  // results were the evidence. If the worker is quarantined already, its first evidence stays.
+  // Stores that a worker is quarantined. The entry is permanent: it stays even if the jobs with the faulty
+  // results are removed. If the worker is quarantined already, the evidence stored first stays.
   virtual Result<void> quarantine(const QuarantinedWorker& worker) = 0;
   virtual Result<std::vector<QuarantinedWorker>> quarantined() const = 0;
 
@@ -176,7 +177,7 @@ class JobStore {
     std::vector<QuarantinedWorker> quarantined;
     // Jobs that another coordinator has taken over from this one; their updates are no longer stored here
     std::vector<JobId> lost;
-    // May contain jobs that this coordinator has lost before.
+    // Jobs that this coordinator has taken over from others. They may include jobs that it has lost before.
     std::vector<Inherited> inherited;
   };
   virtual Moved moved() { return {}; }  // returns what has changed since the last call

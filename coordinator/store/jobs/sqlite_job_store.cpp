@@ -88,7 +88,7 @@ class Statement {
   }
   void bind(double value) { sqlite3_bind_double(statement_.get(), ++bound_, value); }
   void bind(const std::optional<double>& value) {
-    if (!value) return void(++bound_);  // a parameter that is not bound is null
+    if (!value) return void(++bound_);  // SQLite takes NULL for a parameter that is not bound
     bind(*value);
   }
   void bind(std::int64_t value) { sqlite3_bind_int64(statement_.get(), ++bound_, value); }
@@ -284,9 +284,9 @@ Result<std::unique_ptr<JobStore>> open_sqlite_job_store(const std::filesystem::p
   Db db(raw);
   const std::string what = fmt::format("open the job database {}", file.string());
   if (code != SQLITE_OK) return tl::unexpected(db_error(raw, what));
-  // milliseconds; the coordinator is the file's only regular user, but a backup may lock it
+  // Waits up to 5 s if the file is locked. Only the coordinator uses it regularly, but a backup may lock it.
   sqlite3_busy_timeout(raw, 5000);
-  // synchronous is FULL: with NORMAL, a power failure would lose acknowledged work.
+  // synchronous must be FULL: with NORMAL, a power failure could undo changes that were already acknowledged.
   for (const char* sql :
        {"PRAGMA journal_mode = WAL", "PRAGMA synchronous = FULL", "PRAGMA foreign_keys = ON"})
     if (auto done = execute(db, sql, what); !done) return tl::unexpected(done.error());

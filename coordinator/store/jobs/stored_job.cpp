@@ -11,13 +11,14 @@ namespace {
 
 using nlohmann::json;
 
-// JSON has no infinity and no NaN: the library would write null, which could not be read back as a number. So
-// finite() replaces them by 0.
+// JSON has no infinity and no NaN: the JSON library would write null instead, which could not be read back as
+// a number. So finite() replaces these values by 0.
 double finite(double value) { return std::isfinite(value) ? value : 0; }
-// Records of earlier versions may have null where finite() now writes 0.
+// Returns the number `j`. JSON that earlier versions wrote may have null where finite() now gives 0; this is
+// read as 0.
 double number_of(const json& j) { return j.is_null() ? 0 : j.get<double>(); }
-// Throws unless the value is an integer from 0 to 2^64 - 1. Without this check the library would convert even
-// 1e20, which does not fit into 64 bits.
+// Throws unless the value is an integer from 0 to 2^64 - 1. Without this check the JSON library would convert
+// even 1e20, which does not fit into 64 bits.
 std::uint64_t count_of(const json& j) {
   if (!j.is_number_unsigned()) throw std::invalid_argument("a count is not an integer from 0 to 2^64 - 1");
   return j.get<std::uint64_t>();

@@ -100,8 +100,8 @@ std::vector<std::byte> pack_index(std::span<const RawHeader> headers) {
   return out;
 }
 
-// Returns the headers in an index file, whose content is `bytes`. nullopt: the index is damaged, or its
-// records do not add up to `segment_bytes`, the size of the segment.
+// Returns the headers in an index file, whose content is `bytes`. nullopt: the index is damaged, or the sizes
+// of the records do not add up to `segment_bytes`, the size of the segment.
 std::optional<std::vector<RawHeader>> unpack_index(std::span<const std::byte> bytes,
                                                    std::uint64_t segment_bytes) {
   const std::size_t end = sizeof(Digest::bytes);
@@ -225,7 +225,7 @@ Result<bool> PartialLog::scan(std::uint32_t segment, bool last) {
   while (at < size) {
     auto record = record_at(*file, at, size, path);
     if (!record) {
-      // The disk cannot be read here, but the records may be sound. So the file is not cut.
+      // The file cannot be read at this place, but the records may be intact. So nothing is cut off.
       log_warn(place(),
                record.error().message + ": the units of the records from here on are rendered again");
       return false;

@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kJobsAtOnce = 64;
 
 // Returns an error if other coordinators share this Redis. A coordinator that was started without --shared
-// ignores owners: it would take over the jobs of all the others.
+// does not check which coordinator owns a job: it would take over the jobs of all the others.
 Result<void> refuse_shared(RedisLink& link) {
   auto nodes = link.run({"HKEYS", "lightshaft:nodes"});
   if (!nodes) return tl::unexpected(nodes.error());
@@ -215,7 +215,7 @@ Result<void> RedisJobStore::send_counters() {
     const auto state = state_.lock();
     counters.swap(state->counters);
   }
-  if (counters.empty() || shared()) return {};  // coordinators that share a Redis have their own counters
+  if (counters.empty() || shared()) return {};  // if Redis is shared, counters stay local
   RedisLink::Command command{"HSET", kRedisCounters};
   for (const auto& [name, value] : counters) {
     command.push_back(name);

@@ -1,11 +1,12 @@
 // A job store whose jobs are also in Redis. Every change goes to a durable local store first (SQLite), and a
 // separate thread copies it from there to Redis. So no decision of the farm waits for Redis. While Redis is
-// unavailable, its data are out of date; data that Redis has lost (its last second, or writes before a
-// failover) are written again.
+// unavailable, its data are out of date; data that Redis has lost (the writes of its last second, or those
+// before a failover) are written again.
 //
-// Each record has a revision that increases with every change. At open() both sides are compared, and the
-// higher revision wins: a machine that lost its disk gets its jobs back from Redis, and a Redis that lost its
-// memory gets them from the disk. Which data are stored where: docs/decisions/0023-redis.md.
+// The record of each job has a revision that increases with every change. At open() the revisions in the
+// local store and in Redis are compared, and the higher one wins: a machine that lost its disk gets its jobs
+// back from Redis, and a Redis that lost its memory gets them from the disk. Which data are stored where:
+// docs/decisions/0023-redis.md.
 //
 // Keys: lightshaft:jobs (set of ids), lightshaft:job:ID (hash: revision, record, points, log),
 // lightshaft:counters (hash), lightshaft:memory (a random word that shows whether Redis has lost its data).

@@ -1,6 +1,6 @@
-// The class behind redis_job_store.h. This header contains the functions that the coordinator's threads call,
-// redis_job_store.cpp opens the store and contains the thread that updates Redis. A node is one of several
-// coordinators that share the Redis; the members' thread is the one that RedisMembers starts
+// The class behind redis_job_store.h. This header contains the functions that the coordinator's threads call;
+// redis_job_store.cpp contains the function that opens the store and the thread that updates Redis. A node is
+// one of several coordinators that share the Redis; the members' thread is the one that RedisMembers starts
 // (redis_members.h).
 #pragma once
 
@@ -43,7 +43,7 @@ class RedisJobStore final : public JobStore {
     const auto state = state_.lock();
     std::vector<StoredJob> revised;
     for (const StoredJob& job : jobs) {
-      if (state->lost.contains(job.id)) continue;  // another coordinator owns the record
+      if (state->lost.contains(job.id)) continue;  // another coordinator owns the job
       const auto known = state->revisions.find(job.id);
       revised.push_back(job);
       revised.back().revision = (known == state->revisions.end() ? 0 : known->second) + 1;
@@ -194,7 +194,7 @@ class RedisJobStore final : public JobStore {
     }
   }
 
-  // `ids` are the jobs that this node owns according to Redis. Returns those of them that this node does not
+  // `ids` are the jobs that this node owns according to Redis. Returns those of `ids` that this node does not
   // have.
   std::vector<JobId> unknown(std::vector<JobId> ids) {
     const auto state = state_.lock();

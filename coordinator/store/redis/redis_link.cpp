@@ -47,7 +47,7 @@ Error redis_error(const std::string& said, const std::string& shown) {
   return {Errc::unavailable, fmt::format("{} answered: {}", shown, said)};
 }
 
-// Returns the number if the whole text is a number from `lo` to `hi`.
+// Returns the number if the whole text is a number from `lo` to `hi`; otherwise nullopt.
 std::optional<int> whole_number(std::string_view text, int lo, int hi) {
   const auto value = parse_number<int>(text);
   return value && *value >= lo && *value <= hi ? value : std::nullopt;

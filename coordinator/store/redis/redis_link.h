@@ -1,4 +1,5 @@
-// One connection to a Redis server (6 or later); the only user of hiredis. Not thread-safe.
+// One connection to a Redis server (version 6 or later). Only this code uses the library hiredis. Not
+// thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -13,16 +13,17 @@ namespace ls::coordinator {
 namespace {
 
 // Lifetime of the key heir:NODE, which names the coordinator that is taking over the jobs of NODE
-// (redis_members.h). Each job that is taken renews it. Between two renewals the heir may store up to
-// kTakenAtOnce jobs locally; this must take less time.
+// (redis_members.h). The key is renewed with each job that this coordinator takes. But after every
+// kTakenAtOnce jobs it stores these jobs locally before it takes the next one, and the key must not expire
+// meanwhile.
 constexpr const char* kHeirMilliseconds = "15000";
 // During a takeover, after every kTakenAtOnce jobs this node stores the jobs that it has taken and sends a
 // heartbeat. If it took thousands of jobs without a heartbeat, it would itself count as dead.
 constexpr std::size_t kTakenAtOnce = 64;
 
 // Sends a node's heartbeat. ARGV: node; its addresses; lifetime of the heartbeat in ms; the node's number
-// from unique_start(); number of entries at the start of its list of lost jobs that it has handled, which are
-// removed. Returns {its list of lost jobs, node, alive, node, alive, ...}, where `alive` is 0 or 1.
+// from unique_start(); how many entries at the start of its list of lost jobs it has handled. These entries
+// are removed. Returns {its list of lost jobs, node, alive, node, alive, ...}, where `alive` is 0 or 1.
 constexpr const char* kBeat = R"(
 redis.call('SET', 'lightshaft:alive:' .. ARGV[1], ARGV[2], 'PX', ARGV[3])
 redis.call('HSET', 'lightshaft:nodes', ARGV[1], ARGV[2])
@@ -291,8 +292,8 @@ Result<void> RedisMembers::take_from(const std::string& dead) {
   return {};
 }
 
-// Takes over these jobs one by one until one fails. Passes the jobs that it got to callbacks_.taken, which
-// stores them, even if a later one failed.
+// Takes over these jobs one by one until one fails. Passes the jobs taken before that to callbacks_.taken,
+// which stores them.
 Result<void> RedisMembers::take_some(std::span<const JobId> ids, const std::string& dead) {
   std::vector<TakenJob> taken;
   std::optional<Error> cut;

@@ -8,11 +8,12 @@
 //
 // All expiry times are Redis's own (PX), so the clocks of the machines need not agree.
 //
-// Keys: lightshaft:alive:NODE (its addresses as JSON; expires), lightshaft:nodes (hash: the same, permanent),
-// lightshaft:barred (hash: quarantined worker -> evidence), lightshaft:owned:NODE (set of the node's jobs),
-// lightshaft:lost:NODE (list of jobs that others took from it), lightshaft:heir:NODE (the node that is taking
-// over its jobs), lightshaft:sequences (hash: sequence, i.e. a job with several frames -> owner), and
-// `owner`, `from` (the previous owner), `fence` and `state` in lightshaft:job:ID.
+// Keys: lightshaft:alive:NODE (its addresses as JSON; expires), lightshaft:nodes (hash: node -> its
+// addresses; does not expire), lightshaft:barred (hash: quarantined worker -> evidence),
+// lightshaft:owned:NODE (set of the node's jobs), lightshaft:lost:NODE (list of jobs that others took from
+// it), lightshaft:heir:NODE (the node that is taking over its jobs), lightshaft:sequences (hash: sequence,
+// i.e. a job with several frames -> owner), and `owner`, `from` (the previous owner), `fence` and `state` in
+// lightshaft:job:ID.
 #pragma once
 
 #include <functional>
@@ -57,7 +58,7 @@ class FailureDetector {
 
  private:
   int looks_;
-  std::map<std::string, int> absent_;  // number of latest polls without a heartbeat, by coordinator
+  std::map<std::string, int> absent_;  // by coordinator: how many polls in a row found no heartbeat
 };
 
 struct MemberOptions {
@@ -93,8 +94,9 @@ class RedisMembers {
  public:
   // Functions that are called on the heartbeat thread (and on the thread that calls join())
   struct Callbacks {
-    std::function<void(std::vector<TakenJob>)> taken;       // called with jobs that this node has taken over
-    std::function<void(const std::vector<LostJob>&)> lost;  // may be called twice with the same job
+    std::function<void(std::vector<TakenJob>)> taken;  // called with jobs that this node has taken over
+    // Called with jobs that this node has lost; may be called twice with the same job.
+    std::function<void(const std::vector<LostJob>&)> lost;
     // Called with all workers that any coordinator has quarantined, whenever their number has grown, and
     // before `taken` is called.
     std::function<void(const std::vector<QuarantinedWorker>&)> quarantined = {};

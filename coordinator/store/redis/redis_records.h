@@ -1,5 +1,5 @@
-// Encodes the commands that write jobs to Redis, and decodes the replies. It handles texts only and has no
-// connection.
+// Encodes the commands that write jobs to Redis, and decodes the replies. This code handles texts only and
+// uses no connection.
 #pragma once
 
 #include <map>

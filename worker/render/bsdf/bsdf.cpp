@@ -11,8 +11,8 @@
 
 namespace ls::render {
 
-// A material in the form that the inner loop uses. It is one of all kinds of material; each list of kinds
-// below is a family.
+// A material in the form that the inner loop uses. It contains the struct of its kind; each list of kinds
+// below is a family of related kinds.
 struct BsdfTable::Material {
   VariantOf<DiffuseKinds, ConductorKinds, DielectricKinds, PlasticKinds, NestedKinds, PrincipledKinds,
             CoatedConductorKinds>

@@ -94,7 +94,7 @@ class BsdfTable {
 
  private:
   // eval() and sample() handle two-sided materials and diffuse materials with one reflectance everywhere; for
-  // all other kinds they call these functions.
+  // all other kinds they call the two functions below.
   BsdfEval eval_other(const Material& m, const UvPoint& uv, const V3& wo, const V3& wi) const;
   std::optional<BsdfSample> sample_other(const Material& m, const UvPoint& uv, const V3& wo, float u_lobe,
                                          V2 u) const;

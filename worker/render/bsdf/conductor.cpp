@@ -18,17 +18,17 @@ V3 refracted(const V3& w, float ior) {
   return {w.x / ior, w.y / ior, cos_t};
 }
 
-// A coated conductor at one point of a surface, as seen from the direction wo. The value has three parts, the
-// coat, the metal and the rest (conductor.h). inner_o is wo refracted into the coat, the suffixes _o and _i
-// refer to wo and wi, and p_coat, p_base and p_rest are the probabilities of sampling the parts.
+// A coated conductor at one point of a surface, as seen from the direction wo. The value of the BSDF has
+// three parts: `coat`, `metal` and `rest` (conductor.h). inner_o is wo refracted into the coat, the suffixes
+// _o and _i refer to wo and wi, and p_coat, p_base and p_rest are the probabilities of sampling the parts.
 struct SeenCoatedConductor {
   const RoughCoatedConductor& m;
   V3 wo, inner_o;
   Metal metal;
   RoughCoatedConductor::Shares coat_o;
   float staying_o;
-  // Colour of the part `rest` of the value: light that stays in the coat after its first reflection by the
-  // metal.
+  // Colour of the part `rest` of the BSDF, that is, of light that stays in the coat after its first
+  // reflection by the metal.
   C3 rest;
   float p_coat, p_base, p_rest;
 
@@ -90,8 +90,8 @@ struct SeenCoatedConductor {
     return e;
   }
 
-  // Samples wi for the part `metal` of the value. If the sampled light does not leave the coat, the result
-  // has z <= 0.
+  // Samples wi for the part `metal` of the BSDF. If the sampled light does not leave the coat, the result has
+  // z <= 0.
   V3 sample_base(const V2& u) const {
     if (!(inner_o.z > 0)) return {0, 0, 0};
     const V3 w = normalize(reflect(inner_o, m.base.sample_normal(inner_o, u)));
@@ -178,7 +178,7 @@ class Tabulator {
       inside_.emplace(double{m_.coat.ax}, 1 / ior);
       t.reflected = outside.reflected;
       // Light crosses the coat once in each direction, and on the way out more of it is masked or reflected
-      // back. The value must be reciprocal, so each crossing gets the geometric mean of both transmittances,
+      // back. The BSDF must be reciprocal, so each crossing gets the geometric mean of both transmittances,
       // but at most that of the way in.
       t.through = CosineTable(
           [&](double mu) {
@@ -221,7 +221,7 @@ class Tabulator {
 
   // Returns the share of light from wo that stays in the coat after its first reflection by a metal that
   // absorbs nothing, minus kTolerance, but at least 0. This is the light that the metal's facets do not mask
-  // and that the part `metal` of the value (conductor.h) does not contain.
+  // and that the part `metal` of the BSDF (conductor.h) does not contain.
   double staying(const V3& wo) const {
     const V3 inner = refracted(wo, m_.ior);
     const auto coat_o = m_.shares(wo.z);

@@ -113,22 +113,23 @@ inline std::variant<Conductor, RoughConductor> make_material(const RoughConducto
 //
 //   R_all = F + T R T + T R F R T + ... = F + T^2 R / (1 - F R).
 //
-// Otherwise the value has three parts (docs/design/coated-metal.md gives their errors):
+// Otherwise the value of the BSDF has three parts (docs/design/coated-metal.md gives their errors). The
+// suffixes _o and _i mean "for the direction wo" and "for the direction wi".
 //
 //   coat     The reflection of the coat: F D G / (4 cos cos), or a delta if the coat is smooth.
 //   metal    T_o T_i / n^2 times the value of the metal's facets between the two refracted directions, times
-//            the series 1 / (1 - (1 - T) R) with T = max(T_o, T_i). n is the coat's index, and 1 / n^2 is the
-//            ratio of the projected solid angles inside and outside. Under a smooth coat the first term of
-//            the series is exact. A rough coat refracts directions as a plane does, but (n - 1)^2 / (2 n^2)
-//            times its squared roughness is added to the metal's: two refractions add this to the variance of
-//            the slope, in the limit of small slopes.
+//            the series 1 / (1 - min(F_o, F_i) R). n is the coat's index, and 1 / n^2 is the ratio of the
+//            projected solid angles inside and outside. Under a smooth coat the first term of the series is
+//            exact. A rough coat refracts directions as a plane does, but (n - 1)^2 / (2 n^2) times its
+//            squared roughness is added to the metal's: two refractions add this to the variance of the
+//            slope, in the limit of small slopes.
 //   rest     Light that the metal reflects beyond the cone of refraction, or that the series above leaves
 //            out. It stays in the coat at first, and leaves it after more reflections as
 //            Q(wo) Q(wi) / (pi Q_mean), where Q(w) is the share of the light from w that stays. This form is
 //            reciprocal and returns the energy Q (Kulla and Conty 2017).
 //
 // For a white metal the three parts sum to 1 minus the light that single scattering between the metal's
-// facets loses; a roughconductor loses as much. T and Q are tabulated over the cosine.
+// facets loses; a roughconductor loses as much. T, F and Q are tables over the cosine.
 //
 // A smooth metal under a smooth coat. The metal's index is relative to that of the coat.
 struct CoatedConductor : Conductor {

@@ -35,7 +35,7 @@ class MaterialBuilder {
   Slot reflectance(TextureIndex t);
   Roughness roughness(Microfacet distribution, TextureIndex u, TextureIndex v);
   Roughness roughness(Microfacet distribution, double alpha);
-  // Returns the index of refraction inside over outside.
+  // Returns the ratio of two indices of refraction, `inside` over `outside`.
   double index(double inside, double outside);
   float mean(const Slot& s) const;
   // Returns the material for one side of a two-sided material, where b is the material of that side. If b is

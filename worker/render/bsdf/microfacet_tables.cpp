@@ -210,7 +210,7 @@ C3 mean_fresnel(const C3& eta, const C3& k) {
 
 RoughPlasticTable make_rough_plastic_table(Microfacet type, double alpha, double eta) {
   static const Quadrature kOutside = gauss_legendre(48),
-                          // More nodes inside: the integrand has a kink where total reflection begins
+                          // kInside has more nodes: its integrands have a kink where total reflection begins
       kInside = gauss_legendre(96);
   RoughPlasticTable t;
   double internal = 0;

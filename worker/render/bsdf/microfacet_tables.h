@@ -74,8 +74,8 @@ inline constexpr double kEnergyTolerance = 5e-4;
 struct MicrofacetEnergy {
   // (1 - E) / E by the viewer's cosine: for viewers outside and, only for dielectrics, for viewers inside
   CosineTable missing, missing_behind;
-  // Only for plastics: the share of light that passes the coat from outside, as part of the light that leaves
-  // after one bounce, by cosine
+  // Only for plastics. Light from outside that meets the coat is reflected or refracted by one facet, or lost
+  // by masking. Of the light that is not lost, `through` is the refracted share, by cosine.
   CosineTable through;
   float mean = 1;  // E_mean; only for conductors
 

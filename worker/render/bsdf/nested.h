@@ -95,7 +95,7 @@ struct Blend : MaterialKind {
 
  private:
   // The blend as seen from wo. `share` is the weight of each part in the mixture, and `chance` the
-  // probability of sampling it (a null material is never sampled).
+  // probability of sampling it (0 for an index-matched material, which scatters nothing).
   struct Mixture {
     float share[2], chance[2];
   };
@@ -120,8 +120,8 @@ struct Mapped : MaterialKind {
   Slot map;
   BsdfIndex part;
   bool passes = false;   // true if light passes straight through the nested material
-  bool flips = false;    // the scene's parameter flip_invalid_normals (frame())
-  bool shadows = false;  // the scene's parameter use_shadowing_function (shadow())
+  bool flips = false;    // the scene's parameter flip_invalid_normals, used by frame()
+  bool shadows = false;  // the scene's parameter use_shadowing_function, used by shadow()
 
   std::array<BsdfIndex, 1> parts() const { return {part}; }
   bool reads_uv() const { return any_texture(map); }

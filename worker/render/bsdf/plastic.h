@@ -82,7 +82,7 @@ struct CoatedDiffuse : MaterialKind {
 
 struct Plastic : CoatedDiffuse {
   static constexpr bool kHasFacets = false, mirror = true;
-  static constexpr Microfacets facets{};  // never used; SeenPlastic names it
+  static constexpr Microfacets facets{};  // never used, but SeenPlastic refers to it
 
   float through(float cos) const { return 1 - coat_reflectance(cos, ior); }
   BsdfEval eval(const Lookup& look, const V3& wo, const V3& wi) const {

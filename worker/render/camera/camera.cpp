@@ -42,8 +42,8 @@ Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const 
 bool Camera::usable() const {
   // Before their directions are normalised, the rays of perspective and orthographic cameras depend linearly
   // on the positions on the film and on the lens, so testing a few extreme positions suffices. The rays of a
-  // spherical camera all start at one point. An aperture map only makes the lens smaller, by place, so the
-  // whole lens is tested.
+  // spherical camera all start at one point. An aperture map can only make the lens smaller, so the test
+  // leaves it out and uses the whole lens.
   Camera whole = *this;
   whole.textures_ = nullptr;
   for (const double fx : {0., 1.})

@@ -237,7 +237,7 @@ PrimitiveId primitive_in(const Scenes& in, unsigned geometry, unsigned primitive
   return primitive_of(st, rh.hit);
 }
 
-// The version of the loaded library, which may differ from that of the headers.
+// Returns the version of the loaded Embree library, which may differ from that of the headers.
 ssize_t loaded_version() {
   const RTCDevice device = rtcNewDevice(fmt::format("threads=1,user_threads=0,{}", kDeviceConfig).c_str());
   const ssize_t version = device ? rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION) : 0;

@@ -81,7 +81,7 @@ double shape_distance(const void* user, unsigned prim, EmbreeContext* context, c
 // continues.
 struct Collecting : Tracing {
   Collecting(const V3& origin, const V3& direction) : Tracing(origin, direction) { collects = true; }
-  std::array<RTCHit, CoincidentHits::kMost> met;  // only the ids are set
+  std::array<RTCHit, CoincidentHits::kMost> met;  // of each hit only the ids are set
   std::size_t count = 0;
 
   static void keep(EmbreeContext* context, unsigned geometry, unsigned primitive, unsigned instance) {

@@ -1,6 +1,7 @@
 // Convex regions without surfaces in them. A flight through a medium that begins and ends in such a region
-// meets no surface, so no ray has to be traced for it. For a ray that leaves the region no tracing is needed
-// either if the region's surface lets it pass unchanged and no other surface can be in its way (way_out()).
+// meets no surface, so no ray has to be traced for it. A ray that leaves the region need not be traced
+// either, provided that the surface around the region lets it pass unchanged and no other surface can be in
+// its way (way_out()).
 #pragma once
 
 #include <algorithm>
@@ -27,7 +28,7 @@ class ClearRegion {
   static std::optional<ClearRegion> inside(const Geometry& g, std::uint32_t surface,
                                            const std::vector<SurfaceBox>& boxes, bool media_overlap);
 
-  // False for points that are not finite.
+  // True if p is in the region. False if p is not finite.
   bool contains(const V3& p) const {
     if (planes_ == 0) return dot(p - center_, p - center_) < radius_ * radius_;
     for (std::size_t i = 0; i < planes_; ++i) {

@@ -84,7 +84,8 @@ class Finder {
     return {d.center - d.u - d.v, d.center + d.u + d.v, d.center + (d.u - d.v) * side};
   }
 
-  // Searches for coincident surfaces and marks them. It stops when there are too many pairs to compare.
+  // Searches for coincident surfaces and marks them. If there are too many pairs to compare, it marks all
+  // surfaces and stops.
   void search() {
     const auto null = surface_boxes(g_, [](const SurfaceInfo& s) { return s.null; });
     const auto all = surface_boxes(g_, [](const SurfaceInfo&) { return true; });
@@ -125,7 +126,8 @@ class Finder {
   void compare(const SurfaceBox& n, const SurfaceBox& o) {
     if (spent(1) || !n.touches(o)) return;
     if (n.surface == o.surface && n.instance == o.instance) return twice_in_itself(n);
-    // Each pair of null surfaces is found twice, once in each order; it is compared only once.
+    // Each pair of two null (index-matched) surfaces is found twice, once in each order, but compared only
+    // once.
     if (g_.surfaces[o.surface].null && o.surface < n.surface) return;
     if (n.instance != kNone || o.instance != kNone) {
       mark(n.surface, 1, n.instance == kNone);

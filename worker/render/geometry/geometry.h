@@ -39,7 +39,8 @@ struct SurfaceInfo {
   bool null = false;  // index-matched: rays pass straight through
   // True if part of the light passes straight through (BsdfTable::null_transmission)
   bool null_transmission = false;
-  bool normals = false, uvs = false;  // for meshes: true if there are normals, uvs at vertices
+  // For meshes: `normals` is true if the vertices have normals, `uvs` if they have uvs.
+  bool normals = false, uvs = false;
   // wants_uv: true if the material or the light of the surface reads uv, or if the surface is a mesh with uvs
   // and the AOV `uv` reads them; otherwise the uv of hits is not set on meshes and spheres. wants_tangent:
   // true if the material depends on a direction along the surface (anisotropy); otherwise hits have an
@@ -54,16 +55,16 @@ struct SurfaceInfo {
   bool diffuse = false;
   // -1 if normals are opposite to the mesh's winding or to the shape's outward side, else 1
   float orientation = 1;
-  // For a surface that coincides somewhere with others, one of them null: the largest reach (see
-  // SurfaceHit::reach) of all of these surfaces, so that one step moves a ray past all of them. 0 if the
-  // surface coincides with no other.
+  // The surface may coincide with others in some places. If it or one of these others is index-matched
+  // (`null`), this is at least the largest reach (see SurfaceHit::reach) of all of them, so that one step
+  // moves a ray past all of them. 0: find_coincident() has found no such surfaces.
   float coincident_reach = 0;
   // For triangles: the reach (see SurfaceHit::reach) of every hit, if the reaches of all triangles of the
   // surface are within a factor of 16; 0 if each triangle has its own. For other shapes: a lower bound for
   // the reach of a hit.
   float reach = 0;
-  // For triangles: a hit with three barycentric coordinates above this is far enough from all edges and need
-  // not be moved away from them (keep_from_edges)
+  // For triangles: if all three barycentric coordinates of a hit are above this value, the hit is far enough
+  // from all edges and need not be moved away from them (keep_from_edges)
   double edge = 0;
 };
 
@@ -79,7 +80,7 @@ struct Disk {  // points center + a u + b v with a^2 + b^2 <= 1
   std::uint32_t surface = 0;
 };
 struct Cylinder {      // points p0 + z length axis + (u cos a + v sin a) radius, z in [0, 1]; no caps
-  V3d p0, u, v, axis;  // unit vectors; u, v, axis may be left-handed: normals point away from the axis
+  V3d p0, u, v, axis;  // unit vectors u, v, axis, possibly left-handed; normals point away from the axis
   double radius = 1, length = 1;
   std::uint32_t surface = 0;
 };

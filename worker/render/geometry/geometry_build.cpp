@@ -143,7 +143,7 @@ void append_mesh(Geometry& g, LocalMesh mesh, bool normals_given, std::uint32_t 
     g.uvs.insert(g.uvs.end(), mesh.uvs.begin(), mesh.uvs.end());
   }
   const std::uint32_t first_triangle = g.triangle_count();
-  std::vector<std::uint32_t> kept;  // indices, in the mesh, of the triangles that are kept; for attributes
+  std::vector<std::uint32_t> kept;  // indices in `mesh` of the triangles that are kept; needed for attributes
   for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
     const std::uint32_t a = base + mesh.indices[i], b = base + mesh.indices[i + 1],
                         c = base + mesh.indices[i + 2];
@@ -224,8 +224,8 @@ bool finite(const Box& b) {
   return b.empty() || (std::isfinite(b.lo.x + b.lo.y + b.lo.z) && std::isfinite(b.hi.x + b.hi.y + b.hi.z));
 }
 
-// The shapes of a scene as placed by their to_world, the bounds of the world (including instances), and those
-// of each group.
+// The shapes of a scene as placed by their to_world, the bounds of the world (including instances), and the
+// bounds of each group.
 struct Parts {
   std::vector<Placed> shapes;
   Box world;

@@ -18,7 +18,7 @@ struct LocalMesh {
   std::vector<V2> uvs;
   std::vector<std::uint32_t> indices;
   bool face_normals = false;            // true if the mesh file itself requests flat shading
-  std::uint64_t dropped_triangles = 0;  // number of triangles without area, which the file's reader left out
+  std::uint64_t dropped_triangles = 0;  // triangles without area, left out when the file was read
   std::vector<MeshAttribute> attributes;
 };
 struct Placed {

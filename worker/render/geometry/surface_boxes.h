@@ -23,7 +23,7 @@ struct Box {
       hi[k] = std::max(hi[k], b.hi[k]);
     }
   }
-  // The box around the image of this box, which must not be empty, under the map m.
+  // Returns the box around the image of this box under the map m. This box must not be empty.
   Box moved(const Affine& m) const {
     Box r;
     for (int k = 0; k < 8; ++k)

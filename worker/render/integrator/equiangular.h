@@ -38,7 +38,7 @@ class EquiAngular {
   }
 
   struct Sample {
-    float t;    // from the segment's start
+    float t;    // distance from the segment's start
     V3 p;       // computed from the foot of the perpendicular: accurate near the light
     float pdf;  // density per unit length; 0 if no light reaches the segment
   };

@@ -88,7 +88,8 @@ constexpr std::uint64_t kSunRaySeed = 0x5eed0f5a1;
 // The paths of one learning pass and the data that they record. All passes record where paths find the sun
 // (SunMap).
 struct Lesson {
-  bool sky = false, lights = false;  // true if paths record the sky's light, each light source's light
+  // `sky` is true if paths record the light of the sky, `lights` if they record that of each light source.
+  bool sky = false, lights = false;
   std::uint64_t first_path = 0, batch = kLearningBatch;
 };
 
@@ -243,7 +244,7 @@ LightVertices::Look look_of(const World& w, const LightVertex& y) {
     const float peak = mean_component(at_peak.f_cos), q = at_peak.pdf * cosine / kInvFourPi;
     if (peak > even && q > 1) {
       look.axis = -y.hit.shading.to_world(mirrored);
-      look.g = (2 * q + 1 - std::sqrt(8 * q + 1)) / (2 * q);  // (1 + g) / (1 - g)^2 = q
+      look.g = (2 * q + 1 - std::sqrt(8 * q + 1)) / (2 * q);  // solves (1 + g) / (1 - g)^2 = q
       look.lobe = light * (peak - even) * cosine / q;
     }
   } else {
@@ -293,7 +294,8 @@ void learn_connections(const IntegratorSettings& settings, int threads, World& w
       float{LightVertices::kCandidates * kLearningRays} / static_cast<float>(std::max<std::size_t>(count, 1));
 }
 
-constexpr int kLongestPilot = 64;  // segments; paths in a white and dense medium have thousands
+// Paths of pilots end after this many segments. In a white, dense medium they would have thousands.
+constexpr int kLongestPilot = 64;
 
 std::unique_ptr<const Portals> find_portals(bool in_any_case, int threads, World& w) {
   const PilotSettings settings(w, kLearningSeed, kLongestPortalPath);

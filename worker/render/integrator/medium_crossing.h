@@ -1,5 +1,5 @@
 // Part of path_tracer.h, which includes it: flights through media, medium emission, and the media on either
-// side of a surface.
+// side of a surface. A *null* surface is index-matched: light passes it unchanged.
 //
 // Where several media overlap, their particles are independent: a flight ends at the first collision in any
 // of them, and the transmittance is the product of their transmittances. The phase function at a vertex is

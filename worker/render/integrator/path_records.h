@@ -112,7 +112,7 @@ struct FirstVertex {
   // The path's density with each channel as the hero (medium.h), divided by the mean of the three densities
   C3 density{1, 1, 1};
   OneMedium around;  // the medium in front of the vertex
-  int passed = 0;    // surfaces passed straight through between the camera and the vertex
+  int passed = 0;    // number of surfaces passed straight through between camera and vertex
   // A cache for a diffuse surface: the BSDF for a direction along the normal, on the normal's side [0] or on
   // the other [1]; nullopt if it was not evaluated yet.
   std::array<std::optional<BsdfEval>, 2> by_side;
@@ -123,7 +123,7 @@ struct SharedTail {
   // False if there is no second vertex, or if the direction to it was sampled by a delta lobe
   bool usable = false;
   PathVertex at;
-  int passed = 0;  // surfaces passed straight through between the camera and the vertex
+  int passed = 0;  // number of surfaces passed straight through between camera and vertex
   // For the way from the path's own first vertex to the second: `depth` is the optical depth of the media, by
   // channel, `transmission` the null transmission of the surfaces, and `passing` the probability of passing
   // straight through all of these surfaces.

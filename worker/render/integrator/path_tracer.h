@@ -162,7 +162,7 @@ class PathTracer {
   bool passes_null(const SurfaceHit& hit);
   bool may_scatter() const { return world_.depth_allows(depth_ + 1); }
   // True if the depth limit allows another segment after this many scatterings and after `passed` crossings
-  // of null boundaries and null-transmitting surfaces.
+  // of index-matched boundaries and null-transmitting surfaces.
   bool may_go_on(int scatterings, int passed) const {
     return world_.depth_allows(scatterings + (world_.passing_counts ? passed : 0));
   }
@@ -317,14 +317,14 @@ class PathTracer {
   float eta_scale_ = 1;
   int hero_ = 0;
   int depth_ = 0;                 // scatterings so far
-  int passed_ = 0;                // null boundaries and null-transmitting surfaces passed so far
+  int passed_ = 0;                // index-matched and null-transmitting surfaces passed so far
   std::uint64_t boundaries_ = 0;  // with F.connected: number of boundaries that shadow rays passed
   int segment_ = 0;               // number of the current ray; a new ray begins behind each passed surface
   Within medium_;
   bool looked_for_sky_ = false;   // true if look_for_sky() sampled a second direction at the first vertex
   bool first_in_medium_ = false;  // with F.split: true if the first scattering was in a medium
   Vertex last_;
-  SubpathDensities densities_;  // with F.connected: those of the path up to the current vertex
+  SubpathDensities densities_;  // with F.connected: densities of the path up to the current vertex
   Connections connections_;
   SampleOutcome outcome_;
   MediumCounters counters_;
@@ -423,8 +423,8 @@ void PathTracer<F, Light>::go_on(float t_max) {
 }
 
 // The path passes every index-matched surface, and each null-transmitting surface with that surface's
-// probability. As long as the ray hits the same surfaces as in trace(), the decisions use the same random
-// numbers as there.
+// probability. As long as the ray hits the same surfaces as the path of the sample, the decisions use the
+// same random numbers as in trace().
 template <Features F, template <Features> class Light>
 std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay& ray) {
   ray_ = {ray.o, ray.o, ray.d};
@@ -535,7 +535,7 @@ void PathTracer<F, Light>::light_surface_by(const LightChoice& choice, const Sur
 }
 
 // At the path's first vertex: samples a second direction and adds half of the constant environment's light
-// from there (aim.h). `numbers` are the random numbers of the path's own direction. Only in scenes
+// from there (aim.h). `numbers` are the random numbers of the path's own direction. Called only in scenes
 // without media.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::look_for_sky(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo,

@@ -19,8 +19,8 @@
 namespace ls::render {
 namespace {
 
-// The variants of the integrators `volpath` and `path` without Features::aimed, connected and reuse. Variants
-// with these features have lists of their own (variant.h).
+// The variants of the integrators `volpath` and `path` that have none of the features `aimed`, `connected`
+// and `reuse` (Features). Variants with these features have lists of their own (variant.h).
 std::span<const Variant> plain_variants() {
   static const Variant kVariants[] = {
       variant<Features{}>("surfaces"),
@@ -92,7 +92,8 @@ class Samples {
  public:
   Samples(const World& w, const Variant& v, SampleRange range, Breadcrumb* crumb = nullptr)
       : w_(w), v_(v), range_(range), crumb_(crumb) {}
-  // `split` gets the light components; it may be null if the variant computes none.
+  // Renders sample number `sample` of the pixel (x, y). `split` receives the sample's light components; it
+  // may be null if the variant computes none.
   SampleOutcome of(int x, int y, std::uint64_t sample, LightSplit* split) {
     if (v_.group) return shared(x, y, sample, split);
     if (crumb_) mark({x, y}, sample);
@@ -134,7 +135,7 @@ class Samples {
   }
 
   struct Rendered {
-    std::vector<SampleOutcome> outcomes;  // all samples of a block; index: sample * pixels + pixel
+    std::vector<SampleOutcome> outcomes;  // index: (sample - range_.s0) * block.pixels() + block.index(pixel)
     std::vector<LightSplit> splits;
   };
   void render(const SharingBlock& block, Rendered& r) {
@@ -188,8 +189,8 @@ PixelSums render_pixel(Samples& samples, int x, int y, SampleRange range, Health
     aovs.begin_sample();
     const SampleOutcome out = samples.of(x, y, s, aovs.split());
     aovs.end_sample(x, y, s, usable(out));
-    // A sample that is not usable is counted in `health` and contributes zero to the pixel. It remains one of
-    // the samples by whose number the pixel's sum is divided; no other sample replaces it.
+    // A sample that is not usable is counted in `health` and contributes zero to the pixel. No other sample
+    // replaces it, and it still counts in the number of samples by which the pixel's sum is divided.
     if (!clean(out)) [[unlikely]] {
       count(out, {x, y, s}, health);
       if (!usable(out)) continue;

@@ -28,12 +28,13 @@ constexpr std::uint64_t kFewestPilotGroups = 4;
 // sample of each pixel.
 constexpr std::uint64_t kPixelsPerGroup = 1024;
 constexpr std::uint64_t kPilotSamples = 32;
-// Largest number of segments of a pilot's path. Without a limit, paths in a white and dense medium have
-// thousands.
+// Largest number of segments of a pilot's path. Without a limit, a path in a dense medium that absorbs
+// nothing could have thousands.
 constexpr int kPilotDepth = 32;
 // Sharing pays if the noise (squared relative error) without it is more than this many times the noise with
-// it. A shared sample takes 1.4 to 2.4 times as long (docs/decisions/0036-path-reuse.md). The limit is low
-// because the few pixels of the pilot rarely show the rare bright paths that sharing helps most.
+// it. With sharing a sample takes 1.4 to 2.4 times as long as without it (docs/decisions/0036-path-reuse.md).
+// The limit is near the lower end of this range, because the few pixels of the pilot rarely show the rare
+// bright paths that sharing helps most.
 constexpr double kGainThatPays = 1.5;
 // If the gain after some of the groups is this many times kGainThatPays, the other groups are not rendered.
 constexpr double kBeyondDoubt = 4;
@@ -80,8 +81,8 @@ class Pilot {
     Noise noise;
     for (std::size_t k = 0; k < group.size(); ++k)
       for (int c = 0; c < 3; ++c) {
-        // Errors are relative to the mean of both kinds of samples. So a rare bright sample of one kind
-        // reduces the relative errors of both kinds.
+        // Errors are relative to the mean of all samples, shared and not shared. So a rare bright sample of
+        // one kind reduces the relative errors of both kinds.
         const double mean =
             (shared[k][0][c] + shared[k][1][c] + alone[k][0][c] + alone[k][1][c]) / (2 * kPilotSamples);
         const double weight = 1 / (mean * mean + kRelMseDenominator);
@@ -138,8 +139,8 @@ void share_tails(const IntegratorSettings& settings, int threads, World& w) {
   need.split = false;
   need.reuse = true;
   // Paths are not shared in scenes with grids, where the density of flights has no closed form, nor in scenes
-  // with lamps in media, light vertices or points on camera segments, which change how directions are
-  // sampled.
+  // with lamps (lights without extent) in media, with light vertices or with points on camera segments
+  // (segment_nee.h), because these change how directions are sampled.
   const auto variants = reuse_variants();
   const auto sharing =
       std::ranges::find_if(variants, [&](const Variant& v) { return v.covers.covers(need); });

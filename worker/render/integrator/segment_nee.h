@@ -12,8 +12,8 @@
 // that of the macro cells' means) and p_l, p_s the solid-angle densities of light and phase sampling,
 // next-event estimation gets the weight e p_l / (e p_l + f p_s), where e is the sum of the densities used. In
 // place of e and f any functions of the path alone would give unbiased results; closer approximations of the
-// densities give less variance. Channels are combined as in path_tracer.h: each density is the mean of the
-// densities with each channel as the hero.
+// densities give less variance. Channels are combined as in path_tracer.h: each density is the mean over the
+// three choices of the hero, the channel that decides distances.
 #pragma once
 
 #include <algorithm>
@@ -36,8 +36,8 @@ namespace ls::render {
 // it is accurate for optical depths sigma * length from 1e-20, where it is uniform, to 1e6. The textbook form
 // divides by 1 - exp(-sigma length), which is 0 in float32 for all depths below 6e-8.
 //
-// Below kThinDepth the density is uniform to the last bit. The value is large enough that products with it do
-// not underflow.
+// For optical depths below kThinDepth the density is uniform to the last bit. kThinDepth is large enough that
+// products with it do not underflow.
 inline constexpr float kThinDepth = 1e-20f;
 
 // The density at x. Requires sigma >= 0, length > 0 (may be infinite) and x in [0, length]. Returns 0 if
@@ -91,9 +91,10 @@ class SegmentNee {
     float length = 0;
     float points = 1;  // number of points that were sampled by depth on the segment that ends at the vertex
 
-    // This type also describes vertices on surfaces, for which false is right. For vertices in media true
-    // would be right, but the probability of a light is the same in both cases, since the light tree is never
-    // used in media with this strategy (Lights::use_tree_in_media).
+    // True would mean that the vertex's light was chosen by Lights::choose_before_point(). That is so for
+    // vertices in media, but not for those on surfaces, which this type describes too. Returning false is
+    // correct for both: in media the probability of a light is the same either way, since this strategy never
+    // uses the light tree there (Lights::use_tree_in_media).
     static bool light_chosen_first() { return false; }
     float found_as_light() const { return std::min(points * depth_ratio, kMaxRatio); }
     float found_as_light(const Pivot& pivot) const {
@@ -151,7 +152,7 @@ class SegmentNee {
     const auto k = static_cast<std::uint32_t>(i), n = static_cast<std::uint32_t>(points);
     const std::uint32_t step = static_cast<std::uint32_t>((std::uint64_t{1} << 32) / n);
     const std::uint64_t place = ((std::uint64_t{k} << 32) + g.bits[3]) / n;
-    // The steps for the point on the light form a two-dimensional lattice (Roberts 2018, R2)
+    // With these steps the points on the light form a two-dimensional lattice (Roberts 2018, R2).
     return {{g.bits[0] + k * step, g.bits[1] + k * 0xc13fa9a9u, g.bits[2] + k * 0x91e10da5u,
              static_cast<std::uint32_t>(place)}};
   }
@@ -240,8 +241,8 @@ class SegmentNee {
     const bool both = choice.has_place && v.by_angle && v.by_depth;
     const float e_depth = at_point.rate * depth_pdf(path, medium, plan, at_point.x);
     if (both && !by_angle) e_angle = v.angle_pdf(pivot);
-    // The expected numbers of points per unit length at this point: `by_depth` of all points sampled by
-    // depth, `own` of all points sampled by the strategy that sampled this point
+    // The expected numbers of points per unit length at this point: `by_depth` counts all points sampled by
+    // depth, `own` those sampled by the strategy that sampled this point.
     const float by_depth = e_depth * v.points;
     const float own = by_angle ? e_angle : by_depth;
     if (!(own > 0)) return;

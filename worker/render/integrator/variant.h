@@ -122,7 +122,7 @@ class SharingBlock {
   }
 
  private:
-  // Sets these random numbers apart from others of the same seed.
+  // Keeps the random numbers that order a block's pixels apart from other random numbers of the same seed.
   static constexpr std::uint64_t kDealing = 0x6465'616c;
 
   const World& w_;
@@ -141,8 +141,8 @@ std::span<const Variant> connected_variants();
 std::span<const Variant> reuse_variants();
 
 // The last variants of three lists: those of `volpath`, of aimed_variants() and of distant_variants(). They
-// are defined in source files of their own, because the compiler inlines less into the variants of a file if
-// these are among them.
+// are defined in source files of their own, because in a file that contains one of them the compiler inlines
+// less into the other variants.
 extern const Variant kSplitVariant, kAimedSplitVariant, kDistantSplitVariant;
 
 }  // namespace ls::render

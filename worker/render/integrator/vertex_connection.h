@@ -28,9 +28,9 @@ void PathTracer<F, Light>::arrive(const Vertex& from, const V3& p, const V3& ng)
     densities_ = SubpathDensities::extended(f, from.pdf, from.sum, ng, from.ng);
 }
 
-// If the path learns the choice of lights by place (lights/local_lights.h), estimates the light that each
-// light source adds at `place`, and records the estimates. look_for(choice) does the next-event estimation
-// with one light.
+// If this is a learning path from which the choice of lights by place is learned (lights/local_lights.h),
+// estimates the light that each light source adds at `place`, and records the estimates. look_for(choice)
+// does the next-event estimation with one light.
 template <Features F, template <Features> class Light>
 template <class LookFor>
 void PathTracer<F, Light>::learn_lights(const LightPlace& place, const LookFor& look_for) {
@@ -137,7 +137,8 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
     // normal and of the geometric normal ng (light_surface), so neither does a connection.
     const V3 to_x = y.hit.shading.to_local(-w), to_light = y.hit.shading.to_local(y.to_light);
     if ((to_light.z > 0) != (dot(y.to_light, y.hit.ng) > 0)) return;
-    // A camera path that arrives from x would use ng instead of the shading normal.
+    // There is no connection either if x is on different sides of the two normals, because a camera path that
+    // arrives from there uses ng as its shading normal.
     if ((to_x.z > 0) != (dot(w, y.hit.ng) < 0)) return;
     cos_y = std::abs(dot(w, y.hit.ng));
     const BsdfIndex bsdf = world_.geometry.surfaces[y.hit.surface].bsdf;
@@ -248,7 +249,8 @@ void PathTracer<F, Light>::follow_light(const SunMap::Ray& from, const Keep& kee
       const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), to_light, g.u(2), {g.u(0), g.u(1)});
       if (!s || s->delta) return;
       const V3 w = normalize(hit.shading.to_world(s->wi));
-      // A camera path that arrives from this direction would use ng instead of the shading normal.
+      // The path ends if the new direction is on different sides of the shading normal and of ng, because a
+      // camera path that arrives from there uses ng as its shading normal.
       if ((s->wi.z > 0) != (dot(w, hit.ng) > 0)) return;
       const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), s->wi, to_light);
       beta_ *= f.f_cos * (std::abs(dot(w, hit.ng)) / (s->pdf * cosine));

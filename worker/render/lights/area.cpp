@@ -215,7 +215,7 @@ float SphereLight::pdf(const LightWorld& world, const SurfaceHit& hit, const V3&
   const Sphere& sphere = world.geometry.spheres[primitive];
   const float side = side_of(sphere, x);
   // If the sphere lets light through, a ray may pass its near wall and hit the far wall from inside. sample()
-  // finds only points on the side that x sees.
+  // finds only points on the side that x sees, so the density of such a hit is 0.
   if (two_sided && dot(direction, hit.ng) * sign * side > 0) return 0;
   const float cone = one_minus_cos(sphere, reach, side, x);
   return cone > 0 ? p / (kTwoPi * cone) : 0;
@@ -237,7 +237,7 @@ std::variant<ParallelogramLight, MeshLight, SphereLight, DiskLight, CylinderLigh
   const Geometry& g = world.geometry;
   const auto triangles = primitives.triangles[surface], spheres = primitives.spheres[surface],
              disks = primitives.disks[surface], cylinders = primitives.cylinders[surface];
-  // Returns the light l with the members set that do not depend on the shape.
+  // Sets the members of the light l that do not depend on its shape, and returns l.
   const auto shining = [&](auto l) {
     l.set_emission(*shape.emitter, g.surfaces[surface].orientation, world);
     return l;

@@ -65,8 +65,8 @@ struct SunLight : LightKind {
 // portals; else paths find it when they leave the scene.
 struct SkyLight : LightKind {
   // If portals are in front of the shaded point: the probability with which a direction is sampled by the
-  // map's brightness alone, so that every direction from which light comes has a positive density.
-  // kBrightnessWords is the number of the 2^32 random words that choose this.
+  // map's brightness alone, so that every direction from which light comes has a positive density. Of the
+  // 2^32 random words, kBrightnessWords choose this way of sampling.
   static constexpr float kByBrightness = .25f;
   static constexpr std::uint64_t kBrightnessWords = std::uint64_t{1} << 30;
 
@@ -80,9 +80,8 @@ struct SkyLight : LightKind {
     const float radius = world.geometry.radius;
     return ((map ? map->flux() : 0) + 4 * kPiD * luminance(constant)) * kPiD * radius * radius;
   }
-  // Radiance and density are computed from the sampled direction, not from the numbers that it was sampled
-  // by. For paths that leave the scene they are computed from the direction too, so that the MIS weights
-  // match.
+  // Radiance and density are computed from the sampled direction, not from the random numbers. For paths that
+  // leave the scene they are computed in the same way, so the MIS weights of both match.
   std::optional<LightSample> sample(const LightWorld&, const LightNumbers& numbers, const V3& x,
                                     float p) const {
     const auto direction = direction_at(x, numbers);

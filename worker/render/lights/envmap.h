@@ -12,11 +12,11 @@
 //
 // Sampling. A cell lies between four neighbouring texels. One 32-bit random number (a word) chooses a row of
 // cells, and another a cell of the row. The probabilities are proportional to (mean luminance of the corners)
-// x (solid angle), rounded to multiples of 2^-32. Within a cell, the density over azimuth and z, the cosine
+// * (solid angle), rounded to multiples of 2^-32. Within a cell, the density over azimuth and z, the cosine
 // of the polar angle, is proportional to l, the bilinear interpolation of the luminances at the corners. So
 // the pdf per steradian, in row j and cell i, is
 //
-//   p(d) = P(j) P(i | j) / solid angle x l(x, t) / mean of l at the corners,
+//   p(d) = P(j) P(i | j) / (solid angle) * l(x, t) / (mean of l at the corners),
 //
 // where P are the rounded probabilities, and x (in azimuth) and t = (z_j - z) / (z_j - z_j+1), both from 0 to
 // 1, are the position in the cell. sample() has exactly this pdf. It is nearly proportional to the luminance

@@ -74,7 +74,7 @@ struct LightWorld {
 };
 
 struct LightKind {
-  static constexpr bool kHasPlace = false;  // true if it has a position: is not at infinite distance
+  static constexpr bool kHasPlace = false;  // true if it has a position, that is, is not at infinite distance
   static constexpr bool kIsPoint = false;   // true if it has a position but no extent
   static constexpr bool kIsArea = false;    // true if it is an emitting surface
 

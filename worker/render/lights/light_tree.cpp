@@ -63,7 +63,7 @@ class LightTree::Builder {
     std::uint32_t begin, end;
     int depth;
     std::uint64_t trail;
-    std::uint32_t parent;  // node whose right child this job makes; kNoParent for left ones
+    std::uint32_t parent;  // node whose right child this job makes; kNoParent: a left child or the root
   };
   struct Pile {
     V3 low{1e30f, 1e30f, 1e30f}, high{-1e30f, -1e30f, -1e30f};

@@ -12,10 +12,11 @@
 // cos i is left out. A light is sampled by descending from the root, choosing among children in proportion to
 // their importance.
 //
-// Sampling splits random words instead of real numbers. The root has all 32-bit words, or as many as the
-// caller gives it, and each child gets a whole number of its parent's words. So the probability of a light is
-// exactly the number of words that reach it over the number of all words. All arithmetic is plain float32 and
-// float64 without library functions other than square roots, so the results are the same on every machine.
+// Lights are chosen by random words (integers) instead of real numbers. The root has all 32-bit words, or as
+// many as the caller gives it, and each child gets a whole number of its parent's words. So the probability
+// of a light is exactly the number of words that reach it over the number of all words. All arithmetic is
+// plain float32 and float64 without library functions other than square roots, so the results are the same on
+// every machine.
 #pragma once
 
 #include <cstddef>

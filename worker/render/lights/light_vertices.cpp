@@ -12,7 +12,8 @@ namespace {
 // The share of the sun map's rays (SunMap) that is uniform over the whole scene. Because of it there are
 // light vertices also where no learning path (a camera path traced before the first sample) found the sun.
 constexpr double kSceneShare = .05;
-constexpr float kSmallestMargin = 1e-4f;  // margin of the map's rectangle / the scene's radius
+// Smallest margin of the map's rectangle, as a share of the scene's radius.
+constexpr float kSmallestMargin = 1e-4f;
 // The largest |g| for which towards() evaluates the Henyey-Greenstein phase function; sharper ones are
 // clamped to it, because rounding errors would dominate the estimate.
 constexpr float kSharpest = .98f;

@@ -145,9 +145,9 @@ class LightVertices {
     float even = 0, lobe = 0;  // factors of the two terms above; their sum is positive
     V3 axis{0, 0, 1};
     float g = 0;
-    // 1 / densities.sum(1 / (4 pi)), that is, as if paths from the camera scattered uniformly at this vertex.
-    // The larger it is, the more weight connections to this vertex have among all strategies that find its
-    // light.
+    // 1 / densities.sum(1 / (4 pi)). The argument assumes that paths from the camera scatter uniformly in all
+    // directions at this vertex. The larger it is, the more weight connections to this vertex have among all
+    // strategies that find its light.
     float density = 0;
   };
   void add(const LightVertex& vertex, const Look& look);

@@ -93,9 +93,9 @@ class Lights {
   Pivot pivot(const SurfaceHit& hit) const;
   // Returns the radiance of the environment for a path that leaves the scene from x in this direction (a unit
   // vector), weighted against next-event estimation at x, which chooses a light by `place`. `pdf` is the
-  // density, per steradian, with which the path sampled the direction. Infinity gives the full radiance, for
-  // directions that were not sampled. Without portals a constant environment is never sampled as a light,
-  // since it is smooth and paths find it when they leave.
+  // density, per steradian, with which the path sampled the direction. If `pdf` is infinite, the full
+  // radiance is returned; this is for directions that were not sampled. Without portals a constant
+  // environment is never sampled as a light, since it is smooth and paths find it when they leave.
   C3 environment(const V3& x, const V3& direction, float pdf, const LightPlace& place) const {
     const C3 beside = suns_.empty() ? environment_ : environment_ + suns(direction, pdf, place);
     if (!sky_.sampled()) return beside;
@@ -125,7 +125,7 @@ class Lights {
   const EnvironmentMap* map() const { return map_.get(); }
   bool is_sky(const LightChoice& choice) const;
   // From this call on, directions towards the environment map and the constant environment are also sampled
-  // through these portals. With null this ends.
+  // through these portals. A null pointer removes the portals.
   void set_portals(std::unique_ptr<const Portals> portals);
   const Portals* portals() const { return portals_.get(); }
 
@@ -135,7 +135,7 @@ class Lights {
   bool has_tree() const { return !tree_.empty(); }
   std::size_t in_tree() const { return tree_.lights(); }  // number of lights in the tree
   bool enough_for_tree() const;                           // true if enough lights have a position
-  // True if lights are chosen by the tree at some places. `media`: the scene has media.
+  // True if lights are chosen by the tree at some places. `media` is true if the scene has media.
   bool uses_tree(bool media) const {
     return has_tree() && (!local_ || (media && tree_in_media_ && !local_in_media()));
   }
@@ -145,7 +145,8 @@ class Lights {
   // estimation over the square of its mean. It is at least 1, and is 1 where each light contributes in
   // proportion to its probability in the table. 0 if there are no places.
   double spread_over(const LightVisits& visits) const;
-  // From this call on, lights are chosen by probabilities learned from these visits. With null this ends.
+  // From this call on, lights are chosen by probabilities learned from these visits. A null pointer ends
+  // this.
   void set_local(const LightVisits* visits);
   const LocalLights* local() const { return local_.get(); }
   // This light, as if it had been chosen with this probability.
@@ -216,8 +217,8 @@ class Lights {
 
   std::vector<Light> lights_;
   std::vector<std::uint32_t> suns_;  // indices of the suns in lights_
-  // Light i is chosen by the words from last_[i - 1] + 1 to last_[i]. The number of these words over 2^32 is
-  // exactly its probability.
+  // Light i is chosen by the words from last_[i - 1] + 1 to last_[i]. The number of these words divided by
+  // 2^32 is exactly its probability.
   std::vector<std::uint32_t> last_;
   bool alone_ = false;  // true for a single light, which needs no choice
   const Geometry* geometry_ = nullptr;

@@ -12,7 +12,7 @@ namespace {
 constexpr double kTablePart = .25;
 // A cell (node of the k-d tree) is divided if it has more visits (vertices of learning paths) than this.
 constexpr std::ptrdiff_t kVisitsOfCell = 32;
-// A cell's mean is smoothed: it also includes the mean of the cell around it, with the weight of this many
+// A cell's mean is smoothed: it also includes the mean of its parent cell, with the weight of this many
 // visits.
 constexpr double kVisitsOfParent = 16;
 constexpr std::size_t kSides = 7, kInMedia = 6;

@@ -10,15 +10,16 @@
 namespace ls::render {
 namespace {
 
-// A face of the box gets a portal if more than this share of the sky's light leaves through it.
+// A face of the box around most of the rays' origins (Box) gets a portal if more than this share of the sky's
+// light leaves through it.
 constexpr double kLeastLight = .02;
 // More than this share of the light that leaves through a face must pass through the plane that is chosen for
 // the face. Rays that begin between the plane and the face do not pass through the plane.
 constexpr double kLeastThrough = .9;
 // The share of the rays' origins that lie beyond each face of the box
 constexpr double kOutliers = .01;
-// For each face kPlanes planes are tried, from kBeyond times the box's side outside of the face to the middle
-// of the box.
+// For each face kPlanes planes parallel to it are tried. The first lies outside of the box, at kBeyond times
+// the box's side from the face; the last lies near the middle of the box.
 constexpr int kPlanes = 40;
 constexpr float kBeyond = .1f;
 // A plane is divided into kCells x kCells cells to measure how concentrated the rays are on it. The cells
@@ -103,7 +104,7 @@ std::optional<float> Portals::Plane::distance(const V3& p, const V3& d) const {
 // Tries planes parallel to the face and returns the one on which the rays' light is most concentrated: the
 // one with the smallest entropy of the light over the plane's cells. Light with this entropy is as
 // concentrated as light spread evenly over exp(entropy) cells. Planes through which too little of the light
-// passes (kLeastThrough) are skipped; nullopt: all are.
+// passes (kLeastThrough) are skipped; the result is nullopt if all are skipped.
 std::optional<Portals::Plane> Portals::best_plane(const Box& box, int face, std::span<const Found> rays) {
   Plane plane;
   plane.axis = face / 2;

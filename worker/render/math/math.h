@@ -35,7 +35,8 @@ inline float dot(const V3& a, const V3& b) { return a.x * b.x + a.y * b.y + a.z 
 inline V3 cross(const V3& a, const V3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-// Returns a zero or non-finite vector unchanged: callers that need unit length must check.
+// The result does not have unit length if v is zero or not finite, or if dot(v, v) underflows or overflows:
+// callers that need unit length must check.
 inline V3 normalize(const V3& v) {
   const float l2 = dot(v, v);
   return l2 > 0 ? v * (1 / std::sqrt(l2)) : v;

@@ -6,8 +6,8 @@
 
 namespace ls::render {
 
-// A bijection of 64-bit words whose every output bit depends on every input bit (the finaliser of SplitMix64,
-// Steele, Lea and Flood 2014).
+// A bijection of 64-bit words in which every output bit depends on every input bit (the finaliser of
+// SplitMix64, Steele, Lea and Flood 2014).
 constexpr std::uint64_t mix64(std::uint64_t z) {
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;

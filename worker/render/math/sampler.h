@@ -23,8 +23,8 @@ constexpr std::uint32_t reverse_bits(std::uint32_t x) {
   return ((x & 0x55555555u) << 1) | ((x >> 1) & 0x55555555u);
 }
 
-// Owen scrambling in bit-reversed order: bit i of the result depends on bits 0..i only (Laine and Karras
-// 2011, with the constants of Vegdahl 2021). U is a 32-bit word or a vector of such words.
+// Owen scrambling in bit-reversed order: bit i of the result depends only on bits 0 to i of x (Laine and
+// Karras 2011, with the constants of Vegdahl 2021). U is a 32-bit word or a vector of such words.
 template <class U>
 constexpr U scramble_reversed(U x, U seed) {
   x ^= x * 0x3d20adeau;

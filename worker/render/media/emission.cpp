@@ -182,8 +182,8 @@ class EmissionWalk {
   }
 
   // Samples, by the random number u, the point of the interval [a, b] at which light of a channel is
-  // absorbed. s is the channel's extinction per density, and `absorbed` the share of light that the interval
-  // absorbs.
+  // absorbed. s is the channel's extinction per unit of density, and `absorbed` the share of light that the
+  // interval absorbs.
   double absorption_point(double a, double b, double s, double absorbed, double u) const {
     const Passage p = density_.pass(*m_.density, a, b, absorption_depth(u, s, absorbed));
     return p.reached ? density_.distance(p.t) : b;
@@ -201,9 +201,9 @@ class EmissionWalk {
     add(c, e, absorbed);
   }
 
-  // Adds emission per length on [a, b], sampled as if the density were constant along the interval. If it is
-  // constant, the samples are distributed exactly as the transmittance. `whole` is the density integrated
-  // over the interval.
+  // Adds emission per length on [a, b], sampled as if the density were constant along the interval. If it
+  // really is constant, points are sampled in exact proportion to the transmittance. `whole` is the density
+  // integrated over the interval.
   void add_thin(int c, double a, double b, double whole, double u) {
     const double h = b - a, s = m_.sigma_t[c], k = s * whole / h, t = truncated_exponential(u, k, h);
     add(c, source(a + t), h * mean_transmittance(k * h) * std::exp(k * t - s * depth(a, a + t)));

@@ -5,7 +5,7 @@
 // In a homogeneous medium it has a closed form. In a grid the ray is divided into intervals, at most one
 // voxel long where the fields vary. The optical depth of an interval is exact (Grid::pass). Each channel's
 // emission is estimated from one point of the interval, or two if the interval is optically thick and not
-// uniform; without extinction it is integrated exactly. Every term is unbiased, hence the sum is.
+// uniform; without extinction it is integrated exactly. Every term is unbiased, and hence also the sum.
 #pragma once
 
 #include <algorithm>
@@ -37,8 +37,8 @@ inline double truncated_exponential(double u, double k, double h) {
 }
 
 // Samples a point on an interval with a field of density rho. The interval absorbs the share `absorbed` of
-// the light; s is the extinction per density and u a random number. Returns the integral of rho up to the
-// sampled point.
+// the light; s is the extinction per unit of density and u a random number. Returns the integral of rho up to
+// the sampled point.
 inline double absorption_depth(double u, double s, double absorbed) { return -std::log1p(-u * absorbed) / s; }
 // Returns the density, per unit length, with which absorption_depth() samples a point where the field has the
 // density rho. `rest` is the transmittance up to that point.

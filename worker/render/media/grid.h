@@ -128,7 +128,7 @@ class Grid {
 
  private:
   friend class CellWalk;
-  // Defined by the tests.
+  // Defined in the tests, which compare integrals along rays with it.
   friend double exact_integral(const Grid&, const V3d& o, const V3d& d, double t0, double t1);
   void repeat_ends();
   V3 wrapped(const V3& index) const;

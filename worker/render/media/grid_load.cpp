@@ -118,8 +118,8 @@ Result<LoadedVolume> vdb_file(const GridVolume& v, const AssetLoader& files, V3d
   const std::span values(raw.values, of * static_cast<std::size_t>(size[0]) * size[1] * size[2]);
   LoadedVolume out;
   out.clamped = raw.negatives;
-  // Values are at nodes. Within one voxel of the active voxels they fall to the background value; the grid
-  // ends there, so wrapping has no effect.
+  // Values are at nodes. From the active voxels to the next nodes outwards the values fall to the background
+  // value, and there the grid ends, so wrapping has no effect.
   for (std::size_t c = 0; c < of; ++c)
     out.channels.emplace_back(size, channel(values, c, of),
                               from_world(nodes_to_scene.inverse(), center, scale), V3d(0),

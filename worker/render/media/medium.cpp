@@ -44,7 +44,8 @@ class ChannelFlight {
     Flight f;
     f.scattered = true;
     f.t = static_cast<float>(t);
-    // By rounding, an integral over a cell may, very rarely, end where the hero has no density.
+    // Because of rounding, the integral over a cell may, very rarely, end at a point where the hero's density
+    // is 0.
     if (!(rho[hero_] > 0)) {
       f.weight = C3(0);
       return f;

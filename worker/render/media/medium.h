@@ -91,7 +91,8 @@ struct Flight {
   bool scattered = false;
   float t = 0;
   C3 weight{1, 1, 1};
-  C3 density{1, 1, 1};  // density of the flight relative to the hero's; only chromatic code uses it
+  // For each channel, the density of the flight relative to that of the hero. Only chromatic code uses it.
+  C3 density{1, 1, 1};
 };
 
 // Counts densities that exceed the bound of their macro cell. Such a density biases the result, and nothing

@@ -1,7 +1,8 @@
-// The Henyey-Greenstein phase function. It is written in x, the distance of the scattering angle's cosine
-// from the function's peak: x = 1 - cos for g >= 0 and x = 1 + cos for g < 0. This form has no division by g
-// and does not compute x from a rounded cosine, so it is exact for g = 0 and stable up to |g| = 0.99999.
-// (Derivation: 1 - cos and 1 + cos of the sampled angle are rational functions of the random number xi.)
+// The Henyey-Greenstein phase function. It is written in x, the distance between the cosine of the scattering
+// angle and that at the function's peak: x = 1 - cos for g >= 0 and x = 1 + cos for g < 0. This form has no
+// division by g and does not compute x from a rounded cosine, so it is exact for g = 0 and stable up to |g| =
+// 0.99999. (Derivation: 1 - cos and 1 + cos of the sampled angle are rational functions of the random number
+// xi.)
 #pragma once
 
 #include "worker/render/base/work_counters.h"

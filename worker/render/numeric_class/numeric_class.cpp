@@ -140,7 +140,7 @@ void add_sphere_hits(Sha256& h) {
   add(h, v);
 }
 
-// Adds to `list` one element, with default parameters, of each kind of which it has none.
+// For each kind of element that `list` lacks, adds one element of that kind, with default parameters.
 template <class... Kind>
 void add_missing_kinds(std::vector<std::variant<Kind...>>& list) {
   const auto add = [&](auto kind) {

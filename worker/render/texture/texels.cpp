@@ -77,8 +77,8 @@ void drop_channels(std::vector<T>& v, std::uint32_t have, std::uint32_t first, s
   v.shrink_to_fit();
 }
 
-// Reduces an image to one of its channels. If it has no alpha channel, that is an image of one pixel of value
-// 1; the red, green and blue channels of a grey image are its grey.
+// Reduces an image to one of its channels. If the alpha channel is wanted and the image has none, the result
+// is one pixel of value 1. The red, green and blue channels of a grey image are all its grey.
 void keep_channel(ImageData& image, Channel channel) {
   const bool has_alpha = image.channels % 2 == 0, is_grey = image.channels < 3;
   if (channel == Channel::alpha && !has_alpha) {
@@ -95,9 +95,9 @@ void keep_channel(ImageData& image, Channel channel) {
   image.channels = 1;
 }
 
-// True if the last channel is an alpha channel that serves as a mask, that is, falls below 1/2 somewhere. An
-// alpha channel that is 1/2 or more everywhere is not used as a mask: in some images the colour is the mask,
-// and the alpha channel is nearly opaque.
+// True if the last channel is an alpha channel that serves as a mask, that is, one that is below 1/2
+// somewhere. An alpha channel that is 1/2 or more everywhere is not used as a mask: in some images the colour
+// is the mask, and the alpha channel is nearly opaque.
 bool has_alpha(const ImageData& image) {
   if (image.channels % 2) return false;
   const auto transparent = [&](const auto& v, auto half) {

@@ -49,7 +49,7 @@ struct Entry {
   std::uint32_t first = 0, second = 0;
   C3 value{0, 0, 0};  // the value of a constant; for other textures the mean
   UvAffine to_uv;
-  float scale = 1;  // factor on a mesh attribute's values; threshold of a product
+  float scale = 1;  // mesh attribute: factor on its values; product: threshold of its luminance (0: none)
 };
 
 }  // namespace
@@ -113,7 +113,8 @@ class TexelsLoader {
 };
 
 // Makes the entry of a mesh_attribute texture; if no mesh has the attribute, the entry is a black constant.
-// It is never evaluated, because Geometry::build rejects meshes that use the texture but lack the attribute.
+// Such an entry is never evaluated, because Geometry::build rejects meshes that use the texture but lack the
+// attribute.
 Result<Entry> attribute_entry(const MeshAttributeTexture& t, const SurfaceAttributes* attributes) {
   Entry e;
   e.kind = Kind::attribute;

@@ -249,7 +249,7 @@ class Tree {
   Type type_ = kFloat;
   Layout layout_{};
   std::uint64_t root_ = 0;
-  Coord lo_{}, end_{};  // the box of voxels that is read: [lo, end)
+  Coord lo_{}, end_{};  // the box of voxels that is read: from lo_ to before end_
 };
 
 }  // namespace

@@ -9,7 +9,7 @@ namespace ls::render {
 class World;
 
 // Sets `lamps`, `lamp_flights`, `camera_points` and Features::aimed of a world that is otherwise complete, as
-// the scene's integrator settings request or, if they leave it open, as it pays.
+// the scene's integrator settings request or, where these leave it open, by whether the techniques pay.
 void aim(const IntegratorSettings& settings, World& world);
 
 // Sets `sky_samples` of a world that is otherwise complete: decides whether the first vertex of each path

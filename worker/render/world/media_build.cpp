@@ -100,7 +100,7 @@ struct HeteroBuilder {
   const HeterogeneousMedium& m;
   const AssetLoader& files;
   World& w;
-  double per_unit;  // extinction per unit of density, without the tint [1/world unit]
+  double per_unit;  // extinction per unit of density, before multiplication by the tint [1/world unit]
   Medium out;
   Rgb sigma{};  // out.sigma_t before rounding to float32
 

@@ -7,9 +7,9 @@
 
 namespace ls::render {
 
-// True if media may overlap: if some point may be in several media, or in another medium than the one that
-// the boundary crossed last has on the point's side. The test compares bounding boxes: a result of false is
-// certain; a result of true may be wrong, which costs rendering time but changes nothing else.
+// True if media may overlap: if some point may be in several media, or in a medium other than the one on its
+// side of the boundary that was crossed last. The test compares bounding boxes: a result of false is certain;
+// a result of true may be wrong, which costs rendering time but changes nothing else.
 bool media_may_overlap(const World& w);
 
 // Returns the media that contain the camera, for scenes whose media overlap. If the scene gives the sensor no

@@ -43,9 +43,10 @@ struct PilotPixel {
 // `max_depth` segments. Returns an empty vector if a sample was rejected.
 std::vector<PilotPixel> pilot_pixels(World& w, int max_depth, int threads);
 // Compares two renderings of the same pixels, `a` and `b`: true if the noise of `a` is more than `factor`
-// times that of `b`; false if one of them is empty. The noise is the relMSE: a pixel's variance divided by
-// about its squared value. As the value the mean of the two results is used for both, so that a rare bright
-// sample in one of them lowers the weight of its pixel in both and does not decide the comparison.
+// times that of `b`; false if one of them is empty. The noise is the relMSE: the sum of the pixels'
+// variances, each divided by the square of the pixel's value plus a small constant. For both renderings the
+// value is the mean of the two, so that a rare bright sample in one of them lowers the weight of its pixel in
+// both and does not decide the comparison.
 bool is_noisier(const std::vector<PilotPixel>& a, const std::vector<PilotPixel>& b, double factor);
 
 // Mean probabilities with which media scatter or absorb a camera ray before it hits a surface.

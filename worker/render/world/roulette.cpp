@@ -5,8 +5,8 @@
 namespace ls::render {
 namespace {
 
-// Paths split if media of any kind scatter or absorb less than this share of the camera rays. In images of
-// which nearly all pixels show a cloud, splitting is no better than more samples per pixel.
+// Paths split if media of any kind scatter or absorb less than this share of the camera rays. In images where
+// nearly all pixels show a cloud, splitting is no better than more samples per pixel.
 constexpr float kSplitsPay = .75f;
 
 }  // namespace

@@ -44,7 +44,7 @@ class World {
   scene::Needs needs;       // what the scene contains; `need` is derived from this
   bool overlaps = false;    // true if media may be nested or intersect; each path then keeps a MediaState
   MediaState camera_media;  // if `overlaps`: the media state with which camera paths start
-  bool coincident = false;  // true if surfaces coincide of which at least one is null (coincident.h)
+  bool coincident = false;  // true if surfaces coincide and at least one of them is null (coincident.h)
   // True if a null surface that emits light coincides with another surface
   bool lights_on_others = false;
   Features need;
@@ -70,7 +70,8 @@ class World {
   Lamps lamps;  // lights without extent: paths also sample directions that pass close to them
   // True if some flights through homogeneous media are made to end near lamps
   bool lamp_flights = false;
-  // Number of points on each segment at which light is sampled (segment_nee.h); 0: none
+  // Number of points at which light is sampled on each segment that starts at the camera or at a delta lobe
+  // (segment_nee.h); 0: none.
   int camera_points = 0;
   // The next five members are used with Features::connected only. The sun is the directional emitter that
   // lights the scene (light_vertices.h).

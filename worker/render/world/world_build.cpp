@@ -131,8 +131,9 @@ void find_clear_regions(World& w) {
 }
 
 // Sets the camera and the position of the image in the full frame; returns the size of the full frame. If the
-// scene has a crop, the image is that part of the full frame, and its samples have the same bits as there. If
-// the size requested for the image is not that of the crop, the full frame is scaled accordingly.
+// scene has a crop, the image is that part of the full frame, with the same pixel values, bit for bit, as in
+// an image of the full frame. If the size requested for the image is not that of the crop, the full frame is
+// scaled accordingly.
 FrameSize place_camera(const Scene& scene, const RenderSettings& settings, World& w) {
   const FilmSettings& film = scene.film;
   FrameSize frame = settings.size;
