@@ -144,12 +144,13 @@ json forecast(const ReportFacts& facts) {
 std::string note_on(StopReason stopped, TargetLayer layer) {
   if (stopped == StopReason::error && layer == TargetLayer::denoised)
     return "stopped at a target error of the denoised layers: each tile has as many samples as its own error "
-           "asked for, so the image carries a small bias; where it ended was decided by errors that the "
-           "denoiser of this coordinator computed";
+           "required, so the image has a small bias; the errors that ended the job were computed by the "
+           "denoiser of this coordinator";
   if (stopped == StopReason::error)
-    return "stopped at a target error: each tile has as many samples as its own error asked for, so the "
-           "image "
-           "carries a small bias, below the error told; images by samples carry none";
+    return "stopped at a target error: each tile has as many samples as its own error required, so the image "
+           "has a small bias, which is smaller than the reported error; images with a fixed number of "
+           "samples "
+           "have none";
   if (stopped == StopReason::time)
     return "stopped by time: another run may end with other samples, so its pixels may differ";
   return "";

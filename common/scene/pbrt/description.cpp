@@ -194,7 +194,7 @@ class Loader {
     const auto type =
         std::find_if(params->begin(), params->end(), [](const Param& p) { return p.name == "type"; });
     if (type == params->end() || type->texts.size() != 1)
-      return report_.refuse(at, "\"string type\" is missing, which meaning what this is");
+      return report_.refuse(at, "\"string type\" is missing: it says which type of object this is");
     const std::string name = type->texts[0];
     const Span type_at = type->at;
     params->erase(type);

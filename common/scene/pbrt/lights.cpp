@@ -125,8 +125,8 @@ class LightTranslator {
       return p_.error(portal->at, fmt::format("'portal' of {} has {} numbers: give the 12 of its 4 corners",
                                               p_.title(), portal->numbers.size()));
     t_.report.warning(portal->at,
-                      fmt::format("'portal' of {} is read as if it were not there: pbrt shows the light only "
-                                  "through the portal, here it comes from all directions. Both are the same "
+                      fmt::format("'portal' of {} is ignored: pbrt shows the light only through the portal, "
+                                  "here it comes from all directions. Both are the same "
                                   "in a closed room whose only opening is the portal",
                                   p_.title()));
   }

@@ -263,8 +263,8 @@ TEST(Pbrt, APortalIsAWarningAndLeavesTheWholeMap) {
     EXPECT_EQ(digest_of(*with.scene), digest_of(*without.scene));
     ASSERT_EQ(with.diagnostics.size(), 1) << messages(with);
     EXPECT_TRUE(says(messages(with),
-                     "warning: 'portal' of LightSource \"infinite\" is read as if it were "
-                     "not there: pbrt shows the light only through the portal, here it comes "
+                     "warning: 'portal' of LightSource \"infinite\" is ignored: pbrt shows the light only "
+                     "through the portal, here it comes "
                      "from all directions. Both are the same in a closed room whose only "
                      "opening is the portal"))
         << messages(with);
