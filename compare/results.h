@@ -67,7 +67,8 @@ struct Table {
   std::vector<std::vector<std::string>> rows;
 };
 Table summary_table(const Results& results);
-Table forecast_table(const Results& results);           // has no rows if nothing was predicted
+// Compares times predicted during the renders with the real ones; has no rows if no time was predicted.
+Table forecast_table(const Results& results);
 std::vector<std::string> remarks_on(const Race& race);  // about the reference, notes and failures
 // Explains forecast_table(); empty if nothing was predicted.
 std::string forecast_words(const Results& results);

@@ -24,8 +24,9 @@ std::optional<PlyAttribute> colour(std::span<const std::string_view> names) {
   return std::nullopt;
 }
 
-// Consecutive properties with the same prefix, such as foo_x foo_y. Their last characters, in this order, are
-// the beginning of `kind`, which is one of the sequences in kKinds.
+// Consecutive properties of one attribute: a prefix, and then one character of `kind`, in the order of
+// `kind`. The properties foo_x and foo_y have the prefix foo_ and begin the kind "xyzw". kKinds lists all
+// kinds.
 struct Run {
   std::string_view prefix;
   std::string_view kind;

@@ -16,7 +16,7 @@ enum class Technique : std::uint8_t {
   equiangular,      // samples points on path segments in media, close to lights that have a position
   exponential,      // samples points on path segments in media in proportion to the transmittance
   camera_points,    // samples several points on the segments of camera rays in media
-  lamp_directions,  // samples a share of the directions close to lights without extent
+  lamp_directions,  // aims a share of all sampled directions close to a light without extent
   lamp_flights,     // lets a share of the free flights in media end close to lights without extent
   light_vertices,   // connects paths to points that are lit by a directional emitter
   light_tree,       // chooses one of many lights with a tree of lights

@@ -105,7 +105,8 @@ struct AuditFigures {
   // Units whose second result had other bits: a third worker had to decide, or the job failed
   std::uint64_t differ = 0;
   std::uint64_t dropped = 0;  // audits given up: no other worker could render the unit, or the job ended
-  // Results chosen for an audit that did not begin: no other worker of the numeric class was connected
+  // Results chosen for an audit that did not begin: no other worker that computes the same bits (of the same
+  // numeric class) was connected
   std::uint64_t missed = 0;
   std::uint64_t workers_quarantined = 0, tiles_discarded = 0;
 };

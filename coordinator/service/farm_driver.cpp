@@ -376,7 +376,8 @@ void FarmDriver::on(const WorkerBlocked& e) {
 
 // The quarantine of a faulty worker is stored separately from the jobs and outlives them, so that none of its
 // results is accepted after a restart or in a job that is extended later. Until the quarantine is stored, all
-// jobs are paused: after a restart without it, the worker's results in the logs would be accepted.
+// jobs are paused: a restart reads the results of all workers from the jobs' files of partials, and without
+// the stored quarantine it would accept those of the faulty worker.
 void FarmDriver::on(const WorkerFoundFaulty& e) {
   log_error(fmt::format("worker={} job={} tile={} round={}", e.worker.value, e.unit.job.value, e.unit.tile,
                         e.unit.round),

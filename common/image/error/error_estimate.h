@@ -186,8 +186,8 @@ class Checkpoints {
   // Declares that no more rounds will follow for this tile, unless folded() is called for it again.
   void stopped(TileIndex tile);
 
-  // complete() is the number of complete checkpoints: a round is complete if every tile has reached it or has
-  // stopped before it. at() returns the image's figures after such a round.
+  // Each round is a checkpoint. It is complete if every tile has reached it or has stopped before it.
+  // complete() returns the number of complete rounds; at() returns the image's figures after one of them.
   RoundIndex complete() const { return static_cast<RoundIndex>(done_.size()); }
   const TileError& at(RoundIndex round) const { return done_[round]; }
 

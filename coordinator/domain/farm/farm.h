@@ -105,8 +105,8 @@ class Farm {
   // result of `unit` that has arrived; `numeric_class` is that of the worker that rendered it.
   Wanted wanted(const UnitKey& unit, const Digest& numeric_class) const;
   std::optional<JobFigures> job(const JobId& id) const;
-  // Returns the job's current plan, for storage: with changed priority and samples, and without a target
-  // error or time limit that no longer applies.
+  // Returns the job's current plan, for storage. It has the priority and the number of samples that users
+  // have set since the submission, and lacks a target error or time limit that no longer applies.
   std::optional<JobPlan> plan(const JobId& id) const;
   // Return an error, with the reason, if the farm would ignore the event JobRetargeted or JobExtended with
   // this target error or number of samples.

@@ -275,8 +275,9 @@ template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::share(std::span<PathTracer* const> group) {
   struct Seen {
     Look look;
-    // The BSDF or phase function at the tail's vertex, towards this path's first vertex: `lit` for the light
-    // that next-event estimation found, `onward` for the light that arrives along the tail
+    // Values of the BSDF or phase function at the first vertex y_j of the tail, for light that is scattered
+    // from there to the vertex x_i of the path that receives it: `lit` for the light that next-event
+    // estimation found at y_j, `onward` for the light that arrives along the rest of the tail
     C3 lit, onward;
   };
   boost::container::static_vector<Seen, kMostSharing> seen(group.size());
