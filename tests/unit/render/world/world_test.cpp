@@ -249,7 +249,11 @@ SceneBuilder scaled(SceneBuilder builder, int k) {
     }
   }
   for (ls::Medium& m : builder.scene.media) {
-    std::visit([&](auto& v) { v.scale /= f; }, m);
+    std::visit(
+        [&](auto& v) {
+          if constexpr (requires { v.scale; }) v.scale /= f;
+        },
+        m);
     if (auto* h = std::get_if<HomogeneousMedium>(&m))
       for (double& e : h->emission) e /= f;
   }
