@@ -93,8 +93,8 @@ std::optional<std::size_t> next_turn(std::span<const Turn> turns, std::size_t la
 std::optional<SampleRange> next_range(RoundIndex k, double seconds_per_sample, double seconds_left,
                                       std::uint64_t most_spp);
 
-// What make_render_racer() needs: the loaded scene with its integrator, the tiles of the image, and where to
-// write files.
+// The inputs of make_render_racer(): the loaded scene with its integrator, the tiles of the image, and where
+// to write files.
 struct RenderEntry {
   std::shared_ptr<const render::World> world;
   TileGrid grid;

@@ -23,7 +23,7 @@ struct LocalRenderOptions {
 // Renders the scene, and writes the output files; returns the exit code.
 int render_locally(const LocalScene& scene, const LocalRenderOptions& options);
 
-// What only this process knows about the render; the coordinator's report lacks it.
+// Facts about the render that only this process has; the coordinator's report lacks them.
 struct LocalFacts {
   double load_seconds = 0;
   std::uint64_t peak_rss_bytes = 0;

@@ -1,4 +1,4 @@
-// What `lightshaft farm up` costs, in core seconds. The sums are kept in a file, so that the next run with
+// The costs of `lightshaft farm up`, in core seconds. The sums are kept in a file, so that the next run with
 // the same --name continues them. The classes are pure state machines: they read no clock and send no
 // requests.
 #pragma once

@@ -10,8 +10,9 @@ namespace ls {
 
 namespace {
 
-// What the callbacks of libpng use: the bytes still to be read, and the message of an error. Callbacks must
-// not throw. Errors return by longjmp, which calls no destructors, so only plain data may be on the stack.
+// The state of the callbacks of libpng: the bytes still to be read, and the message of an error. Callbacks
+// must not throw. Errors return by longjmp, which calls no destructors, so only plain data may be on the
+// stack.
 struct Source {
   const std::byte* data;
   std::size_t left;

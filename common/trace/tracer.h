@@ -55,7 +55,7 @@ class Tracer {
 
   Options options_;
   Resource resource_;
-  // What is added to a time of options_.clock, in nanoseconds, to get nanoseconds since 1970.
+  // Offset in nanoseconds: a time of options_.clock plus this offset is the time since 1970.
   std::atomic<std::int64_t> offset_ns_{0};
   std::atomic<std::uint64_t> ids_;
   mutable Guarded<SpanQueue> queue_;

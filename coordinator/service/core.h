@@ -5,8 +5,8 @@
 // The path of a worker's result:
 //   receive() -> [verify threads: decode, digest] -> [commit thread: append to the job's log, one fdatasync
 //     for many results] -> farm (the state machine that decides which worker renders what) -> acknowledge
-// What may be stored later goes to the writer thread: convergence points, logs, snapshots (the image so far,
-// for a restart) and final images, strictly in order.
+// The writer thread stores, strictly in order, the data that may be stored later: convergence points, logs,
+// snapshots (the image so far, for a restart) and final images.
 #pragma once
 
 #include <condition_variable>

@@ -128,9 +128,9 @@ struct JobView {
   // by a version without users.
   std::string owner;
   JobState state = JobState::queued;
-  // What ended the job: "spp" (it has its samples), "error" (it reached its target error), "time" (its time
-  // was used up) or "user" (a user cancelled it). Empty: the job is neither done nor cancelled, or the frames
-  // of a sequence ended for different reasons.
+  // The reason for which the job ended: "spp" (it has its samples), "error" (it reached its target error),
+  // "time" (its time was used up) or "user" (a user cancelled it). Empty: the job is neither done nor
+  // cancelled, or the frames of a sequence ended for different reasons.
   std::string stopped;
   double progress = 0;    // from 0 to 1
   std::uint64_t spp = 0;  // requested samples per pixel; if no number was requested, the limit

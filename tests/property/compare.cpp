@@ -10,7 +10,7 @@ namespace {
 
 // Below, a few pixels rule and a standard error means nothing: such a pair is left undecided.
 constexpr double kLeastFreedom = 25;
-// Of float32 along paths of a dozen vertices, see validation/measure/judge.h.
+// Rounding error of float32 along paths of a dozen vertices: see validation/measure/judge.h.
 constexpr double kRounding = 0x1p-16;
 
 }  // namespace

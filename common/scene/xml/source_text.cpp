@@ -62,7 +62,7 @@ std::string_view characters(std::string_view text, std::size_t first, std::size_
 }
 
 // Returns the source line of a diagnostic and, below it, a line with a caret under the diagnostic's position.
-// Of a long line only the part around this position is shown.
+// A long line is cut to the part around that position.
 std::string excerpt(const Diagnostic& d) {
   const std::size_t column = static_cast<std::size_t>(std::max(1, d.place.column)) - 1;
   const std::size_t first = column > kMaxExcerptBytes / 2 ? column - kMaxExcerptBytes / 2 : 0;

@@ -1,4 +1,4 @@
-// What /metrics shows about this process and the HTTP server.
+// The metrics of this process and of its HTTP server, which /metrics shows.
 #pragma once
 
 #include <atomic>

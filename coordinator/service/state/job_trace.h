@@ -21,7 +21,7 @@
 
 namespace ls::coordinator {
 
-// What a JobTrace needs besides the job
+// The part of a JobTrace that is the same for all jobs of a coordinator
 struct Tracing {
   std::shared_ptr<trace::Tracer> tracer;  // receives the spans; null: nothing is traced
   // The ids of all leases since this start of the coordinator begin with this text; the ids of earlier leases

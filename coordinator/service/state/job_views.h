@@ -17,7 +17,7 @@
 
 namespace ls::coordinator {
 
-// What is known of a job when its end is predicted
+// The inputs from which the end of a job is predicted
 struct EtaInputs {
   double done = 0;          // fraction of the requested samples, 0 to 1
   double core_seconds = 0;  // core seconds spent on rendering so far, as in ErrorPoint::core_seconds

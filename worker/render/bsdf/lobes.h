@@ -1,4 +1,4 @@
-// What all kinds of material have in common: parameters, their lookup at a point, and the interface of a
+// The common parts of all kinds of material: parameters, their lookup at a point, and the interface of a
 // kind. A kind is a struct for one type of material, such as Diffuse.
 #pragma once
 

@@ -20,7 +20,7 @@ struct Quadrature {
 // Returns the Gauss-Legendre quadrature with n nodes on [0, 1].
 Quadrature gauss_legendre(int n);
 
-// What happens to the light that meets a microfacet. With F the Fresnel reflectance, the share F is reflected
+// The path of light that meets a microfacet. With F the Fresnel reflectance, the share F is reflected
 // and 1 - F refracted. `mirrored` is reflection without loss: all light is reflected.
 enum class Way { reflected, refracted, mirrored };
 

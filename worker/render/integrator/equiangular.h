@@ -67,8 +67,8 @@ class EquiAngular {
   // be the angle at the pivot from the foot to a point of the segment, `mid` the angle from the foot to the
   // projection of the cone's axis, and m the length of this projection. The direction to the point has the
   // cosine m cos(angle - mid) to the axis, and the point is inside the cone where this is at least cos_reach.
-  // Nothing is cut off if the line passes the pivot so closely that the direction of the foot is lost in
-  // rounding.
+  // The interval stays whole if the line passes the pivot so closely that the direction of the foot is lost
+  // in rounding.
   void keep_lit(const Pivot& pivot, const V3& off) {
     // kRightAngle is less than pi / 2, but more than atan(1 / kCloseness), which no `angle` exceeds
     constexpr float kCloseness = 1e-5f, kRightAngle = 1.57079f;

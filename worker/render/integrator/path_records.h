@@ -69,7 +69,7 @@ constexpr LightPart part_of(int scatterings, bool first_in_medium) {
 // light vertices (points that the sun lights: light_vertices.h), and paths that learn.
 struct Connections {
   const LightVertices* vertices = nullptr;  // null if paths are not connected
-  // What learning paths record about the light that connections, portals or local lights could find.
+  // The records of learning paths about the light that connections, portals or local lights could find.
   // `learner` is null for other paths.
   struct Learner {
     SunMap map;

@@ -173,7 +173,7 @@ struct PixelSums {
   double half[2][3] = {};
 };
 
-// What a pixel accumulates beside the colour sums: nothing (NoAovs), or AOVs (AovPixel).
+// The sums of a pixel besides its colour: none (NoAovs), or AOVs (AovPixel).
 struct NoAovs {
   static LightSplit* split() { return nullptr; }
   static void begin_pixel() {}

@@ -25,7 +25,7 @@
 
 namespace ls::render {
 
-// Whether the emission of a medium is proportional to length or to absorption. For black_body it is
+// The quantity to which the emission of a medium is proportional: length or absorption. For black_body it is
 // proportional to absorption, and the factor is the radiance of a black body.
 enum class EmissionKind : std::uint8_t { none, per_length, per_absorption, black_body };
 
@@ -101,7 +101,7 @@ struct MediumCounters {
   std::uint64_t majorant_violations = 0;
 };
 
-// What free_flight() and transmittance() call for media with one density grid per channel
+// free_flight() and transmittance() call these functions for media with one density grid per channel
 // (Medium::by_channel). Only chromatic code uses them. They are defined in medium.cpp.
 Flight fly_channels(const Medium& m, int hero, float depth, const V3& o, const V3& d, float t_max,
                     RandomStream stream, MediumCounters& counters);
