@@ -5,21 +5,24 @@
 #   tests/run.sh --blender      also the tests of the add-on that need Blender, a download of 350 MB and some minutes
 #   tests/run.sh --kubernetes   also the tests that need Kubernetes' API server, which the first time takes minutes to build
 #   tests/run.sh --upgrade      also the upgrade from the last release, whose programs are built the first time
-#   tests/run.sh --require-all  a test that cannot run here is a failure, not a skip
+#   tests/run.sh --docker       installs and starts Docker for the tests of compose, containers and packages, where that is possible
+#   tests/run.sh --require-all  a test that cannot run here is a failure, not a skip; the parts above that were not asked for, or
+#                               cannot run on this machine, are named at the end
 # System and browser tests mostly wait, for farms and pages; builds and unit tests mostly compute. So these are two lanes
 # that run side by side once the programs are built. Logs, and the seconds of each step, are in build/test-logs.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-quick=0 blender=0 kubernetes=0 upgrade=0 require_all=0
+quick=0 blender=0 kubernetes=0 upgrade=0 docker=0 require_all=0
 for arg in "$@"; do
   case "$arg" in
     --quick) quick=1 ;;
     --blender) blender=1 ;;
     --kubernetes) kubernetes=1 ;;
     --upgrade) upgrade=1 ;;
+    --docker) docker=1 ;;
     --require-all) require_all=1 ;;
-    *) echo "usage: tests/run.sh [--quick] [--blender] [--kubernetes] [--upgrade] [--require-all]" >&2; exit 2 ;;
+    *) echo "usage: tests/run.sh [--quick] [--blender] [--kubernetes] [--upgrade] [--docker] [--require-all]" >&2; exit 2 ;;
   esac
 done
 
@@ -27,10 +30,12 @@ started=$SECONDS
 logs=build/test-logs
 rm -rf "$logs"
 mkdir -p "$logs"
-counts=$logs/counts times=$logs/times.csv
+counts=$logs/counts times=$logs/times.csv not_run=$logs/not-run
 : >"$counts"
+: >"$not_run"
 echo "step,begins,seconds,processor_seconds" >"$times"
 
+left_out() { echo "$1: $2" >>"$not_run"; }  # part, why it is not part of this run
 count() { echo "$1 $2 $3" >>"$counts"; }  # passed failed skipped
 total() { awk -v column="$1" '{ n += $column } END { print n + 0 }' "$counts"; }
 summary() { echo "$(total 1) passed, $(total 2) failed, $(total 3) skipped"; }
@@ -110,28 +115,38 @@ run_in_venv() {  # name, arguments...: by a Python that has what tests/NAME need
 }
 
 run_blender() {
-  if [ "$blender" -eq 1 ]; then run_in_venv blender tests/blender; else run_pytest blender tests/blender/test_files.py; fi
+  if [ "$blender" -eq 1 ]; then run_in_venv blender tests/blender; return; fi
+  left_out "rendering in Blender" "only with --blender"
+  run_pytest blender tests/blender/test_files.py
 }
 
 run_kubernetes() {
-  [ "$kubernetes" -eq 1 ] || return 0
+  [ "$kubernetes" -eq 1 ] || { left_out "Kubernetes" "only with --kubernetes"; return 0; }
   local programs
   if programs=$(tests/kubernetes/tools.sh 2>"$logs/kubernetes-tools.log"); then LIGHTSHAFT_KUBERNETES="$programs" run_pytest kubernetes tests/kubernetes
   else count 0 1 0; tail -n 20 "$logs/kubernetes-tools.log"; echo "kubernetes: the API server could not be built"; fi
 }
 
 run_upgrade() {
-  [ "$upgrade" -eq 1 ] || return 0
+  [ "$upgrade" -eq 1 ] || { left_out "upgrade from the last release" "only with --upgrade"; return 0; }
   local programs
   if programs=$(tests/upgrade/build.sh 2>"$logs/upgrade-build.log"); then LIGHTSHAFT_OLD_BIN="$programs" run_pytest upgrade tests/upgrade
   else count 0 1 0; tail -n 20 "$logs/upgrade-build.log"; echo "upgrade: the last release could not be built"; fi
 }
 
+# The engine that this starts ends with the run.
+prepare_docker() {
+  [ "$docker" -eq 1 ] || return 0
+  if tests/docker_engine.sh "$logs/docker" >"$logs/docker.log" 2>&1; then . "$logs/docker/env"; else tail -n 1 "$logs/docker.log"; fi
+}
+end_docker() { [ ! -e "$logs/docker/dockerd.pid" ] || kill "$(cat "$logs/docker/dockerd.pid")" 2>/dev/null || true; }
+trap end_docker EXIT
+
 run_compose() {
   # Docker may be missing, have no engine, no builder, or no way to the base image.
-  if ! printf 'FROM debian:bookworm-slim\n' | DOCKER_BUILDKIT=1 docker build -q - >"$logs/docker.log" 2>&1; then
-    echo "compose: Docker builds nothing here, so it is not part of this run (tests/compose/run.sh; $logs/docker.log)"
-  elif tests/compose/run.sh --prebuilt >"$logs/compose.log" 2>&1; then count 1 0 0; echo "compose: passed"
+  if ! printf 'FROM debian:bookworm-slim\n' | DOCKER_BUILDKIT=1 docker build -q - >"$logs/docker-build.log" 2>&1; then
+    left_out "compose" "Docker builds nothing here ($(tail -n 1 "$logs/docker-build.log"))"
+  elif tests/compose/run.sh --prebuilt --network "${LIGHTSHAFT_DOCKER_NETWORK:-default}" >"$logs/compose.log" 2>&1; then count 1 0 0; echo "compose: passed"
   else count 0 1 0; tail -n 40 "$logs/compose.log"; echo "compose: failed"; fi
 }
 
@@ -140,14 +155,14 @@ run_docker() {
   local why
   why=$(PYTHONPATH=tests/support /usr/bin/python3 -c 'import docker_engine; print(docker_engine.missing())')
   if [ -z "$why" ]; then run_pytest docker tests/docker
-  else echo "docker: not part of this run: $why"; fi
+  else left_out "workers in containers" "$why"; fi
 }
 
 run_packages() {
   tests/packages/run.sh --prebuilt >"$logs/packages.log" 2>&1
   case $? in
     0) count 1 0 0; echo "packages: passed" ;;
-    77) echo "packages: not part of this run: $(tail -n 1 "$logs/packages.log")" ;;
+    77) left_out "Debian packages" "$(tail -n 1 "$logs/packages.log")" ;;
     *) count 0 1 0; tail -n 40 "$logs/packages.log"; echo "packages: failed" ;;
   esac
 }
@@ -160,6 +175,7 @@ waiting_lane() {
   step "Blender" run_blender
   step "Kubernetes" run_kubernetes
   step "upgrade" run_upgrade
+  step "Docker's engine" prepare_docker
   step "compose" run_compose
   step "Docker" run_docker
   step "packages" run_packages
@@ -196,6 +212,7 @@ wait "$waiting"
 
 printf '\nThe slowest steps (%s):\n' "$times"
 tail -n +2 "$times" | sort -t, -k3 -rn | head -n 6 | awk -F, '{ printf "  %5d s  %s\n", $3, $1 }'
+if [ -s "$not_run" ]; then printf '\nNot part of this run:\n'; sed 's/^/  /' "$not_run"; fi
 if [ "$require_all" -eq 1 ] && [ "$(total 3)" -gt 0 ]; then
   echo "--require-all: $(total 3) tests were skipped"
   count 0 "$(total 3)" "-$(total 3)"

@@ -73,9 +73,7 @@ void BlobWatch::missing(const Digest& digest, const Error& why) {
       waiting.push_back(entry);
   }
   if (waiting.empty()) return;
-  // If the records cannot be stored, the error is ignored: after a restart the coordinator notices again that
-  // the blob is missing.
-  (void)core->records.put_together([&] {
+  core->records.put_together([&] {
     for (const EntryPtr& entry : waiting) {
       core->records.log(entry->stored.id, why.message);
       await_blob(*core, *entry, *file_of(entry->stored, digest), why.code == Errc::failed_precondition);
@@ -110,19 +108,23 @@ void BlobWatch::look_for(const std::set<Digest>& digests) {
   const auto core = core_.lock();
   std::vector<EntryPtr> complete;
   for (const auto& [id, entry] : core->jobs.all()) {
-    auto& left = entry->stored.missing_blobs;
-    if (std::erase_if(left, [&](const Digest& digest) { return here.contains(digest); }) > 0 && left.empty())
+    auto& missing = entry->stored.missing_blobs;
+    const auto is_here = [&](const Digest& digest) { return here.contains(digest); };
+    if (missing.empty()) continue;
+    if (std::all_of(missing.begin(), missing.end(), is_here))
       complete.push_back(entry);
+    else
+      std::erase_if(missing, is_here);
   }
   if (complete.empty()) return;
-  (void)core->records.put_together([&] {
-    for (const EntryPtr& entry : complete) {
-      log_info(fmt::format("job={}", entry->stored.id.value), "its files are here again");
-      core->records.log(entry->stored.id, "its files are here again");
-      if (auto resumed = commands_.become(*core, entry, JobState::running); !resumed)
-        log_error(fmt::format("job={}", entry->stored.id.value), resumed.error().message);
-    }
-  });
+  // Jobs that cannot be resumed keep their missing blobs, and are tried again at the next look.
+  if (auto resumed = commands_.become(*core, complete, JobState::running); !resumed)
+    log_error("", "jobs whose files are here again cannot be resumed: " + resumed.error().message);
+  for (const EntryPtr& entry : complete) {
+    if (!entry->stored.missing_blobs.empty()) continue;
+    log_info(fmt::format("job={}", entry->stored.id.value), "its files are here again");
+    core->records.log(entry->stored.id, "its files are here again");
+  }
 }
 
 void BlobWatch::check_store() {

@@ -113,9 +113,10 @@ void Coordinator::Parts::start_threads() {
   run([this](Stop stop) { every(*options.tick, stop, [&] { tick(); }); });
 }
 
-// Nothing is flushed here: accepted results are durable already, and workers send unacknowledged results
-// again. After a clean shutdown the state is the same as after a crash.
+// Accepted results are durable already, and workers send unacknowledged results again. So after a clean
+// shutdown the state is the same as after a crash, but for records that a full disk had refused.
 void Coordinator::Parts::stop() {
+  core.lock()->records.retry();
   sessions.abandon();
   results.close();
   for (auto& thread : threads) thread.request_stop();
@@ -128,6 +129,7 @@ void Coordinator::Parts::tick() {
   if (options.shared) takeover.look_for_moved_jobs();
   const auto locked = core.lock();
   sessions.report_held_back(*locked);
+  locked->records.retry();
   locked->driver.run(Tick{});
   blob_watch.look_if_due(*locked);
   locked->publisher.publish_due();

@@ -94,7 +94,7 @@ Result<std::vector<EntryPtr>> may_retarget(const Farm& farm, const JobId& id,
         continue;
       woken += pixels_of(job);
       chosen.push_back(frame);
-    } else if (auto ok = farm.may_retarget(frame->stored.id, target_error); !ok)
+    } else if (auto ok = farm.retargeted(frame->stored.id, target_error); !ok)
       last = in_frame(frame->stored.id, ok.error());
     else
       chosen.push_back(frame);
@@ -106,7 +106,8 @@ Result<std::vector<EntryPtr>> may_retarget(const Farm& farm, const JobId& id,
 
 // Returns the frames that are to be extended to `spp` samples per pixel. Frames that were set to `spp`
 // already are left out: an earlier change of the sequence may have been interrupted after some frames.
-Result<std::vector<EntryPtr>> may_extend(const Farm& farm, const Sequence& sequence, std::uint64_t spp) {
+Result<std::vector<EntryPtr>> may_extend(const Farm& farm, const Sequence& sequence, std::uint64_t spp,
+                                         TimePoint now) {
   std::vector<EntryPtr> chosen;
   double woken = 0;
   for (const EntryPtr& frame : sequence.frames) {
@@ -119,7 +120,7 @@ Result<std::vector<EntryPtr>> may_extend(const Farm& farm, const Sequence& seque
     if (frame->stored.spp == even_spp(spp)) continue;
     if (frame->unloaded || frame->finishing)
       woken += frame->unloaded ? pixels_of(frame->stored) : 0;
-    else if (auto ok = farm.may_extend(id, spp); !ok)
+    else if (auto ok = farm.extended(id, spp, now); !ok)
       return tl::unexpected(in_frame(id, ok.error()));
     chosen.push_back(frame);
   }
@@ -131,31 +132,57 @@ Result<std::vector<EntryPtr>> may_extend(const Farm& farm, const Sequence& seque
 
 }  // namespace
 
+// Carries out a command on a job or on the frames of a sequence, and waits until coordinators that may take
+// these jobs over know of it. The wait is not under the lock.
+template <class Command>
+Result<void> JobCommands::carry_out(const JobId& id, Command command) const {
+  if (auto can = store_.can_share(); !can) return can;
+  std::vector<JobId> jobs;
+  {
+    const auto core = core_.lock();
+    if (const Sequence* sequence = core->jobs.sequence(id))
+      for (const EntryPtr& frame : sequence->frames) jobs.push_back(frame->stored.id);
+    else
+      jobs.push_back(id);
+    if (auto done = command(*core); !done) return done;
+  }
+  auto shared = store_.share(jobs);
+  if (shared) return {};
+  return fail(Errc::unavailable,
+              fmt::format("the change is made here, but would be lost if another coordinator took the job "
+                          "over: {}. Look at the job, and try again",
+                          shared.error().message));
+}
+
 Result<void> JobCommands::change(const JobId& id, const JobChange& change) const {
-  const auto core = core_.lock();
-  if (const Sequence* sequence = core->jobs.sequence(id))
-    return change_sequence(*core, id, *sequence, change);
-  const auto entry = core->jobs.usable(id);
-  return entry ? change_job(*core, *entry, change) : tl::unexpected(entry.error());
+  return carry_out(id, [&](Core& core) -> Result<void> {
+    if (const Sequence* sequence = core.jobs.sequence(id))
+      return change_sequence(core, id, *sequence, change);
+    const auto entry = core.jobs.usable(id);
+    return entry ? change_job(core, *entry, change) : tl::unexpected(entry.error());
+  });
 }
 
 Result<void> JobCommands::remove(const JobId& id) const {
-  const auto core = core_.lock();
-  if (const Sequence* sequence = core->jobs.sequence(id)) return remove_sequence(*core, id, *sequence);
-  const auto found = core->jobs.job(id);
+  return carry_out(id, [&](Core& core) {
+    const Sequence* sequence = core.jobs.sequence(id);
+    return sequence ? remove_sequence(core, id, *sequence) : remove_job(core, id);
+  });
+}
+
+Result<void> JobCommands::remove_job(Core& core, const JobId& id) const {
+  const auto found = core.jobs.job(id);
   if (!found) return tl::unexpected(found.error());
   const EntryPtr entry = *found;
   if (const auto frame = frame_of(id))
     return fail(Errc::failed_precondition,
                 fmt::format("{} is a frame of job {}: it can be cancelled, and is removed with all frames",
                             id.value, frame->sequence.value));
-  if (!is_terminal(entry->stored.state) && entry->finishing == 0) {
-    core->driver.run(JobCancelled{id});
-    return {};
-  }
+  if (!is_terminal(entry->stored.state) && entry->finishing == 0)
+    return become(core, {entry}, JobState::cancelled);
   if (auto removed = store_.remove_job(id); !removed) return removed;
-  drop(*core, entry);
-  core->publisher.job_removed(id, entry->stored.owner);
+  drop(core, entry);
+  core.publisher.job_removed(id, entry->stored.owner);
   return {};
 }
 
@@ -177,31 +204,53 @@ Result<void> JobCommands::change_job(Core& core, const EntryPtr& entry, const Jo
   }
   if (change.focus)
     if (auto done = set_focus(core, {entry}, *change.focus); !done) return done;
-  return change.state ? become(core, entry, *change.state) : Result<void>{};
+  return change.state ? become(core, {entry}, *change.state) : Result<void>{};
 }
 
-Result<void> JobCommands::become(Core& core, const EntryPtr& entry, JobState asked) const {
-  const JobId& id = entry->stored.id;
-  const JobState state = entry->stored.state;
-  if (asked == JobState::cancelled) {
-    if (state != asked) core.driver.run(JobCancelled{id});
-  } else if (asked == JobState::paused) {
-    entry->stored.missing_blobs.clear();  // from here on the job is paused by its user, not for missing blobs
-    if (state != asked)
-      core.driver.run(JobPaused{id});
-    else
-      core.records.put(entry);
-  } else if (entry->finishing) {  // the job's final image could not be written: it is written again
-    entry->trouble.clear();
-    images_.finish_again(core, entry);
-  } else if (state == JobState::paused) {
-    if (auto saved = core.records.put_pin(entry); !saved) return saved;
-    if (auto saved = core.records.put_quarantined(); !saved) return saved;
-    entry->trouble.clear();
-    ++entry->resumes;
-    core.driver.run(JobResumed{id});
+Result<void> JobCommands::become(Core& core, const Entries& jobs, JobState asked) const {
+  Result<void> done;
+  Entries changed;
+  for (const EntryPtr& job : jobs) {
+    const JobState state = job->stored.state;
+    if (job->finishing) {  // its final image is being written, or could not be written
+      if (asked == JobState::running && !job->trouble.empty()) {
+        job->trouble.clear();
+        images_.finish_again(core, job);
+      }
+      continue;
+    }
+    if (asked == JobState::running) {
+      if (state != JobState::paused) continue;
+      auto saved = core.records.put_pin(job);
+      if (saved) saved = core.records.put_quarantined();
+      if (!saved && done) done = tl::unexpected(in_frame(job->stored.id, saved.error()));
+      if (!saved) continue;
+    }
+    if (asked != JobState::cancelled || state != asked) changed.push_back(job);
   }
-  return {};
+  // The records are stored before the farm acts on them: what a user was told has happened survives a crash,
+  // and what could not be stored has not happened.
+  const auto edit = [&](StoredJob& job) {
+    const bool begins = asked == JobState::running && !job.numeric_class;
+    job.state = begins ? JobState::queued : asked;
+    job.missing_blobs.clear();  // a pause by the user does not end when the job's files are there
+  };
+  if (auto put = edit_all(changed, edit); !put) return put;
+  core.records.put_together([&] {
+    for (const EntryPtr& job : changed) {
+      const JobId& id = job->stored.id;
+      if (asked == JobState::cancelled) {
+        core.driver.run(JobCancelled{id});
+      } else if (asked == JobState::paused) {
+        core.driver.run(JobPaused{id});
+      } else {
+        job->trouble.clear();
+        ++job->resumes;
+        core.driver.run(JobResumed{id});
+      }
+    }
+  });
+  return done;
 }
 
 // Applies edit() to the records of all these jobs, and stores them in one transaction. If that fails, no
@@ -242,7 +291,7 @@ Result<void> JobCommands::extend(Core& core, JobEntry& entry, std::uint64_t spp)
     return fail(Errc::failed_precondition,
                 fmt::format("job {} is {}: it cannot be extended", id.value, to_string(state)));
   if (auto woken = restore_.wake(core, entry); !woken) return woken;
-  return go_on(core, entry, core.driver.farm().may_extend(id, spp), JobExtended{id, spp},
+  return go_on(core, entry, core.driver.farm().extended(id, spp, clock_.now()), JobExtended{id, spp},
                fmt::format("extended to {} samples per pixel", spp));
 }
 
@@ -254,38 +303,37 @@ Result<void> JobCommands::set_target(Core& core, JobEntry& entry, double target_
                 fmt::format("job {} is {}: its target error can no longer be changed; submit it again",
                             id.value, to_string(state)));
   if (auto woken = restore_.wake(core, entry); !woken) return woken;
-  auto possible = core.driver.farm().may_retarget(id, target_error);
-  if (possible) {
-    const auto before = std::exchange(entry.stored.spec.target_error, target_error);
-    possible = store_.put_job(entry.stored);
-    if (!possible) entry.stored.spec.target_error = before;
-  }
-  return go_on(core, entry, possible, JobRetargeted{id, target_error},
+  return go_on(core, entry, core.driver.farm().retargeted(id, target_error), JobRetargeted{id, target_error},
                fmt::format("target error {} from now on", target_error));
 }
 
-// Extends a job (more samples or a smaller target error), in the farm and in its stored record. `possible`:
-// the farm's check of the extension; if it is an error, returns the error and unloads a done job again.
-Result<void> JobCommands::go_on(Core& core, JobEntry& entry, const Result<void>& possible,
-                                const Event& change, std::string log_line) const {
+// Extends a job (more samples or a smaller target error), first in its stored record, then in the farm.
+// `plan`: the job's plan after the extension, or why the farm refuses it; after an error a done job is
+// unloaded again.
+Result<void> JobCommands::go_on(Core& core, JobEntry& entry, const Result<JobPlan>& plan, const Event& change,
+                                std::string log_line) const {
   const JobState state = entry.stored.state;
-  if (!possible) {
+  const auto refuse = [&](const Error& why) -> Result<void> {
     if (state == JobState::done && !entry.finishing) core.driver.unload(entry);
-    return possible;
+    return tl::unexpected(why);
+  };
+  if (!plan) return refuse(plan.error());
+  StoredJob next = entry.stored;
+  next.spec.target_error = plan->target_error;
+  if (!plan->target_error) next.spec.target_layer = TargetLayer::raw;
+  next.spec.time = plan->time;
+  if (plan->spp != next.spp) next.spp = next.spec.spp = plan->spp;
+  if (state == JobState::done) {
+    next.state = JobState::running;
+    next.stopped.reset();
   }
-  const JobId id = entry.stored.id;
-  const auto spp = entry.stored.spp;
-  const bool at_end = entry.finishing != 0 || state == JobState::done;
-  if (at_end) entry.clock_zero = clock_.now() - from_seconds(entry.stored.totals.render_seconds);
+  if (const auto put = store_.put_job(next); !put) return refuse(put.error());
+  entry.stored = std::move(next);
+  if (entry.finishing != 0 || state == JobState::done)
+    entry.clock_zero = clock_.now() - from_seconds(entry.stored.totals.render_seconds);
   entry.finishing = 0;
   core.driver.run(change);
-  const JobPlan plan = core.driver.farm().plan(id).value();
-  entry.stored.spec.target_error = plan.target_error;
-  if (!plan.target_error) entry.stored.spec.target_layer = TargetLayer::raw;
-  entry.stored.spec.time = plan.time;
-  if (plan.spp != spp) entry.stored.spp = entry.stored.spec.spp = plan.spp;
-  core.records.log(id, std::move(log_line));
-  if (const auto put = store_.put_job(entry.stored); !put) return put;
+  core.records.log(entry.stored.id, std::move(log_line));
   core.publisher.job(entry);
   return {};
 }
@@ -331,7 +379,7 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
     retargeted = std::move(*chosen);
   }
   if (change.spp) {
-    auto chosen = may_extend(farm, sequence, *change.spp);
+    auto chosen = may_extend(farm, sequence, *change.spp, clock_.now());
     if (!chosen) return tl::unexpected(chosen.error());
     extended = std::move(*chosen);
   }
@@ -346,7 +394,9 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
   // checked before the first one is extended.
   for (const EntryPtr& frame : extended) {
     auto possible = restore_.wake(core, *frame);
-    if (possible) possible = farm.may_extend(frame->stored.id, *change.spp);
+    if (possible)
+      if (auto plan = farm.extended(frame->stored.id, *change.spp, clock_.now()); !plan)
+        possible = tl::unexpected(plan.error());
     if (possible) continue;
     for (const EntryPtr& loaded : extended)
       if (!loaded->finishing) core.driver.unload(*loaded);
@@ -364,24 +414,10 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
     if (auto done = set_focus(core, sound, *change.focus); !done) return done;
   if (change.state) {
     open.insert(open.end(), extended.begin(), extended.end());
-    if (auto done = become_all(core, open, *change.state); !done) return done;
+    if (auto done = become(core, open, *change.state); !done) return done;
   }
   core.publisher.sequence(id, true);
   return {};
-}
-
-// Changes the state of the frames to `asked` and stores them together. A frame whose final image is being
-// written is left unchanged; if that writing has failed and `asked` is `running`, the image is written again.
-Result<void> JobCommands::become_all(Core& core, const Entries& frames, JobState asked) const {
-  Result<void> done;
-  const auto saved = core.records.put_together([&] {
-    for (const EntryPtr& frame : frames) {
-      if (frame->finishing && (asked != JobState::running || frame->trouble.empty())) continue;
-      if (auto became = become(core, frame, asked); !became && done)
-        done = tl::unexpected(in_frame(frame->stored.id, became.error()));
-    }
-  });
-  return done ? saved : done;
 }
 
 // If some frames have not ended, cancels these frames and removes nothing, as with a single job. Otherwise
@@ -394,7 +430,7 @@ Result<void> JobCommands::remove_sequence(Core& core, const JobId& id, const Seq
     if (!is_terminal(frame->stored.state) && !frame->finishing) open.push_back(frame);
   }
   if (!open.empty()) {
-    auto done = become_all(core, open, JobState::cancelled);
+    auto done = become(core, open, JobState::cancelled);
     core.publisher.sequence(id, true);
     return done;
   }

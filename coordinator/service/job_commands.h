@@ -31,11 +31,16 @@ class JobCommands {
   // Removes an ended job, or a sequence whose frames have all ended, with all results. If the job or some
   // frames have not ended, these are cancelled, and nothing is removed. The id of a single frame is an error.
   Result<void> remove(const JobId& id) const;
-  // Changes the state of a job. The caller must have checked that the change is possible.
-  Result<void> become(Core& core, const EntryPtr& entry, JobState asked) const;
+  using Entries = std::vector<EntryPtr>;
+  // Changes the state of the jobs; the caller must have checked that this is possible. Either the records of
+  // all jobs are stored, or the change is refused and has no effect. A job whose final image is being written
+  // is left unchanged; if that writing has failed and `asked` is `running`, the image is written again.
+  Result<void> become(Core& core, const Entries& jobs, JobState asked) const;
 
  private:
-  using Entries = std::vector<EntryPtr>;
+  template <class Command>
+  Result<void> carry_out(const JobId& id, Command command) const;
+  Result<void> remove_job(Core& core, const JobId& id) const;
   Result<void> change_job(Core& core, const EntryPtr& entry, const JobChange& change) const;
   template <class Edit>
   Result<void> edit_all(const Entries& jobs, Edit edit) const;
@@ -43,12 +48,11 @@ class JobCommands {
   Result<void> set_focus(Core& core, const Entries& jobs, const std::optional<PixelRect>& focus) const;
   Result<void> extend(Core& core, JobEntry& entry, std::uint64_t spp) const;
   Result<void> set_target(Core& core, JobEntry& entry, double target_error) const;
-  Result<void> go_on(Core& core, JobEntry& entry, const Result<void>& possible, const Event& change,
+  Result<void> go_on(Core& core, JobEntry& entry, const Result<JobPlan>& plan, const Event& change,
                      std::string log_line) const;
 
   Result<void> change_sequence(Core& core, const JobId& id, const Sequence& sequence,
                                const JobChange& change) const;
-  Result<void> become_all(Core& core, const Entries& frames, JobState asked) const;
   Result<void> remove_sequence(Core& core, const JobId& id, const Sequence& sequence) const;
   void drop(Core& core, const EntryPtr& entry) const;
 

@@ -269,6 +269,7 @@ PAGE = """# Hours of chaos
 |---|---|
 | a finished job has the image of one worker to which nothing happens; where pixels are rendered, that of `lightshaft render` | {hashes} |
 | every job comes to the end that its user wanted | {ends} |
+| a change that a coordinator acknowledged (cancel, extension, priority, removal) is still so after every fault | {kept} |
 | no token opens what it must not | {tokens} |
 | a worker that lies is found, an honest one never | {liars} |
 | nothing of a removed job is left in lists, folders, Redis; every object of the store is what its name says | {left} |
@@ -352,7 +353,7 @@ def page(path):
     at_once, most = spans(run)
     waited = sum(row[1] - row[0] for row in ledger.rows if ledger.waits(row))
     notes = collections.Counter(line["what"] for line in run.by["note"])
-    strays = collections.Counter("removed job that came back" if line["removed_before"] else "job whose taking was not answered" for line in run.by["stray"])
+    strays = collections.Counter("job whose taking was not answered" for line in run.by["stray"])
     taken = run.by["webhooks"][0] if run.by["webhooks"] else {"taken": 0, "jobs": 0}
     text = PAGE.format(
         **{key: run.begin[key] for key in ("seed", "minutes", "workers", "commit", "cores", "jobs", "audits")}, waves=run.begin["waves"] / 60,
@@ -364,6 +365,7 @@ def page(path):
                "that does not have the job to the one that refused it)" if held("a token") and run.end else "**some did**" if run.end else UNKNOWN,
         liars=f"{sum(line['found'] for line in liars)} of {len(liars)} found, {sum(not line['found'] and line['ended'] == 'failed' for line in liars)} told of with the evidence where no third "
               f"worker could decide; honest ones quarantined: {sum(line['what'].startswith('an honest') for line in run.by['wrong'])}",
+        kept=("yes" if held("acknowledged and forgotten") else "**not all**") if run.end else UNKNOWN,
         left=("yes" if held("jobs are left", "folders", "Redis has", "the store", "uploads") else "**no**") if run.end else UNKNOWN,
         webhooks=f"{taken['taken']:,} events of {taken['jobs']} jobs" + ("" if held("a webhook", "no webhook", "events") else "; **not all**") if run.end else UNKNOWN,
         processes="yes" if held("a worker ended", "a coordinator") and not grown_wrong + quiet_wrong else "**no**",

@@ -36,6 +36,10 @@ SEEDS = 60  # jobs with the same seed are the same job, so that one undisturbed 
 RIGHT_TO_FAIL = {"crash": "--pixel", "watched": "no third one agrees"}
 AT_ONCE = 8  # jobs of a user that have not ended: on a machine that is short of time a wave waits for the one before
 LOST_AFTER = 300  # seconds in which no coordinator has a job
+# Seconds for which a change that was acknowledged may not be seen: a coordinator that is cut off from Redis, frozen or taken over shows what
+# it knew until it learns that it has lost the job. The longest of these faults lasts 60 s (hours_faults.py); after it come two of the looks
+# at Redis and the next look of the user.
+SEEN_WITHIN = 120
 ENDED = ("done", "failed", "cancelled")
 
 
@@ -58,6 +62,7 @@ class Task:
     submitted: float = 0.0
     resume_at: float = 0.0
     checked: int = 0
+    priority: int = 0
     notes: dict = dataclasses.field(default_factory=dict)
 
     @property
@@ -177,6 +182,7 @@ class User(threading.Thread):
         self.caller, self.todo, self.undisturbed = Caller(farm, token), sorted(tasks, key=lambda t: t.due), undisturbed
         self.dice, self.tasks, self.hurry = random.Random(seed), {}, threading.Event()
         self.finished, self.gone, self.watching = [], set(), []
+        self.removed = {}  # job: its task, of jobs whose removal was acknowledged
         self.stays = False  # also without a job
 
     # ---- handing in ----
@@ -272,21 +278,42 @@ class User(threading.Thread):
         self.record.write("note", what=what, number=task.number, job=task.id, **more)
         return True
 
+    def kept(self, task, what, so, **more):
+        """A change that was acknowledged must be seen (`so`) and is never made again; True once it was forgotten for good, which is wrong."""
+        if so:
+            task.notes.pop(what, None)
+            return False
+        since = task.notes.setdefault(what, time.monotonic())
+        if time.monotonic() - since < SEEN_WITHIN:
+            return False
+        del task.notes[what]
+        self.record.wrong(f"acknowledged and forgotten: {what}", number=task.number, job=task.id, **more)
+        return True
+
     def act(self, task, what, more):
+        """True if it was acknowledged; else it is tried again."""
         if what == "cancel":
+            if not self.change(task, {"state": "cancelled"}):
+                return False
             task.asked = "cancelled"
-            self.change(task, {"state": "cancelled"})
-        elif what == "pause" and self.change(task, {"state": "paused"}):
+        elif what == "pause":
+            if not self.change(task, {"state": "paused"}):
+                return False
             task.asked, task.resume_at = "paused", time.monotonic() + more
-        elif what == "extend" and self.change(task, {"spp": task.spp + more}):
+        elif what == "extend":
+            if not self.change(task, {"spp": task.spp + more}):
+                return False
             task.spp += more
         elif what == "priority":
-            self.change(task, {"priority": more})
+            if not self.change(task, {"priority": more}):
+                return False
+            task.priority = more
         elif what == "watch":
             thread = threading.Thread(target=self.watch)
             thread.start()
             self.watching.append(thread)
         self.record.write("act", number=task.number, what=what)
+        return True
 
     def watch(self):
         """An event stream for a while: nothing of others' jobs may come."""
@@ -313,7 +340,7 @@ class User(threading.Thread):
         if state in ENDED:
             return self.at_its_end(task, at, view)
         if task.asked == "cancelled":
-            if self.note(task, "a cancel was forgotten"):
+            if self.kept(task, "a cancel", False, state=state):
                 self.change(task, {"state": "cancelled"})
             return None
         if task.asked == "paused" and time.monotonic() > task.resume_at and self.change(task, {"state": "running"}):
@@ -321,17 +348,19 @@ class User(threading.Thread):
         elif task.asked == "running" and state == "paused" and self.note(task, "paused by itself", every=5, error=view["error"]):
             if "waits for its file" not in (view["error"] or ""):
                 self.change(task, {"state": "running"})
-        if view["spp"] != task.spp and self.note(task, "an extension was forgotten"):
+        if self.kept(task, "an extension", view["spp"] == task.spp, spp=view["spp"], asked=task.spp):
             self.change(task, {"spp": task.spp})
-        while task.acts and task.acts[0][0] <= share and task.acts[0][1][0] != "extend later":
-            self.act(task, *task.acts.pop(0)[1])
+        if self.kept(task, "a priority", view["priority"] == task.priority, priority=view["priority"], asked=task.priority):
+            self.change(task, {"priority": task.priority})
+        while task.acts and task.acts[0][0] <= share and task.acts[0][1][0] != "extend later" and self.act(task, *task.acts[0][1]):
+            task.acts.pop(0)
         return None
 
     def at_its_end(self, task, at, view):
         state = view["state"]
         if state == "done" and task.asked != "cancelled":
             if view["spp"] != task.spp:
-                if self.note(task, "an extension was forgotten"):
+                if self.kept(task, "an extension", False, spp=view["spp"], asked=task.spp):
                     self.change(task, {"spp": task.spp})
                 return
             if task.checked != task.spp:
@@ -346,8 +375,9 @@ class User(threading.Thread):
                 task.checked, task.pixels = task.spp, json.loads(data)["pixels_sha256"]
                 self.undisturbed.todo.put((task, task.spp, task.pixels))
             if task.acts and task.acts[0][1][0] == "extend later":
-                _, (what, more) = task.acts.pop(0)
+                _, (what, more) = task.acts[0]
                 if self.change(task, {"spp": task.spp + more}):
+                    task.acts.pop(0)
                     task.spp += more
                     self.record.write("act", number=task.number, what=what)
                 return
@@ -363,7 +393,8 @@ class User(threading.Thread):
                               core_seconds=view["core_seconds"], units=view["units_total"])
             task.ended = state
             self.gone.add(task.id)
-            self.finished.append(self.tasks.pop(task.id))
+            self.removed[task.id] = self.tasks.pop(task.id)
+            self.finished.append(task)
 
     def turn(self):
         if self.todo and self.record.now() > self.until:
@@ -375,10 +406,16 @@ class User(threading.Thread):
         for job, (at, view) in found.items():
             if job in self.tasks:
                 self.look_at(self.tasks[job], at, view)
-            elif view["state"] in ENDED or job in self.gone or view["submitted_unix"] + 120 < time.time():
-                # A submission whose answer was lost, or a job that came back after it was removed.
-                self.record.write("stray", job=job, user=self.name_, removed_before=job in self.gone, state=view["state"], at=at)
+            elif job in self.removed:
+                if self.kept(self.removed[job], "a removal", False, state=view["state"], at=at):
+                    self.caller.try_ask(at, "DELETE", f"/api/v1/jobs/{job}")
+            elif view["state"] in ENDED or view["submitted_unix"] + 120 < time.time():
+                # A submission whose answer was lost.
+                self.record.write("stray", job=job, user=self.name_, state=view["state"], at=at)
                 self.caller.try_ask(at, "DELETE", f"/api/v1/jobs/{job}")
+        for job, task in self.removed.items():
+            if job not in found:
+                self.kept(task, "a removal", True)
         for task in list(self.tasks.values()):
             if task.id not in found and time.monotonic() - task.seen > LOST_AFTER and self.note(task, "nobody has it", every=60):
                 self.record.wrong("a job is lost", number=task.number, job=task.id)

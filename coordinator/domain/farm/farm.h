@@ -108,10 +108,10 @@ class Farm {
   // Returns the job's current plan, for storage. It has the priority and the number of samples that users
   // have set since the submission, and lacks a target error or time limit that no longer applies.
   std::optional<JobPlan> plan(const JobId& id) const;
-  // Return an error, with the reason, if the farm would ignore the event JobRetargeted or JobExtended with
-  // this target error or number of samples.
-  Result<void> may_retarget(const JobId& id, double target_error) const;
-  Result<void> may_extend(const JobId& id, std::uint64_t spp) const;
+  // Return the plan that the job would have after the event JobRetargeted or JobExtended with this target
+  // error or number of samples, or the reason for which the farm would ignore the event.
+  Result<JobPlan> retargeted(const JobId& id, double target_error) const;
+  Result<JobPlan> extended(const JobId& id, std::uint64_t spp, TimePoint now) const;
   std::optional<WorkerFigures> worker(const WorkerId& id) const;
   // Explains to the user why no worker may take units of a job that is queued or running: each connected
   // worker is of another class, lacks memory or a tag, is blocked or unhealthy, or the like. Empty if some

@@ -214,7 +214,7 @@ void Farm::State::end(Job& job) {
   refresh(job);
 }
 
-Result<void> Farm::State::may_retarget(const Job& job, double target_error) {
+Result<JobPlan> Farm::State::retargeted(const Job& job, double target_error) {
   const auto refuse = [](std::string why) { return ls::fail(Errc::failed_precondition, std::move(why)); };
   const std::string& id = job.plan.brief.job.value;
   if (!(target_error > 0 && std::isfinite(target_error)))
@@ -239,10 +239,12 @@ Result<void> Farm::State::may_retarget(const Job& job, double target_error) {
         fmt::format("job {} has come down to its target error of {:g}: only a smaller one makes a "
                     "difference",
                     id, *job.plan.target_error));
-  return {};
+  JobPlan plan = job.plan;
+  plan.target_error = target_error;
+  return plan;
 }
 
-Result<void> Farm::State::may_extend(const Job& job, std::uint64_t spp) {
+Result<JobPlan> Farm::State::extended(const Job& job, std::uint64_t spp, TimePoint now) {
   const std::string& id = job.plan.brief.job.value;
   if (is_closed(job.state))
     return ls::fail(Errc::failed_precondition,
@@ -264,13 +266,20 @@ Result<void> Farm::State::may_extend(const Job& job, std::uint64_t spp) {
                                 id, job.spp));
   JobPlan plan = job.plan;
   plan.spp = even_spp(spp);
-  return check_plan(plan);
+  const auto limit = job.time_limit(now);
+  const bool by_time = job.stopping == StopReason::time && (job.frozen || job.ended());
+  if (by_time || (limit && now >= *limit)) plan.time.reset();
+  if (job.stopping) plan.target_error.reset();
+  if (auto sound = check_plan(plan); !sound) return tl::unexpected(sound.error());
+  return plan;
 }
 
 void Farm::State::on(const JobRetargeted& event) {
   Job* job = find(event.job);
-  if (job == nullptr || !may_retarget(*job, event.target_error)) return;
-  job->plan.target_error = event.target_error;
+  if (job == nullptr) return;
+  auto plan = retargeted(*job, event.target_error);
+  if (!plan) return;
+  job->plan = std::move(*plan);
   job->level_seen = 0;
   job->predicted_at = 0;
   job->predicted_error = 0;
@@ -284,15 +293,13 @@ void Farm::State::on(const JobRetargeted& event) {
 
 void Farm::State::on(const JobExtended& event) {
   Job* job = find(event.job);
-  if (job == nullptr || !may_extend(*job, event.spp)) return;
+  if (job == nullptr) return;
+  auto plan = extended(*job, event.spp, now);
+  if (!plan) return;
   const RoundIndex last = round_count(job->spp) - 1;
   const std::uint64_t new_spp = even_spp(event.spp);
   if (cut_range(last, job->spp) != cut_range(last, new_spp)) reopen(*job, last);
-  const auto limit = job->time_limit(now);
-  const bool by_time = job->stopping == StopReason::time && (job->frozen || job->ended());
-  if (by_time || (limit && now >= *limit)) job->plan.time.reset();
-  if (job->stopping) job->plan.target_error.reset();
-  job->plan.spp = new_spp;
+  job->plan = std::move(*plan);
   job->spp = new_spp;
   job->stopping.reset();
   job->frozen = false;

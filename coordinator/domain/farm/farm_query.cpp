@@ -81,16 +81,16 @@ Wanted Farm::wanted(const UnitKey& unit, const Digest& numeric_class) const {
   return {verdict, job->range(code), job->plan.grid.rect(unit.tile), job->numeric_class.has_value()};
 }
 
-Result<void> Farm::may_retarget(const JobId& id, double target_error) const {
+Result<JobPlan> Farm::retargeted(const JobId& id, double target_error) const {
   const Job* job = state_->find(id);
   if (job == nullptr) return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
-  return State::may_retarget(*job, target_error);
+  return State::retargeted(*job, target_error);
 }
 
-Result<void> Farm::may_extend(const JobId& id, std::uint64_t spp) const {
+Result<JobPlan> Farm::extended(const JobId& id, std::uint64_t spp, TimePoint now) const {
   const Job* job = state_->find(id);
   if (job == nullptr) return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
-  return State::may_extend(*job, spp);
+  return State::extended(*job, spp, now);
 }
 
 std::optional<JobPlan> Farm::plan(const JobId& id) const {

@@ -65,8 +65,8 @@ struct Farm::State {
   void on(const JobRetargeted& event);
   void on(const JobExtended& event);
   void on(const JobForgotten& event);
-  static Result<void> may_retarget(const Job& job, double target_error);
-  static Result<void> may_extend(const Job& job, std::uint64_t spp);
+  static Result<JobPlan> retargeted(const Job& job, double target_error);
+  static Result<JobPlan> extended(const Job& job, std::uint64_t spp, TimePoint now);
   void reopen(Job& job, RoundIndex last);  // queues round `last`, which was truncated, to be rendered in full
   void take_up_again(Job& job);            // lets a job go on after its samples or its target were changed
   Job* find(const JobId& id) const;

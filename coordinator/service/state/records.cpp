@@ -19,26 +19,42 @@ bool Records::put(const EntryPtr& entry) {
     return true;
   }
   if (const auto put = store_.put_job(entry->stored); !put) {
-    trouble_ = put.error().message;
     log_error(fmt::format("job={}", entry->stored.id.value), put.error().message);
+    not_saved({entry}, put.error());
     return false;
   }
   entry->pin_unsaved = false;
   return true;
 }
 
-Result<void> Records::put_together(const std::function<void()>& changes) {
-  std::set<EntryPtr> unsaved;
-  together_ = &unsaved;
+void Records::put_together(const std::function<void()>& changes) {
+  std::set<EntryPtr> changed;
+  together_ = &changed;
   changes();
   together_ = nullptr;
+  if (const auto put = put_all(changed); !put) {
+    log_error("", put.error().message);
+    not_saved(std::move(changed), put.error());
+  }
+}
+
+void Records::retry() {
+  std::erase_if(unsaved_, [](const EntryPtr& entry) { return entry->removed; });
+  if (unsaved_.empty() || !put_all(unsaved_)) return;
+  for (const EntryPtr& entry : unsaved_) entry->pin_unsaved = false;
+  unsaved_.clear();
+  if (trouble_ == unsaved_because_) trouble_.clear();
+}
+
+Result<void> Records::put_all(const std::set<EntryPtr>& entries) const {
   std::vector<StoredJob> records;
-  for (const EntryPtr& entry : unsaved) records.push_back(entry->stored);
-  auto put = store_.put_jobs(records);
-  if (put) return put;
-  trouble_ = put.error().message;
-  log_error("", put.error().message);
-  return put;
+  for (const EntryPtr& entry : entries) records.push_back(entry->stored);
+  return store_.put_jobs(records);
+}
+
+void Records::not_saved(std::set<EntryPtr> entries, const Error& why) {
+  unsaved_.merge(entries);
+  trouble_ = unsaved_because_ = why.message;
 }
 
 Result<void> Records::put_pin(const EntryPtr& entry) {

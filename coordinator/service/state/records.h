@@ -21,11 +21,15 @@ class Records {
   Records(JobStore& store, const JobTable& jobs, BackgroundWrites& writes)
       : store_(store), jobs_(jobs), writes_(writes) {}
 
-  // Stores the job's record. If this fails, returns false, and trouble() gives the reason.
+  // Stores the job's record. If this fails, returns false, trouble() gives the reason, and retry() tries
+  // again.
   bool put(const EntryPtr& entry);
+  // Tries to store the records that could not be stored before. Called at each tick, and at the end.
+  void retry();
   // Calls `changes`, and then stores all jobs for which `changes` called put(). One transaction stores them
   // all, since a sequence may have thousands of frames and a transaction for each would take long.
-  Result<void> put_together(const std::function<void()>& changes);
+  // As with put(), retry() tries again what could not be stored.
+  void put_together(const std::function<void()>& changes);
   bool puts_together() const { return together_ != nullptr; }
   // Stores the numeric class (machines that compute the same bits) that the job is pinned to, if it is not
   // stored yet. After a restart a class that was not stored would be forgotten, and the job could be pinned
@@ -34,7 +38,8 @@ class Records {
   void add_quarantined(QuarantinedWorker worker) { quarantined_.push_back(std::move(worker)); }
   // Stores the quarantined workers that are not stored yet. Until they are, no result may be stored.
   Result<void> put_quarantined();
-  // Why a record or a result could not be stored; empty: no attempt has failed since a result was last stored
+  // Why a record or a result could not be stored; empty: all records are stored, and no attempt has failed
+  // since a result was last stored
   const std::string& trouble() const { return trouble_; }
   void set_trouble(std::string why) { trouble_ = std::move(why); }
 
@@ -49,9 +54,14 @@ class Records {
   void set_reference_error(const JobId& id, double spp, const ReferenceError& error);
 
  private:
+  Result<void> put_all(const std::set<EntryPtr>& entries) const;
+  void not_saved(std::set<EntryPtr> entries, const Error& why);
+
   JobStore& store_;
   const JobTable& jobs_;
   BackgroundWrites& writes_;
+  std::set<EntryPtr> unsaved_;              // jobs whose latest record could not be stored
+  std::string unsaved_because_;             // why the last of them could not be
   std::set<EntryPtr>* together_ = nullptr;  // jobs that put_together() will store; null: it is not running
   std::vector<QuarantinedWorker> quarantined_;
   std::string trouble_;

@@ -183,6 +183,12 @@ class JobStore {
   virtual Moved moved() { return {}; }  // returns what has changed since the last call
   // Sets the addresses at which this coordinator can be reached.
   virtual void announce(const std::string&, const std::string&) {}
+  // Tells whether the other coordinators can be told of changes now. If not, returns `unavailable`: a change
+  // that a user is told of could be lost when another coordinator takes the job over.
+  virtual Result<void> can_share() const { return {}; }
+  // Waits until the latest records of these jobs, or their removals, are where another coordinator that takes
+  // the jobs over finds them; at most some seconds. `unavailable`: they are not, or not yet.
+  virtual Result<void> share(std::span<const JobId>) { return {}; }
   // Finds the coordinator that owns a job which this one does not have; may block for a second. nullopt: no
   // coordinator owns the job.
   virtual Result<std::optional<JobLocation>> locate_job(const JobId&) { return std::nullopt; }

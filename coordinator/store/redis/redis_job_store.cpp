@@ -242,8 +242,8 @@ Result<void> RedisJobStore::send_jobs() {
       if (next == state->due.end()) next = state->due.begin();
       state->sent_last = next->first;
       taken.insert(state->due.extract(next));
+      state->sending.insert(state->sent_last);
     }
-    state->sending = taken.size();
     for (const auto& [id, due] : taken)
       if (const auto fence = state->fences.find(id); fence != state->fences.end()) fences.insert(*fence);
   }
@@ -301,7 +301,7 @@ std::vector<RedisLink::Command> RedisJobStore::commands_of(const JobId& id, cons
 // Puts changes that could not be sent back into the list of changes to send.
 void RedisJobStore::give_back(std::map<JobId, Due> taken) {
   const auto state = state_.lock();
-  state->sending = 0;
+  state->sending.clear();
   for (auto& [id, old] : taken) {
     const auto [now, fresh] = state->due.try_emplace(id, old);
     if (fresh || now->second.removed) continue;
@@ -313,6 +313,7 @@ void RedisJobStore::give_back(std::map<JobId, Due> taken) {
     now->second.points |= old.points;
     now->second.log |= old.log;
   }
+  sent_.notify_all();
 }
 
 }  // namespace ls::coordinator

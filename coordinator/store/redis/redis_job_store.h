@@ -26,6 +26,7 @@ struct RedisStoreOptions {
   // While there are no changes to send, the store asks Redis at this interval for lightshaft:memory, to learn
   // whether Redis answers and still has its data
   Duration check_every = std::chrono::seconds(1);
+  Duration share_within = std::chrono::seconds(3);  // JobStore::share() waits no longer
   // This coordinator's name among several that share the Redis (redis_members.h); empty: it shares the Redis
   // with no other.
   std::string node;

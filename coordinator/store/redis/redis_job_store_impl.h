@@ -20,6 +20,17 @@
 
 namespace ls::coordinator {
 
+inline tl::unexpected<Error> owned_by_another(const JobId& job) {
+  return fail(Errc::unavailable,
+              fmt::format("another coordinator has taken over job {}: ask again", job.value));
+}
+inline tl::unexpected<Error> not_shared(const std::string& trouble) {
+  return fail(Errc::unavailable,
+              trouble +
+                  "; until it answers, another coordinator could take the job over without the change: "
+                  "try again later");
+}
+
 class RedisJobStore final : public JobStore {
  public:
   RedisJobStore(std::unique_ptr<JobStore> local, RedisStoreOptions options, std::vector<StoredJob> jobs,
@@ -42,8 +53,9 @@ class RedisJobStore final : public JobStore {
   Result<void> put_jobs(std::span<const StoredJob> jobs) override {
     const auto state = state_.lock();
     std::vector<StoredJob> revised;
+    for (const StoredJob& job : jobs)
+      if (state->lost.contains(job.id)) return owned_by_another(job.id);
     for (const StoredJob& job : jobs) {
-      if (state->lost.contains(job.id)) continue;  // another coordinator owns the job
       const auto known = state->revisions.find(job.id);
       revised.push_back(job);
       revised.back().revision = (known == state->revisions.end() ? 0 : known->second) + 1;
@@ -129,12 +141,32 @@ class RedisJobStore final : public JobStore {
     std::string trouble = state->trouble.empty() ? state->not_kept : state->trouble;
     if (trouble.empty() && members_) trouble = members_->stranded();
     return {options_.address.shown(), std::move(trouble),
-            state->due.size() + state->sending + (state->all_due ? state->revisions.size() : 0)};
+            state->due.size() + state->sending.size() + (state->all_due ? state->revisions.size() : 0)};
   }
 
   Moved moved() override {
     const auto state = state_.lock();
     return std::exchange(state->moved, {});
+  }
+  Result<void> can_share() const override {
+    const auto state = state_.lock();
+    if (!shared() || state->trouble.empty()) return {};
+    return not_shared(state->trouble);
+  }
+  Result<void> share(std::span<const JobId> jobs) override {
+    if (!shared()) return {};
+    auto state = state_.lock();
+    const auto is_sent = [&](const JobId& id) {
+      const auto due = state->due.find(id);
+      return !state->sending.contains(id) && (due == state->due.end() || !due->second.reports());
+    };
+    const auto all_sent = [&] { return std::all_of(jobs.begin(), jobs.end(), is_sent); };
+    const bool sent = sent_.wait_for(state, options_.share_within, all_sent);
+    for (const JobId& id : jobs)
+      if (state->lost.contains(id)) return owned_by_another(id);
+    if (sent) return {};
+    return not_shared(state->trouble.empty() ? options_.address.shown() + " does not answer"
+                                             : state->trouble);
   }
   void announce(const std::string& http, const std::string& grpc) override {
     if (members_) members_->announce(http, grpc);
@@ -232,6 +264,8 @@ class RedisJobStore final : public JobStore {
     std::uint64_t revision = 0;  // revision of the record
     bool points = false, log = false, removed = false;
 
+    // True if a coordinator that takes the job over would not know its latest record, or its removal
+    bool reports() const { return record || removed; }
     void take(const StoredJob& job) {
       record = to_json(job);
       revision = job.revision;
@@ -251,8 +285,8 @@ class RedisJobStore final : public JobStore {
     std::set<JobId> lost;  // jobs that other coordinators own now: their updates are not stored
     Moved moved;           // the result of the next call of moved()
     std::map<JobId, Due> due;
-    // Number of jobs that are being sent to Redis: they have left `due` but are not in Redis yet.
-    std::size_t sending = 0;
+    // Jobs that are being sent to Redis: they have left `due` but are not in Redis yet.
+    std::set<JobId> sending;
     JobId sent_last;  // the last job of the last batch; the next batch begins with the job after it
     std::map<std::string, std::uint64_t> counters;
     std::map<WorkerId, std::string> quarantined;  // all known quarantined workers
@@ -310,8 +344,9 @@ class RedisJobStore final : public JobStore {
   RedisStoreOptions options_;
   mutable Guarded<State> state_;
   std::condition_variable_any wake_;
-  std::unique_ptr<RedisLink> link_;  // link_ and memory_ are used only by send_loop()'s thread
-  std::string memory_;               // the last known value of lightshaft:memory; empty: unknown
+  std::condition_variable_any sent_;  // notified when changes were sent to Redis
+  std::unique_ptr<RedisLink> link_;   // link_ and memory_ are used only by send_loop()'s thread
+  std::string memory_;                // the last known value of lightshaft:memory; empty: unknown
   std::unique_ptr<RedisMembers> members_;
   // Declared last: both threads, this one and that of members_, must end before the variables above are
   // destroyed.

@@ -48,7 +48,7 @@ TEST(Adaptive, MoreSamplesForAFinishedJobMakeItOneBySamples) {
   rig.render_all();
   const auto ends = ends_in(rig);
   const std::uint64_t most = round_range(*std::max_element(ends.begin(), ends.end()) - 1).s1;
-  EXPECT_FALSE(rig.farm.may_extend({"j"}, most - 2));
+  EXPECT_FALSE(rig.farm.extended({"j"}, most - 2, rig.now));
 
   rig.send(JobExtended{{"j"}, most + 10});
   rig.render_all();

@@ -117,20 +117,20 @@ TEST(Target, IsKeptByAJobThatHasNoneOrCannotGoBack) {
   rig.rel_error = one_over_n;
   rig.join("w", 1);
   rig.submit(plan_of("plain", 1, 4));
-  EXPECT_THAT(rig.farm.may_retarget({"plain"}, .1).error().message, HasSubstr("no target error"));
+  EXPECT_THAT(rig.farm.retargeted({"plain"}, .1).error().message, HasSubstr("no target error"));
   JobPlan plan = plan_of("j", 3, std::nullopt);
   plan.target_error = 1 / 100.0;
   rig.submit(plan);
-  EXPECT_EQ(rig.farm.may_retarget({"j"}, -1).error().code, Errc::invalid_argument);
-  EXPECT_TRUE(rig.farm.may_retarget({"j"}, .1).has_value());
+  EXPECT_EQ(rig.farm.retargeted({"j"}, -1).error().code, Errc::invalid_argument);
+  EXPECT_TRUE(rig.farm.retargeted({"j"}, .1).has_value());
   rig.render_all();
 
-  EXPECT_EQ(rig.farm.may_retarget({"j"}, .02).error().code, Errc::failed_precondition)
+  EXPECT_EQ(rig.farm.retargeted({"j"}, .02).error().code, Errc::failed_precondition)
       << "it is better already";
   rig.send(JobRetargeted{{"j"}, .02});
   EXPECT_EQ(rig.farm.plan({"j"})->target_error, 1 / 100.0);
   rig.send(JobStopped{{"j"}});
-  EXPECT_TRUE(rig.farm.may_retarget({"j"}, .001).has_value());
+  EXPECT_TRUE(rig.farm.retargeted({"j"}, .001).has_value());
 }
 
 TEST(Target, ALargerOneIsSafeAcrossARestart) {

@@ -1,10 +1,12 @@
 // Changes and removals of jobs, and damaged folders and records, which must affect one job only.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
 #include <atomic>
 #include <fstream>
+#include <functional>
 #include <thread>
 
 #include "coordinator/base/work_queue.h"
@@ -106,6 +108,88 @@ TEST(Pin, AClassThatCannotBeStoredHoldsTheJobUntilItIs) {
   FakeFarm other(*coordinator, 1);
   ASSERT_TRUE(other.finish(job));
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels());
+}
+
+// Makes every change of a job's record fail, as on a full disk, until mend() is called.
+void break_records(const fs::path& data) {
+  sql(data,
+      "CREATE TRIGGER broken BEFORE UPDATE ON jobs BEGIN SELECT RAISE(ABORT, 'the disk is broken'); END");
+}
+void mend_records(const fs::path& data) { sql(data, "DROP TRIGGER broken"); }
+
+struct UserCommand {
+  const char* name;
+  JobState before;  // state that the job is brought to before the command
+  std::function<Result<void>(Coordinator&, const JobId&)> give;
+  JobState after;
+};
+std::vector<UserCommand> user_commands() {
+  using enum JobState;
+  return {{"pause", queued, pause, paused},
+          {"resume", paused, resume, queued},
+          {"cancel", queued,
+           [](Coordinator& c, const JobId& job) { return c.change(job, {.state = cancelled}); }, cancelled},
+          {"delete", queued, [](Coordinator& c, const JobId& job) { return c.remove(job); }, cancelled},
+          {"extend", queued, [](Coordinator& c, const JobId& job) { return extend(c, job, 64); }, queued},
+          {"extend a done job", done, [](Coordinator& c, const JobId& job) { return extend(c, job, 64); },
+           running}};
+}
+
+// The command is acknowledged only if its effect would survive kill -9; a command that is refused has none.
+TEST(Change, ThatCannotBeStoredIsRefusedAndHasNoEffect) {
+  for (const bool sequence : {false, true})
+    for (const UserCommand& command : user_commands()) {
+      SCOPED_TRACE(fmt::format("{}{}", command.name, sequence ? ", of a sequence" : ""));
+      TempFolder dir;
+      auto coordinator = open_at(dir.path());
+      JobSpec spec;
+      if (sequence) spec.frames = FrameRange{1, 2, 1};
+      const JobId job = submit(*coordinator, spec);
+      if (command.before == JobState::paused) {
+        ASSERT_TRUE(pause(*coordinator, job));
+      } else if (command.before == JobState::done) {
+        ASSERT_TRUE(finish(*coordinator, job));
+      }
+      const JobView before = coordinator->job(job).value();
+      break_records(dir.path());
+
+      const auto refused = command.give(*coordinator, job);
+
+      ASSERT_FALSE(refused);
+      EXPECT_THAT(refused.error().message, HasSubstr("the disk is broken"));
+      const JobView now = coordinator->job(job).value();
+      EXPECT_EQ(now.state, before.state);
+      EXPECT_EQ(now.spp, before.spp);
+      EXPECT_EQ(now.units_total, before.units_total);
+
+      mend_records(dir.path());
+      coordinator.reset();
+      coordinator = open_at(dir.path());
+      EXPECT_EQ(coordinator->job(job)->state, before.state) << "after a restart";
+      ASSERT_TRUE(command.give(*coordinator, job));
+      EXPECT_EQ(coordinator->job(job)->state, command.after);
+      coordinator.reset();
+      coordinator = open_at(dir.path());
+      const JobView after = coordinator->job(job).value();
+      EXPECT_EQ(after.state, command.after) << "after a restart";
+      EXPECT_EQ(after.spp, std::string_view(command.name).starts_with("extend") ? 64u : before.spp);
+    }
+}
+
+TEST(Change, ThatTheFarmMakesIsStoredAsSoonAsTheDiskCanAgain) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  const JobId job = submit(*coordinator);
+  break_records(dir.path());
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.work_until_paused(job)) << "its numeric class cannot be stored";
+  mend_records(dir.path());
+
+  coordinator->tick();
+
+  coordinator.reset();
+  coordinator = open_at(dir.path());
+  EXPECT_EQ(coordinator->job(job)->state, JobState::paused);
 }
 
 TEST(Done, AJobLeavesTheFarmsBooksAndCanStillBeExtended) {

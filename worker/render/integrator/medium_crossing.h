@@ -119,7 +119,10 @@ auto PathTracer<F, Light>::scatter_in(const Medium& medium) -> Step {
 
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::begin_vertex(Segment segment, const Flight& flight) {
-  const bool by_segment = world_.lights.local_in_media();
+  bool by_segment = world_.lights.local_in_media();
+  // All paths of a group that could have found the light of a tail must choose its light source alike
+  // (path_reuse.h), so the choice depends on the vertex alone. No light is chosen before this vertex.
+  if constexpr (F.reuse) by_segment = by_segment && !looks_for_second();
   if (by_segment) last_.place = place_on(segment);
   ray_.advance_to(segment, flight.t);
   last_.p = ray_.origin;

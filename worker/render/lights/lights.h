@@ -31,7 +31,7 @@ struct LightChoice {
 
 // The place for which a light is chosen: a point on a surface and its normal or, with n = 0, a point in a
 // medium. If learned probabilities (LocalLights) choose lights in media, all points of a path's segment have
-// the same place (Lights::place_on).
+// the same place (Lights::place_on), but for the vertex whose light several pixels share (path_reuse.h).
 struct LightPlace {
   V3 p{0, 0, 0}, n{0, 0, 0};
 };

@@ -335,6 +335,48 @@ TEST_F(SharedStores, AJobThatComesBackHasTheLogOfItsLastOwnerAlone) {
   EXPECT_EQ(a->log({"j-1"}).value()[0].text, "by b");
 }
 
+TEST_F(SharedStores, WhatWasSharedIsKnownToWhoTakesTheJobOver) {
+  const auto a = open_node("a");
+  ASSERT_TRUE(a->put_job(sample_job("j-1")));
+  StoredJob cancelled = sample_job("j-1");
+  cancelled.state = JobState::cancelled;
+
+  ASSERT_TRUE(a->put_job(cancelled));
+  ASSERT_TRUE(a->share(std::vector<JobId>{{"j-1"}}));
+
+  EXPECT_EQ(in_redis({"j-1"})->state, JobState::cancelled);
+  ASSERT_TRUE(a->remove_job({"j-1"}));
+  ASSERT_TRUE(a->share(std::vector<JobId>{{"j-1"}}));
+  EXPECT_FALSE(in_redis({"j-1"}));
+}
+
+TEST_F(SharedStores, WhatCannotBeSharedIsSaid) {
+  const auto a = open_node("a");
+  ASSERT_TRUE(a->put_job(sample_job("j-1")));
+  ASSERT_TRUE(a->share(std::vector<JobId>{{"j-1"}}));
+  EXPECT_TRUE(a->can_share());
+  redis_.kill();
+  ASSERT_TRUE(a->put_job(sample_job("j-1")));
+
+  EXPECT_EQ(a->share(std::vector<JobId>{{"j-1"}}).error().code, Errc::unavailable);
+  EXPECT_TRUE(eventually([&] { return !a->can_share(); }));
+
+  redis_.start();
+  EXPECT_TRUE(eventually([&] { return a->can_share().has_value(); }));
+  EXPECT_TRUE(a->share(std::vector<JobId>{{"j-1"}}));
+}
+
+TEST_F(SharedStores, AJobThatAnotherHasTakenOverIsNotChangedHere) {
+  const auto a = open_node("a");
+  ASSERT_TRUE(a->put_job(sample_job("j-1")));
+  ASSERT_TRUE(a->share(std::vector<JobId>{{"j-1"}}));
+  give("j-1", "a", "b", 2);
+  ASSERT_TRUE(eventually([&] { return !a->moved().lost.empty(); }));
+
+  EXPECT_EQ(a->put_job(sample_job("j-1")).error().code, Errc::unavailable);
+  EXPECT_EQ(a->share(std::vector<JobId>{{"j-1"}}).error().code, Errc::unavailable);
+}
+
 TEST(RedisLink, SaysWhatAPasswordIsWantedFor) {
   test::RedisServer redis("secret");
   RedisAddress address{"127.0.0.1", redis.port(), 0, "", ""};
