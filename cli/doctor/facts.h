@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "cli/farm/http_client.h"
-#include "worker/child/sandbox.h"
+#include "common/sandbox/sandbox.h"
 
 namespace ls::cli {
 
@@ -31,7 +31,7 @@ struct MachineFacts {
   double cpu_quota = 0;  // number of CPUs that the control group allows; 0: no limit
   std::uint64_t file_limit = 0;
   // Which restrictions the sandbox can put in place on this machine; nullopt: this could not be tried
-  std::optional<worker::child::Sandboxed> sandbox;
+  std::optional<Sandboxed> sandbox;
   std::filesystem::path vdb_program;
   bool vdb_found = false;
   std::string denoiser, denoiser_trouble;  // the denoiser's name, or why there is no denoiser

@@ -72,13 +72,11 @@ Finding of_sandbox(const MachineFacts& facts) {
   std::vector<std::string> missing;
   if (!facts.sandbox->calls) missing.emplace_back("opening sockets (seccomp)");
   if (!facts.sandbox->files) missing.emplace_back("files that are not a scene's (Landlock)");
-  if (facts.sandbox->files && !facts.sandbox->sizes)
-    missing.emplace_back("cutting cached files short (Landlock of Linux 6.2)");
   if (missing.empty()) return ok("sandbox", "the kernel confines the rendering process of a worker");
   return warning("sandbox",
                  fmt::format("the kernel cannot keep a worker's rendering process from {}",
                              fmt::join(missing, ", nor from ")),
-                 "use Linux 6.2 or later with Landlock, or render trusted scenes only");
+                 "use Linux 5.13 or later with Landlock, or render trusted scenes only");
 }
 
 Finding of_folder(const FolderFacts& folder) {
