@@ -145,6 +145,7 @@ Result<FarmFacts> observe_one(const HttpClient::Options& connection) {
     return facts;
   }
   facts.date = health->date;
+  facts.proxy = health->proxy;
   facts.is_coordinator = health->status == 200 && health->body == "ok\n";
   if (!facts.is_coordinator) return facts;
   ask_readiness(*client, facts);

@@ -55,6 +55,7 @@ struct FarmFacts {
   std::string url;  // address without user and password
   bool has_token = false;
   std::string trouble;          // why there was no answer; empty: there was an answer
+  std::string proxy;            // the proxy that answers come through; empty: none
   bool is_coordinator = false;  // true if a coordinator answered
   // From the answer to GET /readyz. `not_ready`: why the coordinator cannot take jobs; empty: it can.
   // `remark`: what else it reports; empty: nothing.
