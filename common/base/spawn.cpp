@@ -11,6 +11,8 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <fstream>
+#include <sstream>
 #include <utility>
 
 #include "common/base/program_output.h"
@@ -65,6 +67,17 @@ bool inherits(std::string_view variable) {
   return name.starts_with("LD_") || name.starts_with("MALLOC_") || name.ends_with("SAN_OPTIONS");
 }
 
+bool leads_session_without_terminal() {
+  if (::getsid(0) != ::getpid()) return false;
+  std::string stat;
+  std::getline(std::ifstream("/proc/self/stat"), stat);
+  // After the name in parentheses: state, parent, process group, session, terminal (0: none)
+  std::istringstream fields(stat.substr(std::min(stat.size(), stat.rfind(')') + 1)));
+  std::string word;
+  for (int i = 0; i < 4; ++i) fields >> word;
+  return fields >> word && word == "0";
+}
+
 int wait_with(pid_t pid, int flags, int& status) {
   int got = -1;
   while ((got = ::waitpid(pid, &status, flags)) < 0 && errno == EINTR) {
@@ -98,8 +111,9 @@ Result<pid_t> spawn(Program program) {
   sigemptyset(&none), sigfillset(&all);
   posix_spawnattr_setsigmask(&attributes, &none);
   posix_spawnattr_setsigdefault(&attributes, &all);
-  posix_spawnattr_setflags(
-      &attributes, static_cast<short>(POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSID));
+  const int session = program.own_session ? POSIX_SPAWN_SETSID : 0;
+  posix_spawnattr_setflags(&attributes,
+                           static_cast<short>(POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | session));
   pid_t pid = -1;
   if (error == 0)
     error = ::posix_spawnp(&pid, program.path.c_str(), &actions, &attributes,
@@ -140,7 +154,12 @@ Result<HelperEnd> run_helper(const std::filesystem::path& program, std::vector<s
   if (!output) return tl::unexpected<Error>(output.error());
   const int out = (*output)->write_end();
   arguments.insert(arguments.begin(), program.string());
-  const auto pid = spawn({program.string(), std::move(arguments), {kDevNull, out, out, shared}, inherits});
+  // The helper of a render child stays in the child's process group, and so is killed with the child.
+  const auto pid = spawn({program.string(),
+                          std::move(arguments),
+                          {kDevNull, out, out, shared},
+                          inherits,
+                          !leads_session_without_terminal()});
   if (!pid) return fail(Errc::internal, pid.error().message);
   (*output)->close_write_end();
   // The output ends with the program, unless the program has closed it before or has left processes behind

@@ -1,6 +1,5 @@
-// Starts other programs. The caller lists the files and the environment variables that they inherit. Each
-// program has a session of its own: it has no terminal, does not receive its signals, such as Ctrl-C, and
-// cannot type into it.
+// Starts other programs. The caller lists the files and the environment variables that they inherit. The
+// programs have no terminal: they do not receive its signals, such as Ctrl-C, and cannot type into it.
 #pragma once
 
 #include <sys/types.h>
@@ -27,12 +26,14 @@ struct Program {
   std::vector<int> files;
   // Returns true if the program inherits the environment variable, given as NAME=VALUE.
   std::function<bool(std::string_view)> inherits;
+  // True: the program gets a session and a process group of its own, with its process id. False: it shares
+  // those of this process, which must lead a session without a terminal.
+  bool own_session = true;
 };
 
-// Starts the program with no signal blocked or ignored, and returns its process id, which is also the id of
-// its process group and session. Errors: not_found if there is no such program, else internal; the text names
-// the program and the system's reason. A terminal among `files` is an error (internal): the program could
-// type into it.
+// Starts the program with no signal blocked or ignored, and returns its process id. Errors: not_found if
+// there is no such program, else internal; the text names the program and the system's reason. A terminal
+// among `files` is an error (internal): the program could type into it.
 Result<pid_t> spawn(Program program);
 
 // Waits until the process ends, and returns its wait status as waitpid() gives it.

@@ -99,16 +99,18 @@ constexpr std::uint32_t kAllowed[] = {
     // descriptor goes through them.
     SYS_sendto,
     SYS_recvfrom,
-    // Processes: lightshaft-vdb is started with posix_spawn. setsid only takes away a terminal.
+    // Processes: lightshaft-vdb is started with posix_spawn. setsid and setpgid are not among them, so that
+    // the
+    // agent can end all processes that the renderer has started.
     SYS_execve,
     SYS_wait4,
     SYS_waitid,
-    SYS_setsid,
     SYS_exit,
     SYS_exit_group,
     // Facts about this process and the machine
     SYS_getpid,
     SYS_getppid,
+    SYS_getsid,
     SYS_gettid,
     SYS_getuid,
     SYS_geteuid,

@@ -2,12 +2,15 @@
 
 import ctypes
 import errno
+import os
 import pathlib
+import signal
 import socket
+import subprocess
 
 import pytest
 from asked_process import AskedProcess
-from local_farm import PATIENCE, SCENE
+from local_farm import PATIENCE, SCENE, bin_dir, wait_until
 from processes import family
 
 # system calls of x86-64
@@ -81,22 +84,44 @@ def test_the_child_changes_and_locks_no_file_and_leaves_its_agent_the_memory(far
     assert farm.pixels(farm.submit(SCENE, spp=4)) == first  # the agent lives
 
 
-def test_the_child_of_a_worker_on_a_terminal_has_none(farm):
-    worker = farm.add_worker(fake=False, within=ON_A_TERMINAL)
-    farm.wait_for_workers(1)
-    (_, agent, child) = family(worker.popen.pid)
+def session_and_terminal(process):
+    fields = pathlib.Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return int(fields[3]), int(fields[4])
 
-    def session_and_terminal(process):
-        fields = pathlib.Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-        return int(fields[3]), int(fields[4])
 
-    assert session_and_terminal(agent)[1] != 0, "this test needs a worker on a terminal"
+def assert_that_only_the_agent_has_a_terminal(agent, child):
+    assert session_and_terminal(agent)[1] != 0, "this test needs an agent on a terminal"
     assert session_and_terminal(child) == (child, 0)
     assert [str(pathlib.Path(f"/proc/{child}/fd/{standard}").readlink()).split(":")[0] for standard in range(3)] == ["/dev/null", "pipe", "pipe"]
     with AskedProcess(child) as asked:
         for descriptor in range(6):
             assert asked.call(IOCTL, descriptor, TIOCSTI, "x") == errno.EPERM
         assert asked.call(OPENAT, HERE, "/dev/tty", 2) != 0
+
+
+def test_the_child_of_a_worker_on_a_terminal_has_none(farm):
+    worker = farm.add_worker(fake=False, within=ON_A_TERMINAL)
+    farm.wait_for_workers(1)
+
+    (_, agent, child) = family(worker.popen.pid)
+
+    assert_that_only_the_agent_has_a_terminal(agent, child)
+
+
+def test_the_child_of_an_isolated_render_on_a_terminal_has_none(tmp_path):
+    (tmp_path / "scene.xml").write_text(SCENE)
+    command = [*ON_A_TERMINAL, bin_dir() / "lightshaft", "render", tmp_path / "scene.xml", "-o", tmp_path / "image.exr", "--isolate", "--spp", "16777216"]
+    with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as popen:
+        try:
+            (_, agent, child) = wait_until(lambda: len(found := family(popen.pid)) == 3 and found, "the child renders")
+            wait_until(lambda: "ls-render-child" in pathlib.Path(f"/proc/{child}/comm").read_text(), "it is confined")
+            # Its first thread waits for requests once the others are there.
+            wait_until(lambda: len(list(pathlib.Path(f"/proc/{child}/task").iterdir())) > 1, "it serves")
+
+            assert_that_only_the_agent_has_a_terminal(agent, child)
+        finally:
+            for process in reversed(family(popen.pid)):
+                os.kill(process, signal.SIGKILL)
 
 
 def test_what_the_child_writes_is_marked_as_its_own_cleaned_and_bounded(farm, child):

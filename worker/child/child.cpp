@@ -59,9 +59,11 @@ void note_place(const Slot& slot, const LocalJob& job, UnitFailure& failure) {
 // The child's measurement of seconds within `elapsed`, which this process has measured around it.
 double measured(double told, double elapsed) { return told > 0 ? std::min(told, elapsed) : 0; }
 
+// A failure with the child's reason, which is cut if no renderer of ours would give one of such a length.
 UnitFailure refused(const Process::Answer& answer) {
+  constexpr std::size_t kLongestReason = 4096;
   return {.scene_at_fault = answer.reply.outcome == Outcome::scene_at_fault,
-          .reason = plain_text(answer.text)};
+          .reason = plain_text(std::string_view(answer.text).substr(0, kLongestReason))};
 }
 
 class ChildBackend final : public RenderBackend {

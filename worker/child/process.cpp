@@ -127,7 +127,7 @@ std::optional<Process::Condemned> Process::condemned() {
 
 void Process::kill() {
   const std::lock_guard lock(reap_mutex_);
-  if (pid_ > 0 && !end_) ::kill(pid_, SIGKILL);
+  if (pid_ > 0 && !end_) ::kill(-pid_, SIGKILL);
 }
 
 Process::End Process::end() {
@@ -142,6 +142,7 @@ Process::End Process::end() {
   if (end_) return *end_;
   End end;
   if (pid_ > 0) {
+    ::kill(-pid_, SIGKILL);  // the processes that it has started
     const int status = wait_for_end(pid_);
     if (WIFSIGNALED(status)) {
       end.signal = WTERMSIG(status);

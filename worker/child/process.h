@@ -50,7 +50,7 @@ class Process {
   // Kills the child because of what one slot did. Only the first call counts.
   void condemn(int slot, Fault fault);
   std::optional<Condemned> condemned();
-  void kill();
+  void kill();  // also kills all processes that the child has started
   // Waits for the end of the process, which must be imminent, and returns how it ended. kill() may be called
   // meanwhile.
   struct End {

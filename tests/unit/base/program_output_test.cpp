@@ -126,11 +126,39 @@ TEST(Helper, IsKilledWhenToldToStop) {
   EXPECT_EQ(WTERMSIG(end.status), SIGKILL);
 }
 
-TEST(Helper, HasASessionOfItsOwnWithoutATerminal) {
-  // Fields of /proc/PID/stat: 1 process, 6 session, 7 terminal (0: none)
-  const HelperEnd end = run("read -r a b c d e f g rest < /proc/$$/stat; echo $((a - f)) $g");
+TEST(Helper, HasNoTerminal) {
+  // Fields of /proc/PID/stat: 7 terminal (0: none)
+  const HelperEnd end = run("read -r a b c d e f g rest < /proc/$$/stat; echo $g");
 
-  EXPECT_EQ(end.said, "0 0");
+  EXPECT_EQ(end.said, "0");
+}
+
+// The process has a terminal, as the leader of its session or not.
+TEST(Helper, HasNoTerminalThoughItsParentHasOne) {
+  for (const bool leads : {true, false}) {
+    const Descriptor master(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC));
+    ASSERT_EQ(::grantpt(master.fd), 0);
+    ASSERT_EQ(::unlockpt(master.fd), 0);
+    const pid_t leader = ::fork();
+    if (leader == 0) {
+      ::setsid();
+      ::open(::ptsname(master.fd), O_RDWR);  // becomes the terminal of the session
+      const pid_t parent = leads ? 0 : ::fork();
+      if (parent > 0) {
+        int status = 1;
+        ::waitpid(parent, &status, 0);
+        ::_exit(WEXITSTATUS(status));
+      }
+      const Descriptor shared(::open("/dev/null", O_RDWR | O_CLOEXEC));
+      const std::string program = script("read -r a b c d e f g rest < /proc/$$/stat; echo $g");
+      const auto end = run_helper(program, {}, shared.fd);
+      std::filesystem::remove(program);
+      ::_exit(end && end->said == "0" ? 0 : 1);
+    }
+    int status = 1;
+    ::waitpid(leader, &status, 0);
+    EXPECT_EQ(status, 0) << (leads ? "of a leader" : "of another process");
+  }
 }
 
 TEST(Helper, WritesToAPipeOnly) {

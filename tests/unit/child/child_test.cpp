@@ -30,6 +30,7 @@
 namespace ls::worker {
 namespace {
 
+using testing::AnyOf;
 using testing::HasSubstr;
 
 constexpr std::uint64_t kMemoryLimit = 512 << 20;
@@ -216,6 +217,24 @@ TEST(Child, HasASessionOfItsOwnAndWritesToAPipe) {
   EXPECT_THAT(told, HasSubstr("own session"));
   EXPECT_THAT(told, HasSubstr("1 pipe:"));
   EXPECT_THAT(told, HasSubstr("2 pipe:"));
+}
+
+TEST(Child, LeavesNoProcessBehind) {
+  std::string descendant;
+  {
+    const auto child = backend("odd,forks");
+    descendant = child->render(job_with_seed(3), unit(0), kGoOn).error().reason;
+    child->shutdown();
+  }
+
+  // It is killed, and is a zombie until its new parent collects it.
+  std::string state;
+  do {
+    std::string word;
+    state.clear();
+    std::ifstream("/proc/" + descendant + "/stat") >> word >> word >> state;
+  } while (state == "R" || state == "S");
+  EXPECT_THAT(state, AnyOf("", "Z", "X"));
 }
 
 TEST(Child, GivesNoReasonWithControlCharacters) {
@@ -423,6 +442,12 @@ void answer_oddly(const std::string& kind, child::Slot& slot) {
   if (kind == "tells")
     text = std::string(::getsid(0) == ::getpid() ? "own session" : "session of another") + " 1 " +
            link_of(1) + " 2 " + link_of(2);
+  if (kind == "forks") {
+    const pid_t descendant = ::fork();
+    if (descendant == 0)
+      for (;;) ::pause();
+    text = std::to_string(descendant);
+  }
   if (kind == "forges") text = "bad\n\x1b[31m\n2026 info all is well";
   if (kind == "beside") slot.where.x = 1 << 20, slot.where.y = 0;
   if (kind == "slow") reply = {.cpu_seconds = 86399, .wall_seconds = std::nan("")};
