@@ -48,7 +48,7 @@ std::vector<std::string> OutputLines::take(std::string_view bytes, TimePoint now
 std::vector<std::string> OutputLines::end(TimePoint now) {
   std::vector<std::string> lines;
   finish_line(now, lines);
-  tell_left_out(lines);
+  report_left_out(lines);
   return lines;
 }
 
@@ -61,11 +61,11 @@ void OutputLines::finish_line(TimePoint now, std::vector<std::string>& lines) {
     ++left_out_;
     return;
   }
-  tell_left_out(lines);
+  report_left_out(lines);
   lines.push_back(std::move(line));
 }
 
-void OutputLines::tell_left_out(std::vector<std::string>& lines) {
+void OutputLines::report_left_out(std::vector<std::string>& lines) {
   if (const auto count = std::exchange(left_out_, 0); count > 0)
     lines.push_back(fmt::format("({} lines are left out here: it wrote too many)", count));
 }

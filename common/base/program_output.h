@@ -44,7 +44,7 @@ class OutputLines {
 
  private:
   void finish_line(TimePoint now, std::vector<std::string>& lines);
-  void tell_left_out(std::vector<std::string>& lines);
+  void report_left_out(std::vector<std::string>& lines);
 
   LineBudget& budget_;
   std::string line_, last_;

@@ -61,8 +61,8 @@ class Descriptor {
 };
 
 struct HelperEnd {
-  int status = 0;    // as waitpid() gives it
-  std::string said;  // the last line that the helper wrote, safe to show; empty: it wrote none
+  int status = 0;         // as waitpid() gives it
+  std::string last_line;  // the last line that the helper wrote, safe to show; empty: it wrote none
 };
 
 // Runs a helper program and waits for its end. The helper inherits one file, `shared` as kHelperFd; what it

@@ -101,7 +101,7 @@ Result<void> run(const std::filesystem::path& program, const std::string& librar
         WTERMSIG(status) == SIGKILL ? Errc::resource_exhausted : Errc::internal);
   if (WEXITSTATUS(status) != 0)
     return broken(fmt::format("{} ended with code {}{}{}", program.filename().string(), WEXITSTATUS(status),
-                              ended->said.empty() ? "" : ": ", ended->said));
+                              ended->last_line.empty() ? "" : ": ", ended->last_line));
   const Header& header = shared.header();
   // The text need not end with a zero, and other processes may still change it.
   if (header.outcome != Outcome::done)

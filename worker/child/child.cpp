@@ -57,7 +57,7 @@ void note_place(const Slot& slot, const LocalJob& job, UnitFailure& failure) {
 }
 
 // The child's measurement of seconds within `elapsed`, which this process has measured around it.
-double measured(double told, double elapsed) { return told > 0 ? std::min(told, elapsed) : 0; }
+double measured(double reported, double elapsed) { return reported > 0 ? std::min(reported, elapsed) : 0; }
 
 // A failure with the child's reason, which is cut if no renderer of ours would give one of such a length.
 UnitFailure refused(const Process::Answer& answer) {

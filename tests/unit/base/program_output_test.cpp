@@ -101,7 +101,7 @@ TEST(Helper, TellsItsEndAndItsLastWords) {
 
   ASSERT_TRUE(WIFEXITED(end.status));
   EXPECT_EQ(WEXITSTATUS(end.status), 3);
-  EXPECT_EQ(end.said, "out of  [31mpaper");
+  EXPECT_EQ(end.last_line, "out of  [31mpaper");
 }
 
 TEST(Helper, EndsThoughItsOutputStaysOpen) {
@@ -109,7 +109,7 @@ TEST(Helper, EndsThoughItsOutputStaysOpen) {
   const HelperEnd end = run("sleep 600 & echo $!");
 
   EXPECT_TRUE(WIFEXITED(end.status));
-  ::kill(std::stoi(end.said), SIGKILL);
+  ::kill(std::stoi(end.last_line), SIGKILL);
 }
 
 TEST(Helper, EndsAfterItHasClosedItsOutput) {
@@ -130,7 +130,7 @@ TEST(Helper, HasNoTerminal) {
   // Fields of /proc/PID/stat: 7 terminal (0: none)
   const HelperEnd end = run("read -r a b c d e f g rest < /proc/$$/stat; echo $g");
 
-  EXPECT_EQ(end.said, "0");
+  EXPECT_EQ(end.last_line, "0");
 }
 
 // The process has a terminal, as the leader of its session or not.
@@ -153,7 +153,7 @@ TEST(Helper, HasNoTerminalThoughItsParentHasOne) {
       const std::string program = script("read -r a b c d e f g rest < /proc/$$/stat; echo $g");
       const auto end = run_helper(program, {}, shared.fd);
       std::filesystem::remove(program);
-      ::_exit(end && end->said == "0" ? 0 : 1);
+      ::_exit(end && end->last_line == "0" ? 0 : 1);
     }
     int status = 1;
     ::waitpid(leader, &status, 0);
@@ -162,8 +162,8 @@ TEST(Helper, HasNoTerminalThoughItsParentHasOne) {
 }
 
 TEST(Helper, WritesToAPipeOnly) {
-  EXPECT_THAT(run("readlink /proc/$$/fd/1").said, HasSubstr("pipe:"));
-  EXPECT_THAT(run("readlink /proc/$$/fd/2").said, HasSubstr("pipe:"));
+  EXPECT_THAT(run("readlink /proc/$$/fd/1").last_line, HasSubstr("pipe:"));
+  EXPECT_THAT(run("readlink /proc/$$/fd/2").last_line, HasSubstr("pipe:"));
 }
 
 TEST(Spawn, GivesNoProgramATerminal) {

@@ -31,8 +31,9 @@ tl::unexpected<Error> no_program(const char* what, int error) {
 tl::unexpected<Error> how_it_ended(const HelperEnd& end) {
   const int status = end.status;
   if (!WIFSIGNALED(status))
-    return fail(Errc::internal, fmt::format("the program that reads OpenVDB files ended with code {}{}{}",
-                                            WEXITSTATUS(status), end.said.empty() ? "" : ": ", end.said));
+    return fail(Errc::internal,
+                fmt::format("the program that reads OpenVDB files ended with code {}{}{}",
+                            WEXITSTATUS(status), end.last_line.empty() ? "" : ": ", end.last_line));
   switch (WTERMSIG(status)) {
     case SIGXCPU:
       return fail(Errc::resource_exhausted, "reading it takes too long: is it a damaged OpenVDB file?");
