@@ -12,6 +12,7 @@
 #include "common/scene/analysis/needs.h"
 #include "common/scene/json/serialize.h"
 #include "common/scene/schema/integrators.h"
+#include "worker/render/base/build_stop.h"
 
 namespace ls::worker {
 namespace {
@@ -53,13 +54,14 @@ class InProcessBackend final : public LocalBackend {
   Digest numeric_class() const override { return render::numeric_class(); }
   std::string platform() const override { return render::platform(); }
 
-  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override {
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job, const std::atomic<bool>& stop) override {
     if (world(job.brief)) return {};
     const auto text = read_file(job.scene);
     if (!text) return failed(text.error());
     const auto scene = deserialize_scene(*text);
     if (!scene) return failed(scene.error());
     if (const auto same = check_needs(*scene, job.brief); !same) return tl::unexpected(same.error());
+    const render::BuildStop stoppable(stop);
     auto built = render::build_world(*scene, job.brief.settings, job.assets, threads_);
     if (!built) return failed(built.error());
     const std::lock_guard lock(mutex_);

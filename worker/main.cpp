@@ -4,17 +4,18 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdio>
 #include <random>
 #include <thread>
 
 #include "common/base/log.h"
+#include "common/sandbox/sandbox.h"
 #include "common/trace/tracer.h"
 #include "worker/agent/agent.h"
 #include "worker/agent/link_ring.h"
 #include "worker/cache/cache.h"
 #include "worker/child/child.h"
-#include "worker/child/sandbox.h"
 #include "worker/child/serve.h"
 #include "worker/client/client.h"
 #include "worker/machine.h"
@@ -39,15 +40,18 @@ std::unique_ptr<worker::LocalBackend> local_backend(const worker::Options& optio
 
 int run_child(const worker::Options& options) {
   worker::child::confine(options.memory_limit);
-  const auto sandboxed = worker::child::enter_sandbox({options.cache});
+  const auto sandboxed = enter_sandbox({options.cache});
   if (!sandboxed.calls || !sandboxed.files)
     log_warn("",
              fmt::format("this kernel cannot keep the renderer from {}: take care whose scenes it renders",
                          sandboxed.files ? "opening sockets" : "files that are not a scene's"));
-  else if (!sandboxed.sizes)
-    log_warn("",
-             "this kernel (before Linux 6.2) cannot keep the renderer from cutting cached files short: take "
-             "care whose scenes it renders");
+  // The agent of root may read folders of all users, and the renderer has lost the right to.
+  if (::access(options.cache.c_str(), R_OK | X_OK) != 0 && errno == EACCES) {
+    log_error("", fmt::format("the renderer gives up all rights of root, and without them it cannot read the "
+                              "cache {}: change the owner of the folder, or run the worker as its owner",
+                              options.cache.string()));
+    return 1;
+  }
 #ifdef LIGHTSHAFT_RENDERER
   const auto limit = render::limit_threads(options.threads);
 #endif

@@ -156,7 +156,6 @@ std::vector<std::string> child_arguments(const Options& o) {
   // The child must know the cache's folder, where the files of jobs are, so that its sandbox can permit
   // reading there.
   if (!o.cache.empty()) arguments.insert(arguments.end(), {"--cache", o.cache.string()});
-  if (o.log_format == LogFormat::json) arguments.insert(arguments.end(), {"--log-format", "json"});
   if (o.fake) arguments.push_back("--fake");
   arguments.insert(arguments.end(),
                    {"--fake-delay", fmt::format("{}", seconds(o.fake_options.delay) * 1e3),

@@ -110,8 +110,9 @@ Result<void> check_files(const LocalRenderOptions& o) {
 }
 
 // Renders the frames, with the same pixels as on a farm. `options` are the options of one image, except that
-// in their paths a run of # is replaced by the frame number. Reads the scene of every frame before it renders
-// the first. Returns the exit code, and stops at the first frame whose exit code is not 0.
+// in the last component of their paths a run of # is replaced by the frame number. Reads the scene of every
+// frame before it renders the first. Returns the exit code, and stops at the first frame whose exit code is
+// not 0.
 int render_sequence(const std::string& path, const FrameRange& frames, const LocalRenderOptions& options) {
   auto reader = SceneReader::open(path, options.spec.defines, options.strict);
   if (!reader) return print_rejected(reader.error());

@@ -59,9 +59,13 @@ int wait_and_fetch(const std::string& id, const SubmitFlags& flags) {
   if (!api) return print_error(api.error());
   const auto end = watch_job(*api, id, {flags.quiet, flags.farm.json});
   if (!end) return print_rejected(end.error());
-  if (const int code = print_end(*end, flags.quiet); code != kOk) return code;
-  if (!flags.quiet) print_denoised(*api, *end);
-  return fetch_results(*api, id, {flags.out, flags.report, flags.html, false, true});
+  const int code = print_end(*end, flags.quiet);
+  if (code != kOk && done_frames(*end) == 0) return code;
+  if (code == kOk && !flags.quiet) print_denoised(*api, *end);
+  // One frame that has failed does not keep the others from being written.
+  const int fetched =
+      fetch_results(*api, id, {flags.out, flags.report, flags.html, false, true, code != kOk});
+  return code == kOk ? fetched : code;
 }
 
 // Uploads the reference image, and stores its digest in `spec`. Must be called before the job is submitted.

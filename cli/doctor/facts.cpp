@@ -23,15 +23,15 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-enum ProbeBits : int { kProbed = 64, kCalls = 1, kFiles = 2, kSizes = 4 };
+enum ProbeBits : int { kProbed = 64, kCalls = 1, kFiles = 2 };
 
-std::optional<worker::child::Sandboxed> probe_sandbox() {
+std::optional<Sandboxed> probe_sandbox() {
   const Descriptor nothing(::open("/dev/null", O_RDWR | O_CLOEXEC));
   if (nothing.fd < 0) return std::nullopt;
-  const auto status = run_helper("/proc/self/exe", {kSandboxProbeFlag}, nothing.fd);
-  if (!status || !WIFEXITED(*status) || !(WEXITSTATUS(*status) & kProbed)) return std::nullopt;
-  const int bits = WEXITSTATUS(*status);
-  return worker::child::Sandboxed{(bits & kCalls) != 0, (bits & kFiles) != 0, (bits & kSizes) != 0};
+  const auto end = run_helper("/proc/self/exe", {kSandboxProbeFlag}, nothing.fd);
+  if (!end || !WIFEXITED(end->status) || !(WEXITSTATUS(end->status) & kProbed)) return std::nullopt;
+  const int bits = WEXITSTATUS(end->status);
+  return Sandboxed{(bits & kCalls) != 0, (bits & kFiles) != 0};
 }
 
 bool processor_fits([[maybe_unused]] const std::string& target) {
@@ -145,6 +145,7 @@ Result<FarmFacts> observe_one(const HttpClient::Options& connection) {
     return facts;
   }
   facts.date = health->date;
+  facts.proxy = health->proxy;
   facts.is_coordinator = health->status == 200 && health->body == "ok\n";
   if (!facts.is_coordinator) return facts;
   ask_readiness(*client, facts);
@@ -155,8 +156,8 @@ Result<FarmFacts> observe_one(const HttpClient::Options& connection) {
 }  // namespace
 
 int run_sandbox_probe() {
-  const auto held = worker::child::enter_sandbox({});
-  return kProbed | (held.calls ? kCalls : 0) | (held.files ? kFiles : 0) | (held.sizes ? kSizes : 0);
+  const auto held = enter_sandbox({});
+  return kProbed | (held.calls ? kCalls : 0) | (held.files ? kFiles : 0);
 }
 
 MachineFacts observe_machine(const fs::path& cache, const fs::path& data) {

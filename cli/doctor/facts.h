@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "cli/farm/http_client.h"
-#include "worker/child/sandbox.h"
+#include "common/sandbox/sandbox.h"
 
 namespace ls::cli {
 
@@ -31,7 +31,7 @@ struct MachineFacts {
   double cpu_quota = 0;  // number of CPUs that the control group allows; 0: no limit
   std::uint64_t file_limit = 0;
   // Which restrictions the sandbox can put in place on this machine; nullopt: this could not be tried
-  std::optional<worker::child::Sandboxed> sandbox;
+  std::optional<Sandboxed> sandbox;
   std::filesystem::path vdb_program;
   bool vdb_found = false;
   std::string denoiser, denoiser_trouble;  // the denoiser's name, or why there is no denoiser
@@ -55,6 +55,7 @@ struct FarmFacts {
   std::string url;  // address without user and password
   bool has_token = false;
   std::string trouble;          // why there was no answer; empty: there was an answer
+  std::string proxy;            // the proxy that answers come through; empty: none
   bool is_coordinator = false;  // true if a coordinator answered
   // From the answer to GET /readyz. `not_ready`: why the coordinator cannot take jobs; empty: it can.
   // `remark`: what else it reports; empty: nothing.

@@ -72,13 +72,11 @@ Finding of_sandbox(const MachineFacts& facts) {
   std::vector<std::string> missing;
   if (!facts.sandbox->calls) missing.emplace_back("opening sockets (seccomp)");
   if (!facts.sandbox->files) missing.emplace_back("files that are not a scene's (Landlock)");
-  if (facts.sandbox->files && !facts.sandbox->sizes)
-    missing.emplace_back("cutting cached files short (Landlock of Linux 6.2)");
   if (missing.empty()) return ok("sandbox", "the kernel confines the rendering process of a worker");
   return warning("sandbox",
                  fmt::format("the kernel cannot keep a worker's rendering process from {}",
                              fmt::join(missing, ", nor from ")),
-                 "use Linux 6.2 or later with Landlock, or render trusted scenes only");
+                 "use Linux 5.13 or later with Landlock, or render trusted scenes only");
 }
 
 Finding of_folder(const FolderFacts& folder) {
@@ -110,6 +108,8 @@ bool on_this_machine(const std::string& url) {
   return host == "localhost" || host == "[::1]" || host.starts_with("127.");
 }
 
+std::string through(const std::string& proxy) { return proxy.empty() ? "" : ", through the proxy " + proxy; }
+
 Finding of_reachability(const FarmFacts& facts) {
   if (!facts.trouble.empty()) {
     const bool tls = facts.trouble.find("SSL") != std::string::npos ||
@@ -121,12 +121,15 @@ Finding of_reachability(const FarmFacts& facts) {
             : "check the address, that the coordinator runs, and that no firewall is between");
   }
   if (!facts.is_coordinator)
-    return problem("farm", "something else than a coordinator answers there",
-                   "check the address and port: it is the coordinator's --http");
+    return problem("farm", "something else than a coordinator answers there" + through(facts.proxy),
+                   facts.proxy.empty()
+                       ? "check the address and port: it is the coordinator's --http"
+                       : "name the farm's host in no_proxy, or check the address and port: it is the "
+                         "coordinator's --http");
   if (!facts.not_ready.empty())
     return problem("farm", facts.not_ready, "see the coordinator's log; its disk may be full");
   if (!facts.remark.empty()) return warning("farm", facts.remark, "see the coordinator's log");
-  return ok("farm", "reachable and ready");
+  return ok("farm", "reachable and ready" + through(facts.proxy));
 }
 
 Finding of_tls(const FarmFacts& facts) {

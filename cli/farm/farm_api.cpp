@@ -84,7 +84,9 @@ FarmApi::Answer<json> as_json(Result<HttpResponse> response) {
   json j = json::parse(good->body, nullptr, false);
   if (!j.is_object())
     return coordinator::rejected(
-        {Errc::internal, "the answer is no JSON object: is this address a Lightshaft coordinator?"});
+        {Errc::internal,
+         "the answer is no JSON object: is this address a Lightshaft coordinator?" +
+             (good->proxy.empty() ? "" : " The request went through the proxy " + good->proxy)});
   return j;
 }
 
@@ -95,8 +97,11 @@ Rejected problem_of(const HttpResponse& response) {
   out.error.code = code_of(response.status);
   const json j = json::parse(response.body, nullptr, false);
   if (!j.is_object()) {
-    out.error.message = fmt::format("the coordinator answered with status {}: {}", response.status,
-                                    response.body.substr(0, kMaxShownBody));
+    out.error.message =
+        fmt::format("{} answered with status {}: {}",
+                    response.proxy.empty() ? "the coordinator"
+                                           : "the proxy " + response.proxy + ", or what is behind it,",
+                    response.status, response.body.substr(0, kMaxShownBody));
     return out;
   }
   out.error.message =

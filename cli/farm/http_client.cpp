@@ -10,6 +10,8 @@
 #include <cstdio>
 #include <mutex>
 
+#include "common/base/safe_text.h"
+
 namespace ls::cli {
 namespace {
 
@@ -80,6 +82,28 @@ std::size_t take_header(char* data, std::size_t size, std::size_t count, void* r
     if (date != -1) response.date = date;
   }
   return size * count;
+}
+
+// Notes in a text which proxy is used. libcurl tells this only in what it prints for debugging:
+// "Uses proxy env variable http_proxy == 'http://proxy:3128'".
+int take_debug(CURL*, curl_infotype type, char* data, std::size_t size, void* proxy_pointer) {
+  constexpr std::string_view kBegins = "Uses proxy env variable ", kEquals = " == '";
+  std::string_view line(data, size);
+  if (type != CURLINFO_TEXT || !line.starts_with(kBegins)) return 0;
+  line.remove_prefix(kBegins.size());
+  const std::size_t equals = line.find(kEquals);
+  const std::string_view variable = line.substr(0, equals);
+  if (equals == std::string_view::npos || variable == "no_proxy" || variable == "NO_PROXY") return 0;
+  std::string_view proxy = line.substr(equals + kEquals.size());
+  proxy = proxy.substr(0, proxy.rfind('\''));
+  // A password may stand before the host.
+  const std::size_t host = proxy.rfind('@') + 1, scheme = proxy.find("://");
+  const std::string shown = host == 0 ? std::string(proxy)
+                                      : std::string(scheme < host ? proxy.substr(0, scheme + 3) : "") +
+                                            std::string(proxy.substr(host));
+  *static_cast<std::string*>(proxy_pointer) =
+      fmt::format("{} of the variable {}", plain_text(shown), plain_text(variable));
+  return 0;
 }
 
 std::size_t read_file_chunk(char* data, std::size_t size, std::size_t count, void* file) {
@@ -183,8 +207,12 @@ Result<HttpResponse> HttpClient::State::perform(const std::string& path, const H
   curl_easy_setopt(curl, CURLOPT_HEADERFUNCTION, &take_header);
   curl_easy_setopt(curl, CURLOPT_HEADERDATA, &response);
   curl_easy_setopt(curl, CURLOPT_ERRORBUFFER, problem);
+  curl_easy_setopt(curl, CURLOPT_DEBUGFUNCTION, &take_debug);
+  curl_easy_setopt(curl, CURLOPT_DEBUGDATA, &response.proxy);
+  curl_easy_setopt(curl, CURLOPT_VERBOSE, 1L);
   CURLcode code = CURLE_OK;
   for (std::size_t tried = 0; tried < urls.size(); ++tried) {
+    response.proxy.clear();
     set_common(urls[current] + path, headers);
     code = curl_easy_perform(curl);
     if (code != CURLE_COULDNT_CONNECT || urls.size() == 1) break;
@@ -211,9 +239,11 @@ Result<HttpResponse> HttpClient::State::perform(const std::string& path, const H
                             asked));
   if (code != CURLE_COULDNT_CONNECT) current = (current + 1) % urls.size();
   return fail(Errc::unavailable,
-              fmt::format("{} cannot be reached: {}",
+              fmt::format("{} cannot be reached{}: {}{}",
                           urls.size() > 1 && code == CURLE_COULDNT_CONNECT ? options.url : asked,
-                          *problem ? problem : curl_easy_strerror(code)));
+                          response.proxy.empty() ? "" : " through the proxy " + response.proxy,
+                          *problem ? problem : curl_easy_strerror(code),
+                          response.proxy.empty() ? "" : "; to go there directly, name its host in no_proxy"));
 }
 
 Result<HttpResponse> HttpClient::request(std::string_view method, const std::string& path,

@@ -1,4 +1,6 @@
-// The interface to libcurl: sends requests to a coordinator's HTTP API over one persistent connection.
+// The interface to libcurl: sends requests to a coordinator's HTTP API over one persistent connection. As
+// most programs do, libcurl goes through the proxy that http_proxy, https_proxy or all_proxy names, also to
+// this machine's own addresses, unless no_proxy names the host.
 #pragma once
 
 #include <cstdint>
@@ -19,6 +21,7 @@ struct HttpResponse {
   std::string body;
   std::optional<std::uint64_t> upload_offset;  // header Upload-Offset: bytes of the file that the server has
   std::optional<std::int64_t> date;            // header Date, in seconds since 1970
+  std::string proxy;  // the proxy that the request went through, and the variable that names it; empty: none
 };
 
 class HttpClient {

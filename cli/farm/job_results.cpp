@@ -12,6 +12,7 @@
 #include "cli/output/convergence_text.h"
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
+#include "common/base/safe_text.h"
 
 namespace ls::cli {
 namespace {
@@ -34,7 +35,7 @@ std::optional<std::uint32_t> frame_number(const json& frame) {
 
 struct Plan {
   std::vector<Download> downloads;
-  std::vector<std::uint32_t> empty;  // numbers of the frames that have no results
+  std::vector<std::uint32_t> left_out;  // numbers of the frames of which nothing is downloaded
 };
 
 // Returns the part of the image's URL that follows the path of the job: "/image.exr" or "/image.png", the
@@ -60,8 +61,10 @@ Result<Plan> plan_sequence(const std::string& id, const json& job, const json& f
   for (const json& frame : *list) {
     const auto number = frame_number(frame);
     if (!number) return fail(Errc::internal, "the coordinator names a frame that can't be one");
-    if (!(number_field(frame, "spp_done").value_or(0) > 0)) {
-      plan.empty.push_back(*number);
+    const bool taken = wanted.done_only ? text_field(frame, "state") == "done"
+                                        : number_field(frame, "spp_done").value_or(0) > 0;
+    if (!taken) {
+      plan.left_out.push_back(*number);
       continue;
     }
     const auto add = [&](const char* option, const std::string& name, const std::string& what) {
@@ -87,7 +90,21 @@ Plan plan_image(const std::string& id, const json& job, const Results& wanted) {
   return plan;
 }
 
+// Returns the command by which a person downloads the same results.
+std::string fetch_command(const std::string& id, const Results& wanted) {
+  std::string command = "lightshaft fetch " + shell_word(id);
+  for (const auto& [option, name] : {std::pair("-o", wanted.image), std::pair("--report", wanted.report),
+                                     std::pair("--html", wanted.html)})
+    if (!name.empty()) command += fmt::format(" {} {}", option, shell_word(name));
+  return command;
+}
+
 }  // namespace
+
+int done_frames(const json& job) {
+  const json* frames = object_field(job, "frames");
+  return frames ? int_field(*frames, "done", 0) : 0;
+}
 
 ProgressFigures progress_of(const json& job) {
   ProgressFigures f;
@@ -151,6 +168,9 @@ int print_end(const json& job, bool quiet) {
   const std::string error = text_field(job, "error");
   complain(fmt::format("job {} was {}{}", id, state == "failed" ? "given up" : state,
                        error.empty() ? "" : ": " + error));
+  if (const int done = done_frames(job); done > 0)
+    print_note(
+        fmt::format("{} of its frames are done: lightshaft fetch {} -o out_####.exr", done, shell_word(id)));
   return kFailed;
 }
 
@@ -180,13 +200,20 @@ int fetch_results(FarmApi& api, const std::string& id, const Results& wanted) {
       return print_rejected(got.error());
     if (wanted.json) print(dump(json{{"file", d.file}}, -1));
   }
-  if (plan->empty.empty()) return kOk;
+  const std::vector<std::uint32_t>& left_out = plan->left_out;
+  if (left_out.empty()) return kOk;
   constexpr std::size_t kShown = 20;
-  const std::size_t shown = std::min(plan->empty.size(), kShown);
-  complain(fmt::format(
-      "nothing has come yet of {} of the frames: {}{}", plan->empty.size(),
-      fmt::join(plan->empty.begin(), plan->empty.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
-      shown < plan->empty.size() ? ", ..." : ""));
+  const std::size_t shown = std::min(left_out.size(), kShown);
+  const std::string numbers = fmt::format(
+      "{}{}", fmt::join(left_out.begin(), left_out.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
+      shown < left_out.size() ? ", ..." : "");
+  if (wanted.done_only)
+    complain(
+        fmt::format("{} of the frames are not done, and were not written: {}. If there is anything of them, "
+                    "this fetches it: {}",
+                    left_out.size(), numbers, fetch_command(id, wanted)));
+  else
+    complain(fmt::format("nothing has come yet of {} of the frames: {}", left_out.size(), numbers));
   return kFailed;
 }
 

@@ -18,24 +18,30 @@ FarmApi::Answer<nlohmann::json> watch_job(FarmApi& api, const std::string& id, c
 
 ProgressFigures progress_of(const nlohmann::json& job);
 
+// Returns how many frames of a sequence (a job with several frames) are done; 0 for other jobs.
+int done_frames(const nlohmann::json& job);
+
 // Prints how a job ended. If it is done, prints the error of its image (with `quiet` only if the error cannot
-// be trusted) and returns kOk; otherwise prints the reason and returns kFailed.
+// be trusted) and returns kOk; otherwise prints the reason, and how to fetch the frames that are done, and
+// returns kFailed.
 int print_end(const nlohmann::json& job, bool quiet);
 // Prints the error of the denoised image of a job that is done. Only the job's report, which this function
 // downloads, contains that error. Prints nothing if no denoising was requested.
 void print_denoised(FarmApi& api, const nlohmann::json& job);
 
 struct Results {
-  // Names of the files to write; empty: this result is not wanted. A run of # is replaced by the frame
-  // number.
+  // Names of the files to write; empty: this result is not wanted. A run of # in the last component is
+  // replaced by the frame number.
   std::string image, report, html;
   bool json = false;     // print each file as a line of JSON on stdout
   bool patient = false;  // keep trying for a while if the coordinator is unreachable
+  // Of a sequence, only the frames that are done; without it, all that have data.
+  bool done_only = false;
 };
 
 // Downloads the results of job `id`; returns the exit code. For a sequence (a job with several frames),
-// downloads every frame that has data; if any has none, prints the numbers of those frames and returns
-// kFailed. A report name without # gets one report for the whole sequence.
+// downloads every frame that has data or is done; if there are others, prints their numbers and how to fetch
+// them later, and returns kFailed. A report name without # gets one report for the whole sequence.
 int fetch_results(FarmApi& api, const std::string& id, const Results& results);
 
 }  // namespace ls::cli

@@ -1,5 +1,6 @@
 #include "cli/local/local_farm.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -11,6 +12,7 @@
 
 #include "common/base/parse_number.h"
 #include "common/protocol/limits.h"
+#include "common/sandbox/call_filter.h"
 #include "coordinator/store/files.h"
 #include "worker/child/child.h"
 #include "worker/child/serve.h"
@@ -86,19 +88,22 @@ struct MemoryFile final : worker::BlobFile {
 
 }  // namespace
 
-Result<std::shared_ptr<const worker::BlobFile>> LocalBlobFiles::acquire(const BlobRef& blob) {
+Result<std::shared_ptr<const worker::BlobFile>> LocalBlobFiles::acquire(const BlobRef& blob,
+                                                                        const std::atomic<bool>& /*stop*/) {
   if (auto path = blobs_->adopted(blob.digest)) return std::make_shared<const HereFile>(std::move(*path));
   const auto size = blobs_->size(blob.digest);
   if (!size) return tl::unexpected(size.error());
   const auto bytes = blobs_->read(blob.digest, 0, *size);
   if (!bytes) return fail(Errc::failed_precondition, bytes.error().message);
-  coordinator::File file(::memfd_create("lightshaft-blob", MFD_CLOEXEC));
+  coordinator::File file(::memfd_create("lightshaft-blob", MFD_CLOEXEC | MFD_ALLOW_SEALING));
   if (!file)
     return fail(Errc::failed_precondition,
                 fmt::format("no file in memory can be made: {}", std::strerror(errno)));
   auto memory = std::make_shared<const MemoryFile>(std::move(file));
   if (auto written = coordinator::write_all(memory->file, *bytes, memory->path()); !written)
     return fail(Errc::failed_precondition, written.error().message);
+  // Nobody changes the file through its path any more, such as a render child of a malicious scene.
+  ::fcntl(memory->file.fd(), F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL);
   return memory;
 }
 
@@ -109,9 +114,10 @@ struct LocalFarm::Watched final : worker::RenderBackend {
 
   Digest numeric_class() const override { return backend->numeric_class(); }
   std::string platform() const override { return backend->platform(); }
-  tl::expected<void, UnitFailure> prepare(const worker::LocalJob& job) override {
+  tl::expected<void, UnitFailure> prepare(const worker::LocalJob& job,
+                                          const std::atomic<bool>& stop) override {
     const TimePoint start = clock.now();
-    auto ready = backend->prepare(job);
+    auto ready = backend->prepare(job, stop);
     const std::lock_guard lock(mutex);
     load_seconds = std::max(load_seconds, seconds(clock.now() - start));
     if (!ready && ready.error().scene_at_fault) fault = ready.error().reason;
@@ -221,6 +227,7 @@ int run_render_child(const char* threads) {
   const int count = parse_number<int>(threads).value_or(0);
   if (count < 1) return 2;
   worker::child::confine(worker::usable_memory_bytes());
+  limit_calls();  // files are not restricted: those of a scene may be anywhere
   const auto limit = render::limit_threads(count);
   const auto backend = worker::make_inprocess_backend(count);
   return worker::child::serve(*backend, count);

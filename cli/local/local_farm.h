@@ -47,7 +47,8 @@ class LocalBlobFiles final : public worker::BlobFiles {
  public:
   explicit LocalBlobFiles(std::shared_ptr<coordinator::MemoryBlobs> blobs) : blobs_(std::move(blobs)) {}
   // All errors of acquire() are final: waiting and trying again would not help.
-  Result<std::shared_ptr<const worker::BlobFile>> acquire(const BlobRef& blob) override;
+  Result<std::shared_ptr<const worker::BlobFile>> acquire(const BlobRef& blob,
+                                                          const std::atomic<bool>& stop) override;
   std::vector<Digest> held(std::size_t) const override { return {}; }
 
  private:

@@ -41,9 +41,7 @@ struct Pipe {
 
 Result<pid_t> start_program(const Words& words, std::vector<int> standard_files) {
   const auto inherits = [](std::string_view variable) { return !variable.starts_with("LIGHTSHAFT_"); };
-  // The program gets its own process group. Otherwise Ctrl-C at the terminal would stop it, too; only this
-  // process should receive Ctrl-C and decide how to end the program.
-  return spawn({words.front(), words, std::move(standard_files), inherits, true});
+  return spawn({words.front(), words, std::move(standard_files), inherits});
 }
 
 int exit_code(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }

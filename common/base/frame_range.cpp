@@ -78,9 +78,21 @@ std::string to_string(const FrameRange& range) {
   return text;
 }
 
+namespace {
+
+// Where the last component of a path begins: only there # stands for the frame's number.
+std::size_t file_begins(std::string_view name) {
+  const std::size_t end = name.find_last_not_of('/');
+  const std::size_t slash = end == std::string_view::npos ? end : name.rfind('/', end);
+  return slash == std::string_view::npos ? 0 : slash + 1;
+}
+
+}  // namespace
+
 std::string numbered(std::string_view name, std::uint32_t frame) {
-  std::string out;
-  for (std::size_t at = 0; at < name.size();) {
+  const std::size_t file = file_begins(name);
+  std::string out(name.substr(0, file));
+  for (std::size_t at = file; at < name.size();) {
     if (name[at] != '#') {
       out += name[at++];
       continue;
@@ -92,6 +104,8 @@ std::string numbered(std::string_view name, std::uint32_t frame) {
   return out;
 }
 
-bool has_frame_number(std::string_view name) { return name.find('#') != std::string_view::npos; }
+bool has_frame_number(std::string_view name) {
+  return name.find('#', file_begins(name)) != std::string_view::npos;
+}
 
 }  // namespace ls

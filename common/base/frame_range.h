@@ -1,5 +1,6 @@
 // The frames of a sequence (a job that renders one image per frame), as text: "1-10", "1-10x2" (every second
-// frame), "7". In file names a run of # is replaced by the frame number, zero-padded to the run's length.
+// frame), "7". In the last component of a path a run of # is replaced by the frame number, zero-padded to the
+// run's length.
 #pragma once
 
 #include <cstdint>
@@ -30,9 +31,10 @@ struct FrameRange {
 Result<FrameRange> parse_frames(std::string_view text);
 std::string to_string(const FrameRange& range);
 
-// Returns `name` with every run of # replaced by the frame number: "fog.####.vdb" of frame 7 is
-// "fog.0007.vdb". A number with more digits than its run is written in full.
+// Returns the path `name` with every run of # in its last component replaced by the frame number:
+// "shot#3/fog.####.vdb" of frame 7 is "shot#3/fog.0007.vdb". A number with more digits than its run is
+// written in full.
 std::string numbered(std::string_view name, std::uint32_t frame);
-bool has_frame_number(std::string_view name);  // true if the name contains a #
+bool has_frame_number(std::string_view name);  // true if the last component of the path contains a #
 
 }  // namespace ls

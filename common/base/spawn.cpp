@@ -2,19 +2,27 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <fstream>
+#include <sstream>
 #include <utility>
+
+#include "common/base/program_output.h"
 
 extern char** environ;
 
 namespace ls {
 namespace {
+
+constexpr int kLookMs = 20;  // longest time between looks whether a helper has ended, in milliseconds
 
 // Duplicates of the files that the program will inherit. Their numbers are higher than all numbers that the
 // program will use, so that dup2() of one file to its final number cannot overwrite another file that is
@@ -59,6 +67,17 @@ bool inherits(std::string_view variable) {
   return name.starts_with("LD_") || name.starts_with("MALLOC_") || name.ends_with("SAN_OPTIONS");
 }
 
+bool leads_session_without_terminal() {
+  if (::getsid(0) != ::getpid()) return false;
+  std::string stat;
+  std::getline(std::ifstream("/proc/self/stat"), stat);
+  // After the name in parentheses: state, parent, process group, session, terminal (0: none)
+  std::istringstream fields(stat.substr(std::min(stat.size(), stat.rfind(')') + 1)));
+  std::string word;
+  for (int i = 0; i < 4; ++i) fields >> word;
+  return fields >> word && word == "0";
+}
+
 int wait_with(pid_t pid, int flags, int& status) {
   int got = -1;
   while ((got = ::waitpid(pid, &status, flags)) < 0 && errno == EINTR) {
@@ -69,6 +88,8 @@ int wait_with(pid_t pid, int flags, int& status) {
 }  // namespace
 
 Result<pid_t> spawn(Program program) {
+  if (std::any_of(program.files.begin(), program.files.end(), [](int fd) { return ::isatty(fd) != 0; }))
+    return fail(Errc::internal, fmt::format("cannot start {}: it would inherit a terminal", program.path));
   const int count = static_cast<int>(program.files.size());
   HighFiles high;
   posix_spawn_file_actions_t actions;
@@ -90,10 +111,9 @@ Result<pid_t> spawn(Program program) {
   sigemptyset(&none), sigfillset(&all);
   posix_spawnattr_setsigmask(&attributes, &none);
   posix_spawnattr_setsigdefault(&attributes, &all);
-  posix_spawnattr_setpgroup(&attributes, 0);
-  const int group = program.own_group ? POSIX_SPAWN_SETPGROUP : 0;
+  const int session = program.own_session ? POSIX_SPAWN_SETSID : 0;
   posix_spawnattr_setflags(&attributes,
-                           static_cast<short>(POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | group));
+                           static_cast<short>(POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | session));
   pid_t pid = -1;
   if (error == 0)
     error = ::posix_spawnp(&pid, program.path.c_str(), &actions, &attributes,
@@ -127,12 +147,35 @@ Descriptor::~Descriptor() {
   if (fd >= 0) ::close(fd);
 }
 
-Result<int> run_helper(const std::filesystem::path& program, std::vector<std::string> arguments, int shared) {
+Result<HelperEnd> run_helper(const std::filesystem::path& program, std::vector<std::string> arguments,
+                             int shared, const std::atomic<bool>* stop) {
+  static LineBudget budget;  // of all helpers of this process together
+  auto output = ProgramOutput::open(program.filename().string(), budget);
+  if (!output) return tl::unexpected<Error>(output.error());
+  const int out = (*output)->write_end();
   arguments.insert(arguments.begin(), program.string());
-  const auto pid =
-      spawn({program.string(), std::move(arguments), {kDevNull, kDevNull, STDERR_FILENO, shared}, inherits});
+  // The helper of a render child stays in the child's process group, and so is killed with the child.
+  const auto pid = spawn({program.string(),
+                          std::move(arguments),
+                          {kDevNull, out, out, shared},
+                          inherits,
+                          !leads_session_without_terminal()});
   if (!pid) return fail(Errc::internal, pid.error().message);
-  return wait_for_end(*pid);
+  (*output)->close_write_end();
+  // The output ends with the program, unless the program has closed it before or has left processes behind
+  // that keep it open: so both are looked at.
+  std::optional<int> status;
+  bool open = true;
+  for (int pause = 1; !status; status = poll_end(*pid)) {
+    if (stop && *stop) ::kill(*pid, SIGKILL);
+    if (open) {
+      open = (*output)->read(kLookMs);
+    } else {
+      ::poll(nullptr, 0, pause);  // a program ends right after its output, unless it has closed that before
+      pause = std::min(2 * pause, kLookMs);
+    }
+  }
+  return HelperEnd{*status, (*output)->end()};
 }
 
 }  // namespace ls

@@ -1,5 +1,6 @@
 #include "common/denoise/denoiser.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
@@ -54,8 +55,11 @@ class Shared {
   static Result<Shared> of(FrameSize size, std::size_t images) {
     Shared out;
     out.bytes_ = denoise::shared_bytes(size.width, size.height, static_cast<std::int32_t>(images));
-    out.file_ = std::make_unique<Descriptor>(::memfd_create("lightshaft-denoise", MFD_CLOEXEC));
-    if (out.file_->fd < 0 || ::ftruncate(out.file_->fd, static_cast<off_t>(out.bytes_)) != 0)
+    out.file_ =
+        std::make_unique<Descriptor>(::memfd_create("lightshaft-denoise", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+    // The seals keep the helper from cutting the memory short: reading it here would then kill this process.
+    if (out.file_->fd < 0 || ::ftruncate(out.file_->fd, static_cast<off_t>(out.bytes_)) != 0 ||
+        ::fcntl(out.file_->fd, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) != 0)
       return broken(std::strerror(errno), Errc::resource_exhausted);
     void* mapped = ::mmap(nullptr, out.bytes_, PROT_READ | PROT_WRITE, MAP_SHARED, out.file_->fd, 0);
     if (mapped == MAP_FAILED) return broken(std::strerror(errno), Errc::resource_exhausted);
@@ -82,23 +86,26 @@ class Shared {
 
 Result<void> run(const std::filesystem::path& program, const std::string& library, int threads, int seconds,
                  Shared& shared) {
-  const auto status =
+  const auto ended =
       run_helper(program, {library, std::to_string(threads), std::to_string(seconds)}, shared.fd());
-  if (!status) return broken(status.error().message);
-  if (WIFSIGNALED(*status) && WTERMSIG(*status) == SIGALRM)
+  if (!ended) return broken(ended.error().message);
+  const int status = ended->status;
+  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM)
     return broken(fmt::format("{} was ended after {} s: the library hangs, or this machine is overloaded",
                               program.filename().string(), seconds),
                   Errc::resource_exhausted);
-  if (WIFSIGNALED(*status))
+  if (WIFSIGNALED(status))
     return broken(
-        fmt::format("{} was killed ({}){}", program.filename().string(), ::strsignal(WTERMSIG(*status)),
-                    WTERMSIG(*status) == SIGKILL ? ": is there enough memory?" : ""),
-        WTERMSIG(*status) == SIGKILL ? Errc::resource_exhausted : Errc::internal);
-  if (WEXITSTATUS(*status) != 0)
-    return broken(fmt::format("{} ended with code {}", program.filename().string(), WEXITSTATUS(*status)));
-  Header& header = shared.header();
-  header.error[sizeof header.error - 1] = 0;
-  if (header.outcome != Outcome::done) return broken(plain_text(header.error));
+        fmt::format("{} was killed ({}){}", program.filename().string(), ::strsignal(WTERMSIG(status)),
+                    WTERMSIG(status) == SIGKILL ? ": is there enough memory?" : ""),
+        WTERMSIG(status) == SIGKILL ? Errc::resource_exhausted : Errc::internal);
+  if (WEXITSTATUS(status) != 0)
+    return broken(fmt::format("{} ended with code {}{}{}", program.filename().string(), WEXITSTATUS(status),
+                              ended->last_line.empty() ? "" : ": ", ended->last_line));
+  const Header& header = shared.header();
+  // The text need not end with a zero, and other processes may still change it.
+  if (header.outcome != Outcome::done)
+    return broken(plain_text({header.error, ::strnlen(header.error, sizeof header.error)}));
   return {};
 }
 

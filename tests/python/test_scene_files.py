@@ -50,6 +50,13 @@ def test_each_frame_has_its_files(folder):
     assert set(found(folder, text, frames="7-9")) == {"frame_007.ply", "frame_009.ply", "f8"}
 
 
+def test_a_hash_in_the_name_of_a_folder_is_no_number_of_a_frame(folder):
+    (folder / "shot#1").mkdir()
+    (folder / "shot#1/f_2.ply").write_bytes(b"2")
+    text = f'<scene version="3.0.0">{mesh("shot#1/f_#.ply")}</scene>'
+    assert set(found(folder, text, frames="2-2")) == {"shot#1/f_2.ply"}
+
+
 def test_included_files_are_sent_with_what_they_name(folder):
     (folder / "parts/more.xml").write_text(
         f'<scene version="3.0.0"><include filename="last.xml"/>{mesh("a.ply")}</scene>'

@@ -7,6 +7,7 @@
 //   FAKE_OIDN_FAILS   every execution reports an error
 //   FAKE_OIDN_CRASHES every execution aborts
 //   FAKE_OIDN_HANGS   every execution waits for ever
+//   FAKE_OIDN_CUTS    every execution tries to cut the memory short that it shares with its caller
 //   FAKE_OIDN_NAN     the last value of the image becomes NaN
 //   FAKE_OIDN_OLD     it is version 1.4.3
 #include <cstddef>
@@ -16,7 +17,7 @@
 #include <map>
 #include <string>
 #include <vector>
-#ifdef FAKE_OIDN_HANGS
+#if defined(FAKE_OIDN_HANGS) || defined(FAKE_OIDN_CUTS)
 #include <unistd.h>
 #endif
 
@@ -98,6 +99,10 @@ void oidnExecuteFilter(Filter* f) {
 #endif
 #ifdef FAKE_OIDN_HANGS
   for (;;) ::pause();
+#endif
+#ifdef FAKE_OIDN_CUTS
+  constexpr int kShared = 3;  // kHelperFd
+  if (::ftruncate(kShared, 0) != 0) f->device->error = "it cannot be cut short";
 #endif
   const Image output = f->images.at("output");
   const std::size_t floats = 3 * output.width * output.height;

@@ -141,6 +141,21 @@ def test_only_questions_are_asked_and_no_password_is_shown(stub):
     assert {method for method, _ in stub.requests} == {"GET"}
 
 
+def test_a_proxy_that_the_environment_names_is_said(stub):
+    behind = {"http_proxy": "http://me:hush-hush@127.0.0.1:9", "LIGHTSHAFT_TOKEN": SECRET}
+
+    (farm,) = doctor("--farm", stub.url, code=1, **behind)["farm"]
+    jobs = lightshaft("jobs", "--to", stub.url, code=1, env=clean_environment(**behind)).stderr
+    direct = doctor("--farm", stub.url, code=0, no_proxy="127.0.0.1", **behind)["farm"]
+    itself = doctor("--farm", "http://farm.example:80", code=1, http_proxy=stub.url, LIGHTSHAFT_TOKEN=SECRET)["farm"]
+
+    for said in (farm["what"], jobs):
+        assert "cannot be reached through the proxy http://127.0.0.1:9 of the variable http_proxy" in said and "no_proxy" in said
+        assert "hush" not in said
+    assert [check["status"] for check in direct] == ["ok"] and "proxy" not in direct[0]["what"]
+    assert any(f"through the proxy {stub.url} of the variable http_proxy" in check["what"] for check in itself)
+
+
 def test_what_is_no_coordinator_is_said(stub):
     stub.answers[("GET", "/healthz")] = [(200, b"<html>")]
 

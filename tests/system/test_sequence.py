@@ -138,6 +138,25 @@ def test_cancelled_and_removed_as_a_whole(farm, smoke):
     wait_until(lambda: list((farm.data / "jobs").glob(f"{job}*")) == [], "its folders are gone")
 
 
+def test_a_frame_that_fails_does_not_keep_the_others_from_being_written(farm, smoke, tmp_path):
+    for path in smoke.parent.iterdir():
+        (tmp_path / path.name).symlink_to(path)
+    (tmp_path / "fog.0002.vdb").unlink()
+    (tmp_path / "fog.0002.vdb").write_bytes(b"no grid at all")
+    farm.add_worker(fake=False)
+
+    said = lightshaft("submit", tmp_path / "smoke.xml", "--frames", "1-3", *OPTIONS, "--wait", "-o", tmp_path / "o_##.exr",
+                      "--report", tmp_path / "r_##.json", "--html", tmp_path / "h_##.html", env=environment(farm), code=1)
+
+    assert sorted(path.name for path in tmp_path.iterdir() if path.name[1] == "_") == [
+        "h_01.html", "h_03.html", "o_01.exr", "o_03.exr", "r_01.json", "r_03.json"]
+    job = said.stdout.split()[0]
+    assert "frame 2" in said.stderr
+    assert f"1 of the frames are not done, and were not written: 2. If there is anything of them, this fetches it: lightshaft fetch {job} -o" in said.stderr
+    watched = lightshaft("watch", job, env=environment(farm), code=1)
+    assert f"2 of its frames are done: lightshaft fetch {job} -o out_####.exr" in watched.stderr
+
+
 def test_a_missing_frame_is_named_before_anything_is_sent(farm, smoke, tmp_path):
     for path in smoke.parent.iterdir():
         if path.name not in ("fog.0004.vdb", "fog.0009.vdb"):

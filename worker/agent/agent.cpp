@@ -66,11 +66,12 @@ Result<void> Agent::Impl::run() {
 }
 
 void Agent::Impl::end_threads() {
+  for (std::jthread& thread : threads) thread.request_stop();
   {
     const std::lock_guard lock(mutex);
     for (auto& slot : slots) slot->stop = true;
+    stop_loading = true;
   }
-  for (std::jthread& thread : threads) thread.request_stop();
   work.notify_all();
   link.close();
   backend.shutdown();
@@ -116,7 +117,7 @@ void Agent::Impl::handle_message(ToWorker& message) {
                  [this](CancelLease& c) {
                    const std::lock_guard lock(mutex);
                    table.drop_lease(c.lease);
-                   stop_dropped_units();
+                   stop_dropped_work();
                  },
                  [this](DrainNow&) { drain_requested = true; },
              },
@@ -203,12 +204,13 @@ void Agent::Impl::drop_work(const JobId& job) {
   table.drop_job(job);
   outbox.drop_job(job);
   std::erase_if(unsent, [&](const auto& one) { return one.first.job == job; });
-  stop_dropped_units();
+  stop_dropped_work();
 }
 
-void Agent::Impl::stop_dropped_units() {
+void Agent::Impl::stop_dropped_work() {
   for (auto& slot : slots)
     if (slot->unit && !table.is_running(*slot->unit)) slot->stop = true;
+  if (loaded_job && !table.holds(*loaded_job)) stop_loading = true;
 }
 
 void Agent::Impl::look_at_backend() {

@@ -139,7 +139,9 @@ struct Agent::Impl {
   void accept_lease(AssignLease& assign);
   void cancel(const JobId& job);
   void drop_work(const JobId& job);  // drops the job's units and results; call with the mutex held
-  void stop_dropped_units();         // sets the stop flag of each running unit that is no longer in `table`
+  // Sets the stop flag of each running unit that is no longer in `table`, and that of the loader if it loads
+  // a job of which `table` has no unit.
+  void stop_dropped_work();
   void begin_drain();
   void look_at_backend();  // drains if the backend is broken, so that run() ends with the backend's error
   // If the worker was without work for options.idle_limit: drains, or ends run() if it has never joined.
@@ -156,9 +158,14 @@ struct Agent::Impl {
   bool make_room();  // frees an unused world if too many are kept; false: all are in use
   void load(const JobBrief& brief);
   void try_to_load(const JobBrief& brief);
-  void loading_failed(const JobId& id, UnitFailure failure);
-  void postpone(const JobId& id, const Error& why);
-  void hold_off(const JobId& id, const std::string& trouble);
+  // Each of these ends an attempt to load the job that has failed. If the loader was told to stop, or the job
+  // was replaced by another one with its id, they do nothing besides.
+  void loading_failed(const JobBrief& brief, UnitFailure failure);
+  void postpone(const JobBrief& brief, const Error& why);
+  void hold_off(const JobBrief& brief, const std::string& trouble);
+  // Ends an attempt to load the job, and returns the job, which is idle then; null: it was replaced. Call
+  // with the mutex held.
+  Job* end_loading(const JobBrief& brief);
   // Returns a recent fault of this machine that prevented loading a job; empty: there is none. Call with the
   // mutex held.
   std::string trouble() const;
@@ -220,6 +227,7 @@ struct Agent::Impl {
   WorkerId id;
 
   std::atomic<bool> drain_requested{false}, stop_requested{false};
+  std::atomic<bool> stop_loading{false};  // tells the backend to abandon the world that it builds
 
   mutable std::mutex mutex;
   // Wakes the loader and render threads when the leases, the worlds or the free space of the outbox change
@@ -244,6 +252,7 @@ struct Agent::Impl {
   double load_seconds = 0;
   GapMeter gaps;
   Backoff trouble_backoff;
+  std::optional<JobId> loaded_job;  // the job that the loader loads
   // While the loader loads a job: the name of the file that it fetched last or is fetching; otherwise empty
   std::string loading;
 

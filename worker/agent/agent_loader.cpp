@@ -34,10 +34,13 @@ void Agent::Impl::load_loop(std::stop_token token) {
     if (next && make_room()) {
       Job& job = jobs.at(*next);
       job.state = Job::State::loading;
+      loaded_job = *next;
+      stop_loading = token.stop_requested();
       const JobBrief brief = job.brief;
       lock.unlock();
       try_to_load(brief);
       lock.lock();
+      loaded_job.reset();
     } else {
       // The timeout is needed because a job becomes loadable again when its retry_at has passed, and nothing
       // notifies this thread of that. It is notified of all other changes.
@@ -105,9 +108,9 @@ void Agent::Impl::try_to_load(const JobBrief& brief) {
   try {
     load(brief);
   } catch (const std::bad_alloc&) {
-    loading_failed(brief.job, UnitFailure{.reason = "out of memory while loading the scene"});
+    loading_failed(brief, UnitFailure{.reason = "out of memory while loading the scene"});
   } catch (const std::exception& e) {
-    loading_failed(brief.job, UnitFailure{.reason = std::string("cannot load the scene: ") + e.what()});
+    loading_failed(brief, UnitFailure{.reason = std::string("cannot load the scene: ") + e.what()});
   }
 }
 
@@ -125,55 +128,67 @@ void Agent::Impl::load(const JobBrief& brief) {
       loading = blob.name;
     }
     const TimePoint asked = span.parent ? clock.now() : TimePoint{};
-    auto file = files.acquire(blob);
+    auto file = files.acquire(blob, stop_loading);
     if (span.parent && pins.size() < kBlobsTraced)
       record("fetch blob", span.own, asked, clock.now(),
              {{"lightshaft.blob", blob.digest.hex()},
               {"lightshaft.bytes", static_cast<std::int64_t>(blob.bytes)}},
              !file);
-    if (!file && file.error().code == Errc::unavailable) return postpone(id, file.error());
+    if (!file && file.error().code == Errc::unavailable) return postpone(brief, file.error());
     if (!file && of_this_machine(file.error()))
-      return hold_off(id, fmt::format("cannot get '{}': {}", blob.name, file.error().message));
-    if (!file)
-      return loading_failed(
-          id, UnitFailure{.reason = fmt::format("cannot get '{}': {}", blob.name, file.error().message)});
+      return hold_off(brief, fmt::format("cannot get '{}': {}", blob.name, file.error().message));
+    if (!file || stop_loading)
+      return loading_failed(brief,
+                            UnitFailure{.reason = fmt::format("cannot get '{}': {}", blob.name,
+                                                              file ? "told to stop" : file.error().message)});
     if (blob.digest == brief.scene) local->scene = (*file)->path();
     local->assets[blob.digest] = (*file)->path();
     pins.push_back(std::move(*file));
   }
   local->brief = brief;
   const TimePoint start = clock.now();
-  auto prepared = backend.prepare(*local);
+  auto prepared = backend.prepare(*local, stop_loading);
   if (span.parent) {
     const TimePoint end = clock.now();
     record("build world", span.own, start, end, {{"lightshaft.job", id.value}}, !prepared);
     if (prepared) span.loaded_at = end;
   }
-  if (!prepared && backend.broken()) return hold_off(id, prepared.error().reason);
-  if (!prepared) return loading_failed(id, std::move(prepared.error()));
+  if (!prepared && backend.broken()) return hold_off(brief, prepared.error().reason);
+  if (!prepared) return loading_failed(brief, std::move(prepared.error()));
   const std::lock_guard lock(mutex);
-  loading.clear();
   load_seconds = seconds(clock.now() - start);
-  const auto it = jobs.find(id);
-  // True if the job was replaced by another job with this id while it was being loaded
-  if (it == jobs.end() || it->second.state != Job::State::loading) return;
-  it->second.state = Job::State::ready;
-  it->second.local = std::move(local);
-  it->second.files = std::move(pins);
-  it->second.last_use = ++uses;
-  it->second.trouble.clear();
-  it->second.unreported.load += seconds(start - begin);
-  it->second.unreported.build += load_seconds;
+  Job* const job = end_loading(brief);
+  if (!job) return;
+  job->state = Job::State::ready;
+  job->local = std::move(local);
+  job->files = std::move(pins);
+  job->last_use = ++uses;
+  job->trouble.clear();
+  job->unreported.load += seconds(start - begin);
+  job->unreported.build += load_seconds;
   trouble_backoff.reset();
   work.notify_all();
 }
 
+Agent::Impl::Job* Agent::Impl::end_loading(const JobBrief& brief) {
+  loading.clear();
+  const auto it = jobs.find(brief.job);
+  const bool replaced =
+      it == jobs.end() || it->second.state != Job::State::loading || it->second.brief != brief;
+  if (replaced) {
+    backend.forget(brief.job);  // the world of the job that it was
+    return nullptr;
+  }
+  it->second.state = Job::State::idle;
+  return &it->second;
+}
+
 // Reports one unit of the job as failed and returns its other units to the coordinator. So a job that this
 // worker cannot load costs one failed attempt instead of hundreds.
-void Agent::Impl::loading_failed(const JobId& id, UnitFailure failure) {
+void Agent::Impl::loading_failed(const JobBrief& brief, UnitFailure failure) {
+  const JobId& id = brief.job;
   const std::lock_guard lock(mutex);
-  loading.clear();
-  if (const auto it = jobs.find(id); it != jobs.end()) it->second.state = Job::State::idle;
+  if (!end_loading(brief) || stop_loading) return;
   backend.forget(id);
   log_warn(fmt::format("job={}", id.value), "cannot be loaded: " + failure.reason);
   if (const auto first = table.take([&](const JobId& job) { return job == id; })) {
@@ -186,27 +201,24 @@ void Agent::Impl::loading_failed(const JobId& id, UnitFailure failure) {
   inbox->nudge();
 }
 
-void Agent::Impl::postpone(const JobId& id, const Error& why) {
+void Agent::Impl::postpone(const JobBrief& brief, const Error& why) {
   const std::lock_guard lock(mutex);
-  loading.clear();
-  const auto it = jobs.find(id);
-  if (it == jobs.end()) return;
-  it->second.state = Job::State::idle;
-  it->second.retry_at = clock.now() + kTransferRetry;
-  log_warn(fmt::format("job={}", id.value), "a transfer was cut, trying again: " + why.message);
+  Job* const job = end_loading(brief);
+  if (!job || stop_loading) return;
+  job->retry_at = clock.now() + kTransferRetry;
+  log_warn(fmt::format("job={}", brief.job.value), "a transfer was cut, trying again: " + why.message);
 }
 
 // Returns the job's units to the coordinator, so that other workers can render them. If units of the job are
 // assigned to this worker again, they wait until the next attempt to load the job.
-void Agent::Impl::hold_off(const JobId& id, const std::string& trouble) {
+void Agent::Impl::hold_off(const JobBrief& brief, const std::string& trouble) {
+  const JobId& id = brief.job;
   const std::lock_guard lock(mutex);
-  loading.clear();
+  Job* const job = end_loading(brief);
+  if (!job || stop_loading) return;
   const Duration pause = trouble_backoff.next();
-  if (const auto it = jobs.find(id); it != jobs.end()) {
-    it->second.state = Job::State::idle;
-    it->second.retry_at = clock.now() + pause;
-    it->second.trouble = trouble;
-  }
+  job->retry_at = clock.now() + pause;
+  job->trouble = trouble;
   log_warn(fmt::format("job={}", id.value),
            fmt::format("{}; giving its units back, trying again in {:.1f} s", trouble, seconds(pause)));
   for (LeaseReturned& returned : table.return_waiting(&id)) outgoing.push_back(std::move(returned));

@@ -52,7 +52,7 @@ inline tl::unexpected<UnitFailure> unit_failure(std::string reason) {
 }
 
 // Renders units. All calls block, and the agent makes them from several threads concurrently. If the caller
-// sets `stop`, render() should return early; its result is then ignored. UnitFailure::scene_at_fault is true
+// sets `stop`, the call should return early; its result is then ignored. UnitFailure::scene_at_fault is true
 // if the scene caused the failure.
 class RenderBackend {
  public:
@@ -63,7 +63,7 @@ class RenderBackend {
   virtual std::string platform() const { return {}; }
   // Builds the job's world (its scene, ready to render), unless it is already built. Returns a failure with
   // the reason if the world cannot be built.
-  virtual tl::expected<void, UnitFailure> prepare(const LocalJob& job) = 0;
+  virtual tl::expected<void, UnitFailure> prepare(const LocalJob& job, const std::atomic<bool>& stop) = 0;
   virtual tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
                                                          const std::atomic<bool>& stop) = 0;
   // Frees every world whose WorldKey contains this job id.

@@ -1,6 +1,7 @@
 // How the agent reaches its coordinator (CoordinatorLink) and gets the files of jobs (BlobFiles).
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -56,6 +57,8 @@ class BlobFile {
   virtual const std::filesystem::path& path() const = 0;
 };
 
+inline const std::atomic<bool> kNeverStop{false};
+
 // Provides the files of a job's blobs (its scene and assets). There are two implementations: a cache that
 // fetches missing blobs from the coordinator (worker/cache), and `lightshaft render`, whose files are local
 // already (cli/local).
@@ -66,8 +69,10 @@ class BlobFiles {
   // was interrupted; the bytes received are kept, and the caller should try again later. The errors
   // resource_exhausted and internal mean that this machine or its coordinator has a problem (a full disk, the
   // cache limit, a blob missing at the coordinator) that is not the job's fault and may pass. Other errors
-  // are final: for example not_found, if no source has the blob.
-  virtual Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob) = 0;
+  // are final: for example not_found, if no source has the blob. If `stop` becomes true, a transfer counts as
+  // interrupted.
+  virtual Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob,
+                                                          const std::atomic<bool>& stop = kNeverStop) = 0;
   // Returns the digests of the blobs on this machine, at most `limit`, most recently used first. The worker's
   // hello sends this list to the coordinator.
   virtual std::vector<Digest> held(std::size_t limit) const = 0;

@@ -57,14 +57,15 @@ Result<std::unique_ptr<BlobCache>> BlobCache::open(fs::path folder, std::uint64_
 BlobCache::BlobCache(fs::path folder, std::uint64_t limit_bytes, Fetch fetch)
     : folder_(std::move(folder)), limit_(limit_bytes), fetch_(std::move(fetch)) {}
 
-Result<std::shared_ptr<const BlobFile>> BlobCache::acquire(const BlobRef& blob) {
+Result<std::shared_ptr<const BlobFile>> BlobCache::acquire(const BlobRef& blob,
+                                                           const std::atomic<bool>& stop) {
   const std::lock_guard lock(mutex_);
   std::string reason;
   bool arrived_wrong = false;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     auto file = open_verified(blob.digest);
     if (!file || *file) return file;
-    const auto fetched = download(blob, arrived_wrong);
+    const auto fetched = download(blob, arrived_wrong, stop);
     reason = fetched ? "it was evicted by another worker" : fetched.error().message;
     if (!fetched && fetched.error().code != Errc::invalid_argument)
       return tl::unexpected<Error>(passing(fetched.error()));
@@ -103,11 +104,11 @@ Result<std::shared_ptr<const BlobFile>> BlobCache::open_verified(const Digest& d
   return file;
 }
 
-Result<void> BlobCache::download(const BlobRef& blob, bool arrived_wrong) {
+Result<void> BlobCache::download(const BlobRef& blob, bool arrived_wrong, const std::atomic<bool>& stop) {
   verified_.erase(blob.digest);
   auto partial = PartialFile::open(folder_ / kPartialFolder / blob.digest.hex());
   if (!partial) return tl::unexpected<Error>(partial.error());
-  const auto received = receive(blob, arrived_wrong, *partial);
+  const auto received = receive(blob, arrived_wrong, stop, *partial);
   // After an interrupted transfer (unavailable) the received bytes are kept, so that it can be resumed. After
   // any other error they are useless.
   if (!received && received.error().code != Errc::unavailable) partial->discard();
@@ -118,10 +119,12 @@ Result<void> BlobCache::download(const BlobRef& blob, bool arrived_wrong) {
   return {};
 }
 
-Result<void> BlobCache::receive(const BlobRef& blob, bool arrived_wrong, PartialFile& partial) {
+Result<void> BlobCache::receive(const BlobRef& blob, bool arrived_wrong, const std::atomic<bool>& stop,
+                                PartialFile& partial) {
   if (auto ok = make_room(std::max(blob.bytes, partial.size()), partial.path()); !ok) return ok;
   const BlobRequest wanted{blob.digest, partial.size(), arrived_wrong};
   return fetch_(wanted, [&](std::span<const std::byte> bytes) -> Result<void> {
+    if (stop) return fail(Errc::unavailable, "told to stop");
     const std::uint64_t size = partial.size() + bytes.size();
     if (blob.bytes != 0 && size > blob.bytes)
       return fail(Errc::invalid_argument,

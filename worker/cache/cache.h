@@ -35,15 +35,17 @@ class BlobCache final : public BlobFiles {
   static Result<std::unique_ptr<BlobCache>> open(std::filesystem::path folder, std::uint64_t limit_bytes,
                                                  Fetch fetch);
 
-  Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob) override;
+  Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob,
+                                                  const std::atomic<bool>& stop = kNeverStop) override;
   std::vector<Digest> held(std::size_t limit) const override;
 
  private:
   BlobCache(std::filesystem::path folder, std::uint64_t limit_bytes, Fetch fetch);
   Result<std::shared_ptr<const BlobFile>> open_verified(const Digest& digest);
   // Fetches a blob. `arrived_wrong`: an earlier transfer of the blob delivered wrong bytes.
-  Result<void> download(const BlobRef& blob, bool arrived_wrong);
-  Result<void> receive(const BlobRef& blob, bool arrived_wrong, PartialFile& partial);
+  Result<void> download(const BlobRef& blob, bool arrived_wrong, const std::atomic<bool>& stop);
+  Result<void> receive(const BlobRef& blob, bool arrived_wrong, const std::atomic<bool>& stop,
+                       PartialFile& partial);
   // Removes blobs and the files of abandoned transfers until `bytes` more bytes fit within the limit. Never
   // removes the file `but`.
   Result<void> make_room(std::uint64_t bytes, const std::filesystem::path& but);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <condition_variable>
 #include <csignal>
 #include <map>
@@ -9,6 +10,8 @@
 
 #include "common/base/check.h"
 #include "common/base/log.h"
+#include "common/base/program_output.h"
+#include "common/base/safe_text.h"
 #include "worker/child/process.h"
 #include "worker/child/protocol.h"
 
@@ -37,16 +40,30 @@ constexpr int kUnreadyChildren = 5;
 // Longest time from a child's start to its hello. This includes the computations that determine the numeric
 // class (machines of one class render the same bits).
 constexpr Duration kStartLimit = std::chrono::minutes(2);
-// Longest time that the child may take to answer after the agent has set a slot's stop flag; then it is
-// killed
+// Longest time that the child may take to answer after the agent has set a slot's stop flag, or the stop flag
+// of a build; then it is killed
 constexpr Duration kStopLimit = std::chrono::seconds(10);
+// The same for a build while no unit is being rendered, so that killing the child costs little.
+constexpr Duration kLoneBuildStopLimit = std::chrono::milliseconds(500);
 
 // Sets in `failure` the pixel and the number of the sample that the slot was rendering. Sets nothing if the
-// slot had not begun a sample.
-void note_place(const Slot& slot, UnitFailure& failure) {
-  if (slot.where.x < 0) return;
-  failure.pixel = {slot.where.x, slot.where.y};
+// slot had not begun a sample, or names no pixel of the image.
+void note_place(const Slot& slot, const LocalJob& job, UnitFailure& failure) {
+  const FrameSize size = job.brief.settings.size;
+  const std::int32_t x = slot.where.x, y = slot.where.y;
+  if (x < 0 || y < 0 || x >= size.width || y >= size.height) return;
+  failure.pixel = {x, y};
   failure.sample = slot.where.sample;
+}
+
+// The child's measurement of seconds within `elapsed`, which this process has measured around it.
+double measured(double reported, double elapsed) { return reported > 0 ? std::min(reported, elapsed) : 0; }
+
+// A failure with the child's reason, which is cut if no renderer of ours would give one of such a length.
+UnitFailure refused(const Process::Answer& answer) {
+  constexpr std::size_t kLongestReason = 4096;
+  return {.scene_at_fault = answer.reply.outcome == Outcome::scene_at_fault,
+          .reason = plain_text(std::string_view(answer.text).substr(0, kLongestReason))};
 }
 
 class ChildBackend final : public RenderBackend {
@@ -63,7 +80,7 @@ class ChildBackend final : public RenderBackend {
 
   Digest numeric_class() const override { return numeric_class_; }
   std::string platform() const override { return platform_; }
-  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override;
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job, const std::atomic<bool>& stop) override;
   tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
                                                  const std::atomic<bool>& stop) override;
   void forget(const JobId& job) override;
@@ -84,15 +101,18 @@ class ChildBackend final : public RenderBackend {
   // Returns a child that has built the job's world (its scene, ready to render). Sets `number` to the number
   // that stands for the job in requests to the child.
   tl::expected<std::shared_ptr<Process>, UnitFailure> ready_process(const LocalJob& job,
+                                                                    const std::atomic<bool>& stop,
                                                                     std::uint64_t& number);
-  tl::expected<void, UnitFailure> prepare_in(Process& process, const LocalJob& job, std::uint64_t number);
+  tl::expected<void, UnitFailure> prepare_in(Process& process, const LocalJob& job,
+                                             const std::atomic<bool>& stop, std::uint64_t number);
   Attempt attempt(Process& process, int index, std::uint64_t number, const LocalJob& job,
                   const LeaseUnit& unit, const std::atomic<bool>& stop);
-  Attempt judge_death(Process& process, int index);
+  Attempt judge_death(Process& process, int index, const LocalJob& job);
   std::uint64_t number_of(const JobBrief& brief);
 
   const ChildOptions options_;
   const SystemClock clock_;
+  LineBudget lines_;  // of all children together
   Digest numeric_class_;
   std::string platform_;
   // Held during each request on the control channel and while a new child is started, so that only one thread
@@ -132,7 +152,7 @@ Result<std::shared_ptr<Process>> ChildBackend::living_process() {
 Result<std::shared_ptr<Process>> ChildBackend::spawn_greeted() {
   Duration pause = options_.respawn_pause;
   for (int tries = 1;; ++tries, pause *= 2) {
-    auto process = Process::spawn(options_);
+    auto process = Process::spawn(options_, lines_);
     if (!process) return process;
     const auto ok = greet(**process);
     if (ok) return process;
@@ -149,7 +169,7 @@ Result<std::shared_ptr<Process>> ChildBackend::spawn_greeted() {
 // hello and did not die of a signal, and an earlier child did send its hello.
 Result<void> ChildBackend::greet(Process& process) {
   const TimePoint deadline = clock_.now() + kStartLimit;
-  const auto answer = process.ask(process.control_fd(), Request{.kind = Kind::hello}, {}, [&] {
+  const auto answer = process.ask(Process::kControl, Request{.kind = Kind::hello}, {}, [&] {
     if (clock_.now() > deadline) process.kill();
   });
   if (!answer) {
@@ -195,14 +215,15 @@ std::uint64_t ChildBackend::number_of(const JobBrief& brief) {
   return it->second;
 }
 
-tl::expected<void, UnitFailure> ChildBackend::prepare(const LocalJob& job) {
+tl::expected<void, UnitFailure> ChildBackend::prepare(const LocalJob& job, const std::atomic<bool>& stop) {
   std::uint64_t number = 0;
-  if (auto process = ready_process(job, number); !process)
+  if (auto process = ready_process(job, stop, number); !process)
     return tl::unexpected<UnitFailure>(process.error());
   return {};
 }
 
 tl::expected<std::shared_ptr<Process>, UnitFailure> ChildBackend::ready_process(const LocalJob& job,
+                                                                                const std::atomic<bool>& stop,
                                                                                 std::uint64_t& number) {
   number = number_of(job.brief);
   const auto knows = [&](Process& process) {
@@ -220,7 +241,7 @@ tl::expected<std::shared_ptr<Process>, UnitFailure> ChildBackend::ready_process(
   if (process && !send_forgotten(**process)) process = living_process();
   if (!process) return unit_failure(process.error().message);
   if (knows(**process)) return *process;
-  if (auto ok = prepare_in(**process, job, number); !ok) return tl::unexpected<UnitFailure>(ok.error());
+  if (auto ok = prepare_in(**process, job, stop, number); !ok) return tl::unexpected<UnitFailure>(ok.error());
   return *process;
 }
 
@@ -234,8 +255,8 @@ bool ChildBackend::send_forgotten(Process& process) {
   for (const std::uint64_t old : forgotten) {
     const TimePoint deadline = clock_.now() + options_.forget_limit;
     const Request request{.kind = Kind::forget, .job = old};
-    const auto answer = process.ask(process.control_fd(), request, {}, [&] {
-      if (clock_.now() > deadline) process.kill();
+    const auto answer = process.ask(Process::kControl, request, {}, [&] {
+      if (clock_.now() > deadline) process.condemn(Process::kControl, Process::Fault::hung);
     });
     if (!answer) {
       log_warn("", fmt::format("the renderer {} while it freed a scene", process.end().text));
@@ -247,21 +268,34 @@ bool ChildBackend::send_forgotten(Process& process) {
   return true;
 }
 
+// Builds the job's world in the child. If `stop` becomes true, the child is told to abandon it. A child that
+// does not obey is killed: soon if it does nothing else, later if that costs other units.
 tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const LocalJob& job,
+                                                         const std::atomic<bool>& stop,
                                                          std::uint64_t number) {
   const std::string text = child::to_text(job);
   if (text.size() > child::kTextBytes)
     return unit_failure("the job names more files than the render child can be told of");
   const TimePoint deadline = clock_.now() + options_.prepare_limit;
   bool too_long = false;
+  std::optional<TimePoint> stop_since;
+  process.stop_build() = false;
   process.preparing = true;
   const Request request{.kind = Kind::prepare, .job = number};
-  const auto answer = process.ask(process.control_fd(), request, text, [&] {
-    too_long = clock_.now() > deadline;
-    if (too_long) process.kill();
+  const auto answer = process.ask(Process::kControl, request, text, [&] {
+    const TimePoint now = clock_.now();
+    too_long = now > deadline;
+    if (stop && !stop_since) {
+      process.stop_build() = true;
+      stop_since = now;
+    }
+    const Duration limit = process.rendering == 0 ? kLoneBuildStopLimit : kStopLimit;
+    if (too_long || (stop_since && now - *stop_since > limit))
+      process.condemn(Process::kControl, Process::Fault::hung);
   });
   if (!answer) {
     const Process::End end = process.end();
+    if (stop_since) return unit_failure("told to stop");
     return tl::unexpected<UnitFailure>(
         UnitFailure{.reason = too_long ? fmt::format("building the scene took longer than {:.0f} s",
                                                      seconds(options_.prepare_limit))
@@ -269,9 +303,8 @@ tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const
                     .signal = end.signal});
   }
   process.preparing = false;
-  if (answer->reply.outcome != Outcome::ok)
-    return tl::unexpected<UnitFailure>(UnitFailure{
-        .scene_at_fault = answer->reply.outcome == Outcome::scene_at_fault, .reason = answer->text});
+  if (answer->reply.outcome == Outcome::stopped) return unit_failure("told to stop");
+  if (answer->reply.outcome != Outcome::ok) return tl::unexpected<UnitFailure>(refused(*answer));
   const std::lock_guard lock(process.prepared_mutex);
   process.prepared.insert(number);
   return {};
@@ -290,7 +323,7 @@ tl::expected<RenderedUnit, UnitFailure> ChildBackend::render(const LocalJob& job
   Attempt last{unit_failure("the renderer kept dying of other units"), true};
   for (int i = 0; i < kInnocentDeaths && last.innocent && !stop; ++i) {
     std::uint64_t number = 0;
-    const auto process = ready_process(job, number);
+    const auto process = ready_process(job, stop, number);
     last = process ? attempt(**process, slot, number, job, unit, stop)
                    : Attempt{tl::unexpected<UnitFailure>(process.error()), false};
   }
@@ -323,17 +356,19 @@ ChildBackend::Attempt ChildBackend::attempt(Process& process, int index, std::ui
       since = now;
     }
     const bool hangs = now - since > options_.hang_limit || (stop_since && now - *stop_since > kStopLimit);
-    if (!hangs || !process.alive()) return;
-    process.hung_slot = index;
-    process.kill();
+    if (hangs && process.alive()) process.condemn(index, Process::Fault::hung);
   };
   const Request request{Kind::render, 0, number, unit.tile, unit.round, unit.rect, unit.samples};
-  const auto answer = process.ask(process.slot_fd(index), request, {}, watch);
-  if (!answer) return judge_death(process, index);
+  const TimePoint asked = clock_.now();
+  ++process.rendering;
+  const auto answer = process.ask(index, request, {}, watch);
+  --process.rendering;
+  if (!answer) return judge_death(process, index, job);
+  const double elapsed = seconds(clock_.now() - asked);
   const Reply& reply = answer->reply;
   if (reply.outcome != Outcome::ok) {
-    UnitFailure failure{.scene_at_fault = reply.outcome == Outcome::scene_at_fault, .reason = answer->text};
-    note_place(slot, failure);
+    UnitFailure failure = refused(*answer);
+    note_place(slot, job, failure);
     return {tl::unexpected<UnitFailure>(std::move(failure)), false};
   }
   RenderedUnit out;
@@ -341,36 +376,46 @@ ChildBackend::Attempt ChildBackend::attempt(Process& process, int index, std::ui
   out.partial.header = {brief.scene, brief.settings_digest, numeric_class_, unit.rect, unit.samples};
   out.partial.sums.assign(slot.sums, slot.sums + floats_of(job, unit));
   out.partial.aovs = aovs_of(brief.settings);
-  out.cpu_seconds = reply.cpu_seconds;
-  out.wall_seconds = reply.wall_seconds;
+  out.cpu_seconds = measured(reply.cpu_seconds, elapsed);
+  out.wall_seconds = measured(reply.wall_seconds, elapsed);
   out.techniques = TechniqueSet::of_bits(reply.techniques);
   if (!answer->text.empty()) {
     auto health = parse_health(answer->text);
     if (!health)
-      return {unit_failure("the renderer's answer cannot be read: " + health.error().message), false};
+      return {unit_failure("the renderer's answer cannot be read: " + plain_text(health.error().message)),
+              false};
     out.health = std::move(*health);
   }
   return {std::move(out)};
 }
 
-ChildBackend::Attempt ChildBackend::judge_death(Process& process, int index) {
+ChildBackend::Attempt ChildBackend::judge_death(Process& process, int index, const LocalJob& job) {
   const Process::End end = process.end();
-  Slot& slot = process.slot(index);
-  const bool crashed = slot.crashed.load(std::memory_order_relaxed);
-  const int hung = process.hung_slot;
-  const bool known = hung >= 0 || process.some_slot_crashed() || process.preparing;
-  const bool guilty = hung >= 0 ? hung == index : crashed || !known;
+  const Slot& slot = process.slot(index);
+  const bool crash = process.some_slot_crashed();
+  const auto condemned = crash ? std::nullopt : process.condemned();
+  const bool guilty = crash       ? slot.crashed.load(std::memory_order_relaxed)
+                      : condemned ? condemned->slot == index
+                                  : !process.preparing;
   if (!guilty) return {unit_failure("the renderer died of another unit"), true};
-  UnitFailure failure{.reason = hung == index
-                                    ? fmt::format("the renderer hung: no sample finished within {:.3g} s",
-                                                  seconds(options_.hang_limit))
-                                    : fmt::format("the renderer {}", end.text),
-                      .signal = end.signal};
-  note_place(slot, failure);
-  if (process.garbled)
-    failure.reason = "the renderer answered nonsense";
-  else if (end.signal == SIGKILL && hung < 0)
+  UnitFailure failure{.reason = fmt::format("the renderer {}", end.text), .signal = end.signal};
+  if (condemned) {
+    switch (condemned->fault) {
+      case Process::Fault::hung:
+        failure.reason = fmt::format("the renderer hung: no sample finished within {:.3g} s",
+                                     seconds(options_.hang_limit));
+        break;
+      case Process::Fault::answered_nonsense:
+        failure.reason = "the renderer answered nonsense";
+        break;
+      case Process::Fault::closed_its_channel:
+        failure.reason = "the renderer closed its channel without an answer";
+        break;
+    }
+  } else if (end.signal == SIGKILL) {
     failure.reason += "; the system may have run out of memory";
+  }
+  note_place(slot, job, failure);
   log_warn(fmt::format("slot={}", index), failure.reason);
   return {tl::unexpected<UnitFailure>(std::move(failure)), false};
 }

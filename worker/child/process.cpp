@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -18,6 +19,9 @@
 
 namespace ls::worker::child {
 namespace {
+
+constexpr int kLogMs = 200;    // longest wait for output of the child before a look whether to stop
+constexpr int kDyingMs = 500;  // longest time from the end of a child's channels to its death
 
 tl::unexpected<Error> system_error(const char* what, int error = errno) {
   const char* help = error == EMFILE ? "; raise the limit of open files (ulimit -n)" : "";
@@ -39,57 +43,91 @@ bool may_see(std::string_view variable) {
 
 }  // namespace
 
-Result<std::shared_ptr<Process>> Process::spawn(const ChildOptions& options) {
+Result<std::shared_ptr<Process>> Process::spawn(const ChildOptions& options, LineBudget& lines) {
   std::shared_ptr<Process> process(new Process);
   // The descriptors that the child will get, in the order of their numbers in the child. The first one gets
   // the number kSharedMemoryFd.
   std::list<Descriptor> theirs;
-  process->memory_bytes_ = sizeof(Slot) * static_cast<std::size_t>(options.slots);
-  const int memory_fd = ::memfd_create("lightshaft-render", MFD_CLOEXEC);
-  if (memory_fd < 0) return system_error("memfd_create");
-  theirs.emplace_back(memory_fd);
-  if (::ftruncate(memory_fd, static_cast<off_t>(process->memory_bytes_)) != 0)
-    return system_error("shared memory");
-  void* mapped = ::mmap(nullptr, process->memory_bytes_, PROT_READ | PROT_WRITE, MAP_SHARED, memory_fd, 0);
-  if (mapped == MAP_FAILED) return system_error("mmap");
-  process->slots_ = static_cast<Slot*>(mapped);
+  if (const auto ok = process->share_memory(options.slots, theirs); !ok) return tl::unexpected(ok.error());
   for (int i = 0; i <= options.slots; ++i) {
     int pair[2];
     if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0) return system_error("socketpair");
     (i == 0 ? process->control_ : process->slot_fds_.emplace_back()) = pair[0];
     theirs.emplace_back(pair[1]);
   }
-  if (const auto ok = process->start(options, theirs); !ok) return tl::unexpected<Error>(ok.error());
+  if (const auto ok = process->start(options, theirs, lines); !ok) return tl::unexpected<Error>(ok.error());
   return process;
 }
 
-Result<void> Process::start(const ChildOptions& options, const std::list<Descriptor>& theirs) {
+Result<void> Process::share_memory(int slots, std::list<Descriptor>& theirs) {
+  const std::size_t bytes = shared_bytes_ = Shared::bytes(slots);
+  const int fd = ::memfd_create("lightshaft-render", MFD_CLOEXEC | MFD_ALLOW_SEALING);
+  if (fd < 0) return system_error("memfd_create");
+  theirs.emplace_back(fd);
+  // The seals keep the child from cutting the memory short: reading it would then kill the agent.
+  if (::ftruncate(fd, static_cast<off_t>(bytes)) != 0 ||
+      ::fcntl(fd, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) != 0)
+    return system_error("shared memory");
+  void* mapped = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
+  if (mapped == MAP_FAILED) return system_error("mmap");
+  shared_ = static_cast<Shared*>(mapped);
+  return {};
+}
+
+Result<void> Process::start(const ChildOptions& options, const std::list<Descriptor>& theirs,
+                            LineBudget& lines) {
+  auto output = ProgramOutput::open("renderer", lines);
+  if (!output) return tl::unexpected<Error>(output.error());
+  output_ = std::move(*output);
   // The process list should show the name of the program's file, not that of the link /proc/self/exe
   std::error_code no_link;
   const std::filesystem::path behind = std::filesystem::read_symlink(options.executable, no_link);
   Program program{.path = options.executable.string(),
                   .arguments = {no_link ? options.executable.string() : behind.string()},
-                  .files = {kDevNull, STDOUT_FILENO, STDERR_FILENO},
+                  .files = {kDevNull, output_->write_end(), output_->write_end()},
                   .inherits = may_see};
   program.arguments.insert(program.arguments.end(), options.arguments.begin(), options.arguments.end());
   for (const Descriptor& end : theirs) program.files.push_back(end.fd);
   const auto pid = ls::spawn(std::move(program));
   if (!pid) return fail(Errc::internal, "cannot start the render child: " + pid.error().message);
   pid_ = *pid;
+  output_->close_write_end();
+  log_thread_ = std::jthread([this](std::stop_token stop) {
+    sigset_t all;
+    sigfillset(&all);
+    ::pthread_sigmask(SIG_BLOCK, &all, nullptr);  // other threads wait for this process's signals
+    while (!stop.stop_requested() && output_->read(kLogMs)) {
+    }
+    output_->end();
+  });
   return {};
 }
 
 Process::~Process() {
   kill();
   end();
+  log_thread_ = {};
   if (control_ >= 0) ::close(control_);
   for (const int fd : slot_fds_) ::close(fd);
-  if (slots_) ::munmap(slots_, memory_bytes_);
+  if (shared_) ::munmap(shared_, shared_bytes_);
+}
+
+void Process::condemn(int slot, Fault fault) {
+  {
+    const std::lock_guard lock(reap_mutex_);
+    if (!condemned_) condemned_ = Condemned{slot, fault};
+  }
+  kill();
+}
+
+std::optional<Process::Condemned> Process::condemned() {
+  const std::lock_guard lock(reap_mutex_);
+  return condemned_;
 }
 
 void Process::kill() {
   const std::lock_guard lock(reap_mutex_);
-  if (pid_ > 0 && !end_) ::kill(pid_, SIGKILL);
+  if (pid_ > 0 && !end_) ::kill(-pid_, SIGKILL);
 }
 
 Process::End Process::end() {
@@ -104,6 +142,7 @@ Process::End Process::end() {
   if (end_) return *end_;
   End end;
   if (pid_ > 0) {
+    ::kill(-pid_, SIGKILL);  // the processes that it has started
     const int status = wait_for_end(pid_);
     if (WIFSIGNALED(status)) {
       end.signal = WTERMSIG(status);
@@ -128,28 +167,41 @@ std::uint64_t Process::rss_bytes() const { return resident_bytes(pid_); }
 
 bool Process::some_slot_crashed() const {
   for (int i = 0; i < slots(); ++i)
-    if (slots_[i].crashed.load(std::memory_order_relaxed)) return true;
+    if (shared_->slots()[i].crashed.load(std::memory_order_relaxed)) return true;
   return false;
 }
 
-std::optional<Process::Answer> Process::ask(int fd, Request request, const std::string& text,
+std::optional<Process::Answer> Process::ask(int slot, Request request, const std::string& text,
                                             const Watch& watch) {
   request.text_bytes = static_cast<std::uint32_t>(text.size());
-  auto answer = exchange(fd, request, text, watch);
+  auto answer = exchange(slot, request, text, watch);
   // A missing answer does not prove that the child is dead: it may only have closed its end of the channel.
   // So it is killed, because otherwise end() could wait forever.
-  if (!answer) kill();
+  if (!answer && !ends_soon()) condemn(slot, Fault::closed_its_channel);
   return answer;
 }
 
-std::optional<Process::Answer> Process::exchange(int fd, const Request& request, const std::string& text,
+// Returns true if the process is dead or dies within kDyingMs: the system closes the channels of a process
+// that dies a moment before it is dead.
+bool Process::ends_soon() {
+  for (int waited = 0; alive(); ++waited) {
+    if (waited == kDyingMs) return false;
+    ::poll(nullptr, 0, 1);
+  }
+  return true;
+}
+
+std::optional<Process::Answer> Process::exchange(int slot, const Request& request, const std::string& text,
                                                  const Watch& watch) {
+  const int fd = slot == kControl ? control_ : slot_fds_[static_cast<std::size_t>(slot)];
   Answer answer;
   if (!send_all(fd, &request, sizeof request, watch) || !send_all(fd, text.data(), text.size(), watch) ||
       !receive_all(fd, &answer.reply, sizeof answer.reply, watch))
     return std::nullopt;
-  garbled = answer.reply.text_bytes > kReasonBytes;
-  if (garbled) return std::nullopt;
+  if (answer.reply.text_bytes > kReasonBytes || answer.reply.outcome > Outcome::stopped) {
+    condemn(slot, Fault::answered_nonsense);
+    return std::nullopt;
+  }
   answer.text.resize(answer.reply.text_bytes);
   if (!receive_all(fd, answer.text.data(), answer.text.size(), watch)) return std::nullopt;
   return answer;

@@ -10,10 +10,12 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "common/base/clock.h"
 #include "common/base/error.h"
+#include "common/base/program_output.h"
 #include "common/base/spawn.h"
 #include "worker/child/child.h"
 #include "worker/child/protocol.h"
@@ -22,7 +24,8 @@ namespace ls::worker::child {
 
 class Process {
  public:
-  static Result<std::shared_ptr<Process>> spawn(const ChildOptions& options);
+  // `lines`: how many lines the child may still write to our log
+  static Result<std::shared_ptr<Process>> spawn(const ChildOptions& options, LineBudget& lines);
   ~Process();  // kills the process and waits for its end
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
@@ -31,12 +34,23 @@ class Process {
     Reply reply;
     std::string text;
   };
-  // Sends a request, followed by `text`, to the child on the channel `fd` and waits for the answer. While it
-  // waits, it calls `watch` about every 50 ms; `watch` may call kill(). Returns nullopt if the child died, or
-  // if it gave a malformed answer, for which it is killed.
-  std::optional<Answer> ask(int fd, Request request, const std::string& text, const Watch& watch);
+  // Sends a request, followed by `text`, to the child on the channel of a slot, or on the control channel
+  // (kControl), and waits for the answer. While it waits, it calls `watch` about every 50 ms; `watch` may
+  // call kill() or condemn(). Returns nullopt if the child died. A child that gives a malformed answer, or
+  // closes the channel and lives on, is condemned for it.
+  static constexpr int kControl = -1;
+  std::optional<Answer> ask(int slot, Request request, const std::string& text, const Watch& watch);
 
-  void kill();
+  // Why the agent killed the child
+  enum class Fault { hung, answered_nonsense, closed_its_channel };
+  struct Condemned {
+    int slot;  // whose unit is at fault; kControl: none
+    Fault fault;
+  };
+  // Kills the child because of what one slot did. Only the first call counts.
+  void condemn(int slot, Fault fault);
+  std::optional<Condemned> condemned();
+  void kill();  // also kills all processes that the child has started
   // Waits for the end of the process, which must be imminent, and returns how it ended. kill() may be called
   // meanwhile.
   struct End {
@@ -47,15 +61,12 @@ class Process {
   bool alive();
   std::uint64_t rss_bytes() const;
 
-  int control_fd() const { return control_; }
-  int slot_fd(int slot) const { return slot_fds_[static_cast<std::size_t>(slot)]; }
-  Slot& slot(int index) { return slots_[index]; }
+  Slot& slot(int index) { return shared_->slots()[index]; }
+  std::atomic<bool>& stop_build() { return shared_->stop_build; }
   int slots() const { return static_cast<int>(slot_fds_.size()); }
   bool some_slot_crashed() const;
 
-  // Number of the slot (render thread) without progress, for which the agent killed the child; -1: none
-  std::atomic<int> hung_slot{-1};
-  std::atomic<bool> garbled{false};  // true if the child was killed for a malformed answer
+  std::atomic<int> rendering{0};  // number of slots that are waiting for a unit's answer
   // True while the child builds a scene. If the child dies meanwhile, it stays true.
   std::atomic<bool> preparing{false};
   std::mutex prepared_mutex;
@@ -64,16 +75,22 @@ class Process {
 
  private:
   Process() = default;
-  std::optional<Answer> exchange(int fd, const Request& request, const std::string& text, const Watch& watch);
-  Result<void> start(const ChildOptions& options, const std::list<Descriptor>& theirs);
+  std::optional<Answer> exchange(int slot, const Request& request, const std::string& text,
+                                 const Watch& watch);
+  Result<void> share_memory(int slots, std::list<Descriptor>& theirs);
+  Result<void> start(const ChildOptions& options, const std::list<Descriptor>& theirs, LineBudget& lines);
+  bool ends_soon();
 
   pid_t pid_ = -1;
   int control_ = -1;
   std::vector<int> slot_fds_;
-  Slot* slots_ = nullptr;
-  std::size_t memory_bytes_ = 0;
+  Shared* shared_ = nullptr;
+  std::size_t shared_bytes_ = 0;
+  std::unique_ptr<ProgramOutput> output_;
+  std::jthread log_thread_;
   std::mutex reap_mutex_;
-  std::optional<End> end_;  // guarded by reap_mutex_
+  std::optional<End> end_;              // guarded by reap_mutex_
+  std::optional<Condemned> condemned_;  // guarded by reap_mutex_
 };
 
 }  // namespace ls::worker::child

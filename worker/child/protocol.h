@@ -2,7 +2,8 @@
 // pair per channel: one channel for control and one for each slot (render thread). Each slot has an area of
 // shared memory, which holds the pixel sums of its finished unit (one tile and one range of samples), and
 // the pixel and number of the sample that it is rendering. Agent and child are the same executable, so plain
-// structs suffice.
+// structs suffice. A malicious scene may take over the child: the agent uses no size or index that the child
+// has written without checking it, and the shared memory is sealed, so that its size cannot change.
 #pragma once
 
 #include <atomic>
@@ -71,7 +72,7 @@ struct Reply {
 };
 static_assert(std::is_trivially_copyable_v<Request> && std::is_trivially_copyable_v<Reply>);
 
-// The data of one render thread that agent and child share. The shared memory is an array of these.
+// The data of one render thread that agent and child share.
 struct Slot {
   render::Breadcrumb where;
   std::atomic<bool> stop{false};     // set by the agent to make the child abandon the unit
@@ -79,6 +80,16 @@ struct Slot {
   float sums[kSlotFloats];
 };
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
+
+// The shared memory: this, followed by the slots.
+struct alignas(64) Shared {
+  std::atomic<bool> stop_build{false};  // set by the agent to make the child abandon the world that it builds
+  Slot* slots() { return reinterpret_cast<Slot*>(this + 1); }
+  static std::size_t bytes(int slots) {
+    return sizeof(Shared) + sizeof(Slot) * static_cast<std::size_t>(slots);
+  }
+};
+static_assert(alignof(Slot) <= alignof(Shared));
 
 // Block until all bytes are sent or received; false: the other side has closed the channel. Meanwhile they
 // call `watch`, if given, about every 50 ms.

@@ -59,7 +59,8 @@ struct AltStack {
 
 class Server {
  public:
-  Server(LocalBackend& backend, Slot* slots) : backend_(backend), slots_(slots) {}
+  Server(LocalBackend& backend, Shared& shared)
+      : backend_(backend), stop_build_(shared.stop_build), slots_(shared.slots()) {}
 
   void control_loop() {
     Request request;
@@ -119,7 +120,11 @@ class Server {
     } else if (request.kind == Kind::prepare) {
       auto job = from_text(text);
       if (!job) return refused(reply, UnitFailure{.reason = job.error().message});
-      if (auto ok = backend_.prepare(*job); !ok) return refused(reply, ok.error());
+      if (auto ok = backend_.prepare(*job, stop_build_); !ok) {
+        if (!stop_build_) return refused(reply, ok.error());
+        reply.outcome = Outcome::stopped;
+        return {};
+      }
       const std::lock_guard lock(mutex_);
       jobs_[request.job] = std::make_shared<const LocalJob>(std::move(*job));
     } else if (request.kind == Kind::forget) {
@@ -158,6 +163,7 @@ class Server {
   }
 
   LocalBackend& backend_;
+  const std::atomic<bool>& stop_build_;
   Slot* slots_;
   std::mutex mutex_;
   std::map<std::uint64_t, std::shared_ptr<const LocalJob>> jobs_;
@@ -171,8 +177,8 @@ void confine(std::uint64_t memory_limit) {
   ::prctl(PR_SET_NAME, "ls-render-child");
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
-  // The child ignores these signals. A terminal sends them to the agent and the child alike (SIGINT for
-  // Ctrl-C), but only the agent should react: it ends the child when it no longer needs it.
+  // The child ignores these signals, which whoever ends a service may send to all of its processes: only the
+  // agent should react. It ends the child when it no longer needs it.
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) ::signal(signal, SIG_IGN);
 #if !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)  // sanitizers reserve more memory than any limit allows
@@ -188,10 +194,10 @@ void confine(std::uint64_t memory_limit) {
 
 int serve(LocalBackend& backend, int slots) {
   if (slots < 1 || slots > kMostSlots) return 2;
-  const std::size_t bytes = sizeof(Slot) * static_cast<std::size_t>(slots);
-  void* memory = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, kSharedMemoryFd, 0);
+  void* memory =
+      ::mmap(nullptr, Shared::bytes(slots), PROT_READ | PROT_WRITE, MAP_SHARED, kSharedMemoryFd, 0);
   if (memory == MAP_FAILED) return 1;
-  Server server(backend, static_cast<Slot*>(memory));
+  Server server(backend, *static_cast<Shared*>(memory));
   std::vector<std::jthread> threads;
   for (int i = 0; i < slots; ++i) threads.emplace_back([&server, i] { server.render_loop(i); });
   const AltStack stack;

@@ -26,7 +26,7 @@ class FakeBackend final : public LocalBackend {
 
   Digest numeric_class() const override { return options_.numeric_class; }
   std::string platform() const override { return options_.platform; }
-  tl::expected<void, UnitFailure> prepare(const LocalJob&) override { return {}; }
+  tl::expected<void, UnitFailure> prepare(const LocalJob&, const std::atomic<bool>&) override { return {}; }
   void forget(const JobId&) override {}
   std::uint64_t rss_bytes() const override { return 0; }
 

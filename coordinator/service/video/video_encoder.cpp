@@ -14,6 +14,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "common/base/safe_text.h"
 #include "common/base/spawn.h"
 
 namespace ls::coordinator {
@@ -67,7 +68,7 @@ Result<std::unique_ptr<VideoEncoder>> VideoEncoder::start(const Asked& asked, co
   File errors(ends[0]);
   const File its_errors(ends[1]);
   const auto program =
-      spawn({asked.ffmpeg, command(asked), {its_input.fd(), kDevNull, its_errors.fd()}, inherits, true});
+      spawn({asked.ffmpeg, command(asked), {its_input.fd(), kDevNull, its_errors.fd()}, inherits});
   if (!program) return tl::unexpected(program.error());
   for (const File* file : {&pixels, &errors}) ::fcntl(file->fd(), F_SETFL, O_NONBLOCK);
   return std::unique_ptr<VideoEncoder>(
@@ -136,7 +137,8 @@ Error VideoEncoder::ended() {
                         asked_.most_bytes)};
   const std::string why = WIFSIGNALED(status) ? fmt::format("it was killed by signal {}", WTERMSIG(status))
                                               : fmt::format("it ended with code {}", WEXITSTATUS(status));
-  return {Errc::internal, fmt::format("ffmpeg made no video: {}", reported_.empty() ? why : reported_)};
+  return {Errc::internal,
+          fmt::format("ffmpeg made no video: {}", reported_.empty() ? why : plain_text(reported_))};
 }
 
 Result<void> VideoEncoder::add(std::span<const std::uint8_t> rgb) {
@@ -164,7 +166,7 @@ Result<void> VideoEncoder::finish() {
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
   return fail(Errc::internal,
               fmt::format("ffmpeg made no video: {}",
-                          reported_.empty() ? fmt::format("wait status {}", status) : reported_));
+                          reported_.empty() ? fmt::format("wait status {}", status) : plain_text(reported_)));
 }
 
 }  // namespace ls::coordinator

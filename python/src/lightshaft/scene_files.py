@@ -241,7 +241,8 @@ class _Finder:
     def _numbered(self, name: str) -> str:
         if self._frame is None:
             return name
-        return re.sub("#+", lambda run: str(self._frame).zfill(len(run[0])), name)
+        folder, slash, file = name.rpartition("/")  # in the name of a folder # is only a #
+        return folder + slash + re.sub("#+", lambda run: str(self._frame).zfill(len(run[0])), file)
 
     def _filled(self, value: str) -> str:
         """With its parameters put in: after a $ stands the longest name that is defined."""

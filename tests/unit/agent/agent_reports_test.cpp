@@ -17,9 +17,9 @@ class TimedBackend final : public RenderBackend {
   TimedBackend(std::unique_ptr<RenderBackend> fake, FakeClock& clock)
       : fake_(std::move(fake)), clock_(clock) {}
   Digest numeric_class() const override { return fake_->numeric_class(); }
-  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override {
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job, const std::atomic<bool>& stop) override {
     clock_.advance(std::chrono::seconds(2));
-    return fake_->prepare(job);
+    return fake_->prepare(job, stop);
   }
   tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
                                                  const std::atomic<bool>& stop) override {

@@ -20,7 +20,7 @@ namespace ls::worker {
 class FetchedFiles final : public BlobFiles {
  public:
   explicit FetchedFiles(CoordinatorLink& link) : link_(link) {}
-  Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob) override {
+  Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob, const std::atomic<bool>&) override {
     struct File final : BlobFile {
       const std::filesystem::path& path() const override { return file; }
       std::filesystem::path file = "blob";

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <new>
+#include <thread>
 
 #include "tests/unit/agent/agent_rig.h"
 #include "worker/agent/agent_impl.h"
@@ -48,7 +49,7 @@ class Exhausted final : public RenderBackend {
  public:
   explicit Exhausted(bool at_loading) : at_loading_(at_loading) {}
   Digest numeric_class() const override { return {}; }
-  tl::expected<void, UnitFailure> prepare(const LocalJob&) override {
+  tl::expected<void, UnitFailure> prepare(const LocalJob&, const std::atomic<bool>&) override {
     if (at_loading_) throw std::bad_alloc();
     return {};
   }
@@ -77,11 +78,110 @@ TEST_F(AgentInTrouble, ReportsAUnitWhoseBackendRanOutOfMemoryAndLivesOn) {
   }
 }
 
+// A backend whose world of the job with seed 1 is never ready: building it ends when told to stop or, if the
+// backend is `deaf`, fails when the test says so.
+class Building final : public RenderBackend {
+ public:
+  explicit Building(bool deaf) : deaf_(deaf) {}
+  Digest numeric_class() const override { return fake_->numeric_class(); }
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job, const std::atomic<bool>& stop) override {
+    if (job.brief.settings.seed != 1) return fake_->prepare(job, stop);
+    building = true;
+    while (deaf_ ? !fail.load() : !stop.load()) std::this_thread::yield();
+    return unit_failure(deaf_ ? "the world cannot be built" : "told to stop");
+  }
+  tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
+                                                 const std::atomic<bool>& stop) override {
+    return fake_->render(job, unit, stop);
+  }
+  void forget(const JobId& job) override { fake_->forget(job); }
+  std::uint64_t rss_bytes() const override { return 0; }
+
+  std::atomic<bool> building{false}, fail{false};
+
+ private:
+  const bool deaf_;
+  const std::unique_ptr<RenderBackend> fake_ = make_fake_backend({});
+};
+
+class AgentThatBuilds : public AgentTest {
+ protected:
+  // Starts an agent that is building the world of j-1 for lease l-1.
+  Building& start_building(bool deaf) {
+    auto made = std::make_unique<Building>(deaf);
+    Building& backend = *made;
+    start_with(std::move(made));
+    coordinator_.tell(assign("l-1", "j-1", {0, 1}, 1));
+    while (!backend.building) std::this_thread::yield();
+    return backend;
+  }
+  void expect_that_only_tile_7_was_rendered() {
+    coordinator_.wait_for([](auto& c) { return c.results.size() == 1; });
+    EXPECT_TRUE(drain());
+    EXPECT_EQ(tiles_of(coordinator_.results), std::set<TileIndex>{7});
+    EXPECT_TRUE(coordinator_.failures.empty());
+  }
+};
+
+TEST_F(AgentThatBuilds, AbandonsTheWorldOfACancelledJob) {
+  start_building(false);
+
+  coordinator_.tell(CancelJob{JobId{"j-1"}});
+  coordinator_.tell(assign("l-2", "j-2", {7}, 2));
+
+  expect_that_only_tile_7_was_rendered();
+}
+
+TEST_F(AgentThatBuilds, AbandonsTheWorldOfALeaseThatIsTakenBack) {
+  start_building(false);
+
+  coordinator_.tell(CancelLease{LeaseId{"l-1"}});
+  coordinator_.tell(assign("l-2", "j-2", {7}, 2));
+
+  expect_that_only_tile_7_was_rendered();
+}
+
+TEST_F(AgentThatBuilds, GoesOnWithTheWorldOfAJobThatAnotherLeaseNeeds) {
+  Building& backend = start_building(true);
+  coordinator_.tell(assign("l-2", "j-1", {2}, 1));
+
+  coordinator_.tell(CancelLease{LeaseId{"l-1"}});
+  backend.fail = true;
+
+  coordinator_.wait_for([](auto& c) { return c.failures.size() == 1; });
+  EXPECT_EQ(coordinator_.failures[0].lease, LeaseId{"l-2"});
+}
+
+// The id of the job that is being built is given to another job, whose units are no part of the failure.
+TEST_F(AgentThatBuilds, ReportsNoUnitOfAJobThatReplacedTheOneThatCannotBeBuilt) {
+  Building& backend = start_building(true);
+
+  coordinator_.tell(assign("l-2", "j-1", {7}, 2));
+  // The agent has taken the lease once it answers to a later one, which it gives back because it is unknown.
+  AssignLease unknown = assign("l-3", "j-3", {3});
+  unknown.brief.reset();
+  coordinator_.tell(unknown);
+  coordinator_.wait_for([](auto& c) { return c.returned.size() == 1; });
+  backend.fail = true;
+
+  expect_that_only_tile_7_was_rendered();
+}
+
+TEST_F(AgentThatBuilds, EndsWithoutWaitingForTheWorld) {
+  start_building(false);
+
+  agent_->stop();
+
+  EXPECT_TRUE(join());
+}
+
 // A backend that renders tile 0 and reports itself as broken at any other tile.
 class Broken final : public RenderBackend {
  public:
   Digest numeric_class() const override { return fake_->numeric_class(); }
-  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override { return fake_->prepare(job); }
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job, const std::atomic<bool>& stop) override {
+    return fake_->prepare(job, stop);
+  }
   tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
                                                  const std::atomic<bool>& stop) override {
     if (unit.tile == 0) return fake_->render(job, unit, stop);

@@ -96,6 +96,15 @@ TEST_F(Cache, GoesOnWithACutTransferFromWhereItWas) {
   EXPECT_THAT(source_.offsets, testing::ElementsAre(0, 56));
 }
 
+TEST_F(Cache, InterruptsATransferWhenToldToStop) {
+  const BlobRef blob = source_.add("the steam of a bath house");
+  std::atomic<bool> stop{false};
+  source_.meanwhile = [&] { stop = true; };
+
+  EXPECT_EQ(open()->acquire(blob, stop).error().code, Errc::unavailable);
+  EXPECT_TRUE(open()->acquire(blob));
+}
+
 TEST_F(Cache, FetchesAgainWhatArrivedWrong) {
   const BlobRef blob = source_.add("right");
   source_.lie = "wrong";

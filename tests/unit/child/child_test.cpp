@@ -5,15 +5,21 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <thread>
+#include <vector>
 
 #include "common/protocol/limits.h"
 #include "worker/child/protocol.h"
@@ -24,6 +30,7 @@
 namespace ls::worker {
 namespace {
 
+using testing::AnyOf;
 using testing::HasSubstr;
 
 constexpr std::uint64_t kMemoryLimit = 512 << 20;
@@ -159,6 +166,120 @@ TEST(Child, KillsARendererThatClosesItsEndAndLivesOn) {
   EXPECT_FALSE(child->render(job_with_seed(3), unit(0), kGoOn));
 }
 
+// The child answers nonsense on slot 0 as soon as it has been asked for a unit on both of its slots.
+TEST(Child, BlamesNonsenseOnTheSlotThatAnsweredIt) {
+  const auto child = backend("odd,nonsense", 2);
+  std::atomic<bool> stop{false};
+  std::array<std::string, 2> reasons;
+  {
+    std::array<std::jthread, 2> threads;
+    for (std::size_t i = 0; i < 2; ++i)
+      threads[i] = std::jthread([&, i] {
+        const auto result = child->render(job_with_seed(3), unit(static_cast<TileIndex>(i)), stop);
+        if (!result) reasons[i] = result.error().reason;
+        stop = true;  // the other unit is innocent, and would be rendered again for ever
+      });
+  }
+
+  EXPECT_EQ(std::ranges::count(reasons, "the renderer answered nonsense"), 1) << reasons[0] << reasons[1];
+}
+
+TEST(Child, BlamesAClosedChannelOnItsSlot) {
+  const auto child = backend("odd,closes", 2);
+  std::atomic<bool> stop{false};
+  std::array<std::string, 2> reasons;
+  {
+    std::array<std::jthread, 2> threads;
+    for (std::size_t i = 0; i < 2; ++i)
+      threads[i] = std::jthread([&, i] {
+        const auto result = child->render(job_with_seed(3), unit(static_cast<TileIndex>(i)), stop);
+        if (!result) reasons[i] = result.error().reason;
+        stop = true;
+      });
+  }
+
+  EXPECT_EQ(std::ranges::count(reasons, "the renderer closed its channel without an answer"), 1)
+      << reasons[0] << reasons[1];
+}
+
+TEST(Child, CannotCutTheSharedMemoryShort) {
+  const auto child = backend("odd,cuts");
+
+  EXPECT_THAT(child->render(job_with_seed(3), unit(0), kGoOn).error().reason,
+              HasSubstr("Operation not permitted"));
+}
+
+TEST(Child, HasASessionOfItsOwnAndWritesToAPipe) {
+  const auto child = backend("odd,tells");
+
+  const std::string told = child->render(job_with_seed(3), unit(0), kGoOn).error().reason;
+
+  EXPECT_THAT(told, HasSubstr("own session"));
+  EXPECT_THAT(told, HasSubstr("1 pipe:"));
+  EXPECT_THAT(told, HasSubstr("2 pipe:"));
+}
+
+TEST(Child, LeavesNoProcessBehind) {
+  std::string descendant;
+  {
+    const auto child = backend("odd,forks");
+    descendant = child->render(job_with_seed(3), unit(0), kGoOn).error().reason;
+    child->shutdown();
+  }
+
+  // It is killed, and is a zombie until its new parent collects it.
+  std::string state;
+  do {
+    std::string word;
+    state.clear();
+    std::ifstream("/proc/" + descendant + "/stat") >> word >> word >> state;
+  } while (state == "R" || state == "S");
+  EXPECT_THAT(state, AnyOf("", "Z", "X"));
+}
+
+TEST(Child, GivesNoReasonWithControlCharacters) {
+  const auto child = backend("odd,forges");
+
+  EXPECT_EQ(child->render(job_with_seed(3), unit(0), kGoOn).error().reason,
+            "bad  [31m 2026 info all is well");
+}
+
+TEST(Child, NamesNoPixelBesideTheImage) {
+  const auto child = backend("odd,beside");
+
+  EXPECT_FALSE(child->render(job_with_seed(3), unit(0), kGoOn).error().pixel);
+}
+
+// The agent believes no measurement that is longer than the time that it waited.
+TEST(Child, TakesNoMoreTimeThanPassed) {
+  const auto child = backend("odd,slow");
+
+  const auto rendered = child->render(job_with_seed(3), unit(0), kGoOn);
+
+  ASSERT_TRUE(rendered) << rendered.error().reason;
+  EXPECT_LT(rendered->cpu_seconds, 86399);
+  EXPECT_EQ(rendered->wall_seconds, 0);  // it said NaN
+}
+
+TEST(Child, AbandonsAWorldWhenToldTo) {
+  const auto child = backend("odd,obeys");
+  std::atomic<bool> stop{true};
+
+  EXPECT_EQ(child->prepare(job_with_seed(4), stop).error().reason, "told to stop");
+
+  expect_right_pixels(child->render(job_with_seed(3), unit(0), kGoOn), 3, 0);
+}
+
+// A child that builds on is killed, so that the next world can be built.
+TEST(Child, IsKilledWhenItBuildsOnThoughToldToStop) {
+  const auto child = backend("odd,builds");
+  std::atomic<bool> stop{true};
+
+  EXPECT_EQ(child->prepare(job_with_seed(4), stop).error().reason, "told to stop");
+
+  expect_right_pixels(child->render(job_with_seed(3), unit(0), kGoOn), 3, 0);
+}
+
 TEST(Child, EndsARendererThatStopsInTheMiddleOfAnAnswer) {
   const auto child = backend("odd,half", 1, std::chrono::milliseconds(200));
 
@@ -167,10 +288,10 @@ TEST(Child, EndsARendererThatStopsInTheMiddleOfAnAnswer) {
 
 TEST(Child, ReplacesARendererThatHangsWhenItFreesAScene) {
   const auto child = backend("odd,forget", 1, std::chrono::milliseconds(200));
-  ASSERT_TRUE(child->prepare(job_with_seed(3)));
+  ASSERT_TRUE(child->prepare(job_with_seed(3), kGoOn));
   child->forget(job_with_seed(3).brief.job);
 
-  EXPECT_TRUE(child->prepare(job_with_seed(4)));
+  EXPECT_TRUE(child->prepare(job_with_seed(4), kGoOn));
 }
 
 // A coordinator whose data were replaced assigns a job's id to another job while a unit of the old one is
@@ -180,11 +301,11 @@ TEST(Child, RendersTheNewOfTwoJobsOfOneIdAfterAUnitOfTheOldOneCameBetween) {
   const LocalJob old = job_with_seed(3);
   LocalJob other = job_with_seed(4);
   other.brief.job = old.brief.job;
-  ASSERT_TRUE(child->prepare(old));
+  ASSERT_TRUE(child->prepare(old, kGoOn));
   child->forget(old.brief.job);
   expect_right_pixels(child->render(old, unit(0), kGoOn), 3, 0);
 
-  ASSERT_TRUE(child->prepare(other));
+  ASSERT_TRUE(child->prepare(other, kGoOn));
 
   expect_right_pixels(child->render(other, unit(0), kGoOn), 4, 0);
 }
@@ -195,9 +316,9 @@ TEST(Child, RendersOtherJobsWhileAWorldIsBuiltWithoutEnd) {
   ChildOptions options{.arguments = {"--render-child", "1", "odd,builds"},
                        .prepare_limit = std::chrono::milliseconds(500)};
   const auto child = make_child_backend(options).value();
-  ASSERT_TRUE(child->prepare(job_with_seed(3)));
+  ASSERT_TRUE(child->prepare(job_with_seed(3), kGoOn));
   std::jthread builder([&] {
-    EXPECT_THAT(child->prepare(job_with_seed(4)).error().reason,
+    EXPECT_THAT(child->prepare(job_with_seed(4), kGoOn).error().reason,
                 HasSubstr("building the scene took longer than"));
   });
 
@@ -283,13 +404,16 @@ TEST_F(ChildOfAFile, StartsAnotherAfterANewChildThatEndsBeforeItIsReady) {
   EXPECT_FALSE(child->broken());
 }
 
-// A fake renderer that never finishes building the world of the job with seed 4.
+// A fake renderer that never finishes building the world of the job with seed 4, unless it is told to stop
+// and obeys.
 class Builder final : public LocalBackend {
  public:
+  explicit Builder(bool obeys) : obeys_(obeys) {}
   Digest numeric_class() const override { return fake_->numeric_class(); }
-  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override {
-    while (job.brief.settings.seed == 4) ::pause();
-    return fake_->prepare(job);
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job, const std::atomic<bool>& stop) override {
+    while (job.brief.settings.seed == 4 && !(obeys_ && stop)) std::this_thread::yield();
+    if (job.brief.settings.seed == 4) return unit_failure("stopped");
+    return fake_->prepare(job, stop);
   }
   tl::expected<RenderedUnit, UnitFailure> render_marked(const LocalJob& job, const LeaseUnit& unit,
                                                         const std::atomic<bool>& stop,
@@ -300,14 +424,46 @@ class Builder final : public LocalBackend {
   std::uint64_t rss_bytes() const override { return 0; }
 
  private:
+  const bool obeys_;
   const std::unique_ptr<LocalBackend> fake_ = make_fake_backend({});
 };
 
-// Children that behave as no renderer would: they answer half a reply, close a channel, or never answer.
-int serve_oddly(const std::string& kind) {
+std::string link_of(int fd) {
+  std::error_code none;
+  return std::filesystem::read_symlink("/proc/self/fd/" + std::to_string(fd), none).string();
+}
+
+// Answers the request of slot 0 as told.
+void answer_oddly(const std::string& kind, child::Slot& slot) {
   using namespace child;
-  if (kind == "builds") {
-    Builder builder;
+  Reply reply{.outcome = Outcome::failed};
+  std::string text;
+  if (kind == "cuts") text = ::ftruncate(kSharedMemoryFd, 0) == 0 ? "cut" : std::strerror(errno);
+  if (kind == "tells")
+    text = std::string(::getsid(0) == ::getpid() ? "own session" : "session of another") + " 1 " +
+           link_of(1) + " 2 " + link_of(2);
+  if (kind == "forks") {
+    const pid_t descendant = ::fork();
+    if (descendant == 0)
+      for (;;) ::pause();
+    text = std::to_string(descendant);
+  }
+  if (kind == "forges") text = "bad\n\x1b[31m\n2026 info all is well";
+  if (kind == "beside") slot.where.x = 1 << 20, slot.where.y = 0;
+  if (kind == "slow") reply = {.cpu_seconds = 86399, .wall_seconds = std::nan("")};
+  reply.text_bytes = static_cast<std::uint32_t>(text.size());
+  if (kind == "nonsense") reply.text_bytes = kReasonBytes + 1;
+  if (kind == "closes") ::close(kFirstSlotFd);
+  if (kind == "closes") return;
+  send_all(kFirstSlotFd, &reply, kind == "half" ? sizeof reply / 2 : sizeof reply);
+  send_all(kFirstSlotFd, text.data(), text.size());
+}
+
+// Children that behave as no renderer would: they answer half a reply, close a channel, or never answer.
+int serve_oddly(const std::string& kind, int slots) {
+  using namespace child;
+  if (kind == "builds" || kind == "obeys") {
+    Builder builder(kind == "obeys");
     return serve(builder, 1);
   }
   if (kind == "environment") {
@@ -315,13 +471,22 @@ int serve_oddly(const std::string& kind) {
     const std::string all{std::istreambuf_iterator<char>(own), {}};
     return all.find("secret") == std::string::npos ? serve(*make_fake_backend({}), 1) : 9;
   }
-  std::jthread slot([&kind] {
-    Request request;
-    if (!receive_all(kFirstSlotFd, &request, sizeof request)) return;
-    const Reply reply;
-    if (kind == "half") send_all(kFirstSlotFd, &reply, sizeof reply / 2);
-    if (kind == "closes") ::close(kFirstSlotFd);
-  });
+  auto* const shared = static_cast<Shared*>(
+      ::mmap(nullptr, Shared::bytes(slots), PROT_READ | PROT_WRITE, MAP_SHARED, kSharedMemoryFd, 0));
+  // Slot 0 answers once all slots have been asked. Any slot answers properly when it is told to stop.
+  std::atomic<int> asked{0};
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < slots && kind != "forget"; ++i)
+    threads.emplace_back([&, i] {
+      Request of_slot;
+      if (!receive_all(kFirstSlotFd + i, &of_slot, sizeof of_slot)) return;
+      ++asked;
+      Slot& slot = shared->slots()[i];
+      while ((i > 0 || asked < slots) && !slot.stop) std::this_thread::yield();
+      const Reply stopped{.outcome = Outcome::stopped};
+      slot.stop ? static_cast<void>(send_all(kFirstSlotFd + i, &stopped, sizeof stopped))
+                : answer_oddly(kind, slot);
+    });
   Request request;
   while (receive_all(kControlFd, &request, sizeof request)) {
     std::string text(request.text_bytes, 0);
@@ -334,7 +499,7 @@ int serve_oddly(const std::string& kind) {
 }
 
 int serve_as_told(int slots, const std::string& how) {
-  if (how.starts_with("odd,")) return serve_oddly(how.substr(4));
+  if (how.starts_with("odd,")) return serve_oddly(how.substr(4), slots);
   FakeOptions options;
   // A child that finds no file creates it and ends; the next one serves.
   const bool later = how.starts_with("later,");

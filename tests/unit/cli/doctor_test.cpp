@@ -16,7 +16,7 @@ MachineFacts good_machine() {
   facts.memory_bytes = std::uint64_t{16} << 30;
   facts.cpus = 8;
   facts.file_limit = 1'048'576;
-  facts.sandbox = worker::child::Sandboxed{true, true, true};
+  facts.sandbox = Sandboxed{true, true};
   facts.vdb_program = "/usr/lib/lightshaft/lightshaft-vdb";
   facts.vdb_found = true;
   facts.denoiser = "Open Image Denoise 2.3.0";
@@ -86,7 +86,6 @@ INSTANTIATE_TEST_SUITE_P(
         MachineFault{"sandbox", Status::warning, [](MachineFacts& f) { f.sandbox.reset(); }},
         MachineFault{"sandbox", Status::warning, [](MachineFacts& f) { f.sandbox->calls = false; }},
         MachineFault{"sandbox", Status::warning, [](MachineFacts& f) { f.sandbox->files = false; }},
-        MachineFault{"sandbox", Status::warning, [](MachineFacts& f) { f.sandbox->sizes = false; }},
         MachineFault{"openvdb", Status::problem, [](MachineFacts& f) { f.vdb_found = false; }},
         MachineFault{"denoiser", Status::warning,
                      [](MachineFacts& f) { f.denoiser = "", f.denoiser_trouble = "none"; }},

@@ -1,6 +1,9 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 
@@ -98,9 +101,16 @@ TEST(ChildCommand, ReadsMoreThanAPipeHolds) {
 }
 
 TEST(ChildCommand, EndsAProgramThatTakesTooLong) {
-  const auto done = run_command({"sleep", "1000"}, "", .2);
+  const auto file = std::filesystem::temp_directory_path() / fmt::format("lightshaft-sleeps-{}", ::getpid());
+
+  const auto done = run_command({"sh", "-c", "echo $$ > " + file.string() + "; exec sleep 1000"}, "", 2);
+
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().code, Errc::unavailable);
+  pid_t program = 0;
+  ASSERT_TRUE(std::ifstream(file) >> program) << "the shell was not started in time";
+  std::filesystem::remove(file);
+  EXPECT_EQ(::kill(program, 0), -1) << "it still runs";
 }
 
 TEST(ChildCommand, EndsAProgramThatPrintsTooMuch) {

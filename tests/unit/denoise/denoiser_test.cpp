@@ -103,6 +103,7 @@ TEST_P(DenoiserFault, IsAnErrorAndNothingMore) {
 INSTANTIATE_TEST_SUITE_P(All, DenoiserFault,
                          ::testing::Values(Fault{"fails", "out of memory, says the stand-in"},
                                            Fault{"crashes", "was killed (Aborted)"},
+                                           Fault{"cuts", "it cannot be cut short"},
                                            Fault{"nan", "not finite"}),
                          [](const auto& fault) { return std::string(fault.param.library); });
 

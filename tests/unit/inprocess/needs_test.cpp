@@ -35,7 +35,7 @@ TEST(InProcess, RendersASceneWhoseNeedsAreThoseThatTheCoordinatorFound) {
   const test::ScratchFolder folder;
   LocalJob job = job_of(ball(), folder);
   job.brief.needs = canonical_json(scene::needs_of(ball().scene, true));
-  EXPECT_TRUE(make_inprocess_backend(1)->prepare(job));
+  EXPECT_TRUE(make_inprocess_backend(1)->prepare(job, std::atomic<bool>{}));
 }
 
 TEST(InProcess, RefusesASceneWhoseNeedsAreOthersAndNamesTheDifference) {
@@ -45,7 +45,7 @@ TEST(InProcess, RefusesASceneWhoseNeedsAreOthersAndNamesTheDifference) {
   other.scene.emitters.push_back(PointEmitter{});
   job.brief.needs = canonical_json(scene::needs_of(other.scene, true));
 
-  const auto refused = make_inprocess_backend(1)->prepare(job);
+  const auto refused = make_inprocess_backend(1)->prepare(job, std::atomic<bool>{});
 
   ASSERT_FALSE(refused);
   EXPECT_FALSE(refused.error().scene_at_fault);  // another worker may be of the right version
@@ -55,7 +55,7 @@ TEST(InProcess, RefusesASceneWhoseNeedsAreOthersAndNamesTheDifference) {
 
 TEST(InProcess, TakesAJobThatSaysNothingOfNeeds) {
   const test::ScratchFolder folder;
-  EXPECT_TRUE(make_inprocess_backend(1)->prepare(job_of(ball(), folder)));
+  EXPECT_TRUE(make_inprocess_backend(1)->prepare(job_of(ball(), folder), std::atomic<bool>{}));
 }
 
 }  // namespace

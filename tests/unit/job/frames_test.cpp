@@ -46,9 +46,15 @@ TEST(FrameRange, RefusesWhatIsNoneOrTooLong) {
 TEST(FrameRange, PutsTheNumberWhereTheHashesAre) {
   EXPECT_EQ(numbered("fog.####.vdb", 7), "fog.0007.vdb");
   EXPECT_EQ(numbered("fog.#.vdb", 12), "fog.12.vdb");
-  EXPECT_EQ(numbered("##/a-###.vdb", 123), "123/a-123.vdb");
+  EXPECT_EQ(numbered("##a-###.vdb", 123), "123a-123.vdb");
   EXPECT_EQ(numbered("fog.vdb", 7), "fog.vdb");
   EXPECT_EQ(numbered("", 7), "");
+  EXPECT_EQ(numbered("C#/shot ##/a-##.vdb", 7), "C#/shot ##/a-07.vdb")
+      << "a # in the name of a folder is only a #";
+  EXPECT_EQ(numbered("#/parts_##/", 7), "#/parts_07/");
+  EXPECT_EQ(numbered("/", 7), "/");
+  EXPECT_FALSE(has_frame_number("C#/a.vdb"));
+  EXPECT_TRUE(has_frame_number("C#/a#.vdb"));
 }
 
 TEST(FrameRange, IsPartOfAJobsSpec) {

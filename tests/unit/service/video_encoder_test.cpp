@@ -123,7 +123,19 @@ TEST_F(VideoEncoding, AProgramIsKilledWhenTheCoordinatorStops) {
 TEST_F(VideoEncoding, AProgramThatIsNotThereIsAnError) {
   VideoEncoder::Asked asked = program("");
   asked.ffmpeg = (folder / "nowhere").string();
-  EXPECT_FALSE(make(asked));
+
+  const auto made = make(asked);
+
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().code, Errc::not_found);
+  EXPECT_EQ(made.error().message, "cannot start " + asked.ffmpeg + ": No such file or directory");
+}
+
+TEST_F(VideoEncoding, WhatAProgramComplainsOfIsSafeToShow) {
+  const auto made = make(program("echo 'no \033[31mcodec' >&2; exit 3"));
+
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().message, "ffmpeg made no video: no  [31mcodec ");
 }
 
 }  // namespace

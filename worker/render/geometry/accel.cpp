@@ -11,6 +11,7 @@
 #include <optional>
 #include <tuple>
 
+#include "worker/render/base/build_stop.h"
 #include "worker/render/geometry/accel_shapes.h"
 #include "worker/render/geometry/embree.h"
 
@@ -165,10 +166,19 @@ void fill(const Accel::State& st, const Geometry& g, const PrimitiveSet& set, bo
   attach(device, g, set, to, 1, {to.boundary, to.all});
 }
 
+// Builds the BVHs of the scenes. If the build should stop (BuildStop), it ends early, and the scenes are of
+// no use.
 void commit(const Scenes& s) {
-  if (s.all != s.opaque) rtcCommitScene(s.all);
-  if (s.boundary) rtcCommitScene(s.boundary);
-  rtcCommitScene(s.opaque);
+  const std::atomic<bool>* const stop = BuildStop::flag();
+  for (RTCScene scene : {s.all != s.opaque ? s.all : nullptr, s.boundary, s.opaque}) {
+    if (!scene || (stop && *stop)) continue;
+    if (stop)
+      rtcSetSceneProgressMonitorFunction(
+          scene, [](void* p, double /*done*/) { return !*static_cast<const std::atomic<bool>*>(p); },
+          const_cast<std::atomic<bool>*>(stop));
+    rtcCommitScene(scene);
+    if (stop) rtcSetSceneProgressMonitorFunction(scene, nullptr, nullptr);
+  }
 }
 
 void attach_instance(RTCDevice device, const Affine& to_world, RTCScene of, unsigned id,
@@ -279,6 +289,7 @@ Result<Accel> Accel::build(const Geometry& g, int threads, bool coincident) {
   fill(st, g, g.own, boundaries, st.own.emplace());
   attach_instances(g, st);
   commit(*st.own);
+  if (auto ok = BuildStop::go_on(); !ok) return tl::unexpected(ok.error());
   if (const RTCError e = rtcGetDeviceError(st.device); e != RTC_ERROR_NONE) {
     return fail(e == RTC_ERROR_OUT_OF_MEMORY ? Errc::resource_exhausted : Errc::internal,
                 fmt::format("Embree could not build the scene's BVH (code {})", static_cast<int>(e)));

@@ -7,6 +7,7 @@
 
 #include "common/assets/grid_files.h"
 #include "common/base/overloaded.h"
+#include "worker/render/base/build_stop.h"
 #include "worker/render/media/vdb_process.h"
 
 namespace ls::render {
@@ -102,6 +103,7 @@ Result<LoadedVolume> vdb_file(const GridVolume& v, const AssetLoader& files, V3d
   if (!path) return tl::unexpected(path.error());
   const std::string& name = files.name(v.file);
   if (v.border) return fail(Errc::invalid_argument, fmt::format("{}: only a `.vol` has a border", name));
+  if (auto ok = BuildStop::go_on(); !ok) return tl::unexpected(ok.error());
   const auto file = VdbFile::read(*path, v.grid_name, kMaxGridValues);
   if (!file) return fail(file.error().code, fmt::format("{}: {}", name, file.error().message));
   const LsVdbGrid& raw = file->grid();

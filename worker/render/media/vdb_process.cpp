@@ -16,6 +16,7 @@
 #include <mutex>
 
 #include "common/base/spawn.h"
+#include "worker/render/base/build_stop.h"
 
 namespace ls::render {
 namespace {
@@ -27,10 +28,12 @@ tl::unexpected<Error> no_program(const char* what, int error) {
   return no_program(fmt::format("{}: {}", what, std::strerror(error)));
 }
 
-tl::unexpected<Error> how_it_ended(int status) {
+tl::unexpected<Error> how_it_ended(const HelperEnd& end) {
+  const int status = end.status;
   if (!WIFSIGNALED(status))
     return fail(Errc::internal,
-                fmt::format("the program that reads OpenVDB files ended with code {}", WEXITSTATUS(status)));
+                fmt::format("the program that reads OpenVDB files ended with code {}{}{}",
+                            WEXITSTATUS(status), end.last_line.empty() ? "" : ": ", end.last_line));
   switch (WTERMSIG(status)) {
     case SIGXCPU:
       return fail(Errc::resource_exhausted, "reading it takes too long: is it a damaged OpenVDB file?");
@@ -84,10 +87,12 @@ Result<VdbFile> VdbFile::read(const std::filesystem::path& path, const std::stri
                               std::uint64_t max_values, const std::filesystem::path& program) {
   const Descriptor reply(::memfd_create("lightshaft-vdb", MFD_CLOEXEC | MFD_ALLOW_SEALING));
   if (reply.fd < 0) return no_program("memfd_create", errno);
-  const auto status = run_helper(
-      program, {path.string(), grid_name, std::to_string(max_values), std::to_string(data_left())}, reply.fd);
-  if (!status) return no_program(status.error().message);
-  if (!WIFEXITED(*status) || WEXITSTATUS(*status) != 0) return how_it_ended(*status);
+  const auto end =
+      run_helper(program, {path.string(), grid_name, std::to_string(max_values), std::to_string(data_left())},
+                 reply.fd, BuildStop::flag());
+  if (!end) return no_program(end.error().message);
+  if (auto ok = BuildStop::go_on(); !ok) return tl::unexpected(ok.error());
+  if (!WIFEXITED(end->status) || WEXITSTATUS(end->status) != 0) return how_it_ended(*end);
 
   // If the program started other processes, they may still have the reply's file open and could change it. So
   // the reply is sealed against changes before it is read, and rejected if sealing fails.

@@ -13,14 +13,16 @@
 #include <limits>
 
 #include "common/base/spawn.h"
+#include "common/sandbox/call_filter.h"
 #include "worker/render/media/vdb_reply.h"
 
 namespace {
 
 constexpr rlim_t kMostCpuSeconds = 900;  // far more than the few seconds that the largest grids take
 
-// Makes this process end when its parent ends, and limits its resources: processor time and the size of the
-// reply to what a valid file can need, and memory to most_bytes, which is what the parent has left.
+// Makes this process end when its parent ends, and limits its resources and system calls: processor time and
+// the size of the reply to what a valid file can need, and memory to most_bytes, which is what the parent has
+// left.
 void confine(std::uint64_t most_values, std::uint64_t most_bytes) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
@@ -34,6 +36,7 @@ void confine(std::uint64_t most_values, std::uint64_t most_bytes) {
   ::setrlimit(RLIMIT_FSIZE, &file);
   const rlimit data{most_bytes, most_bytes};
   if (most_bytes != ls::render::kNoDataLimit) ::setrlimit(RLIMIT_DATA, &data);
+  ls::limit_calls();
 }
 
 // Returns the peak memory of this process so far, in bytes.

@@ -8,6 +8,7 @@
 #include "common/assets/image.h"
 #include "common/image/aov/identifiers.h"
 #include "common/scene/schema/integrators.h"
+#include "worker/render/base/build_stop.h"
 #include "worker/render/geometry/coincident.h"
 #include "worker/render/geometry/surface_boxes.h"
 #include "worker/render/world/aim.h"
@@ -196,6 +197,7 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
   w.inputs.add(HealthCause::degenerate_triangle, w.geometry.dropped_triangles);
   w.inputs.add(HealthCause::negative_texel, w.geometry.attributes.clamped);
   const auto load = [&](const Asset& a, auto... most_pixels) -> Result<ImageData> {
+    if (auto ok = BuildStop::go_on(); !ok) return tl::unexpected(ok.error());
     const auto it = files.find(a.digest);
     if (it == files.end()) return fail(Errc::internal, "no file was given for '" + a.name + "'");
     return load_image(it->second, a.name, most_pixels...);
@@ -213,7 +215,9 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
     if (auto ok = build_media(scene, loader, w); !ok) return tl::unexpected(ok.error());
     if (scene.sensor.medium) w.camera_medium = scene.sensor.medium->value;
   }
+  if (auto ok = BuildStop::go_on(); !ok) return tl::unexpected(ok.error());
   w.coincident = find_coincident(w.geometry).any;
+  if (auto ok = BuildStop::go_on(); !ok) return tl::unexpected(ok.error());
   auto lights = Lights::build(scene, w.geometry, w.textures, [&](const Asset& a) {
     auto image = load(a, kMaxEnvironmentPixels);
     if (!image && image.error().code == Errc::resource_exhausted)
