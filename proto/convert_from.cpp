@@ -307,6 +307,10 @@ Result<ToWorker> from_wire(const pb::ToWorker& in) {
       LS_TRY(lease, id_from(in.cancel_lease().lease(), "cancel_lease.lease"));
       return CancelLease{LeaseId{lease}};
     }
+    case pb::ToWorker::kRecallLease: {
+      LS_TRY(lease, id_from(in.recall_lease().lease(), "recall_lease.lease"));
+      return RecallLease{LeaseId{lease}};
+    }
     case pb::ToWorker::kDrain:
       return DrainNow{};
     case pb::ToWorker::MESSAGE_NOT_SET:

@@ -180,6 +180,10 @@ void put(const CancelLease& cancel, pb::ToWorker& out) {
   out.mutable_cancel_lease()->set_lease(cancel.lease.value);
 }
 
+void put(const RecallLease& recall, pb::ToWorker& out) {
+  out.mutable_recall_lease()->set_lease(recall.lease.value);
+}
+
 void put(const DrainNow&, pb::ToWorker& out) { out.mutable_drain(); }
 
 }  // namespace

@@ -156,7 +156,7 @@ struct WorkerDraining {
   bool operator==(const WorkerDraining&) const = default;
 };
 // The worker returns units of a lease that it has not rendered and will not render, because it takes no more
-// work (WorkerDraining) or because they were cancelled.
+// work (WorkerDraining), because it cannot load their job, or because the coordinator recalled the lease.
 struct LeaseReturned {
   LeaseId lease;
   std::vector<UnitKey> unrendered;
@@ -202,9 +202,16 @@ struct CancelLease {
   LeaseId lease;
   bool operator==(const CancelLease&) const = default;
 };
+// The worker gives back, in a LeaseReturned message, the units of this lease that it has not begun. It
+// finishes the others. It sends nothing if it has begun all of them or does not hold the lease.
+struct RecallLease {
+  LeaseId lease;
+  bool operator==(const RecallLease&) const = default;
+};
 struct DrainNow {
   bool operator==(const DrainNow&) const = default;
 };
-using ToWorker = std::variant<Welcome, Refused, AssignLease, ResultAck, CancelJob, CancelLease, DrainNow>;
+using ToWorker =
+    std::variant<Welcome, Refused, AssignLease, ResultAck, CancelJob, CancelLease, RecallLease, DrainNow>;
 
 }  // namespace ls

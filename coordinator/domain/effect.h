@@ -75,10 +75,15 @@ struct DigestMismatch {
   WorkerId first_worker, second_worker;
 };
 
-// Only workers of this numeric class may render the job from now on.
+// Only workers of this numeric class may render the job from now on. Until a result is accepted, JobUnpinned
+// may take this back.
 struct JobPinned {
   JobId job;
   Digest numeric_class;
+};
+// The job has no numeric class any more: no result of the class was accepted, and its leases are gone.
+struct JobUnpinned {
+  JobId job;
 };
 struct JobStateChanged {
   JobId job;
@@ -160,7 +165,7 @@ struct WorkerForgotten {
 
 using Effect =
     std::variant<Send, UnitsFreed, RecordUnit, Fold, DropDuplicate, DropUnwanted, DigestMismatch, JobPinned,
-                 JobStateChanged, Checkpoint, CheckDenoised, ReopenRound, JobFinished, JobFailed,
+                 JobUnpinned, JobStateChanged, Checkpoint, CheckDenoised, ReopenRound, JobFinished, JobFailed,
                  WorkerStateChanged, WorkerBlocked, WorkerFoundFaulty, TileDiscarded, WorkerForgotten>;
 
 }  // namespace ls::coordinator

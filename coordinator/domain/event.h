@@ -155,6 +155,9 @@ struct WorkerJoined {
   // its class. It is false for workers of another version than the coordinator's.
   bool may_begin = true;
   std::string platform = {};  // the machine and build of its numeric class, in words
+  // Who answers for the worker: its certificate or its address, as far as the coordinator can tell. All
+  // workers of one principal have one vote. Empty: the worker is a principal of its own.
+  std::string principal = {};
 };
 // The worker rendered wrong pixels; this was found before a restart or by another coordinator. It gets no
 // work, and its results for jobs of this farm are void.

@@ -21,7 +21,9 @@ enum class FreedCause {
   worker_lost,
   newer_stream,  // the worker has opened a new connection, which ends the leases of the old one
   deadline_passed,
-  returned,        // the worker returned it, since it is draining or could not load the job
+  returned,  // the worker returned it, since it is draining or could not load the job
+  // The lease lasted longer than it should, or the job ended or was paused, and the worker had not begun it
+  recalled,
   failed,          // the worker failed to render it
   moved,           // the unit waited behind other units of its worker, and an idle worker gets it
   paused,          // the job was paused
@@ -36,6 +38,7 @@ inline constexpr std::pair<FreedCause, std::string_view> kFreedCauses[] = {
     {FreedCause::newer_stream, "replaced by a newer stream"},
     {FreedCause::deadline_passed, "deadline passed"},
     {FreedCause::returned, "returned"},
+    {FreedCause::recalled, "recalled"},
     {FreedCause::failed, "failed"},
     {FreedCause::moved, "moved to an idle worker"},
     {FreedCause::paused, "job paused"},

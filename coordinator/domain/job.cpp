@@ -23,11 +23,12 @@ bool UnitFailures::failed_on(UnitCode code, WorkerIndex worker) const {
   return std::ranges::any_of(attempts(code), [&](const FailedAttempt& a) { return a.worker == worker; });
 }
 
-bool UnitFailures::exhausted(UnitCode code, std::size_t workers_known) const {
+bool UnitFailures::exhausted(UnitCode code, std::size_t principals, bool only_proven) const {
   const auto& all = attempts(code);
-  std::set<WorkerIndex> distinct;
-  for (const FailedAttempt& a : all) distinct.insert(a.worker);
-  const std::size_t needed = std::clamp<std::size_t>(workers_known, 1, kUnitFailureWorkers);
+  std::set<std::string_view> distinct;
+  for (const FailedAttempt& a : all)
+    if (a.proven || !only_proven) distinct.insert(a.principal);
+  const std::size_t needed = std::clamp<std::size_t>(principals, 1, kUnitFailureWorkers);
   return distinct.size() >= needed && all.size() >= kUnitFailureAttempts;
 }
 

@@ -41,15 +41,20 @@ class CostModel {
     const double n = static_cast<double>(pixel_samples);
     seconds_ = seconds_ * kMemory + cpu_seconds;
     samples_ = samples_ * kMemory + n;
-    tile_cost_[tile] = static_cast<float>(cpu_seconds / n);
+    tiles_known_ += !knows(tile);
+    tile_cost_[tile] = std::max(std::numeric_limits<float>::min(), static_cast<float>(cpu_seconds / n));
   }
   bool known() const { return samples_ > 0; }
+  // True if a result of this tile was measured. The costs of tiles may differ by many orders of magnitude, so
+  // the mean of other tiles says little about a tile without a result.
+  bool knows(TileIndex tile) const { return tile_cost_[tile] > 0; }
+  TileIndex tiles_known() const { return tiles_known_; }
   double per_sample() const { return known() ? seconds_ / samples_ : 0; }
   // Predicts the CPU seconds of a unit of this tile with this many pixel samples; 0 if nothing has been
   // measured.
   double predict(TileIndex tile, std::uint64_t pixel_samples) const {
     if (!known()) return 0;
-    const double cost = tile_cost_[tile] > 0 ? tile_cost_[tile] : per_sample();
+    const double cost = knows(tile) ? tile_cost_[tile] : per_sample();
     return std::max(kLeastSeconds, cost * static_cast<double>(pixel_samples));
   }
 
@@ -60,6 +65,7 @@ class CostModel {
   // hundred results count
   static constexpr double kMemory = 1 - 1.0 / 256;
   double seconds_ = 0, samples_ = 0;
+  TileIndex tiles_known_ = 0;
   std::vector<float> tile_cost_;
 };
 
@@ -68,6 +74,8 @@ class CostModel {
 struct FailedAttempt {
   WorkerIndex worker = kNoWorker;
   std::string worker_name;
+  std::string principal;  // Worker::principal
+  bool proven = false;    // true if the worker had delivered an accepted result before
   UnitFailure failure;
 };
 
@@ -78,9 +86,10 @@ class UnitFailures {
   void accepted(UnitCode code) { units_.erase(code); }
   // True if this worker has failed on this unit.
   bool failed_on(UnitCode code, WorkerIndex worker) const;
-  // True if the unit has failed on min(kUnitFailureWorkers, workers_known) distinct workers and in at least
-  // kUnitFailureAttempts attempts. `workers_known`: number of connected workers that could render the job.
-  bool exhausted(UnitCode code, std::size_t workers_known) const;
+  // True if the unit has failed at min(kUnitFailureWorkers, `principals`) distinct principals and in at least
+  // kUnitFailureAttempts attempts. `principals`: number of principals of the connected workers that could
+  // render the job. `only_proven`: only those workers count that have delivered results, in both numbers.
+  bool exhausted(UnitCode code, std::size_t principals, bool only_proven) const;
   const std::vector<FailedAttempt>& attempts(UnitCode code) const;
   void mark_workers(std::vector<bool>& used) const {
     for (const auto& [code, attempts] : units_)
@@ -196,10 +205,15 @@ struct Job {
   // Why the job ends; nullopt: not decided yet. It is set as soon as the last round of every tile is fixed,
   // even if some units are still leased or not in the image yet. It is final once the job is done
   std::optional<StopReason> stopping;
-  // True if the time limit or the user has stopped the job: it ends with the units that were leased until
-  // then and the first round of each tile
-  bool frozen = false;
+  // Set (to the reason) if the time limit or the user has stopped the job: it ends with the units that were
+  // begun until then and the first round of each tile
+  std::optional<StopReason> frozen;
   std::optional<Digest> numeric_class;
+  // True once a result of the numeric class was accepted. Before that the class is that of the first lease,
+  // and is given up if the leases bring no result
+  bool class_kept = false;
+  TimePoint pinned_at{};              // when the class of the first lease was taken
+  std::set<Digest> passed_over = {};  // classes that were given up so
   // When the first ray was traced, plus the total time in which the job's clock was stopped; nullopt: no ray
   // was traced yet
   std::optional<TimePoint> first_ray;
@@ -274,7 +288,8 @@ struct Job {
   void move_windows(int farm_threads);
   void move_window(TileIndex tile, int farm_threads);
   // Returns the number of rounds that each tile gets if the job stops now: all rounds that were leased or
-  // have an accepted result, and at least the first round.
+  // have an accepted result, and at least the first round. Rounds that came back although nobody had begun
+  // them do not count, unless a later round of the tile was begun.
   std::vector<RoundIndex> begun() const;
   // Limits each tile to ends[tile] rounds, unless it has fewer already, and forgets accepted results of later
   // rounds. If this shortens any tile, `stopping` becomes `reason`.

@@ -27,6 +27,10 @@ inline constexpr std::size_t kClassDigits = 12;
 
 // Wall-clock seconds for which a lease should occupy all threads of a worker
 inline constexpr double kLeaseSeconds = 2.0;
+// A lease that its worker has been rendering for longer than this, in wall-clock seconds, is recalled: the
+// worker gives back the units that it has not begun. The size of leases is chosen by predicted costs, which
+// may be wrong; this limit is what holds.
+inline constexpr double kLeaseLimit = 2 * kLeaseSeconds;
 // Lower bound of the share of a core that a worker's thread is taken to get (CoreShare in worker_table.h)
 inline constexpr double kLeastCoreShare = 1.0 / 64;
 // A lease has at most this many units, so that the message that assigns it stays well below 1 MiB
@@ -96,10 +100,15 @@ inline constexpr RoundIndex kRoundsAhead = 64;
 
 // Failures
 
-// A job fails when one of its units has failed on kUnitFailureWorkers distinct workers and in at least
-// kUnitFailureAttempts attempts. Fewer workers are enough if fewer connected workers could render the job
+// A job fails when one of its units has failed at kUnitFailureWorkers distinct principals (Worker::principal)
+// and in at least kUnitFailureAttempts attempts. Fewer are enough if the connected workers that could render
+// the job are of fewer principals. Where some of these workers have delivered results, only those count
 inline constexpr std::uint32_t kUnitFailureWorkers = 3;
 inline constexpr std::uint32_t kUnitFailureAttempts = 2;
+// A job is pinned to the numeric class of its first lease; until a result of that class is accepted, the pin
+// may move. If none was accepted for this long, and an idle worker of another class could render the job, the
+// pin is released. The time doubles with each release.
+inline constexpr Duration kPinLimit = 60s;
 // After this many failures a worker gets no more units of the job
 inline constexpr std::uint32_t kWorkerFailuresPerJob = 3;
 // A worker that is blocked from this many jobs is unhealthy: it gets no work at all

@@ -105,7 +105,8 @@ class UnitQueue {
   std::uint64_t surely_waiting() const { return surely_ + surely_returned(); }
 
   // Returns the first round of the tile whose turn has not come yet: every earlier round has been leased at
-  // least once, or has an accepted result.
+  // least once, or has an accepted result. Rounds that came back before they were begun do not count, unless
+  // a later round of the tile counts.
   RoundIndex next(TileIndex tile) const { return next_[tile]; }
   // Puts the tile's rounds from `round` on back into the queue.
   void rewind(TileIndex tile, RoundIndex round) {
@@ -149,15 +150,28 @@ class UnitQueue {
     else
       forget(code);
   }
-  // Queues a unit again that was leased and came back without a result.
-  void put_back(UnitCode code) {
-    if (plans(code) && round_of(code) < next_[tile_of(code)])
-      (wanted(code) ? line_of(tile_of(code)).returned : returned_perhaps_).insert(code);
+  // Queues a unit again that was leased and came back without a result. `begun`: a worker may have begun to
+  // render it. If not, and if this holds for the tile's later rounds too, the unit counts as never leased.
+  void put_back(UnitCode code, bool begun = true) {
+    const TileIndex tile = tile_of(code);
+    if (!plans(code) || round_of(code) >= next_[tile]) return;
+    (wanted(code) ? line_of(tile).returned : returned_perhaps_).insert(code);
+    if (begun) begun_.insert(code);
+    RoundIndex next = next_[tile];
+    for (; next > 0; --next) {
+      const UnitCode last = unit_code(next - 1, tile);
+      if (!returned(last) || begun_.contains(last)) break;
+      forget(last);
+    }
+    if (next == next_[tile]) return;
+    counting(tile, [&] { next_[tile] = next; });
+    offer(tile);
   }
   // Removes the unit if it was leased and came back, because its result has arrived after all.
   void forget(UnitCode code) {
     line_of(tile_of(code)).returned.erase(code);
     returned_perhaps_.erase(code);
+    begun_.erase(code);
   }
   bool returned(UnitCode code) const {
     return line_of(tile_of(code)).returned.contains(code) || returned_perhaps_.contains(code);
@@ -271,6 +285,7 @@ class UnitQueue {
   std::priority_queue<Perhaps> perhaps_;
   std::vector<Wanted> wanted_;  // latest values of set_wanted(), by tile; empty: all units are certain
   std::set<UnitCode> returned_perhaps_;
+  std::set<UnitCode> begun_;  // those of the returned units that a worker may have begun
 };
 
 }  // namespace ls::coordinator

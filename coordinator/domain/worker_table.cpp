@@ -28,6 +28,7 @@ void WorkerTable::keep_names(std::vector<bool> used) {
   for (WorkerIndex i = 0; i < ids_.size(); ++i) {
     if (used[i] || ids_[i].empty()) continue;
     index_.erase(ids_[i]);
+    principals_.erase(i);
     ids_[i] = {};
     free_.push_back(i);
   }

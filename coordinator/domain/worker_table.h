@@ -56,6 +56,7 @@ struct Worker {
   WorkerId id;
   std::string name;
   std::uint64_t epoch = 0;
+  std::string principal;  // WorkerJoined::principal, or the worker's id
   Digest numeric_class;
   std::string platform;
   int threads = 1;
@@ -72,6 +73,9 @@ struct Worker {
   std::optional<TimePoint> unhealthy_since;
   TimePoint lost_at{};
   TimePoint progress_at{};  // when it last finished a unit, or when it got its first unit after being idle
+  TimePoint busy_since{};   // when it last got a unit after being idle
+  // CPU seconds that were believed of its results since `busy_since` (Farm::believable_seconds)
+  double claimed = 0;
 
   std::set<LeaseSeq> leases;
   std::uint32_t units_out = 0;  // units leased to it
@@ -89,6 +93,8 @@ struct Worker {
   double seconds_until_free() const { return seconds_out / cores(); }
   // True if it holds at least one unit for each of its threads.
   bool saturated() const { return units_out >= static_cast<std::uint32_t>(threads); }
+  // True if it has delivered an accepted result since it joined this farm.
+  bool proven() const { return units_done > 0; }
   bool blocked(JobSeq job, TimePoint now) const {
     const auto it = failures.find(job);
     return it != failures.end() && it->second.blocked_at(now);
@@ -120,6 +126,14 @@ class WorkerTable {
   Worker* find(const WorkerId& id);
   const Worker* find(const WorkerId& id) const;
   const WorkerId& name_of(WorkerIndex index) const { return ids_[index]; }
+  // Returns the principal of the worker as it last joined; its id if it never did.
+  const std::string& principal_of(WorkerIndex index) const {
+    const auto known = principals_.find(index);
+    return known == principals_.end() ? ids_[index].value : known->second;
+  }
+  void set_principal(Worker& worker, const std::string& principal) {
+    worker.principal = principals_[worker.index] = principal.empty() ? worker.id.value : principal;
+  }
   // Returns the index of the worker with this id; a new id gets an index. The id may come from a stored
   // record, and its worker may never have connected to this farm.
   WorkerIndex index_of(const WorkerId& id);
@@ -156,9 +170,11 @@ class WorkerTable {
   };
   Count of_class(const Digest& numeric_class) const;
   Count of_all_classes() const;
+  std::size_t classes() const { return classes_.size(); }  // number of classes of the workers that count
 
  private:
   std::vector<WorkerId> ids_;
+  std::map<WorkerIndex, std::string> principals_;
   std::unordered_map<WorkerId, WorkerIndex> index_;
   std::vector<WorkerIndex> free_;
   std::size_t kept_ = 0;  // number of names that remained after the last keep_names()
@@ -201,6 +217,14 @@ struct LeaseRecord {
   // True for an audit: a lease of one unit that has an accepted result and is rendered again for comparison
   bool audit = false;
   TimePoint issued{};
+  // When the worker began to render the lease, as far as the coordinator can tell: its scene is loaded, and
+  // the units of earlier leases no longer occupy all threads. nullopt: not yet
+  std::optional<TimePoint> begun;
+  // When the worker was asked to give back the units that it has not begun; nullopt: it was not asked
+  std::optional<TimePoint> recalled;
+  // True while units are expected to come back: until then the worker gets no further units of the job, which
+  // would be of later rounds
+  bool comes_back = false;
   // Predicted time from `issued` until the last unit of this lease is done, including the wait for the
   // worker's earlier leases
   Duration predicted{};

@@ -3,12 +3,14 @@
 #include "coordinator/rpc/streams.h"
 
 #include <fmt/format.h>
+#include <grpc/grpc_security_constants.h>
 
 #include <algorithm>
 #include <utility>
 
 #include "common/base/log.h"
 #include "common/protocol/limits.h"
+#include "coordinator/rpc/principal.h"
 #include "proto/convert.h"
 
 namespace ls::coordinator::rpc {
@@ -30,6 +32,8 @@ grpc::Status to_status(const Error& error) {
     if (code == error.code) return {status, error.message};
   return {INTERNAL, error.message};
 }
+
+std::string_view to_view(const grpc::string_ref& text) { return {text.data(), text.size()}; }
 
 }  // namespace
 
@@ -144,7 +148,9 @@ void WorkStream::greet(FromWorker message) {
     log_warn("peer=" + context_->peer(), "refused: too many wrong join tokens came from its address");
     return refuse({Errc::resource_exhausted, too_many_wrong_tokens(wait)}, true);
   }
-  auto session = coordinator_.connect(*hello, outlet_);
+  const auto shown = context_->auth_context()->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME);
+  const std::string_view certificate = shown.empty() ? std::string_view{} : to_view(shown.front());
+  auto session = coordinator_.connect(*hello, outlet_, principal_of(context_->peer(), certificate));
   if (session || session.error().code == Errc::unauthenticated)
     guard_.tried(address, hello->join_token, session.has_value());
   if (!session) {

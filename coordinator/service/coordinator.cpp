@@ -311,8 +311,9 @@ std::vector<WorkerView> Coordinator::workers() const {
 }
 
 Result<std::unique_ptr<WorkerSession>> Coordinator::connect(const WorkerHello& hello,
-                                                            std::shared_ptr<WorkerSink> sink) {
-  return parts_->sessions.connect(hello, std::move(sink));
+                                                            std::shared_ptr<WorkerSink> sink,
+                                                            const std::string& principal) {
+  return parts_->sessions.connect(hello, std::move(sink), principal);
 }
 
 // Events

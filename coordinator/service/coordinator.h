@@ -115,7 +115,9 @@ class Coordinator {
   // Workers
 
   std::vector<WorkerView> workers() const;
-  Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink);
+  // `principal`: who answers for the worker (WorkerJoined::principal)
+  Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink,
+                                                 const std::string& principal = {});
 
   // Events
 

@@ -53,6 +53,7 @@ class FarmDriver {
   void on(const DropUnwanted& e);
   void on(const DigestMismatch& e);
   void on(const JobPinned& e);
+  void on(const JobUnpinned& e);
   void on(const JobStateChanged& e);
   void on(const Checkpoint& e);
   void on(const CheckDenoised& e);

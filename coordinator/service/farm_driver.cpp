@@ -240,6 +240,18 @@ void FarmDriver::on(const JobPinned& e) {
   }
 }
 
+void FarmDriver::on(const JobUnpinned& e) {
+  const auto entry = core_.jobs.find(e.job);
+  if (!entry) return;
+  entry->stored.numeric_class.reset();
+  entry->stored.build.clear();
+  entry->stored.platform.clear();
+  entry->stored.fake = false;
+  entry->pin_unsaved = true;
+  if (!core_.records.put_pin(entry)) todo_.push_back(JobPaused{e.job});
+  core_.records.log(e.job, "not pinned any more: its numeric class brought no result");
+}
+
 // The state `done` is published and stored only after the final image is written: see ImageWriter.
 void FarmDriver::on(const JobStateChanged& e) {
   const auto entry = core_.jobs.find(e.job);

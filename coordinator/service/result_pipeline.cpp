@@ -61,6 +61,8 @@ void ResultPipeline::receive(const std::shared_ptr<Connection>& from, UnitResult
                          Error{Errc::failed_precondition,
                                "the job is pinned to another numeric class than this worker's"}),
              next();
+    double& cpu = arrived.result.cpu_seconds;
+    if (cpu > 0) cpu = farm.believable_seconds(unit, from->worker, cpu, arrived.at);
     arrived.expected = {arrived.job->stored.scene, arrived.job->settings_digest, from->numeric_class,
                         wanted.rect, wanted.samples};
   }

@@ -83,7 +83,8 @@ class WorkerSessions::Session final : public WorkerSession {
 };
 
 Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello& hello,
-                                                               std::shared_ptr<WorkerSink> sink) {
+                                                               std::shared_ptr<WorkerSink> sink,
+                                                               const std::string& principal) {
   if (auto ok = check_hello(hello, options_.may_join, options_.allow_fake); !ok)
     return tl::unexpected(ok.error());
   const auto core = core_.lock();
@@ -113,7 +114,8 @@ Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello
            "joined");
   core->driver.run(WorkerJoined{id, connection->epoch, hello.name, hello.numeric_class, hello.threads,
                                 hello.tags, hello.memory_bytes, hello.blobs_held,
-                                options_.version.empty() || hello.build == options_.version, hello.platform});
+                                options_.version.empty() || hello.build == options_.version, hello.platform,
+                                principal});
   return std::make_unique<Session>(*this, std::move(connection));
 }
 

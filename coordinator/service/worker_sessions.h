@@ -27,7 +27,9 @@ class WorkerSessions {
         clock_(clock),
         last_epoch_(options_.start << 32) {}
 
-  Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink);
+  // `principal`: who answers for the worker (WorkerJoined::principal)
+  Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink,
+                                                 const std::string& principal = {});
   // Reports to the farm the workers whose results wait for memory in the coordinator, so that their leases
   // are renewed.
   void report_held_back(Core& core) const;

@@ -181,7 +181,7 @@ void Worker::received(ToWorker message) {
             std::erase_if(queue_, [&](const Work& w) { return w.lease == m.lease; });
           },
           [&](const CancelJob& m) { std::erase_if(queue_, [&](const Work& w) { return w.job == m.job; }); },
-          [](const DrainNow&) {}},
+          [](const RecallLease&) {}, [](const DrainNow&) {}},
       message);
 }
 

@@ -119,6 +119,11 @@ void Agent::Impl::handle_message(ToWorker& message) {
                    table.drop_lease(c.lease);
                    stop_dropped_work();
                  },
+                 [this](RecallLease& r) {
+                   const std::lock_guard lock(mutex);
+                   for (LeaseReturned& returned : table.return_waiting(r.lease))
+                     outgoing.push_back(std::move(returned));
+                 },
                  [this](DrainNow&) { drain_requested = true; },
              },
              message);

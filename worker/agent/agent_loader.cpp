@@ -197,7 +197,7 @@ void Agent::Impl::loading_failed(const JobBrief& brief, UnitFailure failure) {
     table.finish(first->key);
     outbox.add(std::move(failure));
   }
-  for (LeaseReturned& returned : table.return_waiting(&id)) outgoing.push_back(std::move(returned));
+  for (LeaseReturned& returned : table.return_waiting(id)) outgoing.push_back(std::move(returned));
   inbox->nudge();
 }
 
@@ -221,7 +221,7 @@ void Agent::Impl::hold_off(const JobBrief& brief, const std::string& trouble) {
   job->trouble = trouble;
   log_warn(fmt::format("job={}", id.value),
            fmt::format("{}; giving its units back, trying again in {:.1f} s", trouble, seconds(pause)));
-  for (LeaseReturned& returned : table.return_waiting(&id)) outgoing.push_back(std::move(returned));
+  for (LeaseReturned& returned : table.return_waiting(id)) outgoing.push_back(std::move(returned));
   inbox->nudge();
 }
 

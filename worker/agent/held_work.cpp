@@ -70,14 +70,27 @@ void HeldLeases::drop_lease(const LeaseId& lease) {
   drop_if([&](const Held& held) { return held.lease == lease; });
 }
 
-std::vector<LeaseReturned> HeldLeases::return_waiting(const JobId* job) {
+std::vector<LeaseReturned> HeldLeases::return_waiting() {
+  return return_if([](const Held&) { return true; });
+}
+
+std::vector<LeaseReturned> HeldLeases::return_waiting(const JobId& job) {
+  return return_if([&](const Held& held) { return held.key.job == job; });
+}
+
+std::vector<LeaseReturned> HeldLeases::return_waiting(const LeaseId& lease) {
+  return return_if([&](const Held& held) { return held.lease == lease; });
+}
+
+std::vector<LeaseReturned> HeldLeases::return_if(const std::function<bool(const Held&)>& goes) {
   std::map<LeaseId, LeaseReturned> returned;
   for (auto it = queue_.begin(); it != queue_.end();) {
-    if (job && it->second.job != *job) {
+    const Held& held = units_.at(it->second).held;
+    if (!goes(held)) {
       ++it;
       continue;
     }
-    const LeaseId lease = units_.at(it->second).held.lease;
+    const LeaseId lease = held.lease;
     returned[lease].lease = lease;
     returned[lease].unrendered.push_back(it->second);
     units_.erase(it->second);

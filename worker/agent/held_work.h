@@ -52,9 +52,11 @@ class HeldLeases {
   // Remove all units of a job or a lease, including running ones.
   void drop_job(const JobId& job);
   void drop_lease(const LeaseId& lease);
-  // Removes the waiting units; if `job` is given, only the waiting units of that job. Returns the messages
+  // Remove the waiting units (without argument: all; else those of this job or lease). Return the messages
   // that give these units back to the coordinator, one message per lease.
-  std::vector<LeaseReturned> return_waiting(const JobId* job = nullptr);
+  std::vector<LeaseReturned> return_waiting();
+  std::vector<LeaseReturned> return_waiting(const JobId& job);
+  std::vector<LeaseReturned> return_waiting(const LeaseId& lease);
 
   std::optional<Held> first_waiting(const JobId& job) const;
   const Held* find(const UnitKey& key) const;  // null: the unit is not held
@@ -77,6 +79,7 @@ class HeldLeases {
   void enqueue(Entry& entry);
   void leave(const LeaseId& lease, bool done);
   void drop_if(const std::function<bool(const Held&)>& goes);
+  std::vector<LeaseReturned> return_if(const std::function<bool(const Held&)>& goes);
 
   std::map<UnitKey, Entry> units_;
   // The waiting units by Entry::order, that is, in the order in which they will be rendered.

@@ -48,7 +48,8 @@ struct Wanted {
   Verdict verdict = Verdict::no;
   SampleRange samples;  // the sample range that the job needs of this unit now
   PixelRect rect;
-  bool pinned = false;  // true if only workers of one numeric class may render the job
+  // True if only workers of one numeric class may render the job for good, since a result of it was accepted
+  bool pinned = false;
 };
 
 struct JobFigures {
@@ -113,6 +114,11 @@ class Farm {
   Result<JobPlan> retargeted(const JobId& id, double target_error) const;
   Result<JobPlan> extended(const JobId& id, std::uint64_t spp, TimePoint now) const;
   std::optional<WorkerFigures> worker(const WorkerId& id) const;
+  // Returns how many of the CPU seconds that a worker reports for its result of this unit, which arrived at
+  // `at`, are credible: one thread renders a unit, and not before the unit was leased to the worker; and the
+  // results of a worker together cannot have taken more than all of its threads since it got work. A result
+  // of a unit that is not leased to the worker is believed to have taken what such units take.
+  double believable_seconds(const UnitKey& unit, const WorkerId& worker, double reported, TimePoint at) const;
   // Explains to the user why no worker may take units of a job that is queued or running: each connected
   // worker is of another class, lacks memory or a tag, is blocked or unhealthy, or the like. Empty if some
   // worker may take units, or if the job is in another state.

@@ -72,6 +72,12 @@ void Farm::State::on(const JobRestored& event) {
     if (!job.units.accepted(code)) job.units.accept(code, {unit.digest, workers.index_of(unit.worker)});
   }
   for (TileIndex t = 0; with_film && t < job.units.tiles(); ++t) restore_tile(job, t, event);
+  job.class_kept = job.numeric_class && job.units.accepted_count() > 0;
+  // A class without results was that of leases that are gone
+  if (job.numeric_class && !job.class_kept && job.state != JobState::done) {
+    job.numeric_class.reset();
+    effects.emplace_back(JobUnpinned{job.plan.brief.job});
+  }
   job.move_windows(workers.threads());
   if (job.state == JobState::done) {
     if (job.complete()) return;
@@ -108,12 +114,13 @@ void Farm::State::on(const JobPaused& event) {
   Job* job = find(event.job);
   if (job == nullptr || !job->leasable()) return;
   set_state(*job, JobState::paused);
-  // A worker finishes a lease that it has begun; leases that are not begun are taken back now. The newest
+  // A worker finishes the units that it has begun; leases that are not begun are taken back now. The newest
   // goes first: whether a lease has begun is derived from the worker's earlier leases, which must still
   // exist.
   const std::vector<LeaseSeq> out = leases_of(*job);
   for (auto seq = out.rbegin(); seq != out.rend(); ++seq)
     if (untouched(*leases.find(*seq))) free_lease(*seq, FreedCause::paused, true);
+  recall_all(*job);
   refresh(*job);
 }
 
@@ -125,6 +132,7 @@ void Farm::State::on(const JobResumed& event) {
   // check again
   job->checking_spp = 0;
   if (job->adaptive) judge(*job);
+  cut_off_returned(*job);
   refresh(*job);
 }
 
@@ -166,19 +174,58 @@ void Farm::State::on(const JobForgotten& event) {
   jobs.erase(job->seq);
 }
 
+namespace {
+
+// Returns the number of rounds that each tile of a frozen job gets: those before the first round that nobody
+// has rendered or is rendering, and at least one. Which rounds these are depends on the units before them,
+// not on what they cost themselves, so the image gets no bias from costs.
+std::vector<RoundIndex> rounds_in_hand(const Job& job) {
+  std::vector<RoundIndex> ends = job.begun();
+  for (TileIndex t = 0; t < ends.size(); ++t)
+    for (RoundIndex r = std::max<RoundIndex>(1, job.units.issued(t)); r < ends[t]; ++r)
+      if (const UnitCode code = unit_code(r, t); !job.units.accepted(code) && !job.out.contains(code))
+        ends[t] = r;
+  return ends;
+}
+
+}  // namespace
+
+void Farm::State::cut_off_returned(Job& job) {
+  if (!job.frozen || !job.leasable()) return;
+  job.cut_off(rounds_in_hand(job), *job.frozen);
+  give_back_beyond(job);
+  issue_folds(job);
+  finish_if_complete(job);
+  refresh(job);
+}
+
 void Farm::State::freeze(Job& job, StopReason reason) {
-  job.frozen = true;
+  job.frozen = reason;
   // Units that workers gave back may be leased again: the time limit no longer forbids it
   work_appeared = true;
-  job.cut_off(job.begun(), reason);
+  job.cut_off(rounds_in_hand(job), reason);
+  give_back_beyond(job);
+  recall_all(job);  // cut_off_returned() drops what comes back
   // The stop rule of a target error no longer holds back accepted results: these are now added to the image
   issue_folds(job);
   finish_if_complete(job);
   refresh(job);
 }
 
+void Farm::State::watch_time(Job& job) {
+  const auto limit = job.time_limit(now);
+  if (job.leasable() && !job.frozen && limit && now >= *limit) freeze(job, StopReason::time);
+}
+
 void Farm::State::finish_if_complete(Job& job) {
   if (job.ended() || !job.complete()) return;
+  // If the units that were chosen for the time that was left cost less than predicted, more of them fit.
+  if (const auto limit = job.time_limit(now);
+      limit && now < *limit && job.stopping == StopReason::time && !job.frozen) {
+    plan_end(job, *limit);
+    work_appeared = true;
+    if (!job.complete()) return refresh(job);
+  }
   // Open audits (units that are rendered again for comparison) must end first: they decide whether the image
   // is right
   if (!job.audits.empty()) return refresh(job);
@@ -302,7 +349,7 @@ void Farm::State::on(const JobExtended& event) {
   job->plan = std::move(*plan);
   job->spp = new_spp;
   job->stopping.reset();
-  job->frozen = false;
+  job->frozen.reset();
   if (job->plan.target_error) job->adaptive->extend(new_spp);
   job->steer();
   job->plan_all();

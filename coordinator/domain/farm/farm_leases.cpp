@@ -34,7 +34,10 @@ void Farm::State::grant(Job& job, Worker& worker, std::vector<UnitCode> units, b
   lease.deadline = now + from_seconds(kDeadlineFactor * seconds(lease.predicted)) + kDeadlineSlack +
                    (worker.warmed_up.contains(job.seq) ? Duration{} : Duration{kLoadSlack});
 
-  if (worker.units_out == 0) worker.progress_at = now;
+  if (worker.units_out == 0) {
+    worker.progress_at = worker.busy_since = now;
+    worker.claimed = 0;
+  }
   worker.units_out += lease.remaining;
   worker.seconds_out += sum;
   worker.leases.insert(lease.seq);
@@ -44,6 +47,7 @@ void Farm::State::grant(Job& job, Worker& worker, std::vector<UnitCode> units, b
   shares.charge(job, lease.remaining * lease.charge_per_unit);
   if (worker.briefed.insert(job.seq).second) message.brief = job.plan.brief;
   leases.add(std::move(lease));
+  note_begun(worker);
   effects.emplace_back(Send{worker.id, std::move(message)});
 }
 
@@ -159,7 +163,19 @@ void Farm::State::close(LeaseRecord& lease, bool send_worker) {
   if (send_worker && worker.connected)
     effects.emplace_back(Send{worker.id, CancelLease{leases.id_of(lease.seq)}});
   touch(worker);
+  Job& job = *lease.job;
+  work_appeared |= lease.comes_back;
   leases.erase(lease.seq);
+  unpin(job);
+}
+
+std::uint32_t Farm::State::units_before(const LeaseRecord& lease) const {
+  std::uint32_t units = 0;
+  for (const LeaseSeq seq : lease.worker->leases) {
+    if (seq >= lease.seq) break;
+    units += leases.all().at(seq).remaining;
+  }
+  return units;
 }
 
 std::vector<LeaseSeq> Farm::State::leases_of(const Job& job) const {
@@ -168,6 +184,69 @@ std::vector<LeaseSeq> Farm::State::leases_of(const Job& job) const {
     if (lease.job == &job) found.push_back(seq);
   }
   return found;
+}
+
+void Farm::State::recall(LeaseRecord& lease) {
+  if (lease.recalled || lease.audit) return;
+  lease.recalled = now;
+  lease.comes_back =
+      units_before(lease) + lease.remaining > static_cast<std::uint32_t>(lease.worker->threads);
+  effects.emplace_back(Send{lease.worker->id, RecallLease{leases.id_of(lease.seq)}});
+}
+
+// The newest goes first, so that later rounds come back before earlier ones.
+void Farm::State::recall_all(const Job& job) {
+  const std::vector<LeaseSeq> all = leases_of(job);
+  for (auto seq = all.rbegin(); seq != all.rend(); ++seq) recall(*leases.find(*seq));
+}
+
+void Farm::State::note_begun(Worker& worker) {
+  std::uint32_t before = 0;
+  for (const LeaseSeq seq : worker.leases) {
+    if (before >= static_cast<std::uint32_t>(worker.threads)) return;
+    LeaseRecord& lease = *leases.find(seq);
+    if (!lease.begun && worker.warmed_up.contains(lease.job->seq)) lease.begun = now;
+    before += lease.remaining;
+  }
+}
+
+void Farm::State::end_long_leases(Worker& worker) {
+  const std::uint32_t threads = static_cast<std::uint32_t>(worker.threads);
+  std::uint32_t units = 0;
+  for (const LeaseSeq seq : worker.leases) {
+    if (units >= threads) return;
+    LeaseRecord& lease = *leases.find(seq);
+    units += lease.remaining;
+    if (!lease.begun || lease.recalled || now - *lease.begun < from_seconds(kLeaseLimit)) continue;
+    recall(lease);
+    // If the units up to here occupy at most all threads, they are probably all being rendered.
+    if (units <= threads) continue;
+    // The costs of later leases of the same job were predicted as wrongly. And their units would go before
+    // those that come back, although these are of earlier rounds.
+    for (auto later = worker.leases.find(seq); later != worker.leases.end(); ++later)
+      if (LeaseRecord& one = *leases.find(*later); one.job == lease.job) recall(one);
+  }
+}
+
+std::uint32_t Farm::State::may_be_begun(const LeaseRecord& lease, FreedCause why) const {
+  const Worker& worker = *lease.worker;
+  switch (why) {
+    // The coordinator returns units by itself whose result it could not store: these were begun
+    case FreedCause::returned:
+      return worker.draining || !worker.warmed_up.contains(lease.job->seq) ? 0 : lease.remaining;
+    case FreedCause::recalled:
+    case FreedCause::moved:
+    case FreedCause::paused:
+      return 0;
+    case FreedCause::worker_lost:
+    case FreedCause::newer_stream:
+    case FreedCause::deadline_passed: {
+      const auto threads = static_cast<std::uint32_t>(worker.threads);
+      return threads - std::min(threads, units_before(lease));
+    }
+    default:
+      return lease.remaining;
+  }
 }
 
 void Farm::State::renew(LeaseRecord& lease) {

@@ -78,7 +78,7 @@ Wanted Farm::wanted(const UnitKey& unit, const Digest& numeric_class) const {
   if (unit.tile >= job->units.tiles() || !job->queue.plans(code)) return {};
   Wanted::Verdict verdict = job->units.accepted(code) ? Wanted::Verdict::duplicate : Wanted::Verdict::yes;
   if (job->numeric_class.value_or(numeric_class) != numeric_class) verdict = Wanted::Verdict::other_class;
-  return {verdict, job->range(code), job->plan.grid.rect(unit.tile), job->numeric_class.has_value()};
+  return {verdict, job->range(code), job->plan.grid.rect(unit.tile), job->class_kept};
 }
 
 Result<JobPlan> Farm::retargeted(const JobId& id, double target_error) const {
@@ -157,6 +157,14 @@ std::optional<WorkerFigures> Farm::worker(const WorkerId& id) const {
                   worker->units_out, worker->units_done, {}};
   if (!worker->leases.empty()) f.job = state_->leases.find(*worker->leases.begin())->job->plan.brief.job;
   return f;
+}
+
+double Farm::believable_seconds(const UnitKey& unit, const WorkerId& worker, double reported,
+                                TimePoint at) const {
+  const Job* job = state_->find(unit.job);
+  if (job == nullptr || unit.tile >= job->units.tiles()) return std::min(reported, kAssumedUnitSeconds);
+  return state_->believable(*job, unit_code(unit.round, unit.tile), state_->workers.find(worker), reported,
+                            at);
 }
 
 std::string Farm::why_waiting(const JobId& id) const {

@@ -35,6 +35,7 @@ struct Farm::State {
   std::map<std::string, Load> users;   // leased units by owner of the jobs, except the administrator
   std::map<std::string, Load> groups;  // leased units by sequence (JobPlan::group)
   std::map<WorkerId, std::string> quarantined;
+  std::set<Digest> proven;  // numeric classes of which a result was accepted since the start
   AuditFigures audited;
   std::set<JobId> audits_changed;
 
@@ -76,7 +77,9 @@ struct Farm::State {
   // state or window (how far ahead rounds may be leased)
   void refresh(Job& job);
   void restore_tile(Job& job, TileIndex tile, const JobRestored& event);
+  // Ends the job with the units that are begun and the first round of each tile
   void freeze(Job& job, StopReason reason);
+  void watch_time(Job& job);  // freezes the job if its time limit has passed
   void finish_if_complete(Job& job);
   void fail(Job& job, std::string error);
   void end(Job& job);  // takes back all leases of a job that has failed or was cancelled
@@ -103,7 +106,9 @@ struct Farm::State {
   void on(const UnitFolded& event);
   void on(const DenoisedChecked& event);
   void on(const UnitFailed& event);
-  void charge(Job& job, double cpu_seconds);  // adds CPU seconds to the shares of the job's owner and group
+  void accept(const UnitAccepted& event);
+  // See Farm::believable_seconds; null: the worker is unknown
+  double believable(const Job& job, UnitCode code, const Worker* worker, double reported, TimePoint at);
   void issue_folds(Job& job, TileIndex tile);
   void issue_folds(Job& job) {
     for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
@@ -128,6 +133,15 @@ struct Farm::State {
   void disagreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
   void claimed(Job& job, UnitCode code, const UnitAccepted& by);
   void undecided(Job& job, UnitCode code);
+  // True if the worker may be asked to render the unit for the audit. Workers of other principals than those
+  // of the results so far go first; others are asked only if no such worker can render the unit.
+  bool may_vote(const Job& job, const Audit& audit, const Worker& worker) const;
+  bool is_outsider(const Audit& audit, const Worker& worker) const;
+  bool may_decide(const Job& job, const Audit& audit, const Worker& worker) const;
+  // True if these two workers, whose results are equal, may outvote the third. They may if they are of two
+  // principals, or if all three are of one: nobody can bar the worker of somebody else alone.
+  bool outvote(WorkerIndex one, WorkerIndex other, WorkerIndex alone) const;
+  void ignore_vote(Job& job, UnitCode code, WorkerIndex by);
   // Which workers can render the unit for the audit. `none`: no connected worker; `away`: only workers that
   // get no work at the moment; `there`: at least one that can render it now.
   enum class Deciders { none, away, there };
@@ -159,7 +173,7 @@ struct Farm::State {
   void take_marks(Job& job);  // emits a Checkpoint for each LevelMark whose rounds are all in the image
   void stop_at_level(Job& job);
   // Decides, from measured costs of units, the last round of each tile that is rendered before the job's time
-  // limit. Called shortly before the limit.
+  // limit. Called shortly before the limit, and when all units that were chosen so are done before it.
   void plan_end(Job& job, TimePoint limit);
   void give_back_beyond(Job& job);  // takes back leased units of rounds after the tiles' last ones
   // Returns the lease under which the worker holds the unit; null: none. Defined in farm_units.cpp, as is
@@ -193,24 +207,45 @@ struct Farm::State {
   void free_lease(LeaseSeq seq, FreedCause why, bool send_worker);
   void close(LeaseRecord& lease, bool send_worker);
   std::vector<LeaseSeq> leases_of(const Job& job) const;
+  std::uint32_t units_before(const LeaseRecord& lease) const;  // units of earlier leases of the same worker
   void renew(LeaseRecord& lease);
+  // Asks the worker to give back the units of the lease that it has not begun (RecallLease), once.
+  void recall(LeaseRecord& lease);
+  void recall_all(const Job& job);
+  void note_begun(Worker& worker);  // sets LeaseRecord::begun of leases that the worker may begin now
+  // Recalls the leases that the worker has been rendering for longer than kLeaseLimit
+  void end_long_leases(Worker& worker);
+  // Returns how many of the units that the lease still holds, from the first on, its worker may have begun if
+  // they are freed for this reason.
+  std::uint32_t may_be_begun(const LeaseRecord& lease, FreedCause why) const;
+  // If the job is frozen, cuts off units that came back before anybody had begun them.
+  void cut_off_returned(Job& job);
 
   // Defined in schedule.cpp
   void dispatch();
   void serve(const std::vector<Worker*>& candidates, bool only_uncovered, bool only_holders);
   bool assign(Worker& worker, bool only_held);
   Job* choose(const Worker& worker);  // the job whose units this worker gets next; null: none
+  // True if units of the job that the worker was asked for will come back in a moment
+  bool awaits_return(const Job& job, const Worker& worker) const;
   enum class Takes { nothing, later, now };
   Takes takes(Job& job, const Worker& worker);
   bool may_pin(const Job& job, const Worker& worker) const;
-  void pin(Job& job, const Digest& numeric_class);  // does nothing if the job is pinned already
+  void pin(Job& job, const Digest& numeric_class);         // does nothing if the job is pinned already
+  void keep_class(Job& job, const Digest& numeric_class);  // pins the job for good
+  // Releases the pin of a job of whose class no result was accepted: its leases are gone
+  void unpin(Job& job);
+  // Takes the leases of the job back, and so releases its pin, if they bring no result for too long although
+  // an idle worker of another class could render the job
+  void doubt_pin(Job& job);
   bool lease_from(Job& job, Worker& worker);
   std::optional<UnitCode> next_for(Job& job, const Worker& worker);
   // True if the unit is speculative (the job may end without it) and the worker has enough other work for
   // now. `units` (number) and `cost` (predicted CPU seconds) are those of the lease that is being composed.
   bool too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units, double cost) const;
   // True if a connected worker other than `but` may take units of the job and has not failed on this unit.
-  bool others_may_take(const Job& job, UnitCode code, const Worker& but) const;
+  // `proven`: only workers that have delivered results count.
+  bool others_may_take(const Job& job, UnitCode code, const Worker& but, bool proven) const;
   // Near the end of a job: takes back a lease that waits behind other work of its worker, so that an idle
   // worker can render its units. Returns true if a lease was taken back.
   bool take_back_for_idle();
@@ -224,13 +259,17 @@ template <class Which>
 void Farm::State::free_units(LeaseRecord& lease, FreedCause why, bool send_worker, Which&& which) {
   Job& job = *lease.job;
   UnitsFreed freed{job.plan.brief.job, leases.id_of(lease.seq), lease.worker->id, {}, why, lease.audit};
+  const std::uint32_t begun = may_be_begun(lease, why);
+  std::uint32_t held = 0;
   for (const UnitCode code : lease.units) {
-    if (!has(lease, code) || !which(code)) continue;
+    if (!has(lease, code)) continue;
+    const bool may_be_begun = held++ < begun;
+    if (!which(code)) continue;
     freed.units.push_back(job.key(code));
     if (!lease.audit) job.voters.note(code, lease.worker->index);
     work_appeared |= lease.audit;
     if (!detach(lease, code)) continue;
-    job.queue.put_back(code);
+    job.queue.put_back(code, may_be_begun);
     work_appeared = true;
   }
   if (!freed.units.empty()) effects.emplace_back(std::move(freed));

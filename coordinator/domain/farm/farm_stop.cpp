@@ -115,11 +115,12 @@ void Farm::State::stop_at_level(Job& job) {
 }
 
 // Decides which units are still rendered before the time limit. The available time is the CPU time that all
-// workers that may render the job have until the limit, minus the predicted cost of the job's leased units.
-// Queued units are kept, in the order of rounds, until their predicted cost uses up this time; a last unit
-// that fits only in part is kept if at least half of its cost fits. So the job ends as often before the limit
-// as after it. Leased units stay leased, however long they take: dropping slow units would bias the image.
-// This function is called again at every tick until the limit, since predictions improve.
+// workers that may render the job have until the limit, minus the predicted cost of the job's leased units
+// and of those that came back. Queued units are kept, in the order of rounds, until their predicted cost uses
+// up this time; a last unit that fits only in part is kept if at least half of its cost fits. So the job ends
+// as often before the limit as after it. Units that are begun are finished, however long they take: dropping
+// slow units would bias the image. This function is called again at every tick until the limit, since
+// predictions improve.
 void Farm::State::plan_end(Job& job, TimePoint limit) {
   if (job.adaptive_running() || !job.cost.known()) return;
   if (job.stopping == StopReason::time) {
@@ -131,6 +132,9 @@ void Farm::State::plan_end(Job& job, TimePoint limit) {
     cores += worker->available() && fits(job, *worker) ? worker->cores() : 0;
   double room = seconds(limit - now) * cores;
   for (const auto& [code, holders] : job.out) room -= job.predict(code);
+  for (TileIndex t = 0; job.queue.returned_count() > 0 && t < job.units.tiles(); ++t)
+    for (RoundIndex r = job.units.folded(t); r < job.queue.next(t); ++r)
+      if (job.queue.returned(unit_code(r, t))) room -= job.predict(unit_code(r, t));
   std::vector<RoundIndex> ends = job.begun();
   const RoundIndex last = job.queue.longest();
   for (RoundIndex round = std::ranges::min(ends); round < last && room > 0; ++round) {
@@ -142,8 +146,6 @@ void Farm::State::plan_end(Job& job, TimePoint limit) {
     }
   }
   job.cut_off(ends, StopReason::time);
-  finish_if_complete(job);
-  refresh(job);
 }
 
 void Farm::State::give_back_beyond(Job& job) {

@@ -24,16 +24,47 @@ std::uint64_t mixed(std::uint64_t x) {
 
 }  // namespace
 
+// True if the worker is of another principal than the workers that have delivered a result of the unit.
+bool Farm::State::is_outsider(const Audit& audit, const Worker& worker) const {
+  return worker.principal != workers.principal_of(audit.first) &&
+         (!audit.second || worker.principal != workers.principal_of(audit.second->first));
+}
+
+bool Farm::State::may_decide(const Job& job, const Audit& audit, const Worker& worker) const {
+  return worker.connected && !worker.draining && !worker.unhealthy_since && audit.asks(worker.index) &&
+         fits(job, worker) && !worker.blocked(job.seq, ticked);
+}
+
+bool Farm::State::may_vote(const Job& job, const Audit& audit, const Worker& worker) const {
+  if (!audit.asks(worker.index)) return false;
+  return is_outsider(audit, worker) ||
+         std::none_of(workers.all().begin(), workers.all().end(), [&](const auto& entry) {
+           return is_outsider(audit, *entry.second) && may_decide(job, audit, *entry.second);
+         });
+}
+
+bool Farm::State::outvote(WorkerIndex one, WorkerIndex other, WorkerIndex alone) const {
+  const std::string& principal = workers.principal_of(one);
+  return principal != workers.principal_of(other) || principal == workers.principal_of(alone);
+}
+
+// The worker's result of the unit decides nothing: another one must be found.
+void Farm::State::ignore_vote(Job& job, UnitCode code, WorkerIndex by) {
+  job.audits.at(code).tried.push_back(by);
+  audits_changed.insert(job.plan.brief.job);
+  work_appeared = true;
+  settle_audits(job);
+}
+
 Farm::State::Deciders Farm::State::deciders(const Job& job, const Audit& audit) const {
-  Deciders found = Deciders::none;
+  Deciders outsiders = Deciders::none, others = Deciders::none;
   for (const auto& [index, worker] : workers.all()) {
-    if (!worker->connected || worker->draining || worker->unhealthy_since || !audit.asks(index) ||
-        !fits(job, *worker) || worker->blocked(job.seq, ticked))
-      continue;
-    if (worker->available()) return Deciders::there;
-    found = Deciders::away;
+    if (!may_decide(job, audit, *worker)) continue;
+    Deciders& found = is_outsider(audit, *worker) ? outsiders : others;
+    if (found != Deciders::there) found = worker->available() ? Deciders::there : Deciders::away;
+    if (outsiders == Deciders::there) break;
   }
-  return found;
+  return outsiders != Deciders::none ? outsiders : others;
 }
 
 void Farm::State::consider_audit(Job& job, UnitCode code, WorkerIndex first) {
@@ -73,7 +104,7 @@ void Farm::State::restore_audits(Job& job, const JobRestored& event) {
 
 std::optional<UnitCode> Farm::State::audit_for(const Job& job, const Worker& worker) const {
   for (const auto& [code, audit] : job.audits)
-    if (audit.lease == 0 && audit.asks(worker.index)) return code;
+    if (audit.lease == 0 && may_vote(job, audit, worker)) return code;
   return std::nullopt;
 }
 
@@ -137,7 +168,10 @@ void Farm::State::compare(Job& job, UnitCode code, const UnitAccepted& event) {
   if (audit != job.audits.end() && audit->second.lease != 0) {
     LeaseRecord* lease = leases.find(audit->second.lease);
     if (lease->worker->id == event.worker) {
-      charge(job, event.cpu_seconds);
+      Worker& worker = *lease->worker;
+      const double cpu_seconds = believable(job, code, &worker, event.cpu_seconds, now);
+      worker.claimed += cpu_seconds;
+      shares.spend(job, cpu_seconds);
       detach(*lease, code);
       close(*lease, false);
     }
@@ -177,12 +211,14 @@ void Farm::State::agreed(Job& job, UnitCode code, const UnitAccepted& with, bool
     if (before && by == before->first)
       return found_faulty(with.unit, by, contradiction(with, before->second));
   if (!asked) return;
+  // Two workers of one principal may be one process that lies twice
+  if (audit.second && !outvote(first.worker, by, audit.second->first)) return ignore_vote(job, code, by);
   free_lease(audit.lease, FreedCause::not_wanted, true);
   job.audits.erase(code);
   audits_changed.insert(job.plan.brief.job);
   if (!audit.second) ++audited.equal;
   for (const auto& alone : {audit.second, audit.claim})
-    if (alone)
+    if (alone && outvote(first.worker, by, alone->first))
       found_faulty(
           with.unit, alone->first,
           outvoted(with.unit, alone->second, workers.name_of(first.worker), with.worker, with.digest));
@@ -217,6 +253,7 @@ void Farm::State::disagreed(Job& job, UnitCode code, const UnitAccepted& with, b
   }
   const auto [second, claimed] = *audit.second;
   if (with.digest != claimed) return undecided(job, code);
+  if (!outvote(second, by, first.worker)) return ignore_vote(job, code, by);
   found_faulty(with.unit, first.worker,
                outvoted(with.unit, first.digest, workers.name_of(second), with.worker, claimed));
 }

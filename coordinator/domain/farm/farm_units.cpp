@@ -11,6 +11,7 @@ namespace ls::coordinator {
 void Farm::State::pin(Job& job, const Digest& numeric_class) {
   if (job.numeric_class) return;
   job.numeric_class = numeric_class;
+  job.pinned_at = now;
   effects.emplace_back(JobPinned{job.plan.brief.job, numeric_class});
   // The job has a numeric class (set of machines that compute the same bits) now. So workers of this class
   // with may_begin == false, which get no units of jobs without a class, may take its units.
@@ -20,14 +21,51 @@ void Farm::State::pin(Job& job, const Digest& numeric_class) {
   }
 }
 
+void Farm::State::keep_class(Job& job, const Digest& numeric_class) {
+  pin(job, numeric_class);
+  job.class_kept |= *job.numeric_class == numeric_class;
+}
+
+void Farm::State::unpin(Job& job) {
+  if (!job.numeric_class || job.class_kept || job.leased > 0 || job.ended()) return;
+  job.passed_over.insert(*job.numeric_class);
+  job.numeric_class.reset();
+  effects.emplace_back(JobUnpinned{job.plan.brief.job});
+  work_appeared = true;
+}
+
+void Farm::State::doubt_pin(Job& job) {
+  if (!job.numeric_class || job.class_kept || !job.leasable()) return;
+  const int doublings = static_cast<int>(std::min<std::size_t>(job.passed_over.size(), 10));
+  if (now - job.pinned_at < kPinLimit * (1 << doublings)) return;
+  const Digest pinned = *std::exchange(job.numeric_class, std::nullopt);
+  const bool wanted = std::any_of(workers.all().begin(), workers.all().end(), [&](const auto& entry) {
+    const Worker& other = *entry.second;
+    return other.numeric_class != pinned && !other.saturated() && may_serve(job, other, ticked);
+  });
+  job.numeric_class = pinned;
+  if (!wanted) return;
+  for (const LeaseSeq seq : leases_of(job)) free_lease(seq, FreedCause::deadline_passed, true);
+  unpin(job);
+  refresh(job);
+}
+
 void Farm::State::on(const ClassChosen& event) {
   Job* job = find(event.job);
   if (job == nullptr || job->ended()) return;
-  pin(*job, event.numeric_class);
+  keep_class(*job, event.numeric_class);
   refresh(*job);
 }
 
 void Farm::State::on(const UnitAccepted& event) {
+  accept(event);
+  Worker* worker = workers.find(event.worker);
+  if (worker == nullptr || !worker->connected) return;
+  note_begun(*worker);
+  end_long_leases(*worker);
+}
+
+void Farm::State::accept(const UnitAccepted& event) {
   const auto unwanted = [&](std::string why) {
     effects.emplace_back(DropUnwanted{event.unit, event.worker, std::move(why)});
   };
@@ -47,27 +85,38 @@ void Farm::State::on(const UnitAccepted& event) {
   }
   if (job.units.accepted(code)) return compare(job, code, event);
 
-  if (worker != nullptr) pin(job, worker->numeric_class);
+  if (worker != nullptr) {
+    keep_class(job, worker->numeric_class);
+    proven.insert(worker->numeric_class);
+  }
   if (job.state == JobState::queued) set_state(job, JobState::running);
-  if (!job.first_ray) job.first_ray = now - from_seconds(std::clamp(event.cpu_seconds, 0.0, 3600.0));
+  const double cpu_seconds = believable(job, code, worker, event.cpu_seconds, now);
+  if (!job.first_ray) job.first_ray = now - from_seconds(cpu_seconds);
   effects.emplace_back(RecordUnit{event.unit, event.samples, event.digest, event.worker});
   settle_unit(job, code, worker);
   job.units.accept(code, {event.digest, workers.index_of(event.worker)});
   job.failures.accepted(code);
-  job.cost.measured(event.unit.tile, job.pixel_samples(code), event.cpu_seconds);
-  charge(job, event.cpu_seconds);
+  job.cost.measured(event.unit.tile, job.pixel_samples(code), cpu_seconds);
+  shares.spend(job, cpu_seconds);
   if (worker != nullptr) {
     ++worker->units_done;
-    workers.measured(*worker, event.cpu_seconds, event.wait_seconds);
+    worker->claimed += cpu_seconds;
+    workers.measured(*worker, cpu_seconds, event.wait_seconds);
     if (worker->connected) worker->warmed_up.insert(job.seq);
   }
   consider_audit(job, code, workers.index_of(event.worker));
   issue_folds(job, event.unit.tile);
+  watch_time(job);
   refresh(job);
 }
 
-void Farm::State::charge(Job& job, double cpu_seconds) {
-  if (cpu_seconds > 0 && cpu_seconds <= kMostUnitSeconds) shares.spend(job, cpu_seconds);
+double Farm::State::believable(const Job& job, UnitCode code, const Worker* worker, double reported,
+                               TimePoint at) {
+  if (!(reported > 0)) return 0;
+  const LeaseRecord* lease = worker == nullptr ? nullptr : lease_of(job, code, *worker);
+  if (lease == nullptr) return std::min(reported, job.cost.known() ? job.predict(code) : kAssumedUnitSeconds);
+  const double of_all_threads = worker->threads * seconds(at - worker->busy_since) - worker->claimed;
+  return std::clamp(std::min(seconds(at - lease->issued), of_all_threads), 0.0, reported);
 }
 
 void Farm::State::issue_folds(Job& job, TileIndex tile) {
@@ -139,16 +188,22 @@ void Farm::State::on(const UnitFailed& event) {
 }
 
 void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure) {
-  job.failures.add(code, {worker.index, worker.name, failure});
+  job.failures.add(code, {worker.index, worker.name, worker.principal, worker.proven(), failure});
   WorkerFailures& record = worker.failures[job.seq];
   const bool was_blocked = record.blocked_at(now);
   record.add(now);
   work_appeared = true;  // other workers may now take this unit
-  std::size_t known = 0, willing = 0;
+  // A process can open any number of streams, each of them a worker. So principals are counted. And where
+  // workers are there that have shown that they can render, only their failures speak against the scene.
+  std::set<std::string_view> known, proven_ones;
+  std::size_t willing = 0;
   for (const auto& [index, other] : workers.all()) {
     if (!other->connected || !fits(job, *other)) continue;
-    ++known;
-    if (!other->blocked(job.seq, now)) ++willing;
+    known.insert(other->principal);
+    const bool blocked = other->blocked(job.seq, now);
+    if (other->proven() && (!blocked || job.failures.failed_on(code, index)))
+      proven_ones.insert(other->principal);
+    if (!blocked) ++willing;
   }
   const auto report = [&](const std::string& head) {
     const PixelRect rect = job.plan.grid.rect(tile_of(code));
@@ -157,8 +212,10 @@ void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const U
   // A single report that the scene is at fault does not fail the job: the worker may have bad memory or lie.
   // It counts like any other failure.
   const std::string at_fault = failure.scene_at_fault ? "the scene cannot be rendered: " : "";
-  if (job.failures.exhausted(code, known)) return report(at_fault);
-  if (known > 0 && willing == 0) {
+  const bool only_proven = !proven_ones.empty();
+  if (job.failures.exhausted(code, (only_proven ? proven_ones : known).size(), only_proven))
+    return report(at_fault);
+  if (!known.empty() && willing == 0) {
     return report(fmt::format(
         "{}no worker is left that may try: each has failed {} units of this job; the last: ", at_fault,
         kWorkerFailuresPerJob));

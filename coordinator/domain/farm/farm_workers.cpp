@@ -7,7 +7,9 @@
 namespace ls::coordinator {
 namespace {
 constexpr int kMaxThreads = 4096;
-}
+// More classes are remembered only while workers of them are connected
+constexpr std::size_t kProvenKept = 64;
+}  // namespace
 
 void Farm::State::touch(Worker& worker) {
   workers.settle(worker);
@@ -22,6 +24,7 @@ void Farm::State::on(const WorkerJoined& event) {
   }
   worker.epoch = event.epoch;
   worker.name = event.name.empty() ? event.worker.value : event.name;
+  workers.set_principal(worker, event.principal);
   worker.numeric_class = event.numeric_class;
   worker.platform = event.platform;
   worker.threads = std::clamp(event.threads, 1, kMaxThreads);
@@ -64,7 +67,9 @@ void Farm::State::on(const WorkerLost& event) {
 void Farm::State::lose(Worker& worker, FreedCause why) {
   workers.connected(worker, false);
   worker.lost_at = now;
-  while (!worker.leases.empty()) free_lease(*worker.leases.begin(), why, false);
+  // The newest lease goes first: which units may be begun is derived from the worker's earlier leases.
+  while (!worker.leases.empty()) free_lease(*worker.leases.rbegin(), why, false);
+  for (const auto& [seq, job] : jobs) cut_off_returned(*job);
   workers.settle(worker);
   effects.emplace_back(WorkerStateChanged{worker.id, worker.state(), std::string(to_string(why))});
   work_appeared = true;  // other workers may now take the units of this worker
@@ -114,12 +119,18 @@ void Farm::State::on(const LeaseCameBack& event) {
   Worker* worker = workers.find(event.worker);
   LeaseRecord* lease = leases.find(event.returned.lease);
   if (worker == nullptr || lease == nullptr || lease->worker != worker) return;
-  if (!worker->draining) worker->pause = Pause::returned;
+  // A worker that answers a recall can take other units at once
+  const bool recalled = lease->recalled.has_value();
+  lease->comes_back = false;
+  if (!worker->draining && !recalled) worker->pause = Pause::returned;
   std::set<UnitCode> back;
   for (const UnitKey& unit : event.returned.unrendered) back.insert(unit_code(unit.round, unit.tile));
   workers.settle(*worker);
   work_appeared = true;  // other workers may now take the units of this worker
-  free_units(*lease, FreedCause::returned, false, [&](UnitCode code) { return back.contains(code); });
+  Job& job = *lease->job;
+  free_units(*lease, recalled ? FreedCause::recalled : FreedCause::returned, false,
+             [&](UnitCode code) { return back.contains(code); });
+  cut_off_returned(job);
 }
 
 void Farm::State::on(const Tick&) {
@@ -130,14 +141,18 @@ void Farm::State::on(const Tick&) {
   for (const auto& [seq, job] : jobs)
     if (!job->audits.empty()) settle_audits(*job);
   for (const auto& [seq, job] : jobs) {
+    watch_time(*job);
     if (!job->leasable() || job->frozen) continue;
-    const auto limit = job->time_limit(now);
-    if (limit && now >= *limit) freeze(*job, StopReason::time);
     // The units that are rendered before the time limit are chosen early, because leases granted later might
     // extend beyond the limit
-    else if (limit && seconds(*limit - now) <= 2 * kTimePlanned)
-      plan_end(*job, *limit);
+    const auto limit = job->time_limit(now);
+    if (!limit || seconds(*limit - now) > 2 * kTimePlanned) continue;
+    plan_end(*job, *limit);
+    finish_if_complete(*job);
+    refresh(*job);
   }
+  for (const auto& [index, worker] : workers.all()) end_long_leases(*worker);
+  for (const auto& [seq, job] : jobs) doubt_pin(*job);
   work_appeared = true;
   for (const WorkerIndex index : workers.wanting_work()) {
     if (!workers.at(index).saturated()) dirty.insert(index);  // an idle worker may copy overdue units
@@ -151,7 +166,9 @@ void Farm::State::expire_leases() {
     workers.settle(worker);
     // The worker is not told to stop: if it recovers and delivers results before other workers do, they are
     // accepted.
+    Job& job = *lease->job;
     free_lease(lease->seq, FreedCause::deadline_passed, false);
+    cut_off_returned(job);
   }
 }
 
@@ -177,6 +194,8 @@ void Farm::State::forgive_and_forget() {
     workers.forget(*worker);
   }
   if (workers.has_many_names()) forget_names();
+  if (proven.size() > kProvenKept)
+    std::erase_if(proven, [&](const Digest& one) { return workers.of_class(one).workers == 0; });
 }
 
 void Farm::State::forget_names() {

@@ -13,6 +13,7 @@ namespace {
 
 struct LeaseSize {
   std::uint64_t units = 1;
+  std::uint64_t new_tiles = 1;  // at most so many of the units are of tiles whose cost is unknown
   double seconds = 0;  // CPU seconds: units are added to the lease until their predicted cost reaches this
 };
 
@@ -28,7 +29,9 @@ double seconds_left(const Job& job, const Worker& worker, TimePoint now) {
 // equally among the farm's `farm_threads` threads, each worker would get a share in proportion to its
 // threads; a lease holds half of this share. As fewer and fewer units wait, leases shrink, and all threads
 // end at about the same time. A lease also ends when its predicted cost reaches LeaseSize::seconds, which
-// shrinks shortly before the job's time limit.
+// shrinks shortly before the job's time limit. Of tiles that have no result yet, a lease has at most as many
+// units as there are tiles with results, or a few for each thread: some cheap tiles do not tell what the rest
+// of the image costs.
 LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, TimePoint now) {
   const std::uint64_t threads = static_cast<std::uint64_t>(worker.threads);
   const std::uint64_t halves = 2 * static_cast<std::uint64_t>(std::max(farm_threads, 1));
@@ -37,10 +40,10 @@ LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, Tim
   // kMaxLeasesPerWorker leases before all its threads have work.
   const std::uint64_t least = (kUnitsAThread * threads + kMaxLeasesPerWorker - 1) / kMaxLeasesPerWorker;
   const std::uint64_t share = std::max(least, (waiting * threads + halves - 1) / halves);
-  const std::uint64_t most =
-      job.cost.known() ? kMaxLeaseUnits : std::min<std::uint64_t>(threads, kMaxLeaseUnits);
+  const std::uint64_t new_tiles =
+      job.cost.known() ? std::max<std::uint64_t>(4 * threads, job.cost.tiles_known()) : threads;
   const double lasts = std::min(kLeaseSeconds, seconds_left(job, worker, now));
-  return {std::min(share, most), lasts * worker.cores()};
+  return {std::min<std::uint64_t>(share, kMaxLeaseUnits), new_tiles, lasts * worker.cores()};
 }
 
 // True if the job's time limit forbids leasing this unit to the worker: the limit has passed, or the worker
@@ -88,12 +91,7 @@ bool Farm::State::take_back_for_idle() {
 // True if the worker certainly has not begun this lease: it processes its leases in order, and the units of
 // its earlier leases keep all its threads busy.
 bool Farm::State::untouched(const LeaseRecord& lease) const {
-  std::uint32_t units = 0;
-  for (const LeaseSeq seq : lease.worker->leases) {
-    if (seq >= lease.seq) break;
-    units += leases.all().at(seq).remaining;
-  }
-  return lease.reported == 0 && units >= static_cast<std::uint32_t>(lease.worker->threads);
+  return lease.reported == 0 && units_before(lease) >= static_cast<std::uint32_t>(lease.worker->threads);
 }
 
 // Returns the predicted seconds until the worker begins the lease; 0 if it may have begun.
@@ -120,10 +118,11 @@ LeaseRecord* Farm::State::longest_waiting_for(const Worker& idle) {
     // The idle worker must be able to begin immediately: it has loaded the job's world and may take these
     // units.
     if (lease.audit || lease.worker == &idle || !idle.warmed_up.contains(job.seq) ||
-        !may_serve(job, idle, ticked) || !job.leasable() || room(job, idle) < lease.remaining)
+        !may_serve(job, idle, ticked) || !job.leasable() || room(job, idle) < lease.remaining ||
+        awaits_return(job, idle))
       continue;
     const bool excluded = std::any_of(lease.units.begin(), lease.units.end(), [&](UnitCode code) {
-      return job.failures.failed_on(code, idle.index) || out_of_time(job, idle, code, now);
+      return !job.failures.attempts(code).empty() || out_of_time(job, idle, code, now);
     });
     const double wait = excluded ? 0 : waits_behind_others(lease);
     if (wait > longest) found = &lease, longest = wait;
@@ -143,27 +142,55 @@ void Farm::State::serve(const std::vector<Worker*>& candidates, bool only_uncove
   }
 }
 
+// What other workers give back matters if the job is frozen: a unit that came back may be cut off as soon as
+// those of later rounds have come back, too. A worker of an older version does not answer, so this ends by
+// itself.
+bool Farm::State::awaits_return(const Job& job, const Worker& worker) const {
+  const auto expected = [&](const LeaseRecord& lease) {
+    return lease.job == &job && lease.comes_back && ticked < *lease.recalled + kSpeculateSlack;
+  };
+  if (job.frozen)
+    return std::any_of(leases.all().begin(), leases.all().end(),
+                       [&](const auto& one) { return expected(one.second); });
+  return std::any_of(worker.leases.begin(), worker.leases.end(),
+                     [&](LeaseSeq seq) { return expected(leases.all().at(seq)); });
+}
+
 Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
   if (!may_serve(job, worker, ticked) || !may_pin(job, worker)) return Takes::nothing;
   if (audit_for(job, worker)) return Takes::now;
+  if (awaits_return(job, worker)) return Takes::nothing;
   const auto code = room(job, worker) > 0 ? next_for(job, worker) : std::nullopt;
   if (!code) return Takes::nothing;
   return too_early(job, worker, *code, 0, 0) ? Takes::later : Takes::now;
 }
 
-// A worker that is alone in its numeric class (machines that compute the same bits) cannot be audited: no
-// other worker can check its results. So, if another class has several workers that fit the job, the job may
-// not be pinned to this worker's class. Without audits the job may be pinned to any class.
+// Decides whether the worker may take the first lease of a job, and so pin it to its numeric class (machines
+// that compute the same bits). Three preferences decide:
+// 1. Another class than one that had leases of this job and brought no result, if an idle worker has it.
+// 2. A class of which a result was accepted before, if an idle worker has it: anybody can announce a class.
+// 3. A class of several workers, so that they can check each other's results in audits. This one waits for
+//    busy workers, too. A class without results so far does not count against one with results.
 bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
-  if (job.numeric_class || options.audit_rate <= 0 || workers.of_class(worker.numeric_class).workers > 1)
-    return true;
+  if (job.numeric_class) return *job.numeric_class == worker.numeric_class;
+  if (workers.classes() < 2) return true;
+  const bool known = proven.contains(worker.numeric_class);
+  const bool passed = job.passed_over.contains(worker.numeric_class);
+  const bool alone = options.audit_rate > 0 && workers.of_class(worker.numeric_class).workers <= 1;
+  if (!passed && !alone && (known || proven.empty())) return true;
   std::map<Digest, int> others;
   for (const auto& [index, other] : workers.all()) {
+    const Digest& another = other->numeric_class;
     const bool there = other->connected && !other->draining && !other->unhealthy_since &&
                        other->pause != Pause::silent && other->pause != Pause::stuck &&
-                       other->numeric_class != worker.numeric_class;
-    if (there && fits(job, *other) && !other->blocked(job.seq, ticked) && ++others[other->numeric_class] > 1)
-      return false;
+                       another != worker.numeric_class;
+    if (!there || !fits(job, *other) || other->blocked(job.seq, ticked)) continue;
+    const bool idle =
+        other->available() && other->wants_more() && !other->saturated() && room(job, *other) > 0;
+    const bool other_passed = job.passed_over.contains(another), other_known = proven.contains(another);
+    if ((passed && !other_passed && idle) || (!known && other_known && !other_passed && idle)) return false;
+    if ((other_passed && !passed) || (known && !other_known)) continue;
+    if (alone && ++others[another] > 1) return false;
   }
   return true;
 }
@@ -197,8 +224,12 @@ bool Farm::State::assign(Worker& worker, bool only_held) {
 }
 
 std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker) {
+  // A unit that has failed is rendered by another worker, and rather by one that has delivered results: then
+  // it is known whether the unit or the worker is at fault.
   const auto excluded = [&](UnitCode code) {
-    return job.failures.failed_on(code, worker.index) && others_may_take(job, code, worker);
+    if (job.failures.attempts(code).empty()) return false;
+    if (!worker.proven() && others_may_take(job, code, worker, true)) return true;
+    return job.failures.failed_on(code, worker.index) && others_may_take(job, code, worker, false);
   };
   const auto code = job.queue.front(job.units, excluded);
   return code && !out_of_time(job, worker, *code, now) ? code : std::nullopt;
@@ -220,9 +251,12 @@ bool Farm::State::lease_from(Job& job, Worker& worker) {
   size.units = std::min<std::uint64_t>(size.units, room(job, worker));
   std::vector<UnitCode> units;
   double cost = 0;
+  std::uint64_t new_tiles = 0;
   while (units.size() < size.units && (units.empty() || cost < size.seconds)) {
     const auto code = next_for(job, worker);
     if (!code || too_early(job, worker, *code, units.size(), cost)) break;
+    new_tiles += !job.cost.knows(tile_of(*code));
+    if (new_tiles > size.new_tiles) break;
     job.queue.pop(*code);
     units.push_back(*code);
     cost += job.predict(*code);
@@ -236,10 +270,10 @@ bool Farm::State::lease_from(Job& job, Worker& worker) {
   return true;
 }
 
-bool Farm::State::others_may_take(const Job& job, UnitCode code, const Worker& but) const {
+bool Farm::State::others_may_take(const Job& job, UnitCode code, const Worker& but, bool proven) const {
   return std::any_of(workers.all().begin(), workers.all().end(), [&](const auto& entry) {
     const Worker& other = *entry.second;
-    return other.index != but.index && may_serve(job, other, ticked) &&
+    return other.index != but.index && (!proven || other.proven()) && may_serve(job, other, ticked) &&
            !job.failures.failed_on(code, other.index);
   });
 }
@@ -251,6 +285,8 @@ void Farm::State::copy_overdue(Worker& worker) {
     Job& job = *lease.job;
     const Duration due = from_seconds(kSpeculateAfter * seconds(lease.predicted)) + kSpeculateSlack;
     if (lease.worker == &worker || now < lease.issued + due) continue;
+    // The units of a recalled lease that are not begun come back in a moment
+    if (lease.recalled && now < *lease.recalled + kSpeculateSlack) continue;
     if (!job.leasable() || !may_serve(job, worker, ticked)) continue;
     std::vector<UnitCode> units;
     const std::uint32_t most = room(job, worker);

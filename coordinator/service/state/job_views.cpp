@@ -201,6 +201,24 @@ JobView JobViews::job(const JobEntry& entry) const {
   return v;
 }
 
+namespace {
+
+// Returns the wall-clock seconds between the ends of two successive frames, mean over the last kFramesTimed
+// frames that are done; 0 if fewer than two are. Only the last ones count, since workers come and go.
+double seconds_between_ends(const Sequence& sequence) {
+  constexpr std::size_t kFramesTimed = 16;
+  std::vector<double> ends;
+  for (const EntryPtr& frame : sequence.frames)
+    if (frame->stored.state == JobState::done && frame->stored.totals.ended_unix > 0)
+      ends.push_back(frame->stored.totals.ended_unix);
+  if (ends.size() < 2) return 0;
+  std::sort(ends.begin(), ends.end());
+  const std::size_t gaps = std::min(kFramesTimed, ends.size() - 1);
+  return (ends.back() - ends[ends.size() - 1 - gaps]) / static_cast<double>(gaps);
+}
+
+}  // namespace
+
 JobView JobViews::sequence(const JobId& id, const Sequence& sequence, bool with_frames) const {
   std::vector<JobView> views;
   views.reserve(sequence.frames.size());
@@ -218,6 +236,7 @@ JobView JobViews::sequence(const JobId& id, const Sequence& sequence, bool with_
                       .warnings = sequence.warnings,
                       .cores = farm_.cores_connected(),
                       .workers = farm_.workers_connected()};
+  facts.frame_seconds = seconds_between_ends(sequence);
   if (began > 0)
     facts.elapsed_seconds = std::max(0.0, (open || ended == 0 ? system_unix_seconds() : ended) - began);
   JobView view = sequence_view(facts, views);

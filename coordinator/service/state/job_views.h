@@ -68,12 +68,16 @@ struct SequenceFacts {
   double elapsed_seconds = 0;
   double cores = 0;  // number of cores of the connected workers
   int workers = 0;   // number of connected workers
+  // Wall-clock seconds from the end of one frame to that of the next, mean over the frames that ended last;
+  // 0: fewer than two frames have ended
+  double frame_seconds = 0;
 };
 // Makes the view of a sequence from the views of its frames (at least one, in ascending order). The
 // sequence's error is the mean over the pixels of all frames that have an error estimate; its interval treats
-// these estimates as independent. The cost of the remaining frames is extrapolated from the work so far. The
-// remaining time assumes as many cores as the sequence's limits allow and its units (rounds of tiles) can
-// keep busy.
+// these estimates as independent. The cost of the remaining frames is extrapolated from the work so far: CPU
+// seconds, and the time in which a worker loads a frame. The remaining time assumes as many cores and workers
+// as the sequence's limits allow and its units (rounds of tiles) can keep busy. It is not less than the
+// remaining frames take at the rate of the last ones.
 JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frames);
 
 FrameView frame_view(const JobView& frame);

@@ -81,25 +81,37 @@ std::string trouble_of(std::span<const JobView> frames) {
 
 struct WorkLeft {
   double core_left = 0, core_queued = 0;
+  // Seconds in which a worker loads frames and prepares them for rendering; meanwhile it renders none of
+  // their units
+  double load_left = 0, load_queued = 0;
+  double frames = 0;  // number of frames that are left; parts of a frame count in part
   std::uint64_t units = 0;
 };
 
 // Predicts the remaining work. A frame that has not begun is expected to cost as much as the others on
-// average: the sum of their core seconds so far, divided by the sum of their progress (0 to 1 each).
+// average: the sum of their core seconds so far, divided by the sum of their progress (0 to 1 each). A frame
+// that has results is loaded already.
 WorkLeft work_left(std::span<const JobView> frames) {
-  double spent = 0, progress = 0;
+  double spent = 0, progress = 0, loading = 0, loaded = 0;
   WorkLeft out;
-  for (const JobView& f : frames)
-    if (f.units_done > 0) spent += f.core_seconds, progress += f.progress;
-  const double each = progress > 0 ? spent / progress : 0;
+  for (const JobView& f : frames) {
+    if (f.units_done == 0) continue;
+    spent += f.core_seconds, progress += f.progress;
+    loading += f.time.load + f.time.build, loaded += 1;
+  }
+  const double each = progress > 0 ? spent / progress : 0, each_load = loaded > 0 ? loading / loaded : 0;
   for (const JobView& f : frames) {
     if (is_terminal(f.state)) continue;
     out.core_left += each * (1 - f.progress);
+    out.load_left += f.units_done > 0 ? 0 : each_load;
+    out.frames += 1 - f.progress;
     out.units += f.units_total - std::min(f.units_total, f.units_done);
-    if (f.state == JobState::queued)
+    if (f.state == JobState::queued) {
       out.core_queued += f.queued_core_seconds > 0 ? f.queued_core_seconds : each;
-    else if (f.state == JobState::running)
+      out.load_queued += each_load;
+    } else if (f.state == JobState::running) {
       out.core_queued += f.queued_core_seconds;
+    }
   }
   return out;
 }
@@ -125,12 +137,17 @@ void add_up(JobView& v, std::span<const JobView> frames) {
   if (pixels > 0) v.spp_done /= pixels, v.progress /= pixels;
 }
 
+// Returns how many workers of the farm may render the sequence at the same time.
+double workers_for(const JobView& v, const SequenceFacts& facts) {
+  const double workers = facts.workers;
+  return v.max_workers ? std::min(workers, static_cast<double>(*v.max_workers)) : workers;
+}
+
 // Returns how many cores of the farm the sequence can use. The number is limited by the sequence's limits on
 // workers and units, and by its number of remaining units, since a unit runs on one thread.
 double cores_for(const JobView& v, const SequenceFacts& facts, std::uint64_t units_left) {
   double cores = facts.cores;
-  if (v.max_workers && facts.workers > 0)
-    cores *= std::min(1., static_cast<double>(*v.max_workers) / facts.workers);
+  if (facts.workers > 0) cores *= workers_for(v, facts) / facts.workers;
   if (v.max_units) cores = std::min(cores, static_cast<double>(*v.max_units));
   return units_left > 0 ? std::min(cores, static_cast<double>(units_left)) : cores;
 }
@@ -196,10 +213,13 @@ JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frame
   add_up(v, frames);
   if (v.state == JobState::done) v.progress = 1;
   const WorkLeft out = work_left(frames);
-  v.queued_core_seconds = out.core_queued;
+  // A worker that loads a frame keeps all its threads from rendering the frame.
+  v.queued_core_seconds =
+      out.core_queued + out.load_queued * (facts.workers > 0 ? facts.cores / facts.workers : 1);
   const bool goes_on = v.state == JobState::running || v.state == JobState::queued;
   if (const double cores = cores_for(v, facts, out.units); goes_on && out.core_left > 0 && cores > 0)
-    v.eta_seconds = out.core_left / cores;
+    v.eta_seconds = std::max(out.core_left / cores + out.load_left / std::max(1., workers_for(v, facts)),
+                             out.frames * facts.frame_seconds);
   v.frames = count(frames, facts.range);
   return v;
 }

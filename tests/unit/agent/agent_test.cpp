@@ -159,6 +159,24 @@ TEST_F(AgentTest, RendersTheOthersWhenOneLeaseIsCancelled) {
   EXPECT_TRUE(drain());
 }
 
+// Its only thread hangs in the first unit of the lease.
+TEST_F(AgentTest, GivesBackWhatItHasNotBegunOfALeaseThatIsRecalled) {
+  start({}, {.fault = {FakeFault::Kind::hang, -1, 0}});
+  coordinator_.tell(assign("l-1", "j-1", {0, 1, 2}));
+  coordinator_.tell(assign("l-2", "j-1", {3}));
+  wait_while_time_passes(
+      [](auto& c) { return !c.progress.empty() && c.progress.back().activity == "rendering"; });
+
+  coordinator_.tell(RecallLease{LeaseId{"l-1"}});
+  coordinator_.wait_for([](auto& c) { return !c.returned.empty(); });
+
+  const LeaseReturned rest{LeaseId{"l-1"}, {{JobId{"j-1"}, 1, 0}, {JobId{"j-1"}, 2, 0}}};
+  EXPECT_EQ(coordinator_.returned, std::vector{rest});
+  EXPECT_EQ(coordinator_.draining, 0);
+  coordinator_.tell(CancelLease{LeaseId{"l-1"}});
+  coordinator_.wait_for([](auto& c) { return tiles_of(c.results) == std::set<TileIndex>{3}; });
+}
+
 TEST_F(AgentTest, EndsWithTheCoordinatorsReasonWhenRefusedForGood) {
   coordinator_.answer_hello_with(Refused{{Errc::unauthenticated, "wrong join token"}, false});
   start();

@@ -99,10 +99,24 @@ TEST(HeldLeases, ReturnsWhatWaitsAndKeepsWhatRuns) {
   table.add(lease("b", kOther, {2}), nothing_handed_in);
   table.take(any);
 
-  EXPECT_THAT(table.return_waiting(&kJob), testing::ElementsAre(LeaseReturned{LeaseId{"a"}, {key(1)}}));
+  EXPECT_THAT(table.return_waiting(kJob), testing::ElementsAre(LeaseReturned{LeaseId{"a"}, {key(1)}}));
   EXPECT_THAT(table.return_waiting(), testing::ElementsAre(LeaseReturned{LeaseId{"b"}, {{kOther, 2, 0}}}));
   EXPECT_EQ(table.finish(key(0)), LeaseId{"a"});
   EXPECT_EQ(table.lease_count(), 0U);
+}
+
+TEST(HeldLeases, ReturnsOfOneLeaseWhatIsNotBegun) {
+  HeldLeases table;
+  table.add(lease("a", kJob, {0, 1, 2}), nothing_handed_in);
+  table.add(lease("b", kJob, {3}), nothing_handed_in);
+  table.take(any);
+
+  EXPECT_THAT(table.return_waiting(LeaseId{"a"}),
+              testing::ElementsAre(LeaseReturned{LeaseId{"a"}, {key(1), key(2)}}));
+  EXPECT_TRUE(table.return_waiting(LeaseId{"a"}).empty()) << "all that is left of it is begun";
+  EXPECT_TRUE(table.return_waiting(LeaseId{"unknown"}).empty());
+  EXPECT_EQ(table.finish(key(0)), LeaseId{"a"});
+  EXPECT_EQ(table.take(any)->key, key(3));
 }
 
 UnitResult result(TileIndex tile) {

@@ -25,6 +25,8 @@ class Clockwork {
   std::function<double(const UnitKey&)> cost = [](const UnitKey&) { return 0.5; };  // core seconds
   // Factors on the cost, for workers that are slower than others
   std::map<std::string, double> slow;
+  // Core seconds that these workers report for each unit, whatever it has cost
+  std::map<std::string, double> lies;
   // Core seconds that each job has used
   std::map<std::string, double> seconds;
   // Number of units rendered, by job and worker
@@ -35,12 +37,19 @@ class Clockwork {
   std::map<std::string, double> finished;
   std::function<Digest(const std::string& worker, const UnitKey&, const SampleRange&)> pixels =
       [](const std::string&, const UnitKey& unit, const SampleRange& range) { return honest(unit, range); };
+  // When the first unit of a lease began and its last one ended, in seconds, and how long its longest one
+  // took
+  struct Span {
+    double begun = 0, ended = 0, longest = 0;
+  };
+  std::map<LeaseId, Span> leases;
   std::vector<Effect> effects;  // all effects except folds and assignments
 
   void join(const std::string& name, int threads, std::uint64_t memory = 0, std::vector<Digest> blobs = {}) {
     threads_[name] = threads;
     note(rig.join(name, threads, 1, {}, memory, std::move(blobs)));
   }
+  void send(const Event& event) { note(rig.send(event)); }
   // The stream breaks; results of the units that the worker holds still arrive.
   void lose(const std::string& name) { note(rig.lose(name)); }
   double now() const { return ls::seconds(rig.now.time_since_epoch()) - begin_; }
@@ -97,7 +106,10 @@ class Clockwork {
         const double factor = slow.contains(id.value) ? slow.at(id.value) : 1;
         const Rig::Held unit = held.front();
         held.pop_front();
-        busy_.push({now() + factor * cost(unit.key()), ++order_, id.value, unit});
+        const double end = now() + factor * cost(unit.key());
+        Span& span = leases.try_emplace(unit.lease, Span{now(), 0, 0}).first->second;
+        span.longest = std::max(span.longest, end - now());
+        busy_.push({end, ++order_, id.value, unit});
       }
     }
   }
@@ -105,14 +117,29 @@ class Clockwork {
     --working_[done.worker];
     const UnitKey key = done.unit.key();
     const double cpu = cost(key);
+    leases[done.unit.lease].ended = now();
     seconds[key.job.value] += cpu;
     ++units[key.job.value][done.worker];
     const Digest digest = pixels(done.worker, key, done.unit.unit.samples);
     if (!accepted.contains(key)) arrived[key] = digest;
-    note(rig.send(UnitAccepted{key, done.unit.unit.samples, digest, {done.worker}, cpu}));
+    const auto lie = lies.find(done.worker);
+    note(rig.send(UnitAccepted{
+        key, done.unit.unit.samples, digest, {done.worker}, lie == lies.end() ? cpu : lie->second}));
+  }
+  // A worker that is told to give back the rest of a lease returns the units that it has not begun.
+  void answer(const Send& sent) {
+    const auto* recall = std::get_if<RecallLease>(&sent.message);
+    if (recall == nullptr) return;
+    LeaseReturned returned{recall->lease, {}};
+    std::erase_if(rig.held[sent.worker], [&](const Rig::Held& h) {
+      if (h.lease == recall->lease) returned.unrendered.push_back(h.key());
+      return h.lease == recall->lease;
+    });
+    if (!returned.unrendered.empty()) note(rig.send(LeaseCameBack{sent.worker, returned}));
   }
   void note(std::vector<Effect> come) {
     for (Effect& e : come) {
+      if (const auto* sent = std::get_if<Send>(&e)) answer(*sent);
       if (const auto* r = std::get_if<RecordUnit>(&e)) accepted[r->unit] = r->digest;
       if (const auto* f = std::get_if<JobFinished>(&e)) finished[f->job.value] = now();
       if (const auto* d = std::get_if<TileDiscarded>(&e))

@@ -66,6 +66,13 @@ const Story kStories[] = {
        const Rig::Held unit = rig.take("w");
        return rig.send(LeaseCameBack{{"w"}, {unit.lease, {unit.key()}}});
      }},
+    {FreedCause::recalled,
+     [](Rig& rig) {
+       lend(rig);
+       const Rig::Held unit = rig.held[{"w"}].back();
+       rig.send(JobStopped{{"j"}});
+       return rig.send(LeaseCameBack{{"w"}, {unit.lease, {unit.key()}}});
+     }},
     {FreedCause::failed,
      [](Rig& rig) {
        lend(rig);

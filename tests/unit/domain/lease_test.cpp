@@ -85,7 +85,7 @@ TEST(Lease, ShrinksAtTheTail) {
   rig.cpu_seconds = 0.01;
   rig.join("a", 2);
   rig.join("b", 2);
-  rig.submit(plan_of("j", 400, 2));
+  rig.submit(plan_of("j", 400, 4));
 
   std::vector<std::size_t> sizes;
   for (const auto& [id, message] : sent<AssignLease>(rig.render_all()))
@@ -153,6 +153,7 @@ TEST(Lease, AJobIsPinnedToTheNumericClassOfItsFirstLease) {
   const auto pinned = of<JobPinned>(rig.submit(plan_of("j", 100, 64)));
   ASSERT_EQ(pinned.size(), 1u);
   EXPECT_EQ(pinned[0].numeric_class, digest_number(1));
+  rig.render("a");
 
   EXPECT_TRUE(sent<AssignLease>(rig.join("b", 1, 2)).empty());
   EXPECT_EQ(rig.farm.why_waiting({"j"}), "") << "a may take it";
@@ -309,19 +310,20 @@ TEST(Deadline, FollowsTheMeasuredCost) {
 }
 
 // Runs a job with two workers until its cost is measured, "fast" has rendered all its units, and no unit
-// waits.
-void run_dry(Rig& rig, double cpu_seconds) {
+// waits. Units of "fast" take `fast_seconds`.
+void run_dry(Rig& rig, double cpu_seconds, double fast_seconds) {
   rig.cpu_seconds = cpu_seconds;
   rig.join("slow", 1);
   rig.submit(plan_of("j", 8, 2));
   rig.join("fast", 1);
   rig.render("slow");
+  rig.cpu_seconds = fast_seconds;
   while (rig.worker("fast").units_out > 0 && rig.worker("slow").units_out > 1) rig.render("fast");
 }
 
 TEST(TakingBack, AnIdleWorkerGetsWhatHasNotBeenBegunElsewhere) {
   Rig rig;
-  run_dry(rig, 1.0);
+  run_dry(rig, .5, .001);  // nothing is overdue yet: kSpeculateSlack
   EXPECT_EQ(rig.worker("slow").units_out, 1u) << "what it is rendering stays";
   while (rig.worker("fast").units_out > 0) rig.render("fast");
   EXPECT_EQ(rig.worker("slow").units_out, 1u);
@@ -332,11 +334,12 @@ TEST(TakingBack, AnIdleWorkerGetsWhatHasNotBeenBegunElsewhere) {
 
 TEST(TakingBack, TheWorkerThatWaitedIsToldAndAResultThatComesAllTheSameCounts) {
   Rig rig;
-  rig.cpu_seconds = 1;
+  rig.cpu_seconds = .5;  // nothing is overdue yet: kSpeculateSlack
   rig.join("slow", 1);
   rig.submit(plan_of("j", 4, 2));
   rig.join("fast", 1);
   rig.render("slow");
+  rig.cpu_seconds = .001;
   const auto waiting = rig.held[{"slow"}];
   ASSERT_EQ(waiting.size(), 2u);
   ASSERT_EQ(rig.held[{"fast"}].size(), 1u);
@@ -360,7 +363,7 @@ TEST(TakingBack, WorkThatWillBeBegunAtOnceStaysWhereItIs) {
   // "slow" holds three units; the last one waits for the two others.
   for (const auto& [share, stays] : {std::pair{.45, 3u}, {.55, 2u}}) {
     Rig rig;
-    run_dry(rig, share * seconds(kTakeBackAfter));
+    run_dry(rig, share * seconds(kTakeBackAfter), share * seconds(kTakeBackAfter));
     if (stays == 3) {
       EXPECT_EQ(rig.worker("fast").units_out, 0u);
       EXPECT_EQ(rig.worker("slow").units_out, 3u);
@@ -373,7 +376,7 @@ TEST(TakingBack, WorkThatWillBeBegunAtOnceStaysWhereItIs) {
 
 TEST(TakingBack, AWorkerThatHasNotLoadedTheJobTakesNothing) {
   Rig rig;
-  rig.cpu_seconds = 1;
+  rig.cpu_seconds = .5;  // nothing is overdue yet: kSpeculateSlack
   rig.join("slow", 1);
   rig.submit(plan_of("j", 4, 2));
   rig.render("slow");

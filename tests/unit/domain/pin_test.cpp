@@ -48,7 +48,8 @@ TEST(Pin, WhereNothingIsAuditedTheFirstWorkerPins) {
 TEST(Pin, AWorkerOfAnotherVersionFinishesJobsOfItsClassAndBeginsNone) {
   Rig rig;
   rig.join("old", 1, 1);
-  rig.submit(plan_of("begun", 1, 2));
+  rig.submit(plan_of("begun", 2, 2));
+  rig.render("old");
   ASSERT_EQ(rig.farm.job({"begun"})->numeric_class, digest_number(1));
   rig.lose("old");
 
@@ -98,6 +99,96 @@ TEST(Pin, TheClassOfTheFirstResultToBeStoredIsThatOfTheJob) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
+// Two streams of a made-up class take the first leases of a job and never deliver.
+TEST(Pin, AClassWhoseLeasesAreGoneWithoutAResultIsGivenUp) {
+  Rig rig;
+  rig.join("x1", 64, 9);
+  rig.join("x2", 64, 9);
+  rig.submit(plan_of("j", 40, 2));
+  rig.join("honest", 1, 1);
+  ASSERT_EQ(rig.job().numeric_class, digest_number(9));
+  EXPECT_TRUE(rig.held[{"honest"}].empty());
+
+  rig.lose("x1");
+  const auto effects = rig.lose("x2");
+
+  EXPECT_EQ(of<JobUnpinned>(effects).size(), 1u);
+  EXPECT_EQ(rig.job().numeric_class, digest_number(1));
+  EXPECT_FALSE(rig.held[{"honest"}].empty());
+  EXPECT_EQ(audit(rig.farm), "");
+}
+
+TEST(Pin, AClassThatBringsNoResultForLongGivesWayToAnIdleWorkerOfAnother) {
+  for (const bool others : {true, false}) {
+    Rig rig;
+    rig.join("x1", 64, 9);
+    rig.submit(plan_of("j", 40, 2));
+    if (others) rig.join("honest", 1, 1);
+    const auto report = [&] {
+      LeaseProgress progress{{"x1"}, {}};
+      for (const auto& held : rig.held[{"x1"}]) progress.leases.push_back({held.lease, 0});
+      rig.send(progress);
+    };
+
+    for (Duration waited{}; waited <= kPinLimit; waited += 10s) report(), rig.pass(10s);
+
+    EXPECT_EQ(rig.job().numeric_class, digest_number(others ? 1 : 9));
+    EXPECT_EQ(rig.held[{"honest"}].empty(), !others);
+    EXPECT_EQ(audit(rig.farm), "");
+  }
+}
+
+TEST(Pin, AClassOfWhichAResultWasAcceptedStays) {
+  Rig rig;
+  rig.join("a", 1, 1);
+  rig.submit(plan_of("j", 40, 2));
+  rig.render("a");
+  rig.join("b", 1, 2);
+
+  rig.lose("a");
+  rig.pass(2 * kPinLimit);
+
+  EXPECT_EQ(rig.job().numeric_class, digest_number(1));
+  EXPECT_TRUE(rig.held[{"b"}].empty());
+}
+
+TEST(Pin, ANewJobGoesToIdleWorkersOfAClassThatHasDelivered) {
+  for (const double rate : {0., .01}) {
+    Rig rig(audited(rate));
+    rig.join("honest", 1, 1);
+    rig.submit(plan_of("first", 1, 2));
+    rig.render_all();
+    ASSERT_EQ(rig.farm.job({"first"})->state, JobState::done);
+    rig.join("x1", 64, 9);
+    rig.join("x2", 64, 9);
+
+    rig.submit(plan_of("j", 40, 2));
+
+    EXPECT_EQ(rig.job().numeric_class, digest_number(1)) << "audit rate " << rate;
+    EXPECT_EQ(audit(rig.farm), "");
+    // The honest worker is busy now: another job does not wait for it.
+    rig.submit(plan_of("k", 40, 2));
+    EXPECT_EQ(rig.farm.job({"k"})->numeric_class, digest_number(9));
+    EXPECT_EQ(audit(rig.farm), "");
+  }
+}
+
+// Its unit fails on the only worker of the class that has delivered; the other class must get its turn.
+TEST(Pin, AFailedUnitGoesToAnotherClassIfNoResultWasAccepted) {
+  Rig rig;
+  rig.join("honest", 1, 1);
+  rig.submit(plan_of("first", 1, 2));
+  rig.render_all();
+  rig.join("x", 1, 9);
+  rig.submit(plan_of("j", 1, 2));
+  ASSERT_EQ(rig.held[{"honest"}].size(), 1u);
+
+  rig.fail("honest");
+
+  EXPECT_EQ(rig.held[{"honest"}].size() + rig.held[{"x"}].size(), 1u);
+  EXPECT_EQ(audit(rig.farm), "");
+}
+
 TEST(Pin, AJobThatAsksForAClassWaitsForItAndSaysWhatThereIs) {
   for (const std::string asked : {digest_number(9).hex().substr(0, 12), std::string("armv8-a:gcc-14")}) {
     Rig rig(audited(.01));
@@ -126,6 +217,7 @@ TEST(Pin, APinnedJobSaysHowMuchOfTheFarmCanTakeIt) {
 
   rig.join("a", 2, 1);
   EXPECT_EQ(rig.job().class_share, (ClassShare{1, 1, 2, 2}));
+  rig.render("a");  // the class is final
   rig.join("b", 6, 9);
   rig.join("c", 4, 1);
   EXPECT_EQ(rig.job().class_share, (ClassShare{2, 3, 6, 12}));

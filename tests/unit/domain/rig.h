@@ -87,6 +87,10 @@ class Rig {
   double cpu_seconds = 0.01;  // reported for each unit
   // Seconds that the thread waited, reported for each unit
   double wait_seconds = 0;
+  // Who answers for a worker, by its name (WorkerJoined::principal)
+  std::map<std::string, std::string> principals;
+  // True: the test sets the time. Otherwise each unit that render() renders takes as long as it reports.
+  bool own_time = false;
 
   // Returns the effects of the event and of all folds that result from it.
   std::vector<Effect> send(const Event& event) {
@@ -121,7 +125,10 @@ class Rig {
                              threads,
                              std::move(tags),
                              memory,
-                             std::move(blobs)});
+                             std::move(blobs),
+                             true,
+                             {},
+                             principals[name]});
   }
   std::vector<Effect> join_another_version(const std::string& name, int threads,
                                            std::uint64_t numeric_class) {
@@ -140,6 +147,7 @@ class Rig {
   // The worker renders the first unit that it holds, and delivers the result.
   std::vector<Effect> render(const std::string& name) {
     const Held unit = take(name);
+    if (!own_time) now += from_seconds(cpu_seconds + wait_seconds);
     return result(name, unit);
   }
   std::vector<Effect> result(const std::string& name, const Held& unit) {

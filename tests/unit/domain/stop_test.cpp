@@ -140,6 +140,7 @@ TEST(StopByError, ARestartAfterTheLastFoldAddsNoRound) {
 // Renders the units of worker "w" one after the other, each in `unit_seconds` of wall-clock time, with a tick
 // after each.
 void render_all_of_w(Rig& rig, double unit_seconds) {
+  rig.own_time = true;
   for (int i = 0; i < 1000 && !rig.held[{"w"}].empty(); ++i) {
     rig.now += from_seconds(unit_seconds);
     rig.render("w");
@@ -165,6 +166,7 @@ TEST(StopByTime, ALeaseEndsWithTheUnitThatReachesTheTime) {
 
 TEST(StopByTime, NothingLeasedIsThrownAwayAndNothingIsLeasedAfterwards) {
   Rig rig;
+  rig.own_time = true;
   rig.join("w", 1);
   rig.cpu_seconds = 0.5;
   JobPlan plan = plan_of("j", 4, std::nullopt);
@@ -197,6 +199,7 @@ TEST(StopByTime, NothingLeasedIsThrownAwayAndNothingIsLeasedAfterwards) {
 TEST(StopByTime, EveryTileHasItsFirstRoundHoweverLateItIs) {
   constexpr int kTiles = 20;
   Rig rig;
+  rig.own_time = true;
   rig.join("w", 1);
   rig.cpu_seconds = 2;
   JobPlan plan = plan_of("j", kTiles, std::nullopt);
@@ -236,6 +239,7 @@ TEST(StopByTime, TheLastRoundsAreChosenFromWhatUnitsHaveCost) {
 TEST(StopByTime, ATargetThatIsNotMetDoesNotMoveTheEnd) {
   constexpr double kUnit = 0.05;
   Rig rig;
+  rig.own_time = true;
   rig.rel_error = uneven_error;
   rig.join("w", 1);
   rig.cpu_seconds = kUnit;
@@ -257,6 +261,7 @@ TEST(StopByTime, ATargetThatIsNotMetDoesNotMoveTheEnd) {
 
 TEST(StopByTime, ATargetThatIsMetBeforeEndsTheJobWhereItWouldHaveEnded) {
   Rig rig;
+  rig.own_time = true;
   rig.rel_error = uneven_error;
   rig.join("w", 1);
   rig.cpu_seconds = .01;

@@ -44,6 +44,7 @@ void Walk::step() {
   if (what < 8) return user_acts();
   if (what < 20) return send(Tick{});
   if (what < 21) return restart();
+  if (what < 30 && !recalled_.empty()) return answer_recall();
   if (what < 45 && !unfolded_.empty()) {
     const UnitFolded folded = unfolded_.front();
     unfolded_.pop_front();
@@ -121,7 +122,9 @@ void Walk::submit() {
     job.plan.spp = chance(70) ? 6000 : 1500;
     if (chance(50)) job.plan.grid = {{static_cast<int>(job.plan.grid.count()) * 32, 32}, 32};
   }
-  if (chance(10)) job.plan.time = 1 + static_cast<double>(pick(20));
+  if (chance(20)) job.plan.time = 1 + static_cast<double>(pick(20));
+  // Only the time, or the target error, ends it
+  if (job.plan.time && chance(50)) job.plan.spp.reset();
   if (chance(10)) job.plan.tags = {"even"};
   job.plan.priority = static_cast<int>(pick(3));
   job.plan.owner = std::array{"", "ann", "bob"}[pick(3)];
@@ -185,6 +188,19 @@ void Walk::worker_acts() {
   if (!worker.stalled) render(name);
 }
 
+void Walk::answer_recall() {
+  const auto [id, lease] = recalled_.front();
+  recalled_.pop_front();
+  FakeWorker& worker = workers_[id.value];
+  if (!worker.connected || worker.stalled) return;
+  LeaseReturned back{lease, {}};
+  std::erase_if(worker.held, [&](const auto& h) {
+    if (h.lease == lease) back.unrendered.push_back(h.key());
+    return h.lease == lease;
+  });
+  if (!back.unrendered.empty()) send(LeaseCameBack{id, back});
+}
+
 void Walk::render(const std::string& name) {
   FakeWorker& worker = workers_[name];
   if (worker.held.empty()) return;
@@ -207,6 +223,7 @@ void Walk::restart() {
   ++restarts_;
   Farm fresh{options()};
   unfolded_.clear();
+  recalled_.clear();
   std::vector<Event> restored;
   for (auto& [id, job] : jobs_) {
     const JobFigures f = farm_.job(id).value();
@@ -257,6 +274,7 @@ void Walk::calm_down() {
     if (all_ended()) return;
     now_ += 20ms;
     for (auto& [name, worker] : workers_) render(name);
+    while (!recalled_.empty() && wrong_.empty()) answer_recall();
     while (!on_the_way_.empty() && wrong_.empty()) {
       const UnitAccepted result = on_the_way_.front();
       on_the_way_.pop_front();

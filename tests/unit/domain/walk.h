@@ -72,6 +72,7 @@ class Walk {
   void submit();
   void join(const std::string& name);
   void render(const std::string& name);
+  void answer_recall();  // a worker gives back what it has not begun of a lease that was recalled
   void restart();
   void calm_down();
   bool all_ended() const;
@@ -89,7 +90,8 @@ class Walk {
   TimePoint now_{};
   std::map<std::string, FakeWorker> workers_;
   std::map<JobId, StoredJob> jobs_;
-  std::deque<UnitFolded> unfolded_;      // requested folds that are not done
+  std::deque<UnitFolded> unfolded_;                    // requested folds that are not done
+  std::deque<std::pair<WorkerId, LeaseId>> recalled_;  // leases that workers were asked to give back
   std::deque<UnitAccepted> on_the_way_;  // results in the network: any may arrive first, some arrive twice
   std::string wrong_;
 };

@@ -81,6 +81,7 @@ const std::vector<ToWorker> kToWorker = {
     ResultAck{{JobId{"j"}, 1, 2}, Error{Errc::failed_precondition, "no"}},
     CancelJob{JobId{"j"}},
     CancelLease{LeaseId{"l"}},
+    RecallLease{LeaseId{"l"}},
     DrainNow{},
 };
 

@@ -207,7 +207,7 @@ TEST(Done, AJobLeavesTheFarmsBooksAndCanStillBeExtended) {
   ASSERT_TRUE(farm.finish(job));
 
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels(70));
-  EXPECT_EQ(report(*coordinator, job)["core_seconds"], (8 + farm.results_sent) * .125);
+  EXPECT_EQ(report(*coordinator, job)["core_seconds"], (8 + farm.results_sent) * kUnitSeconds);
 }
 
 TEST(Done, AJobWhoseSnapshotIsLostIsFoldedAgainWhenItIsExtended) {

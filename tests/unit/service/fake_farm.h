@@ -18,6 +18,10 @@
 
 namespace ls::coordinator {
 
+// CPU seconds that a fake worker reports for a unit. The coordinator believes no more than have passed since
+// the unit was leased: it is far less than making a result takes.
+inline constexpr double kUnitSeconds = 0x1p-24;
+
 inline const std::string kSceneText = R"(<scene version="3.0.0">
   <integrator type="volpath"/>
   <sensor type="perspective">
@@ -174,7 +178,7 @@ class FakeFarm {
     r.lease = lease.id;
     r.exr = encode_partial(partial, brief.settings.size).value();
     r.digest = unit_digest(partial);
-    r.cpu_seconds = .125;
+    r.cpu_seconds = kUnitSeconds;
     return r;
   }
 

@@ -84,7 +84,7 @@ TEST(Sequence, IsOneJobWhoseFramesHaveThePixelsOfJobsOfTheirOwn) {
   }
   EXPECT_EQ(distinct.size(), 3u) << "frames with one noise";
   EXPECT_EQ(whole["pixels_sha256"], chain.finish().hex());
-  EXPECT_EQ(whole["core_seconds"], 3 * 4 * .125);  // 2 tiles, 2 rounds; duplicate results count once
+  EXPECT_EQ(whole["core_seconds"], 3 * 4 * kUnitSeconds);  // 2 tiles, 2 rounds; duplicate results count once
   EXPECT_NE(coordinator->job_log(id)->find("frame 3: submitted with 3 frames"), std::string::npos);
 }
 

@@ -137,6 +137,29 @@ TEST(SequenceView, ItsTimeLeftIsThatOnCoresThatItsLimitsAndUnitsKeepBusy) {
   EXPECT_DOUBLE_EQ(eta(8, 4), 40);
 }
 
+// Frames that render in no time, but that each worker must load for a while.
+TEST(SequenceView, ItsTimeLeftHasTheLoadingOfFramesThatWait) {
+  auto frames =
+      with({JobState::done, JobState::running, JobState::queued, JobState::queued, JobState::queued});
+  frames[0].progress = 1, frames[0].units_done = 10, frames[0].core_seconds = .01;
+  frames[0].time.load = .1, frames[0].time.build = .3;
+  frames[1].progress = .5, frames[1].units_done = 5, frames[1].core_seconds = .005;
+  frames[1].time.load = .1, frames[1].time.build = .3;
+  const auto view = [&](double cores, int workers, double frame_seconds = 0) {
+    SequenceFacts facts{{"j-1"}, {1, 5, 1}, {}, 12, cores, workers, frame_seconds};
+    return sequence_view(facts, frames);
+  };
+
+  // 3.5 frames of .01 core seconds are left, and three of them are to be loaded, for .4 s each.
+  EXPECT_DOUBLE_EQ(view(4, 1).eta_seconds.value(), .035 / 4 + 1.2);
+  EXPECT_DOUBLE_EQ(view(8, 2).eta_seconds.value(), .035 / 8 + .6);
+  // A worker that loads keeps its four threads from rendering.
+  EXPECT_DOUBLE_EQ(view(8, 2).queued_core_seconds, 3 * (.01 + 4 * .4));
+  EXPECT_DOUBLE_EQ(view(8, 2, 2).eta_seconds.value(), 7) << "frames have ended every 2 s";
+  frames[0].max_workers = 1;
+  EXPECT_DOUBLE_EQ(view(8, 2).eta_seconds.value(), .035 / 4 + 1.2);
+}
+
 TEST(SequenceView, NamesTheFrameThatFailedBeforeOneThatWaits) {
   auto frames = with({JobState::queued, JobState::queued, JobState::failed});
   frames[0].error = "no worker is connected";

@@ -29,8 +29,8 @@ TEST(Service, RendersAJobOnDiskToThePixelsOfOneInMemory) {
   EXPECT_EQ(r["spp"], 16);
   EXPECT_EQ(r["samples"], 16 * 40 * 24);
   EXPECT_EQ(r["stopped"], "spp");
-  EXPECT_EQ(r["convergence"].size(), 4u);  // rounds of 2, 2, 4, 8 samples
-  EXPECT_EQ(r["core_seconds"], 8 * .125);  // 2 tiles, 4 rounds; duplicate results count once
+  EXPECT_EQ(r["convergence"].size(), 4u);          // rounds of 2, 2, 4, 8 samples
+  EXPECT_EQ(r["core_seconds"], 8 * kUnitSeconds);  // 2 tiles, 4 rounds; duplicate results count once
   EXPECT_TRUE(std::filesystem::exists(dir.path() / "jobs" / job.value / "image.exr"));
   const JobView view = coordinator->job(job).value();
   EXPECT_EQ(view.state, JobState::done);
