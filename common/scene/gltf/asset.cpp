@@ -197,7 +197,7 @@ std::optional<Document> load_document(std::string_view file_name, std::string_vi
   check_extensions(t);
   const Choices chosen = choices(options, root);
   if (report.has_errors()) return std::nullopt;
-  tell_ignored(t);
+  warn_of_ignored(t);
   set(t.scene, "version", "3.0.0", root.at());
   const Stage stage = read_nodes(t, read_poses(t, chosen.moment));
   Materials materials(t);

@@ -1,5 +1,5 @@
-// Tells what of a file has no effect: members of objects that glTF 2.0 or the extension does not define (most
-// are misspelt), members that are not read, and extensions that are not read.
+// Warns of what in a file has no effect: members of objects that glTF 2.0 or the extension does not define
+// (most are misspelt), members that are not read, and extensions that are not read.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -129,9 +129,9 @@ constexpr Kind kMembersOfRead[] = {{"EXT_mesh_gpu_instancing", kInstancingMember
                                    {"KHR_node_visibility", kVisibilityMembers},
                                    kTextureTransform};
 
-class Teller {
+class IgnoredParts {
  public:
-  explicit Teller(Translation& t) : t_(t) {}
+  explicit IgnoredParts(Translation& t) : t_(t) {}
 
   void object(const Value& value, const Kind& kind) {
     const auto* members = std::get_if<Value::Members>(&value.is);
@@ -147,7 +147,7 @@ class Teller {
       if (rule == kind.members.end())
         unknown(m, kind);
       else if (!rule->ignored.empty())
-        tell(m.value, fmt::format("{} has no effect: {}", m.name, rule->ignored));
+        warn(m.value, fmt::format("{} has no effect: {}", m.name, rule->ignored));
       else if (rule->kind)
         each(m.value, *rule->kind);
     }
@@ -155,7 +155,7 @@ class Teller {
   }
 
  private:
-  void tell(const Value& at, std::string text) { t_.warn_once(Item(at, t_.report), std::move(text)); }
+  void warn(const Value& at, std::string text) { t_.warn_once(Item(at, t_.report), std::move(text)); }
 
   void each(const Value& value, const Kind& kind) {
     const auto* list = std::get_if<Value::List>(&value.is);
@@ -166,7 +166,7 @@ class Teller {
   void unknown(const Member& m, const Kind& kind) {
     std::vector<std::string> names;
     for (const MemberRule& r : kind.members) names.emplace_back(r.name);
-    tell(m.value, fmt::format("{} has no member {}, which has no effect{}", kind.title, plain_text(m.name),
+    warn(m.value, fmt::format("{} has no member {}, which has no effect{}", kind.title, plain_text(m.name),
                               suggestion(m.name, names)));
   }
 
@@ -175,10 +175,10 @@ class Teller {
     if (!members) return;
     for (const Member& m : *members) {
       const Row* row = find_extension(m.name);
-      // With the texts of check_extensions(), so that an extension is told once.
-      if (!row) tell(m.value, fmt::format("{} is not known here, and has no effect", plain_text(m.name)));
+      // With the texts of check_extensions(), so that an extension is reported once.
+      if (!row) warn(m.value, fmt::format("{} is not known here, and has no effect", plain_text(m.name)));
       if (row && row->use == Use::ignored)
-        tell(m.value, fmt::format("{} has no effect: {}", m.name, row->meaning));
+        warn(m.value, fmt::format("{} has no effect: {}", m.name, row->meaning));
       const auto* kind = std::find_if(std::begin(kMembersOfRead), std::end(kMembersOfRead),
                                       [&](const Kind& k) { return k.title == m.name; });
       if (kind != std::end(kMembersOfRead)) each(m.value, *kind);
@@ -195,7 +195,7 @@ class Teller {
       if (!m.name.starts_with("_") && std::none_of(std::begin(kKnown), std::end(kKnown), [&](auto name) {
             return name.ends_with("_") ? m.name.starts_with(name) : m.name == name;
           }))
-        tell(m.value, fmt::format("the attribute {} has no effect", plain_text(m.name)));
+        warn(m.value, fmt::format("the attribute {} has no effect", plain_text(m.name)));
   }
 
   Translation& t_;
@@ -203,6 +203,6 @@ class Teller {
 
 }  // namespace
 
-void tell_ignored(Translation& t) { Teller(t).object(*t.root.identity(), kRoot); }
+void warn_of_ignored(Translation& t) { IgnoredParts(t).object(*t.root.identity(), kRoot); }
 
 }  // namespace ls::scene::gltf

@@ -189,7 +189,7 @@ struct Stage {
 Stage read_nodes(Translation& t, const Poses& poses);
 
 // In ignored.cpp: warns of what the file has and no function here reads, once for each kind of it.
-void tell_ignored(Translation& t);
+void warn_of_ignored(Translation& t);
 
 // In lights.cpp: translates a light and adds it to the scene.
 void add_light(Translation& t, const Standing& light);
