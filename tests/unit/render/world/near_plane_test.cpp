@@ -1,9 +1,11 @@
 // Boundaries of media that lie before the camera's near plane, so that no ray meets them.
 #include "worker/render/world/near_plane.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 
 #include "tests/support/render_check.h"
 
@@ -17,14 +19,18 @@ using test::operator*;
 
 // A scene of a camera at y = `eye` that looks along +y, before a white sky, with near plane `near`.
 SceneBuilder before_sky(double eye, double near, double x = 0) {
-  SceneBuilder builder({1, 1});
+  SceneBuilder builder({16, 16});
   builder.environment();
   builder.look({x, eye, 0}, {x, eye + 1, 0});
   builder.scene.sensor.near_clip = near;
   return builder;
 }
-double transmitted(const SceneBuilder& builder) {
-  return render_sample(*test::world_of(builder), 0, 0, 0).rgb[0];
+// Expects that the camera sees this share of the sky, within five standard errors: each sample is absorbed or
+// not.
+void expect_transmitted(const SceneBuilder& builder, double share, const std::string& what = "") {
+  const auto e = test::estimate(builder, 32);
+  EXPECT_NEAR(e.mean[0], share, 5 * e.standard_error[0] + 1e-6) << what;
+  EXPECT_LT(e.standard_error[0], .01) << what;
 }
 
 // Through a body of 2 with the extinction 1, behind its face at -1: from outside with the face before the
@@ -39,7 +45,7 @@ TEST(NearPlane, HidesNoMediumBehindIt) {
 
       const double hidden = std::max(0., eye + near + 1);
 
-      EXPECT_NEAR(transmitted(builder), std::exp(-(2 - hidden)), 1e-4) << eye << " " << near;
+      expect_transmitted(builder, std::exp(-(2 - hidden)), fmt::format("{} {}", eye, near));
     }
 }
 
@@ -49,7 +55,7 @@ TEST(NearPlane, IsBehindAMediumThatEndsBeforeIt) {
   builder.container(CubeShape{}, translate({0, -1, 0}), builder.null(), fog);
   builder.scene.sensor.medium = fog;
 
-  EXPECT_NEAR(transmitted(builder), 1, 1e-6);
+  expect_transmitted(builder, 1);
 }
 
 // Both faces of a thin slab of fog, and the face of a ball in it, lie before the near plane.
@@ -60,7 +66,7 @@ TEST(NearPlane, IsInTheInnermostOfSeveralBodies) {
   builder.container(CubeShape{}, translate({0, -1.08, 0}) * scale(1, .02, 1), builder.null(), thin);
   builder.container(SphereShape{}, {}, builder.null(), ball);
 
-  EXPECT_NEAR(transmitted(builder), std::exp(-1.85), 1e-4);
+  expect_transmitted(builder, std::exp(-1.85));
 }
 
 // Where nothing lies before the near plane, rays start as ever, and cost nothing.
