@@ -16,13 +16,23 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class):
         raise ExportError("Output > Format: Aspect X and Y must be equal; Lightshaft's pixels are square")
     if render.use_border:
         raise ExportError("Output > Format: Render Region is not supported. Switch it off (Ctrl Alt B)")
-    if data.type == "PANO":
+    if data.type not in ("PERSP", "ORTHO"):
+        kind = "panoramas" if data.type == "PANO" else "cameras of your own"
         raise ExportError(
-            f"camera '{name}': panoramas are not supported. Choose Lens > Type: Perspective or Orthographic"
+            f"camera '{name}': {kind} are not supported. Choose Lens > Type: Perspective or Orthographic"
+        )
+    if render.use_multiview:
+        problems.unsupported("Output > Stereoscopy. Lightshaft renders one view: switch it off")
+    if abs(scene.cycles.film_exposure - 1) > 1e-6:
+        problems.unsupported("Render Properties > Film: Exposure. Set it to 1, and use Color Management")
+    if scene.cycles.use_fast_gi:
+        problems.warning(
+            "Render Properties > Light Paths: Fast GI Approximation has no effect: all light is followed"
         )
     width, height = size
-    location, rotation, _ = camera.matrix_world.decompose()
-    to_world = matrix_class.Translation(location) @ rotation.to_matrix().to_4x4() @ matrix_class(TURNED)
+    if abs(camera.matrix_world.determinant()) < 1e-30:
+        raise ExportError(f"camera '{name}': its scale is 0. Set it to 1")
+    to_world = unscaled(camera.matrix_world, matrix_class) @ matrix_class(TURNED)
     fit = data.sensor_fit if data.sensor_fit != "AUTO" else ("HORIZONTAL" if width >= height else "VERTICAL")
     frame = width if fit == "HORIZONTAL" else height
     values = {"near_clip": float(data.clip_start), "far_clip": float(data.clip_end)}
@@ -60,6 +70,15 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class):
     inside = reference(medium, "medium") if medium else None
     document.add(element("sensor", plugin, None, film, sampler, inside, to_world=to_world, **values))
     document.add(element("integrator", "volpath", None, max_depth=int(scene.lightshaft.max_depth)))
+
+
+def unscaled(matrix, matrix_class):
+    """Without scale and shear: the axis z, and the plane of z and y, stay, and it mirrors if `matrix` does."""
+    y, z = matrix.col[1].xyz, matrix.col[2].xyz.normalized()
+    x = y.cross(z).normalized()
+    side = x if matrix.determinant() > 0 else -x
+    rows = zip(side, z.cross(x), z, matrix.translation)
+    return matrix_class([*map(list, rows), [0, 0, 0, 1]])
 
 
 def focus_distance(camera):

@@ -41,6 +41,8 @@ class Exporter:
         textures = Textures(self.document, self.problems)
         self.textures, self.volumes = textures, Volumes(self.document, self.problems)
         self.materials = Materials(self.document, self.problems, textures)
+        self.layer = depsgraph.view_layer_eval
+        self.override = self.layer.material_override
         self.known, self.places, self.bodies = {}, {}, []
 
     def run(self):
@@ -48,11 +50,14 @@ class Exporter:
         if camera is None:
             self.problems.error("The scene has no camera. Add one (Shift A > Camera)")
             self.problems.raise_errors()
+        self.check_collections(self.layer.layer_collection)
         for instance in self.depsgraph.object_instances:
             if instance.show_self:
                 self.add(instance.object, instance.matrix_world.copy())
         self.place_meshes()
-        add_world(self.document, self.problems, self.textures, self.scene.world)
+        add_world(
+            self.document, self.problems, self.textures, self.layer.world_override or self.scene.world
+        )
         camera = camera.evaluated_get(self.depsgraph)
         eye = camera.matrix_world.translation
         around = next((medium for medium, contains in self.bodies if contains(eye)), None)
@@ -64,8 +69,7 @@ class Exporter:
         name = item.name
         if item.type in UNSEEN:
             return
-        if item.type in MESHES:
-            self.check_visibility(item)
+        self.check_visibility(item)
         if item.type == "LIGHT":
             add_light(self.document, self.problems, item, matrix, Matrix)
             self.check_lamp(item, matrix)
@@ -117,17 +121,38 @@ class Exporter:
                 "Move it out of the picture, or make it a point light of Radius 0"
             )
 
+    def check_collections(self, layer):
+        """Holdout and Indirect Only of collections, which the objects in them do not say themselves."""
+        if layer.exclude:
+            return
+        for name, on in (("Holdout", layer.holdout), ("Indirect Only", layer.indirect_only)):
+            if on and len(layer.collection.all_objects):
+                self.problems.unsupported(
+                    f"collection '{layer.collection.name}': {name}. Switch it off in the Outliner (Filter > Restriction Toggles)"
+                )
+        for child in layer.children:
+            self.check_collections(child)
+
     def check_visibility(self, item):
+        kind = "light" if item.type == "LIGHT" else "object"
         where = "Object properties > Visibility"
-        if item.is_holdout or item.is_shadow_catcher:
+        # Of a light the second says that it lights shadow catchers, of which there are none here.
+        if item.is_holdout or (item.is_shadow_catcher and kind == "object"):
             self.problems.unsupported(
-                f"object '{item.name}': Holdout or Shadow Catcher. Switch it off in {where}"
+                f"{kind} '{item.name}': Holdout or Shadow Catcher. Switch it off in {where}"
             )
-        rays = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
+        rays = ["camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow"]
+        if kind == "light":  # which has a check of its own for the camera, and no shadow
+            rays = rays[1:-1]
         hidden = [ray for ray in rays if not getattr(item, f"visible_{ray}")]
         if hidden:
             self.problems.unsupported(
-                f"object '{item.name}': hidden from rays ({', '.join(hidden)}). Switch all on in {where}"
+                f"{kind} '{item.name}': hidden from rays ({', '.join(hidden)}). Switch all on in {where}"
+            )
+        linking = item.light_linking
+        if linking and (linking.receiver_collection or linking.blocker_collection):
+            self.problems.unsupported(
+                f"{kind} '{item.name}': Light Linking or Shadow Linking. Clear it in Object properties > Shading"
             )
 
     def shapes_of(self, item):
@@ -149,7 +174,9 @@ class Exporter:
 
     def shape(self, item, part, extent):
         slots = item.material_slots
-        material = slots[min(part.slot, len(slots) - 1)].material if len(slots) else None
+        material = self.override
+        if material is None and len(slots):
+            material = slots[min(part.slot, len(slots) - 1)].material
         bsdf, emission = self.materials.surface(item.name, material)
         owner = Owner(item.name, material)
         found = self.volumes.coefficients(owner, of_grid=False) if material else None
@@ -207,7 +234,8 @@ class Exporter:
 
     def add_grid(self, item, matrix):
         data = item.data
-        owner = Owner(item.name, item.material_slots[0].material if len(item.material_slots) else None)
+        own = item.material_slots[0].material if len(item.material_slots) else None
+        owner = Owner(item.name, self.override or own)
         if not data.grids.load():
             self.problems.error(
                 f"{owner}: {data.grids.error_message or 'its file cannot be read'}. Set it in Volume properties"

@@ -35,6 +35,10 @@ def add_light(document, problems, item, matrix, matrix_class):
         )
     if not any(colour) or data.cycles.is_portal:
         return
+    if data.cycles.max_bounces < 1024:  # Blender's default
+        problems.warning(
+            f"light '{name}': Max Bounces has no effect: its light is followed like that of others"
+        )
     rigid = matrix.normalized()
     if data.type == "SUN":
         direction = -rigid.col[2].xyz

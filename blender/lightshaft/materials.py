@@ -99,16 +99,21 @@ class Materials:
             self.problems.unsupported(
                 f"{owner}, node '{place.title}': Specular Tint of a metal. Set it to white"
             )
+        multiple = keeps_energy(place.node)
         if transmission == 1.0 and metallic == 0.0:
             bsdf = self.glass(colour, roughness, ior, owner, place)
         else:
-            bsdf = opaque(colour, metallic, roughness, transmission, adjusted_ior(ior, level))
+            bsdf = opaque(colour, metallic, roughness, transmission, adjusted_ior(ior, level), multiple)
         bsdf = self.with_normal(place, bsdf, owner)
         if not (transmission == 1.0 and metallic == 0.0) and transmission == 0.0:
             bsdf = two_sided(bsdf)
-        bsdf = self.with_alpha(place, bsdf, owner)
+        alpha = get("Alpha")
+        if alpha is not None and alpha != 1.0:
+            bsdf = element("bsdf", "mask", None, bsdf, opacity=alpha)
         strength, glow = get("Emission Strength"), get("Emission Color")
-        return Surface(bsdf, self.scaled_emission(glow, strength, owner, place))
+        emission = self.scaled_emission(glow, strength)
+        # What is cut out or lets light pass by its alpha gives as much less light.
+        return Surface(bsdf, emission if alpha is None else times(alpha, emission))
 
     def glass(self, colour, roughness, ior, owner, place):
         if not isinstance(colour, list) or not isinstance(roughness, float):
@@ -152,7 +157,11 @@ class Materials:
         if node.type == "NORMAL_MAP":
             if node.space != "TANGENT":
                 self.problems.unsupported(f"{where}: space {node.space.title()}. Choose Tangent Space")
-            return element("bsdf", "normalmap", None, bsdf, normalmap=texture)
+            if source.node.uv_map:
+                self.problems.warning(
+                    f"{where}: the mesh's UV map for rendering is taken, named in the node: {source.node.uv_map}"
+                )
+            return element("bsdf", "normalmap", None, bsdf, normalmap=texture, follow_mirroring=True)
         distance = constant(source, source.input("Distance"))
         if not isinstance(distance, float) or source.source(source.input("Normal"))[0]:
             self.problems.unsupported(f"{where}: Distance must be a number, and Normal unlinked")
@@ -160,12 +169,6 @@ class Materials:
         return element(
             "bsdf", "bumpmap", None, bsdf, texture=texture, scale=-distance if node.invert else distance
         )
-
-    def with_alpha(self, place, bsdf, owner):
-        alpha = self.textures.value(place, "Alpha", owner)
-        if alpha is None or alpha == 1.0:
-            return bsdf
-        return element("bsdf", "mask", None, bsdf, opacity=alpha)
 
     def diffuse(self, place, owner):
         if constant(place, place.input("Roughness")) != 0.0:
@@ -194,7 +197,7 @@ class Materials:
         else:
             bsdf = element(
                 "bsdf", "roughconductor", None, distribution="ggx", alpha=roughness**2, specular_reflectance=colour,
-                eta=0.0, k=1.0, multiple_scattering=True,
+                eta=0.0, k=1.0, multiple_scattering=keeps_energy(place.node),
             )  # fmt: skip
         return Surface(two_sided(self.with_normal(place, bsdf, owner)))
 
@@ -226,20 +229,10 @@ class Materials:
         glow, strength = self.textures.value(place, "Color", owner), self.textures.value(
             place, "Strength", owner
         )
-        return Surface(None, self.scaled_emission(glow, strength, owner, place))
+        return Surface(None, self.scaled_emission(glow, strength))
 
-    def scaled_emission(self, glow, strength, owner, place):
-        if strength is None or glow is None or strength == 0.0:
-            return None
-        if isinstance(strength, float) and isinstance(glow, list):
-            radiance = [strength * c for c in glow]
-            return radiance if any(radiance) else None
-        if strength != 1.0:
-            self.problems.error(
-                f"{owner}, node '{place.title}': with a texture as emission colour the strength must be 1. Scale the image instead"
-            )
-            return None
-        return glow
+    def scaled_emission(self, glow, strength):
+        return None if strength is None or glow is None else times(strength, glow)
 
     def mix(self, place, owner):
         first, second = place.node.inputs[1], place.node.inputs[2]
@@ -250,19 +243,18 @@ class Materials:
         ]
         if share is None:
             return Surface(None)
-        emissions = [part.emission for part in parts]
-        if any(e is not None for e in emissions):
-            if not isinstance(share, float) or any(
-                e is not None and not isinstance(e, list) for e in emissions
-            ):
-                self.problems.error(
-                    f"{owner}, node '{place.title}': emission mixed by a texture. Mix by a number, or use Add Shader"
-                )
-                return Surface(None)
-            a, b = ([0.0] * 3 if e is None else e for e in emissions)
+        a, b = (part.emission for part in parts)
+        if a is None:
+            emission = times(share, b)
+        elif isinstance(share, float) and b is None:
+            emission = times(1 - share, a)
+        elif isinstance(share, float) and isinstance(a, list) and isinstance(b, list):
             emission = [x * (1 - share) + y * share for x, y in zip(a, b)]
         else:
-            emission = None
+            self.problems.error(
+                f"{owner}, node '{place.title}': two emissions mixed by a texture, or the first by one. Mix by a number, make the emission the second, or use Add Shader"
+            )
+            return Surface(None)
         sides = [
             two_sided(element("bsdf", "diffuse", None, reflectance=0.0)) if p.bsdf is None else p.bsdf
             for p in parts
@@ -304,24 +296,40 @@ def two_sided(bsdf):
     return element("bsdf", "twosided", None, bsdf)
 
 
-def opaque(colour, metallic, roughness, transmission, eta):
+def times(share, emission):
+    """A radiance times a number or a texture; None: no light."""
+    if emission is None or (isinstance(share, float) and share == 0.0):
+        return None
+    if isinstance(emission, list) and not any(emission):
+        return None
+    if isinstance(share, float) and isinstance(emission, list):
+        return [share * c for c in emission]
+    return emission if share == 1.0 else element("texture", "product", None, first=share, second=emission)
+
+
+def keeps_energy(node):
+    """Whether light that is lost between the node's facets is added back, as by its distribution Multiscatter GGX."""
+    return node.distribution == "MULTI_GGX"
+
+
+def opaque(colour, metallic, roughness, transmission, eta, multiple=True):
     """A dielectric coat over a diffuse base, which is nearest to Blender's, wherever it can be; else Burley's model."""
     if transmission != 0.0 or not isinstance(roughness, float):
-        return burley(colour, metallic, roughness, transmission, eta)
+        return burley(colour, metallic, roughness, transmission, eta, multiple)
     coated = element(
         "bsdf", "roughplastic", None, distribution="ggx", alpha=max(roughness**2, 1e-3), int_ior=eta, ext_ior=1.0,
         diffuse_reflectance=colour, multiple_scattering=True,
     )  # fmt: skip
     if metallic == 0.0:
         return coated
-    metal = burley(colour, 1.0, roughness, 0.0, eta)
+    metal = burley(colour, 1.0, roughness, 0.0, eta, multiple)
     return metal if metallic == 1.0 else element("bsdf", "blendbsdf", None, coated, metal, weight=metallic)
 
 
-def burley(colour, metallic, roughness, transmission, eta):
+def burley(colour, metallic, roughness, transmission, eta, multiple):
     return element(
         "bsdf", "principled", None, base_color=colour, metallic=metallic, roughness=roughness,
-        spec_trans=None if transmission == 0.0 else transmission, eta=eta,
+        spec_trans=None if transmission == 0.0 else transmission, eta=eta, multiple_scattering=multiple,
     )  # fmt: skip
 
 

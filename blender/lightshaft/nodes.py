@@ -1,5 +1,7 @@
 """Walks node trees: through reroutes and groups to the node that a socket's value comes from."""
 
+from .constants import as_type, computed
+
 
 class Place:
     """A node within the groups that were entered to reach it."""
@@ -8,9 +10,9 @@ class Place:
         self.node, self.groups = node, groups
 
     def input(self, name):
-        return next(
-            (socket for socket in self.node.inputs if socket.identifier == name or socket.name == name), None
-        )
+        """By its identifier, or else by its name."""
+        by_identifier = next((socket for socket in self.node.inputs if socket.identifier == name), None)
+        return by_identifier or next((socket for socket in self.node.inputs if socket.name == name), None)
 
     def source(self, socket):
         """What feeds an input: (Place, output socket); (None, socket) with the socket that holds the value if nothing does."""
@@ -59,34 +61,12 @@ def plain(socket):
 
 
 def constant(place, socket):
-    """The value of an input if it is the same everywhere, else None."""
+    """The value of an input if it is the same everywhere, else None: three numbers for colours and vectors."""
     source, output = place.source(socket)
     if source is None:
-        return plain(output) if output is not None and hasattr(output, "default_value") else None
-    node = source.node
-    if node.type in ("RGB", "VALUE"):
-        return plain(output)
-    if node.type == "BLACKBODY":
-        return None
-    if node.type == "MATH" and not node.use_clamp and node.operation in ARITHMETIC:
-        values = [constant(source, s) for s in node.inputs[:2]]
-        return ARITHMETIC[node.operation](*values) if all(isinstance(v, float) for v in values) else None
-    if (
-        node.type == "MIX"
-        and node.data_type == "RGBA"
-        and node.blend_type == "MIX"
-        and node.factor_mode == "UNIFORM"
-    ):
-        share = constant(source, source.input("Factor_Float"))
-        ends = [constant(source, source.input(name)) for name in ("A_Color", "B_Color")]
-        if isinstance(share, float) and all(isinstance(end, list) for end in ends):
-            return [a + (b - a) * share for a, b in zip(*ends)]
-    return None
-
-
-ARITHMETIC = {
-    "ADD": lambda a, b: a + b,
-    "SUBTRACT": lambda a, b: a - b,
-    "MULTIPLY": lambda a, b: a * b,
-    "DIVIDE": lambda a, b: a / b if b else 0.0,
-}
+        value = plain(output) if output is not None and hasattr(output, "default_value") else None
+    elif source.node.type in ("RGB", "VALUE"):
+        value = plain(output)
+    else:
+        value = computed(source.node, output, lambda name: constant(source, source.input(name)))
+    return as_type(value, getattr(socket, "type", None))

@@ -8,6 +8,7 @@ from .nodes import Place, constant, output_node
 # The middle of a world image is the direction +x in Blender and +z in the scene format; the point a quarter from its
 # left edge is +y in Blender and +x in the scene format.
 AXES = np.array([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]], float)
+RAYS = ("camera", "diffuse", "glossy", "transmission", "scatter")
 
 
 def add_world(document, problems, textures, world):
@@ -17,6 +18,11 @@ def add_world(document, problems, textures, world):
     node = output_node(world.node_tree, "OUTPUT_WORLD") if world.node_tree else None
     if node is None:
         return
+    hidden = [ray for ray in RAYS if not getattr(world.cycles_visibility, ray)]
+    if hidden:
+        problems.unsupported(
+            f"{owner}: hidden from rays ({', '.join(hidden)}). Switch all on in World properties > Settings > Ray Visibility"
+        )
     output = Place(node)
     if output.source(output.input("Volume"))[0]:
         problems.error(

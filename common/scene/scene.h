@@ -81,7 +81,8 @@ using Texture = std::variant<ConstantTexture, BitmapTexture, CheckerboardTexture
 enum class Microfacet { beckmann, ggx };
 // Several rough surfaces below have the option multiple_scattering. If it is true, they include light that is
 // scattered several times between microfacets, which the plain microfacet model leaves out
-// (docs/design/multiple-scattering.md). The roughness must then be a constant, the same along u and v.
+// (docs/design/multiple-scattering.md). The roughness must then be the same along u and v, and, except for
+// PrincipledBsdf, a constant.
 
 struct DiffuseBsdf {
   TextureIndex reflectance;
@@ -173,10 +174,13 @@ struct BlendBsdf {  // the mixture (1 - weight) first + weight second
 // flip_invalid_normals, a mapped normal that faces away from the viewer is rotated by half a turn about the
 // surface's normal (Schuessler et al. 2017). With use_shadowing_function, light is reduced by the shadowing
 // function of microfacets that are as steep as the mapped normal (Estevez, Lecocq, Stein 2019).
-struct NormalMapBsdf {  // (x, y, z) = 2 (r, g, b) - 1 is the normal in the frame (u, v, surface normal)
+// The normal is (x, y, z) = 2 (r, g, b) - 1: x along u, z along the surface normal n, and y along the cross
+// product of n and u. With follow_mirroring, y is along whichever direction across u points to the top of the
+// image, that is, against v. The two differ where the image appears mirrored on the surface.
+struct NormalMapBsdf {
   TextureIndex normalmap;
   BsdfIndex bsdf;
-  bool flip_invalid_normals = true, use_shadowing_function = true;
+  bool flip_invalid_normals = true, use_shadowing_function = true, follow_mirroring = false;
   bool operator==(const NormalMapBsdf&) const = default;
 };
 // A bump map: the texture's luminance times `scale`, in scene units, displaces the surface along its normal,
@@ -194,6 +198,7 @@ struct PrincipledBsdf {
   std::optional<TextureIndex> spec_trans;  // nullopt: no light crosses the surface
   double eta = 1.5;
   TextureIndex spec_tint, sheen, sheen_tint, flatness, clearcoat, clearcoat_gloss;
+  bool multiple_scattering = false;
   bool operator==(const PrincipledBsdf&) const = default;
 };
 // A metal with GGX facets under a dielectric coat with GGX facets. eta and k are the metal's index of

@@ -141,7 +141,12 @@ def test_colours_above_one_are_rendered_as_one(stage, kind):
         painted = material("Painted", "ShaderNodeBsdfDiffuse", Color=(brightness, 0.5, 0.5))
         if kind == "checker":
             checker = feed(painted, "Color", "ShaderNodeTexChecker")
-            checker.inputs["Color1"].default_value = checker.inputs["Color2"].default_value = (brightness, 0.5, 0.5, 1)
+            checker.inputs["Color1"].default_value = checker.inputs["Color2"].default_value = (
+                brightness,
+                0.5,
+                0.5,
+                1,
+            )
             where = painted.node_tree.nodes.new("ShaderNodeTexCoord")
             painted.node_tree.links.new(where.outputs["UV"], checker.inputs["Vector"])
         plane.data.materials.clear()
@@ -248,3 +253,50 @@ def test_no_denoiser_is_said_in_words(stage, monkeypatch):
     monkeypatch.setenv("LIGHTSHAFT_OIDN", "/no/such/folder")
 
     assert "Open Image Denoise" in refused(stage)
+
+
+def test_what_cycles_leaves_out_is_refused_by_name(stage):
+    import bpy
+    from stage import diffuse
+
+    bpy.ops.mesh.primitive_plane_add()
+    layer = bpy.context.view_layer
+    for name, setting in (("Hidden", "holdout"), ("Bounced", "indirect_only")):
+        collection = bpy.data.collections.new(name)
+        stage.scene.collection.children.link(collection)
+        collection.objects.link(bpy.data.objects.new(name, bpy.data.meshes.new(name)))
+        setattr(layer.layer_collection.children[name], setting, True)
+    lamp = stage.light("POINT", 10)
+    lamp.name, lamp.visible_glossy = "Lamp", False
+    linked = stage.cube(diffuse())
+    linked.name = "Linked"
+    linked.light_linking.receiver_collection = bpy.data.collections.new("Receivers")
+    stage.scene.world.cycles_visibility.diffuse = False
+    try:
+        told = refused(stage)
+    finally:
+        stage.scene.world.cycles_visibility.diffuse = True
+        for name in ("Hidden", "Bounced"):
+            bpy.data.collections.remove(bpy.data.collections[name])
+
+    for part in (
+        "collection 'Hidden': Holdout",
+        "collection 'Bounced': Indirect Only",
+        "light 'Lamp': hidden from rays (glossy)",
+        "object 'Linked': Light Linking",
+        f"world '{stage.scene.world.name}': hidden from rays (diffuse)",
+    ):
+        assert part in told, told
+
+
+def test_the_material_and_the_world_of_the_view_layer_override_others(stage):
+    import bpy
+    from stage import diffuse, material
+
+    layer = bpy.context.view_layer
+    stage.plane(diffuse((0.9, 0.1, 0.1)), 40)
+    layer.material_override = material("Over", "ShaderNodeEmission", Color=(0.2, 0.4, 0.6))
+    try:
+        assert stage.render(samples=2).mean(axis=(0, 1))[:3] == pytest.approx((0.2, 0.4, 0.6), rel=1e-3)
+    finally:
+        layer.material_override = None

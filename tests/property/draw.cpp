@@ -90,6 +90,9 @@ BsdfIndex Draw::bsdf(int depth) {
             if (rough.multiple_scattering)
               rough.alpha_u = rough.alpha_v =
                   SceneBuilder::push<TextureTag>(scene_.textures, ConstantTexture{kGreys[dice_.below(3)]});
+          if constexpr (requires { rough.anisotropic; })
+            if (rough.multiple_scattering)
+              rough.anisotropic = SceneBuilder::push<TextureTag>(scene_.textures, ConstantTexture{{0, 0, 0}});
         }
       },
       b);

@@ -116,7 +116,8 @@ void check_version(const Item& root) {
     root["asset"]["minVersion"].error(fmt::format("it needs glTF {}, and 2.0 is read", least));
 }
 
-void check_extensions(const Item& root) {
+void check_extensions(Translation& t) {
+  const Item& root = t.root;
   for (const Item& item : root["extensionsRequired"].list()) {
     const std::string name = item.text("");
     const Row* row = find_extension(name);
@@ -130,8 +131,8 @@ void check_extensions(const Item& root) {
     const std::string name = item.text("");
     const Row* row = find_extension(name);
     if (row && row->use == Use::ignored)
-      item.warning(fmt::format("{} has no effect: {}", name, row->meaning));
-    if (!row) item.warning(fmt::format("{} is not known here, and has no effect", name));
+      t.warn_once(item, fmt::format("{} has no effect: {}", name, row->meaning));
+    if (!row) t.warn_once(item, fmt::format("{} is not known here, and has no effect", plain_text(name)));
   }
 }
 
@@ -190,13 +191,13 @@ std::optional<Document> load_document(std::string_view file_name, std::string_vi
   const Item root(*tree, report);
   check_version(root);
   if (report.has_errors()) return std::nullopt;
-  check_extensions(root);
-  const Choices chosen = choices(options, root);
-  if (report.has_errors()) return std::nullopt;
-
   Translation t{
       assets, report, root, Buffers(root, assets, pieces->chunk), made("scene", "", root.at()), 0, false,
       {},     {},     {}};
+  check_extensions(t);
+  const Choices chosen = choices(options, root);
+  if (report.has_errors()) return std::nullopt;
+  warn_of_ignored(t);
   set(t.scene, "version", "3.0.0", root.at());
   const Stage stage = read_nodes(t, read_poses(t, chosen.moment));
   Materials materials(t);

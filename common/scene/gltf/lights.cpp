@@ -12,14 +12,19 @@ namespace ls::scene::gltf {
 namespace {
 
 // Adds the two angles of a spot light to `out`. Both are measured from the axis: the intensity is full within
-// innerConeAngle and 0 beyond outerConeAngle.
+// innerConeAngle and 0 beyond outerConeAngle. Equal angles are a cone with a hard edge, which several
+// programs write though the specification wants the inner one to be smaller.
 void add_cone(Translation& t, const Item& spot, Element& out) {
-  const double outer = spot["outerConeAngle"].number(std::numbers::pi / 4);
-  const double inner = spot["innerConeAngle"].number(0);
-  if (!(outer > 0 && outer <= std::numbers::pi / 2 && inner >= 0 && inner < outer))
-    return spot.error("a cone is wanted with 0 <= innerConeAngle < outerConeAngle <= pi/2");
+  constexpr double kRight = std::numbers::pi / 2;
+  double outer = spot["outerConeAngle"].number(std::numbers::pi / 4),
+         inner = spot["innerConeAngle"].number(0);
+  if (!(outer > 0 && outer <= kRight * (1 + kSingle) && inner >= -kSingle && inner <= outer * (1 + kSingle)))
+    return spot.error("a cone is wanted with 0 <= innerConeAngle <= outerConeAngle <= pi/2");
+  outer = std::min(outer, kRight);
+  inner = std::clamp(inner, 0., outer);
   add(out, "cutoff_angle", outer * kDegrees, out.at);
   add(out, "beam_width", inner * kDegrees, out.at);
+  if (inner == outer) return;
   t.warn_once(spot,
               "between its two angles a spot falls off linearly in the angle here, and in glTF by the square "
               "of its cosine's share");

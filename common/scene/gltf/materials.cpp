@@ -31,12 +31,14 @@ class MaterialTranslator {
   }
 
   Element bsdf(Material& out) {
-    if (m_.extension("KHR_materials_unlit").given()) return unlit(out);
-    if (transmission_.is(0) || metallic_.is(1)) return masked(mapped_opaque(metallic_, out));
-    return masked(has_volume() ? mapped(body(out), out) : sheet(out));
+    if (is_unlit()) return masked(black());
+    if (transmission_.is(0) || metallic_.is(1)) return masked(mapped_opaque(metallic_));
+    return masked(has_volume() ? mapped(body(out)) : sheet());
   }
 
+  // Returns the emitter of the surface; nullopt: it gives no light.
   std::optional<Element> light() {
+    if (is_unlit()) return shining(base_);
     const double strength = m_.extension("KHR_materials_emissive_strength")["emissiveStrength"].number(1);
     auto factor = m_["emissiveFactor"].numbers<3>({0, 0, 0});
     for (double& x : factor) x *= strength;
@@ -45,10 +47,11 @@ class MaterialTranslator {
 
  private:
   void read() {
-    const auto factor = pbr_["baseColorFactor"].numbers<4>({1, 1, 1, 1});
+    auto factor = pbr_["baseColorFactor"].numbers<4>({1, 1, 1, 1});
+    for (double& x : factor) x = share(x);
     base_ = colour_source(t_, {factor[0], factor[1], factor[2]}, pbr_["baseColorTexture"]);
     if (kind_.colours) base_.images.push_back(vertex_attribute("vertex_color", at_));
-    alpha_ = Source{{factor[3], factor[3], factor[3]}, {}};
+    read_opacity(factor[3]);
     const Item both = pbr_["metallicRoughnessTexture"];
     metallic_ = number_source(t_, pbr_["metallicFactor"], 1, both, Part::blue);
     roughness_ = number_source(t_, pbr_["roughnessFactor"], 1, both, Part::green);
@@ -83,17 +86,20 @@ class MaterialTranslator {
   // True if the transmitting material is the surface of a solid body; false if it is a thin sheet.
   bool has_volume() const { return m_.extension("KHR_materials_volume")["thicknessFactor"].number(0) > 0; }
 
-  // Returns the bsdf of an unlit material (KHR_materials_unlit), which reflects nothing, and makes the
-  // surface emit the base colour.
-  Element unlit(Material& out) {
-    out.light = shining(base_);
-    Element black = made("bsdf", "diffuse", at_);
-    add(black, "reflectance", 0., at_);
-    return masked(two_sided(std::move(black), at_));
+  // True for a material that reflects nothing and emits its base colour.
+  bool is_unlit() const { return m_.extension("KHR_materials_unlit").given(); }
+
+  Element black() {
+    Element inner = made("bsdf", "diffuse", at_);
+    add(inner, "reflectance", 0., at_);
+    return two_sided(std::move(inner), at_);
   }
 
-  std::optional<Element> shining(const Source& radiance) {
+  // Where the surface is cut out or lets light pass by its opacity, it gives as much less light.
+  std::optional<Element> shining(Source radiance) {
+    for (std::size_t i = 0; i < 3; ++i) radiance.factor[i] *= opacity_.factor[i];
     if (radiance.factor == std::array<double, 3>{0, 0, 0}) return std::nullopt;
+    radiance.images.insert(radiance.images.end(), opacity_.images.begin(), opacity_.images.end());
     t_.has_light = true;
     if (m_["doubleSided"].is_true(false))
       t_.warn_once(m_, "a surface that gives light does so on its front only, though it is doubleSided");
@@ -102,9 +108,7 @@ class MaterialTranslator {
     return out;
   }
 
-  Element mapped_opaque(const Source& metallic, Material& out) {
-    return two_sided(mapped(opaque(metallic), out), at_);
-  }
+  Element mapped_opaque(const Source& metallic) { return two_sided(mapped(opaque(metallic)), at_); }
 
   Element opaque(const Source& metallic) {
     if (!roughness_.is_constant() || !coat_.is(0)) return burley(metallic, Source{{0, 0, 0}, {}});
@@ -128,6 +132,7 @@ class MaterialTranslator {
     give(out, "roughness", roughness_, at_);
     if (!transmission.is(0)) give(out, "spec_trans", transmission, at_);
     add(out, "eta", std::max(seen_ior_, 1.001), at_);
+    add(out, "boolean", "multiple_scattering", "true", at_);
     if (!coat_.is(0)) add_coat(out);
     return out;
   }
@@ -195,14 +200,14 @@ class MaterialTranslator {
 
   // Returns the bsdf of a transmitting surface without a volume, which is a thin sheet of glass. Its metallic
   // part is opaque.
-  Element sheet(Material& out) {
+  Element sheet() {
     if (!coat_.is(0) && transmission_.is(1))
       t_.warn_once(m_.extension("KHR_materials_clearcoat"), "a clear coat has no effect on a sheet of glass");
-    Element clear = sheet_of_glass(out);
+    Element clear = sheet_of_glass();
     const Source none{{0, 0, 0}, {}};
-    if (!transmission_.is(1)) clear = blend(transmission_, mapped_opaque(none, out), std::move(clear));
+    if (!transmission_.is(1)) clear = blend(transmission_, mapped_opaque(none), std::move(clear));
     if (metallic_.is(0)) return clear;
-    return blend(metallic_, std::move(clear), mapped_opaque(Source{}, out));
+    return blend(metallic_, std::move(clear), mapped_opaque(Source{}));
   }
 
   Element blend(const Source& weight, Element first, Element second) {
@@ -213,7 +218,7 @@ class MaterialTranslator {
     return out;
   }
 
-  Element sheet_of_glass(Material& out) {
+  Element sheet_of_glass() {
     const double alpha = roughness_.factor[0] * roughness_.factor[0];
     const bool smooth = roughness_.is_constant() && alpha < kSmooth;
     Element glass = made("bsdf", smooth ? "thindielectric" : "roughthindielectric", at_);
@@ -228,7 +233,7 @@ class MaterialTranslator {
     } else {
       give(glass, "alpha", squared(roughness_), at_);
     }
-    return mapped(std::move(glass), out);
+    return mapped(std::move(glass));
   }
 
   static Source squared(Source s) {
@@ -238,38 +243,43 @@ class MaterialTranslator {
     return s;
   }
 
-  Element mapped(Element inner, Material& out) {
+  Element mapped(Element inner) {
     const Item info = m_["normalTexture"];
     auto normals = texture(t_, info, Part::normal);
     if (!normals) return inner;
     if (info["scale"].number(1) != 1)
       t_.warn_once(info["scale"], "the strength of a normal map counts as 1 here");
-    out.has_normal_map = true;
     Element map = made("bsdf", "normalmap", at_);
+    add(map, "boolean", "follow_mirroring", "true", at_);
     set(*normals, "name", "normalmap", at_);
     add(map, std::move(*normals));
     add(map, std::move(inner));
     return map;
   }
 
-  Element masked(Element inner) {
+  // Reads the surface's opacity: 1 without alphaMode; of alphaMode MASK 0 or 1.
+  void read_opacity(double factor) {
     const std::string mode = m_["alphaMode"].text("OPAQUE");
-    if (mode == "OPAQUE") return inner;
-    if (mode != "MASK" && mode != "BLEND") {
-      m_["alphaMode"].error("alphaMode is OPAQUE, MASK or BLEND");
-      return inner;
-    }
+    if (mode == "OPAQUE") return;
+    if (mode != "MASK" && mode != "BLEND") return m_["alphaMode"].error("alphaMode is OPAQUE, MASK or BLEND");
+    opacity_.factor.fill(factor);
     if (auto image = texture(t_, pbr_["baseColorTexture"], Part::alpha))
-      alpha_.images.push_back(std::move(*image));
-    if (kind_.opacities) alpha_.images.push_back(vertex_attribute("vertex_opacity", at_));
-    double cutoff = mode == "MASK" ? m_["alphaCutoff"].number(.5) : 0;
-    if (alpha_.is_constant() && mode == "MASK") {
-      alpha_.factor.fill(alpha_.factor[0] >= cutoff ? 1 : 0);
-      cutoff = 0;
-    }
-    if (alpha_.is(1)) return inner;
+      opacity_.images.push_back(std::move(*image));
+    if (kind_.opacities) opacity_.images.push_back(vertex_attribute("vertex_opacity", at_));
+    if (mode == "BLEND") return;
+    const double cutoff = std::max(m_["alphaCutoff"].number(.5), 0.);
+    if (opacity_.is_constant()) return opacity_.factor.fill(opacity_.factor[0] >= cutoff ? 1 : 0);
+    if (cutoff == 0) return void(opacity_ = Source{});  // no alpha is below it
+    Element holder = made("bsdf", "mask", at_);
+    give(holder, "opacity", opacity_, at_, cutoff);
+    opacity_ = Source{{1, 1, 1}, std::move(holder.children)};
+    std::erase_if(opacity_.images[0].attributes, [](const Attribute& a) { return a.name == "name"; });
+  }
+
+  Element masked(Element inner) {
+    if (opacity_.is(1)) return inner;
     Element mask = made("bsdf", "mask", at_);
-    give(mask, "opacity", alpha_, at_, std::max(cutoff, 0.));
+    give(mask, "opacity", opacity_, at_);
     add(mask, std::move(inner));
     return mask;
   }
@@ -279,7 +289,7 @@ class MaterialTranslator {
   const Span at_;
   const Item pbr_;
   const MeshKind kind_;
-  Source base_, alpha_, metallic_, roughness_, transmission_, coat_;
+  Source base_, opacity_, metallic_, roughness_, transmission_, coat_;
   double ior_ = 1.5, seen_ior_ = 1.5;
 };
 
@@ -324,7 +334,7 @@ const Material& Materials::of(const Item& index, const MeshKind& kind) {
   out.id = t_.fresh_id(material["name"].text("material"));
   MaterialTranslator translator(t_, material, kind);
   Element bsdf = translator.bsdf(out);
-  if (!out.light) out.light = translator.light();
+  out.light = translator.light();
   set(bsdf, "id", out.id, material.at());
   t_.add(std::move(bsdf));
   return out;

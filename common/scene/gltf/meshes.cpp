@@ -34,21 +34,6 @@ std::vector<std::uint32_t> triangles(const std::vector<std::uint32_t>& order, st
   return out;
 }
 
-// True if some triangle is mirrored in texture space, that is if its winding by texture coordinates is the
-// opposite of its winding in space.
-bool has_mirrored_uvs(const MadeMesh& mesh) {
-  for (std::size_t i = 0; !mesh.uvs.empty() && i < mesh.indices.size(); i += 3) {
-    const auto at = [&](std::size_t k, std::size_t axis) {
-      return double{mesh.uvs[2 * mesh.indices[i + k] + axis]};
-    };
-    const double area =
-        (at(1, 0) - at(0, 0)) * (at(2, 1) - at(0, 1)) - (at(2, 0) - at(0, 0)) * (at(1, 1) - at(0, 1));
-    // In glTF v points down. So the signed area of a triangle that is not mirrored is negative.
-    if (area > 0) return true;
-  }
-  return false;
-}
-
 }  // namespace
 
 std::optional<Meshes::Surface> Meshes::read_primitive(const Item& primitive, const Use& use) {
@@ -127,10 +112,6 @@ std::optional<Meshes::Surface> Meshes::read_primitive(const Item& primitive, con
   out.at = primitive.at();
   out.flat = mesh.normals.empty();
   out.material = materials_.of(material, kind);
-  if (out.material.has_normal_map && has_mirrored_uvs(mesh))
-    t_.warn_once(primitive["attributes"],
-                 "where an image is mirrored on this mesh, its normal map leans the other way across u: "
-                 "tangents follow from the texture coordinates here, without a sign");
   for (std::size_t i = 0; i < mesh.corners(); ++i) {
     const float* p = &mesh.positions[3 * i];
     out.box.include(Vec3{{double{p[0]}, double{p[1]}, double{p[2]}}});
@@ -197,9 +178,10 @@ void Meshes::add(const std::vector<Use>& uses) {
     const auto placed = [&](const Surface& s, const Use& use) {
       Element e = shape(s);
       place(e, use.to_world, s.at);
-      // A mirroring transform reverses the winding of the triangles, and so would swap front and back. In
-      // glTF the front stays the front, so the normals are flipped.
-      if (determinant3(use.to_world) < 0) scene::add(e, "boolean", "flip_normals", "true", s.at);
+      // In glTF the front stays the front under a mirroring transform. Normals of the file do so by
+      // themselves; those of flat triangles follow the winding, which the transform reverses, so they are
+      // flipped.
+      if (s.flat && determinant3(use.to_world) < 0) scene::add(e, "boolean", "flip_normals", "true", s.at);
       if (s.material.light) scene::add(e, *s.material.light);
       t_.add(std::move(e));
     };

@@ -135,7 +135,7 @@ std::optional<Element> texture(Translation& t, const Item& info, Part part) {
 }
 
 Source number_source(Translation& t, const Item& factor, double fallback, const Item& info, Part part) {
-  const double x = factor.number(fallback);
+  const double x = share(factor.number(fallback));
   Source out{{x, x, x}, {}};
   if (auto image = x != 0 ? texture(t, info, part) : std::nullopt) out.images.push_back(std::move(*image));
   return out;
@@ -172,6 +172,11 @@ void give(Element& parent, std::string_view name, const Source& source, const Sp
   }
   give(product, "second", rest, at);
   add(parent, named(std::move(product), name, at));
+}
+
+double share(double x) {
+  if (x > 1 && x <= 1 + kSingle) return 1;
+  return x < 0 && x >= -kSingle ? 0 : x;
 }
 
 Element vertex_attribute(std::string_view name, const Span& at) {

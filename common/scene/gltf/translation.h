@@ -80,6 +80,12 @@ struct Box {
   bool is_empty() const { return low[0] > high[0]; }
 };
 
+// Relative tolerance of bounds: programs compute in single precision, so that a number which is meant to be a
+// bound may lie a few units of its last place (2^-23) beyond it.
+inline constexpr double kSingle = 1e-6;
+// Returns x, or the nearer bound if x is beyond 0 or 1 by no more than kSingle. In textures.cpp.
+double share(double x);
+
 // In textures.cpp: a value that is a constant, or the product of a constant and images.
 struct Source {
   std::array<double, 3> factor{1, 1, 1};
@@ -109,7 +115,6 @@ struct Material {
   std::string interior;  // id of the medium within; empty: none
   std::optional<Element> light;
   std::size_t uv_set = 0;
-  bool has_normal_map = false;
 };
 struct MeshKind {
   bool colours = false, opacities = false;  // true if the vertices have them
@@ -182,6 +187,9 @@ struct Stage {
   std::set<std::vector<double>> weights;
 };
 Stage read_nodes(Translation& t, const Poses& poses);
+
+// In ignored.cpp: warns of what the file has and no function here reads, once for each kind of it.
+void warn_of_ignored(Translation& t);
 
 // In lights.cpp: translates a light and adds it to the scene.
 void add_light(Translation& t, const Standing& light);

@@ -344,6 +344,13 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<PrincipledBsdf>(const Element& e) 
   if (b.spec_trans && b.spec_trans->value < scene_.textures.size())
     if (const auto* share = std::get_if<ConstantTexture>(&scene_.textures[b.spec_trans->value]))
       if (share->value == Rgb{0, 0, 0}) b.spec_trans.reset();
+  if (b.multiple_scattering && b.anisotropic.value < scene_.textures.size()) {
+    const auto* share = std::get_if<ConstantTexture>(&scene_.textures[b.anisotropic.value]);
+    if (!share || share->value != Rgb{0, 0, 0})
+      report_.error(e.at,
+                    "multiple_scattering of bsdf \"principled\" needs the same roughness both ways: leave "
+                    "anisotropic out, or multiple_scattering");
+  }
   return add_bsdf(e, b);
 }
 

@@ -82,12 +82,14 @@ void describe(V& v, T& t) {
 }
 
 // Describes the parameter multiple_scattering, which several rough surfaces have.
+inline Field multiple_scattering_field(std::string_view doc) {
+  return {.name = "multiple_scattering", .doc = doc, .elided = true};
+}
 template <class V, class T>
 void describe_multiple_scattering(V& v, T& b) {
-  v.field({.name = "multiple_scattering",
-           .doc = "our own: light that microfacets throw onto each other is not lost (see "
-                  "docs/design/multiple-scattering.md); needs one roughness that is no texture",
-           .elided = true},
+  v.field(multiple_scattering_field("our own: light that microfacets throw onto each other is not lost (see "
+                                    "docs/design/multiple-scattering.md); needs one roughness that is no "
+                                    "texture"),
           b.multiple_scattering);
 }
 
@@ -309,6 +311,13 @@ void describe(V& v, T& b) {
           b.normalmap);
   v.field(nested_field("bsdf", "that sees them", "<bsdf>"), b.bsdf);
   describe_map(v, b);
+  v.field(
+      {.name = "follow_mirroring",
+       .doc = "our own: green leans to the top of the image, also where texture coordinates or `to_world` "
+              "mirror the image on the surface (as in glTF, USD and Blender); else it leans the other way "
+              "there, as in Mitsuba",
+       .elided = true},
+      b.follow_mirroring);
 }
 
 LS_TYPE(BumpMapBsdf, "bsdf", "bumpmap", "",
@@ -350,6 +359,9 @@ void describe(V& v, T& b) {
   v.field(share_field("flatness", "from diffuse to an imitation of light that scatters below"), b.flatness);
   v.field(share_field("clearcoat", "of a thin coat"), b.clearcoat);
   v.field(share_field("clearcoat_gloss", "of the coat"), b.clearcoat_gloss);
+  v.field(multiple_scattering_field("our own: light that microfacets throw onto each other is not lost (see "
+                                    "docs/design/multiple-scattering.md); without `anisotropic`"),
+          b.multiple_scattering);
 }
 
 }  // namespace ls::scene

@@ -142,3 +142,12 @@ def test_a_camera_that_is_none_is_told(stage):
     made.GetFocalLengthAttr().Set(0.0)
     with pytest.raises(lightshaft.StageRejected, match="/world/eye"):
         lightshaft.usd.read(path_of(stage))
+
+
+@pytest.mark.parametrize(
+    "clipping, seen", [((1, 20), True), ((9.5, 10.5), True), ((10.5, 20), False), ((1, 9.5), False)]
+)
+def test_a_clipping_range_clips(farm, stage, clipping, seen):
+    made = camera(stage, (0.5, 0.5, 10), (0.5, 0.5, 0), 4.0)
+    made.CreateClippingRangeAttr(Gf.Vec2f(*clipping))
+    assert (image(farm, stage, 4, (8, 8)).mean() < 0.5) == seen

@@ -1,6 +1,7 @@
 """UsdPreviewSurface and its textures: looked at under a white sky, where a diffuse surface shows its
 albedo."""
 
+import contextlib
 import math
 
 import numpy as np
@@ -271,3 +272,101 @@ def test_images_of_kinds_that_the_farm_does_not_read_are_written_anew(farm, stag
     picture.save(tmp_path / "a.jpg", quality=100)
     look(stage, diffuseColor=texture(stage, "/look/t", tmp_path / "a.jpg"))
     agree(middle(farm, stage, 16), (1, 0, 0), 0.02)  # of the coding of JPEG
+
+
+@pytest.mark.parametrize(
+    "opacity, threshold, expected", [(0.25, 0.0, 0.25), (0.0, 0.5, 0.0), (0.6, 0.5, 1.0)]
+)
+def test_emission_is_as_much_less_as_is_cut_out(farm, stage, opacity, threshold, expected):
+    """Before a black sky: what is behind gives no light."""
+    stage.RemovePrim("/sky")
+    look(
+        stage,
+        diffuseColor=(0.0, 0.0, 0.0),
+        emissiveColor=(2.0, 1.0, 0.5),
+        opacity=opacity,
+        opacityThreshold=threshold,
+    )
+    with pytest.warns(lightshaft.SceneWarning) if expected == 0 else contextlib.nullcontext():
+        shown = seen(farm, stage, 4, (8, 8), camera="/middle")
+    if expected == 0:  # it has no light at all, so that a white sky is put around it
+        agree(shown, 1.0)
+    else:
+        agree(shown, np.array((2.0, 1.0, 0.5)) * expected)
+
+
+def test_emission_is_cut_out_by_an_image(farm, stage, tmp_path):
+    stage.RemovePrim("/sky")
+    alpha = np.array([[0.9, 0.1], [0.4, 0.6]])
+    file = png(
+        tmp_path / "a.png", large(np.concatenate([np.full((2, 2, 3), 0.5), alpha[:, :, None]], axis=2))
+    )
+    look(
+        stage,
+        diffuseColor=(0.0, 0.0, 0.0),
+        emissiveColor=(1.0, 1.0, 1.0),
+        opacity=texture(stage, "/look/t", file, "a"),
+        opacityThreshold=0.5,
+    )
+    shown = quarters(whole(farm, stage, 16))
+    assert np.abs(shown - (alpha >= 0.5)[:, :, None]).max() < 1e-3
+
+
+@pytest.mark.parametrize("metallic", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("roughness", [0.3, 1.0])
+def test_white_metal_keeps_the_light_of_a_white_sky(farm, stage, metallic, roughness):
+    """A white plastic keeps it, too: 0.006, as light between its coat and its base is followed once more or less."""
+    look(stage, diffuseColor=(1.0, 1.0, 1.0), metallic=metallic, roughness=roughness, useSpecularWorkflow=0)
+    agree(middle(farm, stage, 64), 1.0, 2e-3 if metallic == 1 else 6e-3)
+
+
+@pytest.mark.parametrize("content", [None, b"no image"])
+def test_the_fallback_of_a_texture_takes_the_place_of_an_image_that_is_missing_or_broken(
+    farm, stage, tmp_path, content
+):
+    if content:
+        (tmp_path / "lost.png").write_bytes(content)
+    output = texture(stage, "/look/t", "lost.png", fallback=Gf.Vec4f(0.3, 0.6, 0.2, 1))
+    look(stage, diffuseColor=output)
+    with pytest.warns(lightshaft.SceneWarning, match="/look/t: .*the fallback of the shader is taken"):
+        agree(middle(farm, stage, 16), (0.3, 0.6, 0.2))
+
+
+def test_an_image_that_is_missing_without_a_fallback_is_refused(stage):
+    look(stage, diffuseColor=texture(stage, "/look/t", "lost.png"))
+    with pytest.raises(lightshaft.StageRejected, match="lost.png@ is not found"):
+        lightshaft.usd.read(path_of(stage), camera="/whole")
+
+
+def test_what_has_no_effect_is_told_by_its_prim(stage):
+    material = look(stage, diffuseColor=(0.5, 0.5, 0.5), sheen=0.5)
+    displaced = UsdShade.Shader.Define(stage, "/look/displaced")
+    displaced.CreateIdAttr("UsdPreviewSurface")
+    material.CreateDisplacementOutput().ConnectToSource(displaced.ConnectableAPI(), "displacement")
+    square(stage).GetAttribute("velocities").Set([Gf.Vec3f(1, 0, 0)] * 4)
+    eye = stage.GetPrimAtPath("/whole")
+    eye.GetAttribute("clippingRange").Set(Gf.Vec2f(50, 0.1))
+    eye.GetAttribute("shutter:close").Set(0.5)
+    eye.GetAttribute("exposure:iso").Set(400.0)
+    sun = stage.DefinePrim("/sun", "DistantLight")
+    sun.GetAttribute("inputs:angle").Set(1.0)
+    sun.CreateAttribute("inputs:shadow:color", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(1, 0, 0))
+    stage.DefinePrim("/procedural", "GenerativeProcedural")
+    stage.DefinePrim("/physics", "Acme")
+    stage.GetPrimAtPath("/m").CreateAttribute("userProperties:note", Sdf.ValueTypeNames.String).Set("quiet")
+
+    told = lightshaft.usd.read(path_of(stage), camera="/whole").warnings
+
+    for start, part in (
+        ("/look/surface", "inputs:sheen has no effect"),
+        ("/look", "outputs:displacement of a material has no effect"),
+        ("/m", "velocities has no effect: motion blur"),
+        ("/whole", "clippingRange (50, 0.1) shows nothing"),
+        ("/whole", "shutter:open and shutter:close"),
+        ("/whole", "exposure:iso has no effect"),
+        ("/sun", "inputs:shadow:color of a light has no effect"),
+        ("/procedural", "a GenerativeProcedural is not read"),
+        ("/physics", "a Acme has no effect"),
+    ):
+        assert any(w.startswith(f"{start}: ") and part in w for w in told), (start, part, told)
+    assert not any("note" in w or "sky" in w for w in told)

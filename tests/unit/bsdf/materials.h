@@ -187,8 +187,11 @@ inline PrincipledValues all_values() {
           .clearcoat = .5,
           .clearcoat_gloss = .1};
 }
-// Of the last material.
+// Of the last material, and of the last texture.
 inline BsdfIndex last(const Scene& s) { return {static_cast<std::uint32_t>(s.bsdfs.size() - 1)}; }
+inline TextureIndex last_texture(const Scene& s) {
+  return {static_cast<std::uint32_t>(s.textures.size() - 1)};
+}
 inline Scene masked(Scene s, double opacity) {
   add(s, MaskBsdf{texture(s, opacity), last(s)});
   return s;

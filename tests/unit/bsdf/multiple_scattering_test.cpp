@@ -92,6 +92,74 @@ TEST(MultipleScattering, AWhitePlasticKeepsAll) {
     }
 }
 
+// A metal of the principled material, alone and blended with plastic as readers of other formats do, and its
+// glass from both sides, for every roughness. Of a texture the tables are coarser.
+Scene white_principled(double roughness, double spec_trans = 0) {
+  return with_compensation(principled(
+      {.roughness = roughness, .metallic = spec_trans > 0 ? 0. : 1., .spec_trans = spec_trans}, {1, 1, 1}));
+}
+// The last texture that the material reads as its roughness becomes an image of that value.
+Scene with_textured_roughness(Scene s) {
+  auto& b = std::get<PrincipledBsdf>(s.bsdfs.back());
+  const Texture same = s.textures[b.roughness.value];
+  s.textures.push_back(same);
+  s.textures.push_back(CheckerboardTexture{b.roughness, last_texture(s), {}});
+  b.roughness = last_texture(s);
+  return s;
+}
+
+TEST(MultipleScattering, AWhiteMetalOfThePrincipledMaterialKeepsAll) {
+  for (const double roughness : {0., .5, 1.})
+    for (const double metallic : {0., .5, 1.}) {
+      Scene s = with_compensation(
+          rough_plastic(Microfacet::ggx, std::max(roughness * roughness, 1e-3), 1.5, 1, true, {1, 1, 1}));
+      const BsdfIndex plastic = last(s);
+      const Scene metal = white_principled(roughness);
+      PrincipledBsdf one = std::get<PrincipledBsdf>(metal.bsdfs.back());
+      for (TextureIndex* t :
+           {&one.base_color, &one.roughness, &one.anisotropic, &one.metallic, &one.spec_tint, &one.sheen,
+            &one.sheen_tint, &one.flatness, &one.clearcoat, &one.clearcoat_gloss})
+        *t = texture(s, std::get<ConstantTexture>(metal.textures[t->value]).value);
+      add(s, one);
+      add(s, BlendBsdf{texture(s, metallic), plastic, last(s)});
+      const auto b = bench(s);
+      for (const double mu : {1., .25, .03})
+        expect_white(*b, direction(mu, .3), 2 * kEnergyTolerance,
+                     fmt::format("metallic {} of roughness {}", metallic, roughness));
+    }
+}
+
+TEST(MultipleScattering, WhiteGlassOfThePrincipledMaterialKeepsAllFromBothSides) {
+  for (const double roughness : {.3, 1.}) {
+    const auto b = bench(white_principled(roughness, 1));
+    for (const double mu : {1., .25, -.25, -1.})
+      expect_white(*b, direction(mu, .3), kEnergyTolerance, fmt::format("glass {}", roughness));
+  }
+}
+
+TEST(MultipleScattering, OfATexturedRoughnessKeepsAllThatIsNotGrazing) {
+  for (const double roughness : {.11, .52, .98}) {
+    const auto metal = bench(with_textured_roughness(white_principled(roughness))),
+               glass = bench(with_textured_roughness(white_principled(roughness, 1)));
+    for (const double mu : {1., .25, .1}) {
+      const std::string what = fmt::format("of roughness {}", roughness);
+      expect_white(*metal, direction(mu, .3), kTexturedEnergyTolerance, "metal " + what);
+      for (const double side : {1., -1.})
+        expect_white(*glass, direction(side * mu, .3), kTexturedEnergyTolerance, "glass " + what);
+    }
+  }
+}
+
+TEST(MultipleScattering, OfAnisotropicPrincipledMaterialsIsRefused) {
+  const Scene s = with_compensation(principled({.anisotropic = .3, .metallic = 1}));
+  const auto textures =
+      TextureTable::build(s, [](const Asset&) -> Result<ImageData> { return fail(Errc::not_found, ""); });
+  ASSERT_TRUE(textures);
+  const auto table = BsdfTable::build(s, *textures);
+  ASSERT_FALSE(table);
+  EXPECT_NE(table.error().message.find("without anisotropic"), std::string::npos);
+}
+
 // A metal that absorbs gains less from compensation than a white one, whether by its tint or by its index.
 // `gain` is summed as a series, in which each further bounce has the factor F (1 - E_mean).
 TEST(MultipleScattering, AMetalGainsByItsOwnReflectance) {
@@ -118,7 +186,9 @@ TEST(MultipleScattering, AMetalGainsByItsOwnReflectance) {
 // compensation apply.
 TEST(MultipleScattering, LeavesSamplingAlone) {
   const Scene all[] = {rough_metal(Microfacet::ggx, .4, .4, kGoldEta, kGoldK),
-                       rough_glass(Microfacet::beckmann, .3, .3, 1.5, 1)};
+                       rough_glass(Microfacet::beckmann, .3, .3, 1.5, 1),
+                       principled({.roughness = .6, .metallic = .7}),
+                       principled({.roughness = .6, .metallic = .2, .spec_trans = .6})};
   for (const Scene& s : all) {
     const auto plain = bench(s), more = bench(with_compensation(s));
     for (const double mu : {.9, .3, -.4})

@@ -238,6 +238,24 @@ TEST(NormalMap, TurnsTheDirectionsOfAnisotropyAlong) {
               1e-4 * bare->eval(local(wo), local(wi)).f_cos.x);
 }
 
+// Where the image is not mirrored, dp/du, dp/dv and the normal are left-handed, since v points down: the
+// map's green then leans against dp/dv either way. Where it is mirrored, it does so with follow_mirroring
+// alone.
+TEST(NormalMap, LeansToTheTopOfAMirroredImageIfItIsToldTo) {
+  const V3 n = direction(.8, .7);
+  for (const bool follows : {false, true})
+    for (const float dv : {-1.f, 1.f}) {
+      Scene s = turned(diffuse({.5, .5, .5}), n);
+      std::get<NormalMapBsdf>(s.bsdfs.back()).follow_mirroring = follows;
+      const auto b = bench(s);
+      EXPECT_EQ(b->bsdfs.reads_slopes(b->bsdf), follows);
+      b->at.du = {2, 0, 0};
+      b->at.dv = {.3f, dv, 0};
+      const V3 leans(n.x, follows && dv > 0 ? -n.y : n.y, n.z), wi = direction(.9, 1.5);
+      EXPECT_NEAR(b->eval(kUp, wi).f_cos.x, .5f * kInvPi * dot(leans, wi), 1e-6) << follows << dv;
+    }
+}
+
 // As in Mitsuba 3.9.1: unscattered light is shadowed as reflected light would be, and there is none if the
 // direction is on different sides of the surface and of the mapped normal.
 TEST(NormalMap, ShadowsWhatPassesStraightOnAsWell) {

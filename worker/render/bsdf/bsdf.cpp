@@ -163,7 +163,7 @@ bool BsdfTable::anisotropic(BsdfIndex i) const {
 }
 bool BsdfTable::reads_slopes(BsdfIndex i) const {
   const Material& m = materials_[i.value];
-  return with_kind(m.kind, [](const auto& k) { return k.kReadsSlopes; }) ||
+  return with_kind(m.kind, [](const auto& k) { return k.reads_slopes(); }) ||
          any_part(m, [&](BsdfIndex part) { return reads_slopes(part); });
 }
 

@@ -72,10 +72,10 @@ struct MaterialKind {
   // True if the back of the surface is black. eval() and sample() are then called only for directions above
   // the surface (z > 0).
   static constexpr bool kFrontOnly = true;
-  static constexpr bool kSmooth = false;       // true if the kind has a lobe that is not a delta
-  static constexpr bool kDiffuse = false;      // see BsdfTable::is_diffuse
-  static constexpr bool kReadsSlopes = false;  // see BsdfTable::reads_slopes
+  static constexpr bool kSmooth = false;   // true if the kind has a lobe that is not a delta
+  static constexpr bool kDiffuse = false;  // see BsdfTable::is_diffuse
 
+  static bool reads_slopes() { return false; }  // see BsdfTable::reads_slopes
   static bool reads_uv() { return false; }
   static bool anisotropic() { return false; }
   static std::array<BsdfIndex, 0> parts() { return {}; }  // the materials of which this one consists

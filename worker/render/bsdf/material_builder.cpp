@@ -93,16 +93,31 @@ const MicrofacetEnergy* MaterialBuilder::energy(EnergyOf of, const Roughness& r,
   return energy(of, r.distribution, double{r.u.value.x}, eta);
 }
 
-const MicrofacetEnergy* MaterialBuilder::energy(EnergyOf of, Microfacet type, double alpha, double eta) {
-  const auto [it, fresh] = known_energies_.try_emplace({of, type, alpha, eta});
+const MicrofacetEnergy* MaterialBuilder::energy(EnergyOf of, Microfacet type, double alpha, double eta,
+                                                Accuracy accuracy) {
+  const auto [it, fresh] = known_energies_.try_emplace({of, type, alpha, eta, accuracy});
   if (!fresh) return it->second;
   energies_.push_back(nullptr);
   if (!room_for_table()) return nullptr;
-  energies_.back() =
-      (std::make_unique<MicrofacetEnergy>(of == EnergyOf::conductor    ? conductor_energy(type, alpha)
-                                          : of == EnergyOf::dielectric ? dielectric_energy(type, alpha, eta)
-                                                                       : coat_energy(type, alpha, eta)));
+  energies_.back() = std::make_unique<MicrofacetEnergy>(
+      of == EnergyOf::conductor    ? conductor_energy(type, alpha, accuracy)
+      : of == EnergyOf::dielectric ? dielectric_energy(type, alpha, eta, accuracy)
+                                   : coat_energy(type, alpha, eta));
   return it->second = energies_.back().get();
+}
+
+EnergyByRoughness MaterialBuilder::energies(EnergyOf of, const Slot& roughness, double eta) {
+  std::vector<const MicrofacetEnergy*> tables;
+  const auto add = [&](float r, Accuracy accuracy) {
+    const double alpha = double{std::max(kMinPrincipled, r * r)};
+    if (!refused()) tables.push_back(energy(of, Microfacet::ggx, alpha, eta, accuracy));
+  };
+  if (roughness.constant)
+    add(std::clamp(luminance(roughness.value), 0.f, 1.f), Accuracy::full);
+  else
+    for (int i = 0; i <= EnergyByRoughness::kSteps; ++i)
+      add(static_cast<float>(i) / EnergyByRoughness::kSteps, Accuracy::rough);
+  return refused() ? EnergyByRoughness() : EnergyByRoughness(std::move(tables));
 }
 
 }  // namespace ls::render

@@ -18,6 +18,8 @@
 
 namespace ls::render {
 
+inline constexpr float kMinPrincipled = .001f;  // the smallest alpha of the facets of Burley's material
+
 // Builds the parts of materials. After an error the functions still return something, so make_material()
 // needs no error handling of its own: the builder records the first error and ignores later ones.
 class MaterialBuilder {
@@ -54,7 +56,10 @@ class MaterialBuilder {
   // kind `of` (microfacet_tables.h); null: the scene is refused.
   enum class EnergyOf { conductor, dielectric, coat };
   const MicrofacetEnergy* energy(EnergyOf of, const Roughness& roughness, double eta);
-  const MicrofacetEnergy* energy(EnergyOf of, Microfacet type, double alpha, double eta);
+  const MicrofacetEnergy* energy(EnergyOf of, Microfacet type, double alpha, double eta,
+                                 Accuracy accuracy = Accuracy::full);
+  // Returns the energies of GGX facets whose alpha is the square of `roughness`, but at least kMinPrincipled.
+  EnergyByRoughness energies(EnergyOf of, const Slot& roughness, double eta);
 
   // Returns the tables of a coated metal. Materials with equal `parameters` share them; `make` computes them
   // if they do not exist yet.
@@ -74,7 +79,8 @@ class MaterialBuilder {
   std::optional<Error> error_;
   std::uint64_t clamped_ = 0;
   std::map<std::tuple<Microfacet, double, double>, RoughPlasticTable> coats_;
-  std::map<std::tuple<EnergyOf, Microfacet, double, double>, const MicrofacetEnergy*> known_energies_;
+  std::map<std::tuple<EnergyOf, Microfacet, double, double, Accuracy>, const MicrofacetEnergy*>
+      known_energies_;
   std::vector<std::unique_ptr<const MicrofacetEnergy>> energies_;
   std::map<std::array<float, 4>, CoatedConductorTables> coated_conductors_;
 };

@@ -97,10 +97,15 @@ namespace {
 constexpr int kOctaves = 16, kDeepest = 12;
 constexpr std::size_t kMostEntries = 1024;
 
-const Quadrature& quadrature(double eta) {
-  static const Quadrature kSmooth = gauss_legendre(64), kKinked = gauss_legendre(128);
+const Quadrature& quadrature(double eta, Accuracy accuracy) {
+  static const Quadrature kSmooth = gauss_legendre(64), kKinked = gauss_legendre(128),
+                          kRough = gauss_legendre(24), kRoughKinked = gauss_legendre(48);
   // If eta < 1, the integrand has a kink where total reflection begins, so more nodes are needed
+  if (accuracy == Accuracy::rough) return eta >= 1 ? kRough : kRoughKinked;
   return eta >= 1 ? kSmooth : kKinked;
+}
+double tolerance(Accuracy accuracy) {
+  return accuracy == Accuracy::full ? kEnergyTolerance : kTexturedEnergyTolerance / 4;
 }
 
 // The masking of the viewer in the BSDF's value, divided by the masking in the density of visible normals.
@@ -112,12 +117,14 @@ double fit(Microfacet type, double alpha, double mu) {
   return double{beckmann::G1_over_cos(w, a, a)} / double{beckmann::exact_G1_over_cos(w, a, a)};
 }
 
-double share(Way way, Microfacet type, double alpha, double eta, double mu) {
+double share(Way way, Microfacet type, double alpha, double eta, double mu,
+             Accuracy accuracy = Accuracy::full) {
   const double safe = std::max(mu, 1e-6);
-  return fit(type, alpha, safe) * rough_share(way, type, alpha, eta, safe, quadrature(eta));
+  return fit(type, alpha, safe) * rough_share(way, type, alpha, eta, safe, quadrature(eta, accuracy));
 }
-double both_ways(Microfacet type, double alpha, double eta, double mu) {
-  return share(Way::reflected, type, alpha, eta, mu) + share(Way::refracted, type, alpha, eta, mu);
+double both_ways(Microfacet type, double alpha, double eta, double mu, Accuracy accuracy = Accuracy::full) {
+  return share(Way::reflected, type, alpha, eta, mu, accuracy) +
+         share(Way::refracted, type, alpha, eta, mu, accuracy);
 }
 double lacking(double E) { return (1 - E) / E; }
 
@@ -166,22 +173,25 @@ double CosineTable::mean() const {
   return 2 * sum;
 }
 
-MicrofacetEnergy conductor_energy(Microfacet type, double alpha) {
+MicrofacetEnergy conductor_energy(Microfacet type, double alpha, Accuracy accuracy) {
   MicrofacetEnergy e;
-  e.missing = CosineTable([&](double mu) { return lacking(share(Way::mirrored, type, alpha, 1, mu)); },
-                          kEnergyTolerance);
+  e.missing =
+      CosineTable([&](double mu) { return lacking(share(Way::mirrored, type, alpha, 1, mu, accuracy)); },
+                  tolerance(accuracy));
   const CosineTable E([&](double mu) { return 1 / (1 + e.missing.at(static_cast<float>(mu))); },
-                      kEnergyTolerance);
+                      tolerance(accuracy));
   e.mean = static_cast<float>(E.mean());
   return e;
 }
 
-MicrofacetEnergy dielectric_energy(Microfacet type, double alpha, double eta) {
+MicrofacetEnergy dielectric_energy(Microfacet type, double alpha, double eta, Accuracy accuracy) {
   MicrofacetEnergy e;
-  e.missing =
-      CosineTable([&](double mu) { return lacking(both_ways(type, alpha, eta, mu)); }, kEnergyTolerance);
-  e.missing_behind =
-      CosineTable([&](double mu) { return lacking(both_ways(type, alpha, 1 / eta, mu)); }, kEnergyTolerance);
+  const auto table = [&](double index) {
+    return CosineTable([=](double mu) { return lacking(both_ways(type, alpha, index, mu, accuracy)); },
+                       tolerance(accuracy));
+  };
+  e.missing = table(eta);
+  e.missing_behind = table(1 / eta);
   return e;
 }
 
@@ -206,6 +216,16 @@ C3 mean_fresnel(const C3& eta, const C3& k) {
     sum += V3d(fresnel_conductor(static_cast<float>(mu), eta, k)) * (2 * mu / kSteps);
   }
   return C3(sum);
+}
+
+float mean_fresnel(double eta) {
+  constexpr int kSteps = 1024;
+  double sum = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double mu = (i + .5) / kSteps;
+    sum += fresnel_dielectric(mu, eta).reflectance * 2 * mu / kSteps;
+  }
+  return static_cast<float>(sum);
 }
 
 RoughPlasticTable make_rough_plastic_table(Microfacet type, double alpha, double eta) {

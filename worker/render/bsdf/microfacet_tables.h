@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "common/scene/scene.h"
@@ -58,6 +60,9 @@ class CosineTable {
 // without absorption has the radiance 1 up to this error. It covers the errors of the tables and of the
 // quadrature by which they are computed.
 inline constexpr double kEnergyTolerance = 5e-4;
+// The same for a surface of GGX facets whose roughness is a texture (EnergyByRoughness), up to the roughness
+// sqrt(alpha) = 1: the error of interpolation between its tables.
+inline constexpr double kTexturedEnergyTolerance = 5e-3;
 
 // Single-scattering microfacet models lose the light that is scattered several times between microfacets.
 // Here a factor on the BSDF f compensates for it (Turquin 2019, "Practical multiple scattering compensation
@@ -90,16 +95,54 @@ struct MicrofacetEnergy {
   std::size_t bytes() const { return missing.bytes() + missing_behind.bytes() + through.bytes(); }
 };
 
-MicrofacetEnergy conductor_energy(Microfacet type, double alpha);
+// How accurate a table is: its tolerance, and the number of nodes of the quadrature behind it (where light is
+// totally reflected, twice as many).
+enum class Accuracy { full, rough };
+MicrofacetEnergy conductor_energy(Microfacet type, double alpha, Accuracy accuracy = Accuracy::full);
 // eta is the index inside over the index outside.
-MicrofacetEnergy dielectric_energy(Microfacet type, double alpha, double eta);
+MicrofacetEnergy dielectric_energy(Microfacet type, double alpha, double eta,
+                                   Accuracy accuracy = Accuracy::full);
 // Makes the tables for the coat of a rough plastic. Sets `missing` and `through`, and leaves `missing_behind`
 // empty. eta is the index of the coat over the index outside.
 MicrofacetEnergy coat_energy(Microfacet type, double alpha, double eta);
 
+// The energies of GGX surfaces of every roughness r = sqrt(alpha) from 0 to 1: one table if the roughness is
+// constant, else tables at equal steps of r, between which (1 - E) / E is interpolated linearly.
+class EnergyByRoughness {
+ public:
+  static constexpr int kSteps = 24;
+
+  EnergyByRoughness() = default;
+  // `tables`: one, or those of the roughnesses i / kSteps for i from 0 to kSteps. They must outlive this
+  // object.
+  explicit EnergyByRoughness(std::vector<const MicrofacetEnergy*> tables) : tables_(std::move(tables)) {}
+
+  bool empty() const { return tables_.empty(); }
+  // Each returns what the function of this name of MicrofacetEnergy does, for the roughness r.
+  C3 factor(float r, float cos, const C3& F) const {
+    return between(r, [&](const MicrofacetEnergy& e) { return e.factor(cos, F); });
+  }
+  float factor(float r, float cos, bool outside) const {
+    return between(r, [&](const MicrofacetEnergy& e) { return e.factor(cos, outside); });
+  }
+
+ private:
+  template <class Value>
+  std::invoke_result_t<Value, const MicrofacetEnergy&> between(float r, Value value) const {
+    if (tables_.size() == 1) return value(*tables_[0]);
+    const float x = std::clamp(r, 0.f, 1.f) * kSteps;
+    const auto i = std::min(static_cast<std::size_t>(x), tables_.size() - 2);
+    const float t = x - static_cast<float>(i);
+    return value(*tables_[i]) * (1 - t) + value(*tables_[i + 1]) * t;
+  }
+  std::vector<const MicrofacetEnergy*> tables_;
+};
+
 // Returns the mean Fresnel reflectance of a conductor, 2 int F(mu) mu dmu over the cosine mu from 0 to 1, per
 // channel. eta and k are the real and the imaginary part of its index.
 C3 mean_fresnel(const C3& eta, const C3& k);
+// The same of a dielectric seen from outside; eta is the index inside over the index outside.
+float mean_fresnel(double eta);
 
 // The tables of a coat over a metal that absorbs nothing, by the cosine outside the coat. T, F and Q are
 // those of conductor.h: transmittance and reflectance of the coat for light from outside, and the share of

@@ -182,12 +182,22 @@ struct Mapped : MaterialKind {
 };
 
 struct NormalMap : Mapped<NormalMap> {
-  V3 normal(const Lookup& look) const { return look.reflectance(map) * 2 - V3(1); }
+  bool follows_mirroring = false;
+
+  bool reads_slopes() const { return follows_mirroring; }
+  V3 normal(const Lookup& look) const {
+    V3 n = look.reflectance(map) * 2 - V3(1);
+    // v points down the image. So where the image is not mirrored, (dp/du, dp/dv, normal) are left-handed.
+    const UvPoint& at = look.at;
+    if (follows_mirroring && at.du.x * at.dv.y - at.du.y * at.dv.x > 0) n.y = -n.y;
+    return n;
+  }
 };
 
 struct BumpMap : Mapped<BumpMap> {
-  static constexpr bool kReadsSlopes = true;
   float scale = 1;
+
+  static bool reads_slopes() { return true; }
 
   // A bump map displaces the surface by h along its normal n. This changes the components of dp/du and dp/dv
   // along n from 0 to dh/du and dh/dv (Blinn 1978; the change of n itself is neglected).
@@ -228,7 +238,9 @@ Map map_of(const Description& b, TextureIndex texture, MaterialBuilder& builder)
   return m;
 }
 inline NormalMap make_material(const NormalMapBsdf& b, MaterialBuilder& builder) {
-  return map_of<NormalMap>(b, b.normalmap, builder);
+  auto m = map_of<NormalMap>(b, b.normalmap, builder);
+  m.follows_mirroring = b.follow_mirroring;
+  return m;
 }
 inline BumpMap make_material(const BumpMapBsdf& b, MaterialBuilder& builder) {
   auto m = map_of<BumpMap>(b, b.texture, builder);

@@ -57,7 +57,7 @@ struct SeenPrincipled {
     eta = front ? p.eta : 1 / p.eta;
     const float a = sqr(look.share(p.roughness)),
                 aspect = std::sqrt(1 - .9f * look.share(p.anisotropic_slot));
-    facets = {Microfacet::ggx, std::max(.001f, a / aspect), std::max(.001f, a * aspect)};
+    facets = {Microfacet::ggx, std::max(kMinPrincipled, a / aspect), std::max(kMinPrincipled, a * aspect)};
     const float coat = .25f * clearcoat, diffuse = front ? brdf : 0, sum = 1 + coat + diffuse;
     chance_facets = 1 / sum;
     chance_coat = coat / sum;
@@ -77,12 +77,28 @@ struct SeenPrincipled {
     return l > 0 ? base / l : C3(1);
   }
   C3 reflectance(float F, float cos, const C3& base) const {
-    if (!front) return C3(bsdf * F);
+    if (!front) return C3(bsdf * F * glass_factor());
     const float w = schlick(cos, eta), tinted = look.share(p.spec_tint);
     const C3 f0 = tint(base) * sqr((eta - 1) / (eta + 1));
-    return C3((1 - metallic) * (1 - tinted) * F) + schlick(base, w) * metallic +
-           schlick(f0, w) * ((1 - metallic) * tinted);
+    if (p.metal_energy.empty())
+      return C3((1 - metallic) * (1 - tinted) * F) + schlick(base, w) * metallic +
+             schlick(f0, w) * ((1 - metallic) * tinted);
+    // What is not metal is opaque or glass, with the shares `brdf` and `bsdf`.
+    const C3 opaque = C3(brdf) * metal_factor(C3(p.mean_fresnel)) + C3(bsdf * glass_factor());
+    return opaque * ((1 - tinted) * F) + schlick(base, w) * metal_factor(mean_schlick(base)) * metallic +
+           schlick(f0, w) * metal_factor(mean_schlick(f0)) * ((1 - metallic) * tinted);
   }
+
+  // The compensation for light lost between the facets, 1 if there is none: of those that only reflect, with
+  // the mean reflectance `mean`, and of those of glass.
+  C3 metal_factor(const C3& mean) const {
+    return p.metal_energy.empty() ? C3(1) : p.metal_energy.factor(look.share(p.roughness), wo.z, mean);
+  }
+  float glass_factor() const {
+    return p.glass_energy.empty() ? 1 : p.glass_energy.factor(look.share(p.roughness), wo.z, front);
+  }
+  // The mean 2 int F(mu) mu dmu of Schlick's F = F0 + (1 - F0) (1 - mu)^5
+  static C3 mean_schlick(const C3& f0) { return f0 + (C3(1) - f0) * (1 / 21.f); }
 };
 
 // The diffuse lobe's part of the BSDF, times |cos wi|: diffuse reflection, retro-reflection, approximate
@@ -145,7 +161,8 @@ BsdfEval eval_refraction(const SeenPrincipled& s, const C3& base, const V3& wi) 
   const V3 up(wi.x, wi.y, -wi.z), root(std::sqrt(base.x), std::sqrt(base.y), std::sqrt(base.z));
   const float G = s.facets.G1_over_cos(s.wo) * s.facets.G1_over_cos(up) * up.z;
   const float share = s.chance_facets * (s.front ? s.bsdf : 1);
-  return {root * (s.bsdf * density * G), share * density * s.facets.visible_over_D(s.wo) * sqr(s.eta)};
+  return {root * (s.bsdf * density * G * s.glass_factor()),
+          share * density * s.facets.visible_over_D(s.wo) * sqr(s.eta)};
 }
 
 }  // namespace
@@ -210,6 +227,13 @@ Principled make_material(const PrincipledBsdf& b, MaterialBuilder& builder) {
   // As in Mitsuba, the index is moved away from 1: without a contrast of indices the facets would neither
   // reflect nor refract.
   if (p.transmits && std::abs(p.eta - 1) < 1e-3f) p.eta = 1.001f;
+  if (!b.multiple_scattering || builder.refused()) return p;
+  if (!p.anisotropic_slot.constant || p.anisotropic_slot.value != C3(0))
+    builder.refuse("multiple_scattering needs the same roughness both ways, without anisotropic");
+  const double eta = double{p.eta};
+  p.mean_fresnel = mean_fresnel(eta);
+  p.metal_energy = builder.energies(MaterialBuilder::EnergyOf::conductor, p.roughness, 1);
+  if (p.transmits) p.glass_energy = builder.energies(MaterialBuilder::EnergyOf::dielectric, p.roughness, eta);
   return p;
 }
 

@@ -8,9 +8,15 @@
 // t = spec_trans and b = (1 - m) t, the unnormalised probabilities from the front are 1 for the facets (they
 // reflect with probability 1 - b (1 - F)), clearcoat / 4 for the coat, and (1 - m) (1 - t) for the diffuse
 // lobe. From behind there are only the facets, which reflect with probability F.
+//
+// With multiple_scattering (our own) each part of what the facets reflect or refract is multiplied by the
+// factor that docs/design/multiple-scattering.md gives for its kind: that of a metal of its own mean
+// reflectance for what metal and opaque dielectric reflect, and that of a dielectric for glass. Diffuse lobe
+// and coat stay as they are: they lose nothing between facets. Sampling stays as it is.
 #pragma once
 
 #include "worker/render/bsdf/material_builder.h"
+#include "worker/render/bsdf/microfacet_tables.h"
 
 namespace ls::render {
 
@@ -21,6 +27,10 @@ struct Principled : MaterialKind {
       clearcoat, clearcoat_gloss;
   bool transmits = false;
   float eta = 1.5f;  // index of refraction inside over outside
+  // What compensates for light lost between the facets (microfacet_tables.h): of those that reflect, and of
+  // those of glass (empty unless `transmits`). Both are empty without multiple_scattering.
+  EnergyByRoughness metal_energy, glass_energy;
+  float mean_fresnel = 0;  // of the dielectric, seen from the front; set only with multiple_scattering
 
   bool reads_uv() const {
     return any_texture(base_color, roughness, anisotropic_slot, metallic, spec_trans, spec_tint, sheen,

@@ -90,6 +90,28 @@ CameraRay Camera::perspective_ray(const V3& o, const V3d& local) const {
   return {o + d * (near_ * per_depth), d, (far_ - near_) * per_depth};
 }
 
+std::pair<V3d, V3d> Camera::before_near_plane(double pixels) const {
+  V3d low(std::numeric_limits<double>::infinity()), high = -low;
+  for (const double x : {-pixels, 1 / per_pixel_x_ + pixels})
+    for (const double y : {-pixels, 1 / per_pixel_y_ + pixels}) {
+      const CameraRay r = ray(x, y, {.5f, .5f});  // from the middle of the lens
+      const V3d end(r.o), lens = end - V3d(r.d) * (double{near_distance(r.d)} * (1 + 1e-3));
+      for (int k = 0; k < 3; ++k) {
+        low[k] = std::min({low[k], end[k], lens[k]});
+        high[k] = std::max({high[k], end[k], lens[k]});
+      }
+    }
+  // The lens is a disk, and what rays pass up to the near plane is at most (1 + near / focus) times as wide.
+  const double wide = has_lens() ? double{aperture_} * (1 + double{near_} / double{focus_}) : 0;
+  for (int k = 0; k < 3; ++k) {
+    const double margin = 1e-6 * std::max(std::abs(low[k]), std::abs(high[k])) +
+                          wide * double{std::abs(lens_x_[k]) + std::abs(lens_y_[k])};
+    low[k] -= margin;
+    high[k] += margin;
+  }
+  return {low, high};
+}
+
 float Camera::near_distance(const V3& d) const {
   if (projection_ == Projection::spherical) return 0;
   const double along = axis_z_.length();

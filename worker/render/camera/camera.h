@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "common/image/frame/frame.h"
@@ -53,6 +54,10 @@ class Camera {
   bool usable() const;
   // Returns the distance from the camera, or from its lens, to the start of a ray in direction d.
   float near_distance(const V3& d) const;
+  // Returns the lower and the upper corner of a box around everything that rays of the frame, and of `pixels`
+  // around it, pass between the lens and the near plane, enlarged by a thousandth of its distance. Not for
+  // spherical cameras, which have no near plane.
+  std::pair<V3d, V3d> before_near_plane(double pixels) const;
   bool has_lens() const { return aperture_ > 0; }
   Projection projection() const { return projection_; }
 
@@ -89,6 +94,8 @@ class PixelFilter {
   // Returns the offset of a sample from the pixel's centre along one axis, in pixels, for the random number u
   // in [0, 1).
   double offset(float u) const;
+  // The largest absolute value of an offset, in pixels.
+  double reach() const { return radius_; }
 
  private:
   enum class Kind { box, tent, table } kind_ = Kind::box;

@@ -273,12 +273,18 @@ void PathTracer<F, Light>::add_medium_emission(const Medium& medium, float t_max
 }
 
 template <Features F, template <Features> class Light>
-auto PathTracer<F, Light>::start_medium() const -> Within {
+auto PathTracer<F, Light>::start_medium(const CameraRay& ray) const -> Within {
   Within in;
-  if constexpr (F.overlaps) {
-    if (world_.overlaps) return world_.camera_media;
-  }
-  in.only(world_.camera_medium);
+  const auto at_lens = [&] {
+    if constexpr (F.overlaps)
+      if (world_.overlaps) return void(in = world_.camera_media);
+    in.only(world_.camera_medium);
+  };
+  at_lens();
+  if (world_.hidden_boundaries) [[unlikely]]
+    for_hidden_boundaries(world_, ray, [&](const SurfaceHit& hit, const SurfaceInfo& surface) {
+      in = beyond(hit, surface, ray.d, ray.d, in);
+    });
   return in;
 }
 

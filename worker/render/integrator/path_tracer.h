@@ -34,6 +34,7 @@
 #include "worker/render/integrator/vertex_nee.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/medium_stack.h"
+#include "worker/render/world/near_plane.h"
 #include "worker/render/world/roulette.h"
 #include "worker/render/world/world.h"
 
@@ -192,7 +193,8 @@ class PathTracer {
   [[gnu::always_inline]] inline C3 through_boundaries(C3 value, const V3& start, const V3& p, const V3& d,
                                                       float left, Within medium, RandomStream stream);
   C3 through_media(const Within& media, const V3& from, const V3& d, float t, RandomStream& stream) const;
-  Within start_medium() const;
+  // Returns the media in which a camera ray begins.
+  Within start_medium(const CameraRay& ray) const;
   // Requires that `surface` is the surface of `hit`. The function is described at its definition
   // (medium_crossing.h).
   [[gnu::always_inline]] inline Within beyond(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& w,
@@ -343,7 +345,7 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
   if (!world_.depth_allows(0)) return outcome_;
   ray_ = {ray.o, ray.o, ray.d};
   last_.p = ray.o;
-  if constexpr (F.media) medium_ = start_medium();
+  if constexpr (F.media) medium_ = start_medium(ray);
   if constexpr (F.chromatic) hero_ = std::min(2, static_cast<int>(3 * stream_.group(0, Purpose::hero).u(0)));
   if constexpr (kSplits) reference_ = world_.mean_radiance > 0 ? kNoReference : 1;
   go_on(ray.t_max);
@@ -456,7 +458,7 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
   DenoisingGuide guide;
   double unscattered = 1;
   ray_ = {ray.o, ray.o, ray.d};
-  medium_ = start_medium();
+  medium_ = start_medium(ray);
   float reach = ray.t_max;
   for (segment_ = 0; segment_ < kGuideSegments; ++segment_, reach = kInfinity) {
     SurfaceHit hit;

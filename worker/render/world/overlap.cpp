@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "worker/render/geometry/surface_boxes.h"
+#include "worker/render/world/near_plane.h"
 
 namespace ls::render {
 namespace {
@@ -75,10 +76,11 @@ MediaState camera_media(const World& w) {
   if (w.camera_medium == kNone) return state;
   const CameraRay ray =
       w.camera.ray(w.origin_x + w.size.width / 2., w.origin_y + w.size.height / 2., {.5f, .5f});
+  const V3 eye = w.hidden_boundaries ? hidden_part(w, ray).start : ray.o;
   Left left;
   // The directions avoid axes and diagonals, along which hits are often grazing.
   for (const V3d& d : {V3d(.31, .82, .48), V3d(-.72, .24, .65), V3d(.17, -.44, -.88)})
-    note_left(w, ray.o, V3(d.normalized()), left);
+    note_left(w, eye, V3(d.normalized()), left);
   const auto around = [&](const auto& entry) { return entry.second >= 2; };
   const bool inside_of_it = std::any_of(left.begin(), left.end(), [&](const auto& e) {
     return around(e) && w.geometry.surfaces[e.first.first].interior == w.camera_medium;

@@ -16,7 +16,7 @@ bool media_may_overlap(const World& w);
 // medium, there are none, as in Mitsuba. Otherwise they are the sensor's `medium` and the interiors of the
 // closed boundaries around the camera. A boundary counts as enclosing the camera if at least two of three
 // rays from the camera leave it without having entered it. The camera's position is the origin of the ray
-// through the image's centre.
+// through the image's centre; it is the lens instead if World::hidden_boundaries is set.
 MediaState camera_media(const World& w);
 
 }  // namespace ls::render

@@ -11,6 +11,7 @@
 #include "worker/render/math/random.h"
 #include "worker/render/media/optical_depth.h"
 #include "worker/render/render.h"
+#include "worker/render/world/near_plane.h"
 
 namespace ls::render {
 namespace {
@@ -45,6 +46,10 @@ std::pair<int, int> somewhere(const World& w, RandomStream& places) {
 float met_by(const World& w, const CameraRay& ray) {
   V3 start = ray.o, origin = ray.o;
   std::uint32_t medium = w.camera_medium;
+  const auto beyond = [&](const SurfaceHit& hit, const SurfaceInfo& surface) {
+    if (surface.transition) medium = dot(ray.d, hit.ng) > 0 ? surface.exterior : surface.interior;
+  };
+  if (w.hidden_boundaries) for_hidden_boundaries(w, ray, beyond);
   float passes = 1, left = ray.t_max;
   constexpr int kMaxBoundaries = 16;
   for (int i = 0; i < kMaxBoundaries; ++i) {
@@ -61,7 +66,7 @@ float met_by(const World& w, const CameraRay& ray) {
     }
     const SurfaceInfo* surface = met ? &w.geometry.surfaces[hit.surface] : nullptr;
     if (!met || !surface->null) break;
-    if (surface->transition) medium = dot(ray.d, hit.ng) > 0 ? surface->exterior : surface->interior;
+    beyond(hit, *surface);
     start = hit.p;
     origin = offset_point(hit, ray.d);
     left = kInfinity;

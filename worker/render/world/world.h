@@ -41,6 +41,8 @@ class World {
   PixelFilter filter;
 
   std::uint32_t camera_medium = kNone;
+  // True if boundaries of media may lie between the lens and the near plane (near_plane.h)
+  bool hidden_boundaries = false;
   scene::Needs needs;       // what the scene contains; `need` is derived from this
   bool overlaps = false;    // true if media may be nested or intersect; each path then keeps a MediaState
   MediaState camera_media;  // if `overlaps`: the media state with which camera paths start

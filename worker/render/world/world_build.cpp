@@ -12,6 +12,7 @@
 #include "worker/render/geometry/coincident.h"
 #include "worker/render/geometry/surface_boxes.h"
 #include "worker/render/world/aim.h"
+#include "worker/render/world/near_plane.h"
 #include "worker/render/world/overlap.h"
 #include "worker/render/world/world.h"
 
@@ -242,6 +243,7 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
                 "the rays of the sensor leave the range of single precision: check its to_world, fov, "
                 "principal_point_offset, clip planes, aperture_radius and focus_distance");
   w.filter = PixelFilter(scene.film.filter);
+  w.hidden_boundaries = near_plane_hides_boundaries(w);
   const Features found = found_in(w);
   w.needs = scene::needs_of(scene, w.use_media);
   w.need = features_of(w.needs);

@@ -10,12 +10,13 @@ from pxr import Usd, UsdGeom
 
 from ..errors import StageRejected
 from .document import Document
+from .ignored import tell_prim
 from .problems import Problems
 from .shading import plain
-from .transforms import Matrix, column_matrix, rigid, scale, translation
+from .transforms import Matrix, column_matrix, is_usable, scale, translation, unscaled
 
 TURNED = scale(-1, 1, -1)  # looks along +z with +x to the left
-NEAR, FAR = 1e-4, 1e7  # of the depths that are seen: clipping is not read
+NEAR, FAR = 1e-4, 1e7  # of the depths that are seen, unless the camera says otherwise
 WIDTH = 960  # pixels of a frame whose size nobody gives
 FRAMED = 50.0  # degrees of the view of a stage without a camera
 TENTH = 0.1  # apertures and focal lengths are in tenths of a scene unit
@@ -91,7 +92,11 @@ def add_camera(
     # The frame holds all of the aperture: where its shape differs it shows more.
     wide = width / height >= across / along
     shown = (along * width / height, along) if wide else (across, across * height / width)
-    matrix = rigid(column_matrix(camera.ComputeLocalToWorldTransform(time)))
+    matrix = column_matrix(camera.ComputeLocalToWorldTransform(time))
+    if not is_usable(matrix):
+        raise StageRejected(f"{camera.GetPath()}: its transform flattens the camera to nothing")
+    matrix = unscaled(matrix)
+    tell_prim(prim, problems)
     shift = get("horizontalApertureOffset", 0.0), get("verticalApertureOffset", 0.0)
     sensor: dict[str, Any] = {"type": "perspective"}
     if str(prim.GetAttribute("projection").Get(time)) == "orthographic":
@@ -111,7 +116,20 @@ def add_camera(
             sensor["type"] = "thinlens"
             sensor["aperture_radius"] = focal * TENTH / (2 * stop)
             sensor["focus_distance"] = distance
+    sensor["near_clip"], sensor["far_clip"] = _clipping(problems, prim, time)
     _add(document, str(camera.GetPath()), sensor, (width, height), medium)
+
+
+def _clipping(problems: Problems, prim: Usd.Prim, time: Usd.TimeCode) -> tuple[float, float]:
+    """The least and the largest depth that is seen: all, unless the camera itself says otherwise."""
+    attribute = prim.GetAttribute("clippingRange")
+    if not attribute.HasAuthoredValue():
+        return NEAR, FAR
+    near, far = plain(attribute.Get(time))
+    if not near < far or far <= NEAR:
+        problems.warn(prim, f"clippingRange ({near:g}, {far:g}) shows nothing: nothing is clipped")
+        return NEAR, FAR
+    return max(near, NEAR), far
 
 
 def add_framing_camera(
@@ -134,7 +152,8 @@ def add_framing_camera(
         to_world[:3, 3] = middle - [0, depth / 2 + reach, 0]
     else:
         to_world[:3, 3] = middle + [0, 0, depth / 2 + reach]
-    sensor = {"type": "perspective", "to_world": to_world @ TURNED, "fov": FRAMED, "fov_axis": "x"}
+    sensor: dict[str, Any] = {"type": "perspective", "to_world": to_world @ TURNED}
+    sensor.update(fov=FRAMED, fov_axis="x", near_clip=NEAR, far_clip=FAR)
     _add(document, "camera", sensor, (width, height), None)
 
 
@@ -146,7 +165,7 @@ def _add(
     document: Document, name: str, sensor: dict[str, Any], size: tuple[int, int], medium: str | None
 ) -> None:
     film = {"type": "hdrfilm", "width": size[0], "height": size[1], "rfilter": {"type": "gaussian"}}
-    sensor.update(near_clip=NEAR, far_clip=FAR, film=film)
+    sensor["film"] = film
     if medium:
         sensor["medium"] = {"type": "ref", "id": medium}
     document.define(name, sensor)

@@ -65,11 +65,14 @@ class Files:
             outer, _ = Ar.SplitPackageRelativePathOuter(layer.realPath)
             self._admit("the stage", layer.identifier, outer)
 
+    def exists(self, value: Any) -> bool:
+        resolved = str(value.resolvedPath)
+        return bool(resolved) and os.path.isfile(Ar.SplitPackageRelativePathOuter(resolved)[0])
+
     def find(self, prim: Any, value: Any) -> Asset | None:
         """The file of an asset path. None, with an error told, if there is none."""
-        resolved = str(value.resolvedPath)
-        outer, inner = Ar.SplitPackageRelativePathOuter(resolved)
-        if not resolved or not os.path.isfile(outer):
+        outer, inner = Ar.SplitPackageRelativePathOuter(str(value.resolvedPath))
+        if not self.exists(value):
             self._problems.error(
                 prim, f"the asset @{value.path}@ is not found. Put the file there, or mend the path"
             )

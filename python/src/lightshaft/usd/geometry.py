@@ -14,7 +14,7 @@ from .materials import GREY, Materials, Surface, constant_colour
 from .meshes import Corners, Floats, Ints, Part, Polygons, smooth_normals
 from .problems import Problems
 from .shading import Primvar
-from .transforms import Matrix, is_similarity, scale
+from .transforms import Matrix, is_similarity, mirrors, scale
 
 SHEET = 1e-5  # the back of a sheet that gives off light stands this share of its size behind the front
 Dict = dict[str, Any]
@@ -65,7 +65,9 @@ class Geometry:
         if shape["type"] == "sphere" and not is_similarity(matrix):
             kept = {key: value for key, value in shape.items() if key not in ("type", "radius")}
             shape = {**self._ply(sphere_part(shape["radius"])), **kept}
-        return {**shape, "to_world": matrix}
+        # Mirrored, spheres and flat triangles are turned inside out: their normals follow their parameters.
+        inside_out = mirrors(matrix) and (shape["type"] == "sphere" or shape.get("face_normals", False))
+        return {**shape, "to_world": matrix, **({"flip_normals": True} if inside_out else {})}
 
     def _get(self, prim: Usd.Prim, name: str, default: Any = None) -> Any:
         attribute = prim.GetAttribute(name)

@@ -50,6 +50,19 @@ class Images:
             self._written[key] = self._name(asset, look)
         return self._written[key]
 
+    def fault(self, node: Any, value: Any) -> str:
+        """Why the image of an asset path cannot be read; empty: it can."""
+        if not self._files.exists(value):
+            return "is not found"
+        asset = self._files.find(node, value)
+        if asset is None or asset.suffix == ".hdr":
+            return ""
+        try:
+            _exr_texels(asset) if asset.suffix == ".exr" else _open(asset)
+        except FileRefused:
+            return "cannot be read"
+        return ""
+
     def _name(self, asset: Asset, look: Look) -> tuple[str, bool]:
         picture = None if asset.suffix in (".exr", ".hdr") else _open(asset)
         grey = picture is not None and picture.mode in ("L", "1")

@@ -10,11 +10,12 @@ from pxr import Usd, UsdGeom, UsdLux
 
 from .document import Document, colour
 from .gprims import cylinder_part, sphere_part
+from .ignored import tell_light
 from .images import Images, exr, scaled
 from .meshes import Part
 from .problems import Problems
 from .shading import plain
-from .transforms import Matrix, is_similarity, mean_scale, rigid, scale
+from .transforms import Matrix, is_similarity, mean_scale, mirrors, scale, unscaled
 
 FLIP = scale(1, -1, -1)  # USD's lights shine along -z, those of the scene format along +z
 PROFILE = 512  # pixels of the image that a spot light throws
@@ -44,6 +45,7 @@ class Lights:
             return
         self.count += 1
         self._check(prim)
+        tell_light(prim, self._problems)
         build(self, prim, matrix)
 
     def finish(self) -> None:
@@ -181,12 +183,12 @@ class Lights:
         radius = self.number(prim, "radius", 0.5)
         shaped = prim.HasAPI(UsdLux.ShapingAPI)
         cone = self.number(prim, "shaping:cone:angle", 90.0) if shaped else 180.0
-        point = prim.GetAttribute("treatAsPoint")
-        if (point and point.Get(self._time)) or radius == 0 or cone < 180:
+        if self.value(prim, "treatAsPoint", False) or radius == 0 or cone < 180:
             self._point(prim, matrix, radius * mean_scale(matrix), cone)
         elif is_similarity(matrix):
             size = radius * mean_scale(matrix)
-            self._lamp(prim, {"type": "sphere", "radius": radius}, matrix, 4 * math.pi * size**2)
+            lamp = {"type": "sphere", "radius": radius, "flip_normals": mirrors(matrix)}
+            self._lamp(prim, lamp, matrix, 4 * math.pi * size**2)
         else:
             self._mesh_lamp(prim, sphere_part(radius).moved(matrix))
 
@@ -283,7 +285,7 @@ class Lights:
         cone = max(cone, 0.01)
         spot = {
             "type": "spot",
-            "to_world": rigid(matrix) @ FLIP,
+            "to_world": unscaled(matrix) @ FLIP,
             "intensity": colour(intensity),
             "cutoff_angle": cone,
             "beam_width": cone * 0.9999,

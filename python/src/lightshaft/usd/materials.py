@@ -9,6 +9,7 @@ import numpy as np
 from pxr import Usd, UsdShade
 
 from .document import Document, colour
+from .ignored import tell_material, tell_shader
 from .images import Images
 from .problems import Problems
 from .shading import Input, Primvar, Shaders, Texture
@@ -62,8 +63,10 @@ class Materials:
             self._problems.warn(material, f"{told}: displayColor is taken")
             return None
         used = _Used(self._shaders, self._problems)
+        tell_material(material, self._problems)
         built = Preview(shader, self._shaders, self._problems, used)
-        bsdf, emission = built.bsdf(), built.emission()
+        bsdf, opacity = built.bsdf(), built.opacity()
+        bsdf, emission = masked(bsdf, opacity), built.emission(opacity)
         identifier = self._document.define(str(material.GetPath()), bsdf)
         return Surface(identifier, emission, used.coordinates, used.colours)
 
@@ -105,6 +108,8 @@ class Preview:
         return self._shaders.input(self._shader, name, default)
 
     def bsdf(self) -> Dict:
+        """Without its opacity."""
+        tell_shader(self._shader, self._problems)
         if self._input("displacement", 0.0) != 0.0:
             self._problems.warn(self._shader, "displacement is left out")
         base = self._used.value(self._input("diffuseColor", list(GREY)))
@@ -118,8 +123,7 @@ class Preview:
         else:
             metallic = self._used.value(self._input("metallic", 0.0))
             bsdf = opaque(base, metallic, roughness, ior, coat, self._gloss(coat))
-        bsdf = two_sided(self._with_normals(bsdf))
-        return masked(bsdf, self._opacity())
+        return two_sided(self._with_normals(bsdf))
 
     def _by_specular_colour(self, base: Any, roughness: Any) -> Dict:
         """The reflection straight on is given as a colour."""
@@ -161,10 +165,11 @@ class Preview:
         return {
             "type": "normalmap",
             "normalmap": self._used.value(given, scale=halved, bias=moved),
+            "follow_mirroring": True,
             "bsdf": bsdf,
         }
 
-    def _opacity(self) -> Any:
+    def opacity(self) -> Any:
         given = self._input("opacity", 1.0)
         threshold = float(self._shaders.constant(self._shader, "opacityThreshold", 0.0))
         if isinstance(given, Texture):
@@ -173,11 +178,16 @@ class Preview:
             return float(given >= threshold)
         return self._used.value(given)
 
-    def emission(self) -> Any:
+    def emission(self, opacity: Any) -> Any:
+        """What is cut out or lets light pass by `opacity` gives as much less light."""
         given = self._input("emissiveColor", [0.0, 0.0, 0.0])
-        if isinstance(given, list) and not any(x > 0 for x in given):
+        if opacity == 0.0 or (isinstance(given, list) and not any(x > 0 for x in given)):
             return None
-        return self._used.value(given, bounded=False)
+        if isinstance(given, list) and isinstance(opacity, float):
+            given = [x * opacity for x in given]
+            opacity = 1.0
+        glow = self._used.value(given, bounded=False)
+        return glow if opacity == 1.0 else {"type": "product", "first": glow, "second": opacity}
 
 
 def two_sided(bsdf: Dict) -> Dict:
@@ -216,6 +226,7 @@ def burley(base: Any, metallic: Any, roughness: Any, ior: float, coat: Any = 0.0
         "metallic": metallic,
         "roughness": roughness,
         "eta": max(ior, 1.001),
+        "multiple_scattering": True,
     }
     return built if coat == 0.0 else {**built, "clearcoat": coat, "clearcoat_gloss": gloss}
 

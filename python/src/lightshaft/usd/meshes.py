@@ -174,4 +174,5 @@ class Part:
     def moved(self, matrix: npt.NDArray[np.float64]) -> Part:
         """Without normals and the like: its shape alone."""
         points = self.table[:, :3] @ matrix[:3, :3].T + matrix[:3, 3]
-        return Part(("x", "y", "z"), points.astype("<f4"), self.triangles, self.closed)
+        triangles = self.triangles[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else self.triangles
+        return Part(("x", "y", "z"), points.astype("<f4"), triangles, self.closed)

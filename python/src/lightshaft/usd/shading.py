@@ -9,6 +9,7 @@ import numpy as np
 from pxr import Usd, UsdShade
 
 from .files import Asset, Files
+from .ignored import tell_shader
 from .images import Images, Look
 from .problems import Problems
 from .transforms import Matrix
@@ -92,6 +93,7 @@ class Shaders:
         return default
 
     def _texture(self, node: UsdShade.Shader, output: str) -> Input:
+        tell_shader(node, self._problems)
         scale, bias, fallback = (
             tuple(plain(self.constant(node, name, default)))
             for name, default in (
@@ -102,13 +104,20 @@ class Shaders:
         )
         channels = output if output in ("r", "g", "b", "a") else "rgb"
         value = self.constant(node, "file", None)
+        number = {"r": 0, "g": 1, "b": 2, "a": 3}.get(channels)
+        computed = [f * s + b for f, s, b in zip(fallback, scale, bias)]
+        without = computed[:3] if number is None else computed[number]
         if value is None or not value.path:
-            number = {"r": 0, "g": 1, "b": 2, "a": 3}.get(channels)
-            computed = [f * s + b for f, s, b in zip(fallback, scale, bias)]
-            return computed[:3] if number is None else computed[number]
+            return without
         if "<UDIM>" in value.path:
             self._problems.error(node, f"@{value.path}@: images in tiles (UDIM) are not read")
             return 0.0
+        given = node.GetInput("fallback")
+        if given and given.GetAttr().HasAuthoredValue():
+            why = self._images.fault(node, value)
+            if why:
+                self._problems.warn(node, f"@{value.path}@ {why}: the fallback of the shader is taken")
+                return without
         asset = self._files.find(node, value)
         if asset is None:
             return 0.0

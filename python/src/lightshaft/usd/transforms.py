@@ -36,14 +36,20 @@ def mean_scale(matrix: Matrix) -> float:
     return math.cbrt(abs(np.linalg.det(matrix[:3, :3])))
 
 
-def rigid(matrix: Matrix) -> Matrix:
-    """The nearest transform that turns and moves alone."""
-    left, _, right = np.linalg.svd(matrix[:3, :3])
-    turn = left @ right
-    if np.linalg.det(turn) < 0:
-        turn = left @ np.diag([1, 1, -1]) @ right
+def mirrors(matrix: Matrix) -> bool:
+    return bool(np.linalg.det(matrix[:3, :3]) < 0)
+
+
+def unscaled(matrix: Matrix) -> Matrix:
+    """For what looks or shines along its axis z, with y upright: without size and shear. z and the plane of z and
+    y stay, and it mirrors if `matrix` does."""
+    z, y = matrix[:3, 2], matrix[:3, 1]
+    z = z / np.linalg.norm(z)
+    x = np.cross(y, z)
+    x = x / np.linalg.norm(x)
     result = np.eye(4)
-    result[:3, :3], result[:3, 3] = turn, matrix[:3, 3]
+    result[:3, :3] = np.stack([-x if mirrors(matrix) else x, np.cross(z, x), z], axis=1)
+    result[:3, 3] = matrix[:3, 3]
     return result
 
 

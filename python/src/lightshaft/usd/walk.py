@@ -18,13 +18,13 @@ from pxr import Usd, UsdGeom, UsdLux, UsdShade
 from ..errors import StageRejected
 from .document import Document, reference
 from .geometry import Geometry, Leaf
+from .ignored import SILENT, tell_prim
 from .lights import Lights, is_light
 from .problems import Problems
 from .transforms import Matrix, column_matrix, is_usable
 from .volumes import Volumes
 
 SHOWN = ("default", "render")  # purposes
-UNSEEN = ("", "Xform", "Scope", "Camera", "Material", "Shader", "NodeGraph", "GeomSubset", "SkelRoot")
 MAX_PLACED = 120_000  # shapes and instances, each four elements or more of the 500 000 that a scene can have
 MAX_NESTING = 32  # of instances in instances
 
@@ -117,9 +117,10 @@ class Walk:
 
     def _add(self, prim: Usd.Prim, matrix: Matrix, content: Content) -> None:
         kind = str(prim.GetTypeName())
+        tell_prim(prim, self._problems)
         if kind == "SkelRoot" and prim.IsInstanceProxy():
             self._problems.warn(prim, "skinning of an instance is left out: its meshes stand as bound")
-        if kind in UNSEEN or not prim.IsA(UsdGeom.Imageable):
+        if not kind or kind in SILENT or not prim.IsA(UsdGeom.Imageable):
             return
         if str(UsdGeom.Imageable(prim).ComputePurpose()) not in SHOWN:
             return
@@ -131,6 +132,8 @@ class Walk:
             if prim.HasAPI(UsdLux.LightAPI):
                 self._problems.warn(prim, "the light of a mesh is left out: give it an emissiveColor")
             content.leaves += self._geometry.leaves(prim, matrix)
+        elif kind not in SILENT:
+            self._problems.warn(prim, f"a {kind} is not read")
 
     def _instance(self, prim: Usd.Prim, matrix: Matrix, content: Content) -> None:
         """What looks different by what it inherits (material, colour, purpose) is a content of its own."""
@@ -152,6 +155,7 @@ class Walk:
         instancer = UsdGeom.PointInstancer(prim)
         if str(instancer.ComputePurpose()) not in SHOWN:
             return
+        tell_prim(prim, self._problems)
         targets = instancer.GetPrototypesRel().GetForwardedTargets()
         indices = np.asarray(instancer.GetProtoIndicesAttr().Get(self._time) or [], np.int64)
         if indices.size and not 0 <= indices.min() <= indices.max() < len(targets):

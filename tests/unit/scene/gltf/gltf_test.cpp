@@ -197,11 +197,35 @@ TEST(Gltf, NodesCarryTheirChildren) {
     EXPECT_NEAR(t.m[i], want[i], 1e-13) << i;  // a few roundings of numbers below 32
 }
 
-TEST(Gltf, MirrorsKeepTheFrontInFront) {
+// Under a mirror normals of the file keep their side, and those of flat triangles follow the winding. What is
+// seen is compared in tests/system/test_mirrors.py.
+TEST(Gltf, MirrorsFlipFlatTrianglesAlone) {
   GltfFile file;
   file.j["nodes"][0]["scale"] = {-1, 1, 1};
-
   EXPECT_TRUE(gltf(file).shapes.at(0).flip_normals);
+  file.attributes()["NORMAL"] = file.add(Floats{0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
+
+  EXPECT_FALSE(gltf(file).shapes.at(0).flip_normals);
+}
+
+// As Blender writes them: equal angles for a hard edge, and a right angle in single precision.
+TEST(Gltf, SpotsMayHaveAHardEdgeAndARightAngle) {
+  for (const auto& [inner, outer] : {std::pair{.6, .6},
+                                     {1.5707963705062866, 1.5707963705062866},
+                                     {.6000000238418579, .5999999642372131},
+                                     {0., 1.5707963705062866}}) {
+    GltfFile file;
+    file.j["extensions"]["KHR_lights_punctual"]["lights"][0] = {
+        {"type", "spot"}, {"spot", {{"innerConeAngle", inner}, {"outerConeAngle", outer}}}};
+
+    const Scene s = gltf(file);
+
+    const auto& spot = std::get<SpotEmitter>(s.emitters.at(0));
+    EXPECT_NEAR(spot.cutoff_angle, outer * 180 / kPi, 1e-5);
+    EXPECT_LE(spot.cutoff_angle, 90);
+    EXPECT_NEAR(spot.beam_width, inner * 180 / kPi, 1e-5);
+    EXPECT_LE(spot.beam_width, spot.cutoff_angle);
+  }
 }
 
 TEST(Gltf, MeshesOfSeveralNodesAreInstances) {

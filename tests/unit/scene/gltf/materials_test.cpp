@@ -140,6 +140,58 @@ TEST(GltfMaterials, EmissionIsMultipliedByItsStrength) {
   EXPECT_EQ(constant(s, s.shapes[0].emitter->radiance), (Rgb{10, 5, 0}));
 }
 
+// What is cut out or lets light pass gives as much less light, whether the surface glows or is unlit.
+TEST(GltfMaterials, EmissionIsMultipliedByTheOpacity) {
+  for (const bool unlit : {false, true}) {
+    GltfFile file;
+    if (unlit)
+      file.material()["extensions"]["KHR_materials_unlit"] = nlohmann::json::object();
+    else
+      file.material()["emissiveFactor"] = {1, 1, 1};
+    file.pbr()["baseColorFactor"] = {1, 1, 1, .25};
+    const auto light = [&] {
+      const Scene s = gltf(file);
+      return s.shapes.at(0).emitter ? constant(s, s.shapes[0].emitter->radiance) : Rgb{0, 0, 0};
+    };
+    EXPECT_EQ(light(), (Rgb{1, 1, 1})) << "opaque";
+    file.material()["alphaMode"] = "BLEND";
+    EXPECT_EQ(light(), (Rgb{.25, .25, .25}));
+    file.material()["alphaMode"] = "MASK";
+    EXPECT_EQ(light(), (Rgb{0, 0, 0}));
+    file.material()["alphaCutoff"] = .2;
+    EXPECT_EQ(light(), (Rgb{1, 1, 1}));
+  }
+}
+
+TEST(GltfMaterials, EmissionIsCutOutByAnImage) {
+  GltfFile file;
+  file.pbr()["baseColorTexture"] = {{"index", 0}};
+  file.material()["alphaMode"] = "MASK";
+  file.material()["emissiveFactor"] = {.5, .5, .5};
+
+  const Scene s = gltf(file);
+
+  ASSERT_TRUE(s.shapes.at(0).emitter);
+  const auto& light = product(s, s.shapes[0].emitter->radiance);
+  EXPECT_EQ(light.threshold, 0);
+  EXPECT_EQ(constant(s, light.first), (Rgb{.5, .5, .5}));
+  const auto& cut = product(s, light.second);
+  EXPECT_EQ(cut.threshold, .5);
+  EXPECT_EQ(bitmap(s, cut.second).channel, Channel::alpha);
+  EXPECT_EQ(product(s, only<MaskBsdf>(s)->opacity).threshold, .5);
+}
+
+TEST(GltfMaterials, SharesMayLieBeyondOneByTheRoundingOfSinglePrecision) {
+  GltfFile file;
+  file.pbr() = {{"baseColorFactor", {1.0000001192092896, -1e-9, 0, 1}},
+                {"metallicFactor", 1.0000001192092896}};
+
+  const Scene s = gltf(file);
+
+  EXPECT_EQ(constant(s, only<PrincipledBsdf>(s)->base_color), (Rgb{1, 0, 0}));
+  EXPECT_EQ(constant(s, only<PrincipledBsdf>(s)->metallic), (Rgb{1, 1, 1}));
+}
+
 TEST(GltfMaterials, BodiesOfGlassHoldWhatAbsorbs) {
   GltfFile file;
   file.pbr() = {{"metallicFactor", 0}, {"roughnessFactor", 0}, {"baseColorFactor", {.25, 1, 1, 1}}};
@@ -238,6 +290,7 @@ TEST(GltfMaterials, NormalMapsAreRaw) {
   const Scene s = gltf(file);
 
   EXPECT_TRUE(bitmap(s, only<NormalMapBsdf>(s)->normalmap).raw);
+  EXPECT_TRUE(only<NormalMapBsdf>(s)->follow_mirroring);
 }
 
 TEST(GltfMaterials, SpecularScalesTheReflectionStraightOn) {
@@ -279,6 +332,7 @@ TEST(GltfMaterials, WithoutAMaterialItIsWhiteMetal) {
   const Scene s = gltf(file);
 
   EXPECT_EQ(constant(s, only<PrincipledBsdf>(s)->roughness), (Rgb{1, 1, 1}));
+  EXPECT_TRUE(only<PrincipledBsdf>(s)->multiple_scattering);
 }
 
 TEST(GltfMaterials, MeshesHaveTheTextureCoordinatesThatTheirMaterialAsksFor) {

@@ -332,15 +332,40 @@ TEST(Gltf, WhatHasNoEffectIsAWarning) {
   GltfFile file;
   file.j["animations"] = {json::object()};
   file.material()["normalTexture"] = {{"index", 0}, {"scale", .5}};
-  file.primitive()["attributes"]["TEXCOORD_0"] = file.add(std::vector<float>{0, 0, 1, 0, 0, 1}, "VEC2");
+  file.material()["alphaMod"] = "MASK";
+  file.material()["extras"] = {{"anything", 1}};
+  file.material()["extensions"]["ACME_paint"] = json::object();
+  file.material()["extensions"]["KHR_materials_sheen"] = json::object();
+  file.material()["extensions"]["KHR_materials_ior"] = {{"IOR", 2}};
+  file.attributes()["COLOR_1"] = file.attributes()["_MINE"] = file.attributes()["POSITION"];
+  file.j["extensions"]["KHR_lights_punctual"]["lights"][0]["range"] = 10;
 
   const ReadResult r = read_gltf(file);
 
   ASSERT_TRUE(r.scene) << messages(r);
-  for (const char* want : {"animations: what moves is seen as the nodes themselves say",
-                           "materials[0].normalTexture.scale: the strength of a normal map counts as 1 here",
-                           "attributes: where an image is mirrored on this mesh"})
+  for (const char* want :
+       {"animations: what moves is seen as the nodes themselves say",
+        "materials[0].normalTexture.scale: the strength of a normal map counts as 1 here",
+        "materials[0].alphaMod: a material has no member alphaMod, which has no effect; did you "
+        "mean 'alphaMode'?",
+        "materials[0].extensions.ACME_paint: ACME_paint is not known here, and has no effect",
+        "materials[0].extensions.KHR_materials_sheen: KHR_materials_sheen has no effect",
+        "KHR_materials_ior.IOR: KHR_materials_ior has no member IOR",
+        "attributes.COLOR_1: the attribute COLOR_1 has no effect",
+        "lights[0].range: range has no effect: light has no end here"})
     EXPECT_NE(messages(r).find(want), std::string::npos) << want << "\n" << messages(r);
+  EXPECT_EQ(r.diagnostics.size(), 8u) << "quiet are extras and _MINE: " << messages(r);
+}
+
+TEST(Gltf, WhatHasNoEffectIsToldOnce) {
+  GltfFile file;
+  file.j["extensionsUsed"] = {"ACME_paint"};
+  for (int i = 0; i < 3; ++i)
+    file.j["materials"].push_back({{"extensions", {{"ACME_paint", json::object()}}}, {"colour", 1}});
+
+  const ReadResult r = read_gltf(file);
+
+  EXPECT_EQ(r.diagnostics.size(), 2u) << messages(r);
 }
 
 TEST(Gltf, MeshesWithoutAFileSayWhoSendsThem) {

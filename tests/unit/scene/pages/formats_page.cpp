@@ -41,12 +41,18 @@ lightshaft render helmet.gltf -D environment=1 -o helmet.exr
   may have 32 MiB; a larger scene is exported as a `.gltf` with several buffers of at most 32 MiB, and 64 MiB together.
 - **Materials** follow what the Blender add-on makes of a Principled BSDF: with one roughness a rough coat over a diffuse base, blended with
   metal by the metallic share; with a texture of roughness, a clear coat, or a share of transmission `principled`. Transmission
-  of 1 with a volume and without textures is a `dielectric`, or a `roughdielectric`.
+  of 1 with a volume and without textures is a `dielectric`, or a `roughdielectric`. All of them keep the light that is scattered between
+  facets (`multiple_scattering`).
+- **Alpha**: what alphaMode cuts out or lets pass neither reflects nor gives light, unlit surfaces included.
+- **Mirrors**: a node that mirrors keeps the front of its meshes in front. A camera in one looks along its axis, and its picture is not
+  mirrored.
 - **Sides**: surfaces are seen from both sides whatever doubleSided says. A body of glass must be closed, with its front outside. What
   gives light does so on the front only.
-- **Normal maps** lean along u and along the cross product of normal and u. Where an image is mirrored on a mesh they lean the
-  other way across u than glTF's tangents, with a warning.
-- **Spots** fall off linearly in the angle between their two angles, with a warning.
+- **Normal maps** lean along u and to the top of the image, also where the image or its node is mirrored (`follow_mirroring`). TANGENT is
+  not read.
+- **Spots** fall off linearly in the angle between their two angles, with a warning; equal angles are a hard edge.
+- **What has no effect** is told, once for each kind, with the path of the first: members that glTF does not define, those of the tables
+  below without effect, unknown extensions. Quiet are `extras`, attributes that begin with `_`, and what the tables call needless.
 - **Samples**: 64 a pixel, paths of any depth; `--spp`, `--size` and the others choose otherwise.
 )";
 

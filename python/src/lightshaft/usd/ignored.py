@@ -1,0 +1,102 @@
+"""What a stage says that changes its picture elsewhere and has no effect here, told by its prims."""
+
+from __future__ import annotations
+
+from pxr import Usd, UsdGeom, UsdShade
+
+from .problems import Problems
+
+# Types of prims that show nothing by themselves, or that others read on their way.
+SILENT = {
+    *("Xform", "Scope", "Camera", "Material", "Shader", "NodeGraph", "GeomSubset"),
+    *("SkelRoot", "Skeleton", "SkelAnimation", "BlendShape", "OpenVDBAsset"),
+    *("RenderSettings", "RenderProduct", "RenderVar", "RenderPass", "Backdrop", "Collection"),
+}
+MOTION = "motion blur is not read"
+NO_EFFECT = {
+    "velocities": MOTION,
+    "accelerations": MOTION,
+    "angularVelocities": MOTION,
+    "exposure:time": "images are linear, and --exposure shows them brighter",
+    "exposure:iso": "images are linear, and --exposure shows them brighter",
+    "exposure:fStop": "images are linear, and --exposure shows them brighter",
+    "exposure:responsivity": "images are linear, and --exposure shows them brighter",
+    "treatAsLine": "a cylinder light has the radius that it says",
+    "fieldIndex": "the first grid of the name is read",
+}
+LIGHT_INPUTS = {
+    *("intensity", "exposure", "color", "colorTemperature", "enableColorTemperature", "normalize"),
+    *("radius", "width", "height", "length", "angle", "texture:file", "texture:format", "treatAsPoint"),
+    # Told by themselves where they have no effect.
+    *("diffuse", "specular", "shadow:enable", "shaping:cone:angle", "shaping:cone:softness"),
+    *("shaping:focus", "shaping:focusTint", "shaping:ies:file"),
+}
+SHADER_INPUTS = {
+    "UsdPreviewSurface": {
+        *("diffuseColor", "emissiveColor", "useSpecularWorkflow", "specularColor", "metallic"),
+        *("roughness", "clearcoat", "clearcoatRoughness", "opacity", "opacityMode", "opacityThreshold"),
+        *("ior", "normal", "displacement", "occlusion"),
+        "specular",  # of Blender's exporter alone: ior says the same
+    },
+    "UsdUVTexture": {
+        *("file", "st", "wrapS", "wrapT", "fallback", "scale", "bias", "sourceColorSpace"),
+    },
+    "UsdTransform2d": {"in", "rotation", "scale", "translation"},
+}
+
+
+def tell_prim(prim: Usd.Prim, problems: Problems) -> None:
+    """The type of a prim, and its attributes."""
+    kind = str(prim.GetTypeName())
+    if kind and kind not in SILENT and not prim.IsA(UsdGeom.Imageable):
+        problems.warn(prim, f"a {kind} has no effect")
+    for attribute in prim.GetAuthoredAttributes():
+        name = attribute.GetName()
+        if name in NO_EFFECT and _says_something(attribute):
+            problems.warn(prim, f"{name} has no effect: {NO_EFFECT[name]}")
+    shutter = [prim.GetAttribute(f"shutter:{end}") for end in ("open", "close")]
+    if all(shutter) and shutter[0].Get() != shutter[1].Get():
+        problems.warn(prim, f"shutter:open and shutter:close have no effect: {MOTION}")
+    mode = UsdGeom.ModelAPI(prim).GetModelDrawModeAttr()
+    if mode and mode.HasAuthoredValue() and str(mode.Get()) not in ("default", "inherited"):
+        problems.warn(prim, f"model:drawMode {mode.Get()} has no effect: the model itself is rendered")
+
+
+def tell_light(prim: Usd.Prim, problems: Problems) -> None:
+    """The inputs of a light."""
+    for attribute in prim.GetAuthoredAttributes():
+        name = attribute.GetName()
+        if name.startswith("inputs:") and name[7:] not in LIGHT_INPUTS and _says_something(attribute):
+            problems.warn(prim, f"{name} of a light has no effect")
+
+
+def tell_material(material: UsdShade.Material, problems: Problems) -> None:
+    """Outputs of a material besides its surface."""
+    for name, output in (
+        ("displacement", material.GetDisplacementOutput()),
+        ("volume", material.GetVolumeOutput()),
+    ):
+        if output and output.HasConnectedSource():
+            problems.warn(material, f"outputs:{name} of a material has no effect")
+
+
+def tell_shader(shader: UsdShade.Shader, problems: Problems) -> None:
+    """Inputs that a shader of this kind does not have: most are misspelt."""
+    kind = shader.GetIdAttr().Get()
+    known = SHADER_INPUTS.get(kind)
+    if known is None:
+        return
+    for given in shader.GetInputs():
+        if given.GetBaseName() not in known:
+            problems.warn(shader, f"inputs:{given.GetBaseName()} has no effect: no {kind} has it")
+
+
+def _says_something(attribute: Usd.Attribute) -> bool:
+    """Whether it has a value, and one that its schema does not say anyway."""
+    if attribute.HasAuthoredConnections():
+        return True
+    value = attribute.Get(Usd.TimeCode.EarliestTime())
+    if value is None or (hasattr(value, "__len__") and not len(value)):
+        return False
+    definition = attribute.GetPrim().GetPrimDefinition()
+    return bool(value != definition.GetAttributeFallbackValue(attribute.GetName()))

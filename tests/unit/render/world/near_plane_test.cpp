@@ -1,0 +1,87 @@
+// Boundaries of media that lie before the camera's near plane, so that no ray meets them.
+#include "worker/render/world/near_plane.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "tests/support/render_check.h"
+
+namespace ls::render {
+namespace {
+
+using test::scale;
+using test::SceneBuilder;
+using test::translate;
+using test::operator*;
+
+// A scene of a camera at y = `eye` that looks along +y, before a white sky, with near plane `near`.
+SceneBuilder before_sky(double eye, double near, double x = 0) {
+  SceneBuilder builder({16, 16});
+  builder.environment();
+  builder.look({x, eye, 0}, {x, eye + 1, 0});
+  builder.scene.sensor.near_clip = near;
+  return builder;
+}
+// Expects that the camera sees this share of the sky, within five standard errors: each sample is absorbed or
+// not.
+void expect_transmitted(const SceneBuilder& builder, double share, const std::string& what = "") {
+  const auto e = test::estimate(builder, 32);
+  EXPECT_NEAR(e.mean[0], share, 5 * e.standard_error[0] + 1e-6) << what;
+  EXPECT_LT(e.standard_error[0], .01) << what;
+}
+
+// Through a body of 2 with the extinction 1, behind its face at -1: from outside with the face before the
+// near plane, from the face itself, and from a little inside without a `medium` of the sensor. The near plane
+// is up to 0.1 from the lens, and what lies before it is not seen, so that as much of the way may be missing.
+TEST(NearPlane, HidesNoMediumBehindIt) {
+  for (const ls::Geometry& body : {ls::Geometry(SphereShape{}), ls::Geometry(CubeShape{})})
+    for (const auto& [eye, near] :
+         {std::pair{-1.05, .1}, {-1., .1}, {-1., 1e-4}, {-1.001, .01}, {-5., 4.05}}) {
+      SceneBuilder builder = before_sky(eye, near);
+      builder.container(body, {}, builder.null(), builder.homogeneous({1, 1, 1}, {0, 0, 0}));
+
+      const double hidden = std::max(0., eye + near + 1);
+
+      expect_transmitted(builder, std::exp(-(2 - hidden)), fmt::format("{} {}", eye, near));
+    }
+}
+
+TEST(NearPlane, IsBehindAMediumThatEndsBeforeIt) {
+  SceneBuilder builder = before_sky(-.05, .1);
+  const MediumIndex fog = builder.homogeneous({1, 1, 1}, {0, 0, 0});
+  builder.container(CubeShape{}, translate({0, -1, 0}), builder.null(), fog);
+  builder.scene.sensor.medium = fog;
+
+  expect_transmitted(builder, 1);
+}
+
+// Both faces of a thin slab of fog, and the face of a ball in it, lie before the near plane.
+TEST(NearPlane, IsInTheInnermostOfSeveralBodies) {
+  SceneBuilder builder = before_sky(-1.15, .3);
+  const MediumIndex thin = builder.homogeneous({9, 9, 9}, {0, 0, 0}),
+                    ball = builder.homogeneous({1, 1, 1}, {0, 0, 0});
+  builder.container(CubeShape{}, translate({0, -1.08, 0}) * scale(1, .02, 1), builder.null(), thin);
+  builder.container(SphereShape{}, {}, builder.null(), ball);
+
+  expect_transmitted(builder, std::exp(-1.85));
+}
+
+// Where nothing lies before the near plane, rays start as ever, and cost nothing.
+TEST(NearPlane, IsAskedOnlyIfABoundaryMayLieBeforeIt) {
+  const auto asked = [](double eye, double x) {
+    SceneBuilder builder = before_sky(eye, .1, x);
+    builder.container(CubeShape{}, {}, builder.null(), builder.homogeneous({1, 1, 1}, {0, 0, 0}));
+    return test::world_of(builder)->hidden_boundaries;
+  };
+
+  EXPECT_TRUE(asked(-1.05, 0));
+  EXPECT_FALSE(asked(-1.2, 0));
+  EXPECT_FALSE(asked(-1.05, 3));
+  EXPECT_FALSE(asked(0, 0)) << "inside, away from the faces";
+}
+
+}  // namespace
+}  // namespace ls::render

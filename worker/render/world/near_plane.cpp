@@ -1,0 +1,56 @@
+#include "worker/render/world/near_plane.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "worker/render/geometry/surface_boxes.h"
+
+namespace ls::render {
+namespace {
+
+// True if some point of the sphere's surface is in the box.
+bool touches(const Sphere& s, const SurfaceBox& box) {
+  double nearest = 0, farthest = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double lo = double{box.lo[k]} - s.center[k], hi = double{box.hi[k]} - s.center[k];
+    const double out = std::max({lo, -hi, 0.}), far = std::max(std::abs(lo), std::abs(hi));
+    nearest += out * out;
+    farthest += far * far;
+  }
+  return nearest <= s.radius * s.radius && farthest >= s.radius * s.radius;
+}
+
+bool touches_own(const Geometry& g, std::uint32_t surface, const SurfaceBox& region) {
+  for (std::uint32_t i = g.own.triangles.first; i < g.own.triangles.last; ++i) {
+    if (g.triangle_surface[i] != surface) continue;
+    const V3 a = g.vertex(i, 0), b = g.vertex(i, 1), c = g.vertex(i, 2);
+    SurfaceBox box;
+    for (int k = 0; k < 3; ++k) {
+      box.lo[k] = std::min({a[k], b[k], c[k]});
+      box.hi[k] = std::max({a[k], b[k], c[k]});
+    }
+    if (box.touches(region)) return true;
+  }
+  for (const Sphere& s : g.spheres)
+    if (s.surface == surface && touches(s, region)) return true;
+  const auto of = [&](const auto& one) { return one.surface == surface; };
+  return std::any_of(g.disks.begin(), g.disks.end(), of) ||
+         std::any_of(g.cylinders.begin(), g.cylinders.end(), of);
+}
+
+}  // namespace
+
+bool near_plane_hides_boundaries(const World& w) {
+  if (!w.use_media || w.camera.projection() == Projection::spherical) return false;
+  const auto boxes = surface_boxes(w.geometry, [](const SurfaceInfo& s) { return s.transition; });
+  if (!boxes) return true;
+  if (boxes->empty()) return false;
+  const auto [low, high] = w.camera.before_near_plane(w.filter.reach());
+  SurfaceBox region;
+  region.lo = V3(low), region.hi = V3(high);
+  return std::any_of(boxes->begin(), boxes->end(), [&](const SurfaceBox& box) {
+    return box.touches(region) && (box.instance != kNone || touches_own(w.geometry, box.surface, region));
+  });
+}
+
+}  // namespace ls::render

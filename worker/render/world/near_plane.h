@@ -1,0 +1,43 @@
+// Boundaries of media between the camera's lens and its near plane. Camera rays begin on the near plane, so
+// that such a boundary is not seen; but the medium behind it is.
+#pragma once
+
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+// True if a boundary of a medium may lie between the lens and the near plane of w.camera. The test compares
+// boxes: a result of false is certain; a result of true may be wrong, which costs rendering time but changes
+// nothing else.
+bool near_plane_hides_boundaries(const World& w);
+
+// The part of a camera ray before its origin: from a little before the lens, so that a camera that stands on
+// a boundary looks through it, to the near plane.
+struct HiddenPart {
+  V3 start;
+  float length = 0;
+};
+inline HiddenPart hidden_part(const World& w, const CameraRay& ray) {
+  const float hidden = w.camera.near_distance(ray.d);
+  const float length = hidden * (1 + 0x1p-10f) + 0x1p-20f * largest(ray.o);
+  return {ray.o - ray.d * length, length};
+}
+
+// Calls cross(hit, surface) for each boundary that the hidden part of the ray crosses, from the lens on.
+template <class Cross>
+void for_hidden_boundaries(const World& w, const CameraRay& ray, Cross cross) {
+  constexpr int kMost = 64;  // surfaces that are crossed at most
+  HiddenPart part = hidden_part(w, ray);
+  V3 from = part.start;
+  for (int i = 0; i < kMost && part.length > 0; ++i) {
+    const auto primitive = w.accel.nearest(from, ray.d, part.length);
+    SurfaceHit hit;
+    if (!primitive || !w.geometry.complete(*primitive, from, ray.d, hit)) return;
+    cross(hit, w.geometry.surfaces[hit.surface]);
+    const V3 next = offset_point(hit, ray.d);
+    part.length -= dot(next - from, ray.d);
+    from = next;
+  }
+}
+
+}  // namespace ls::render
