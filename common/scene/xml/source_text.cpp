@@ -160,7 +160,7 @@ void Report::warning(const Span& at, std::string text) {
 }
 
 void Report::warning_once(const Span& at, std::string text) {
-  if (takes_warnings() && said_once_.insert(text).second) warning(at, std::move(text));
+  if (takes_warnings() && warned_.insert(text).second) warning(at, std::move(text));
 }
 
 void Report::add(Diagnostic::Severity severity, const Span& at, std::string text) {

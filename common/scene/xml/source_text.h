@@ -96,7 +96,7 @@ class Report {
   bool strict_;
   std::deque<SourceText> files_;
   std::vector<Diagnostic> found_;
-  std::set<std::string> said_once_;
+  std::set<std::string> warned_;
   std::size_t errors_ = 0, warnings_ = 0;
 };
 
