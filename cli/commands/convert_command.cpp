@@ -36,8 +36,9 @@ struct FileCopy {
 // A scene as canonical XML.
 struct Converted {
   std::string text;
-  Digest digest;                 // digest of the scene that the text describes
-  std::vector<FileCopy> copies;  // files to copy beside the XML file
+  std::vector<std::string> only_ours;  // what Mitsuba 3 does not read of the text
+  Digest digest;                       // digest of the scene that the text describes
+  std::vector<FileCopy> copies;        // files to copy beside the XML file
 };
 
 // Provides the assets of a scene that was already read, by name, without opening files. The converted text is
@@ -133,7 +134,9 @@ Result<Converted> convert_scene(const LocalScene& scene, const fs::path& out) {
   auto copies = copies_for(scene, written, folder, other_folder);
   if (!copies) return tl::unexpected(copies.error());
   converted.copies = std::move(*copies);
-  converted.text = write_xml(written);
+  WrittenScene xml = write_scene(written);
+  converted.text = std::move(xml.text);
+  converted.only_ours = std::move(xml.only_ours);
   converted.digest = digest_of(written);
   KnownAssets assets(written);
   const ReadResult again = read_scene(out.filename().string(), converted.text, assets);
@@ -180,6 +183,9 @@ int run(const ConvertFlags& flags) {
   }
   if (const auto written = write_output(flags.out, converted->text); !written)
     return print_error(written.error());
+  if (!converted->only_ours.empty())
+    print_note(fmt::format("warning: only Lightshaft reads {}; Mitsuba 3 refuses {}",
+                           fmt::join(converted->only_ours, ", "), flags.out));
   print(fmt::format("scene_sha256 {}", converted->digest.hex()));
   return kOk;
 }

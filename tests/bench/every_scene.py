@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
 """Every scene file below a folder: does it load and render to a healthy picture, and what is said if not?
 
-usage: every_scene.py DIR [--size WxH] [--spp N] [--threads N] [--only TEXT] [--markdown]
-Each XML, .pbrt, .gltf and .glb is rendered small. Healthy is a picture that is finite, not black, and whose report counts no non-finite sample and no
+usage: every_scene.py DIR [--size WxH] [--spp N] [--threads N] [--only TEXT] [--markdown] [--inspect]
+Each XML, .pbrt, .gltf and .glb is rendered small; with --inspect it is only read, and a table of the reasons for which scenes are
+refused follows: a scene counts once for each kind of error that it has, without its names and numbers. Healthy is a picture that is finite, not black, and whose report counts no non-finite sample and no
 majorant violation. Scenes whose root is a test (Nori's `ttest`, `chi2test`) are run by `lightshaft validate`. Files that others
 include, and those without a sensor, are fragments: listed as such. What is refused is printed with the first error.
 Exit status: 0 unless a render failed or was not healthy. Needs numpy and the OpenEXR package of PyPI. A bench, not a test.
 """
 import argparse
+import collections
 import json
 import os
 import pathlib
@@ -61,6 +63,16 @@ def rendered(scene, options, folder, spp):
     return ("NOT HEALTHY" if ill else "renders"), ", ".join(ill + [f"mean {image.mean():.3g}", f"{warnings} warnings"] + samples)
 
 
+def inspected(scene, reasons):
+    done = run(BIN / "lightshaft", "inspect", scene, "--json")
+    if done.returncode == 0:
+        return "loads", f"{sum('warning:' in line for line in done.stderr.splitlines())} warnings"
+    errors = [line.split("error:", 1)[1] for line in done.stderr.splitlines() if "error:" in line] or [first_error(done.stderr, scene)]
+    for kind in {re.sub(r'"[^"]*\.\w+"', '"FILE"', re.sub(r"(?<![\w.])-?\d[\d.e+-]*", "N", error)).strip() for error in errors}:
+        reasons[kind] += 1
+    return ("refused" if done.returncode == 2 else "FAILED"), first_error(done.stderr, scene)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=pathlib.Path)
@@ -69,13 +81,14 @@ def main():
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--only", default="")
     parser.add_argument("--markdown", action="store_true")
+    parser.add_argument("--inspect", action="store_true")
     options = parser.parse_args()
     files = sorted(f for ending in ("xml", "pbrt", "gltf", "glb") for f in options.folder.rglob(f"*.{ending}"))
     texts = {f: f.read_text(errors="replace") for f in files}
     included = {pathlib.PurePath(name).name for text in texts.values() for name in re.findall(r'(?:<include[^>]*filename=|^\s*(?:Include|Import)\s+)"([^"]+)"', text, re.M)}
     if options.markdown:
         print("| scene | outcome | |\n|---|---|---|")
-    bad = 0
+    bad, outcomes, reasons = 0, collections.Counter(), collections.Counter()
     with tempfile.TemporaryDirectory() as folder:
         for scene in files:
             if options.only not in str(scene):
@@ -84,11 +97,17 @@ def main():
                 outcome = "fragment", "included by others"
             elif re.search(r"<test\b", texts[scene]):
                 outcome = validated(scene)
+            elif options.inspect:
+                outcome = inspected(scene, reasons)
             else:
                 outcome = rendered(scene, options, pathlib.Path(folder), options.spp)
             bad += outcome[0].isupper()
+            outcomes[outcome[0]] += 1
             cells = (str(scene.relative_to(options.folder)), *outcome)
             print("| " + " | ".join(c.replace("|", "\\|") for c in cells) + " |" if options.markdown else "  ".join(cells), flush=True)
+    print("\n" + ", ".join(f"{count} {outcome}" for outcome, count in outcomes.most_common()))
+    for kind, count in reasons.most_common():
+        print(f"{count:5} {kind}")
     sys.exit(bad > 0)
 
 

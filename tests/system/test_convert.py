@@ -100,3 +100,15 @@ def test_a_bad_scene_is_told_with_places_and_writes_nothing(tmp_path):
 
     assert "bad.xml:" in said and "gridvolume" in said
     assert [p.name for p in tmp_path.iterdir()] == ["bad.xml"]
+
+
+def test_what_only_lightshaft_reads_is_named(tmp_path):
+    (tmp_path / "t.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    scene, out = tmp_path / "nori.xml", tmp_path / "out.xml"
+    scene.write_text('<scene><integrator type="path_mis"/><camera type="perspective"/>'
+                     '<mesh type="obj"><string name="filename" value="t.obj"/></mesh></scene>')
+
+    said = lightshaft("convert", scene, out).stderr
+
+    assert f"warning: only Lightshaft reads 'flat_without_normals' of shape \"obj\"; Mitsuba 3 refuses {out}" in said
+    assert "only Lightshaft reads" not in lightshaft("convert", write_fog(tmp_path), tmp_path / "fog2.xml").stderr

@@ -38,12 +38,20 @@ std::optional<Element> filter(const Element& e, Report& report) {
   const Plugin* plugin = known_plugin(e, report);
   if (!plugin) return std::nullopt;
   Object o(e, *plugin, report);
-  Element out = made("rfilter", plugin->type, e.at);
+  const bool has_lobes = plugin->type == "mitchell";
+  Element out = made("rfilter", has_lobes ? "gaussian" : plugin->type, e.at);
+  if (has_lobes)
+    report.warning(
+        value_place(e, "type"),
+        fmt::format("{} is read as \"gaussian\", which blurs a little more: it has negative lobes, "
+                    "which samples that each belong to one pixel can't follow",
+                    o.title()));
   if (plugin->type == "gaussian") {
     const double stddev = o.number("stddev", .5), radius = o.number("radius", 2);
     if (radius != 4 * stddev)
-      report.error(e.at, fmt::format("{} ends at {} pixels: here it always ends at four times its stddev, {}",
-                                     o.title(), radius, 4 * stddev));
+      report.warning(e.at,
+                     fmt::format("{} ends at {} pixels: here it always ends at four times its stddev, {}",
+                                 o.title(), radius, 4 * stddev));
     add(out, "stddev", stddev, e.at);
   }
   o.finish();

@@ -181,9 +181,13 @@ class SceneTranslator {
 
 bool is_nori(const Element& root) {
   if (root.tag == "test") return true;
-  return root.tag == "scene" && !root.find("version") &&
-         std::any_of(root.children.begin(), root.children.end(),
-                     [](const Element& c) { return c.tag == "camera" || c.tag == "mesh"; });
+  const auto has = [&](std::string_view one, std::string_view other) {
+    return std::any_of(root.children.begin(), root.children.end(),
+                       [&](const Element& c) { return c.tag == one || c.tag == other; });
+  };
+  // Mitsuba has no meshes, and called its sensors cameras before 0.4; its files have a version, and those of
+  // some descendants of Nori have one, too.
+  return root.tag == "scene" && has("camera", "mesh") && (!root.find("version") || !has("shape", "sensor"));
 }
 
 bool translate(Document& document, Report& report) {
@@ -191,6 +195,7 @@ bool translate(Document& document, Report& report) {
   if (document.root.tag == "test")
     return report.error(document.root.at, "this is a test, not a scene: run it by lightshaft validate FILE"),
            false;
+  std::erase_if(document.root.attributes, [](const Attribute& a) { return a.name == "version"; });
   if (!check_objects(document.root, report)) return false;
   auto scene = translate_scene(document.root, report);
   if (!scene) return false;

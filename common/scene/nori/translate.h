@@ -9,8 +9,8 @@
 
 namespace ls::scene::nori {
 
-// True if this root element belongs to a Nori file: a <test>, or a <scene> without version that has a
-// <camera> or a <mesh>.
+// True if this root element belongs to a Nori file: a <test>, or a <scene> that has a <camera> or a <mesh>.
+// If it has a version, it must not have a <shape> or a <sensor> besides: these are Mitsuba's.
 bool is_nori(const Element& root);
 
 // Translates the document in place if it is a Nori file. Returns false if the file has errors, which were

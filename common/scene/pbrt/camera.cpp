@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "common/scene/pbrt/object_translation.h"
 #include "common/scene/xml/transform_element.h"
@@ -45,6 +46,10 @@ class SettingsTranslator {
 
   void fill(Element& film) {
     Params& p = *s_.film;
+    if (const std::string_view type = p.row().type; type == "gbuffer" || type == "spectral")
+      t_.report.warning(p.at(), fmt::format("{} gives the picture in red, green and blue: further layers are "
+                                            "chosen by --aov",
+                                            p.title()));
     add_size(film, p.integer("xresolution", 1280), p.integer("yresolution", 720));
     crop(film, p);
     if (const std::string sensor = p.text("sensor", "cie1931"); sensor != "cie1931")
@@ -79,8 +84,15 @@ class SettingsTranslator {
     if (!s_.filter) return made("rfilter", "gaussian", file_);
     Params& p = *s_.filter;
     const std::string_view type = p.row().type;
-    Element out = made("rfilter", type == "triangle" ? "tent" : type, p.at());
-    if (type == "gaussian") {
+    const bool has_lobes = type == "mitchell" || type == "sinc";
+    Element out = made("rfilter", type == "triangle" ? "tent" : has_lobes ? "gaussian" : type, p.at());
+    if (has_lobes) {
+      t_.report.warning(
+          p.at(),
+          fmt::format("{} is read as \"gaussian\", which blurs a little more: it has negative lobes, which "
+                      "samples that each belong to one pixel can't follow",
+                      p.title()));
+    } else if (type == "gaussian") {
       add(out, "stddev", p.number("sigma", .5), p.at());
     } else {
       const double x = p.number("xradius", type == "box" ? .5 : 2), y = p.number("yradius", x);
@@ -144,12 +156,45 @@ class SettingsTranslator {
       return made("sensor", "perspective", file_);
     }
     Params& p = *s_.camera;
-    Element out = p.row().type == "orthographic" ? orthographic(p) : perspective(p);
-    add(out, "near_clip", kNearest, p.at());
-    add(out, "far_clip", kFarthest, p.at());
+    const std::string_view type = p.row().type;
+    Element out = type == "spherical"      ? spherical(p)
+                  : type == "orthographic" ? orthographic(p)
+                                           : perspective(p);
+    if (type != "spherical") {
+      add(out, "near_clip", kNearest, p.at());
+      add(out, "far_clip", kFarthest, p.at());
+    }
     if (!s_.camera_medium.empty()) refer(out, "medium", medium_id(s_.camera_medium), p.at());
     p.finish();
     return out;
+  }
+
+  // The part of the plane one unit ahead of the camera that the frame shows: its middle, and half of its
+  // width and of its height, negative if it is mirrored. x points right, y up. The plane of a perspective
+  // camera is measured in multiples of tan(fov / 2).
+  struct Window {
+    double x = 0, y = 0, half_width = 1, half_height = 1;
+  };
+
+  double frame_aspect() const { return static_cast<double>(width_) / std::max(1, height_); }
+
+  // Returns the window that `screenwindow` or `frameaspectratio` gives. nullopt: neither is given, or it is
+  // wrong, which was reported. Then the shorter side of the frame shows [-1, 1].
+  std::optional<Window> window(Params& p) {
+    const Param* sides = p.take("screenwindow");
+    const bool has_aspect = p.has("frameaspectratio");
+    const double aspect = p.number("frameaspectratio", 1);
+    if (!sides && !has_aspect) return std::nullopt;
+    if (!sides && !(aspect > 0))
+      return p.refuse(p.at(), fmt::format("{} wants a frameaspectratio above 0", p.title()));
+    if (!sides && aspect == frame_aspect()) return std::nullopt;
+    if (!sides) return Window{0, 0, std::max(1., aspect), std::max(1., 1 / aspect)};
+    const auto& n = sides->numbers;
+    if (n.size() != 4 || n[0] == n[1] || n[2] == n[3])
+      return p.refuse(sides->at, fmt::format("'screenwindow' of {} wants four numbers: x0 x1 y0 y1, with x0 "
+                                             "other than x1 and y0 other than y1",
+                                             p.title()));
+    return Window{(n[0] + n[1]) / 2, (n[2] + n[3]) / 2, (n[1] - n[0]) / 2, (n[3] - n[2]) / 2};
   }
 
   // Mirrors the camera: pbrt's has +x on the right, ours on the left.
@@ -157,16 +202,59 @@ class SettingsTranslator {
 
   Element orthographic(Params& p) {
     Element out = made("sensor", "orthographic", p.at());
-    const double wider = std::max(1., static_cast<double>(width_) / std::max(1, height_));
-    place(out, multiply(facing(s_.camera_ctm.from), scaled(Vec3{{wider, wider, 1}}).to), p.at());
+    // Our frame is 2 wide before to_world, and has the shape of the film.
+    const double wider = std::max(1., frame_aspect());
+    Placed shown = scaled(Vec3{{wider, wider, 1}});
+    if (const auto w = window(p))
+      shown = then(moved(Vec3{{-w->x, w->y, 0}}),
+                   scaled(Vec3{{w->half_width, w->half_height * frame_aspect(), 1}}));
+    place(out, multiply(facing(s_.camera_ctm.from), shown.to), p.at());
     return out;
+  }
+
+  // In pbrt the azimuth begins at +x and goes on to +z, here it begins at -z and goes on to +x.
+  Element spherical(Params& p) {
+    if (const std::string mapping = p.text("mapping", "equalarea"); mapping != "equirectangular")
+      p.error(p.at(),
+              fmt::format("{} has the mapping \"{}\": only equirectangular is read", p.title(), mapping));
+    window(p);  // it does not change what this camera sees
+    Element out = made("sensor", "spherical", p.at());
+    const Transform axes{{0, 0, -1, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 1}};
+    place(out, multiply(without_scale(s_.camera_ctm.from).rigid, axes), p.at());
+    return out;
+  }
+
+  // Adds the field of view and the principal point of a perspective camera.
+  void look_through(Element& out, Params& p, const Window& w, double fov) {
+    // Here pixels are square. Files give the numbers of a window with few digits: four significant ones are
+    // off by up to 5e-4 each, so that the shape of the window is known to 1e-3.
+    constexpr double kRounding = 1e-3;
+    const double shape = std::abs(w.half_width / w.half_height);
+    if (std::abs(shape / frame_aspect() - 1) > kRounding)
+      p.error(p.at(),
+              fmt::format("{} shows a window of the shape {:.6g} : 1 on a film of {:.6g} : 1, so that "
+                          "its pixels are not square, which is not known here: give the film that "
+                          "shape, or leave screenwindow and frameaspectratio out",
+                          p.title(), shape, frame_aspect()));
+    constexpr double kDegree = std::numbers::pi / 180;
+    const double edge = std::tan(fov / 2 * kDegree) * std::abs(w.half_width);
+    add(out, "fov", 2 * std::atan(edge) / kDegree, p.at());
+    add(out, "string", "fov_axis", "x", p.at());
+    if (w.x != 0) add(out, "principal_point_offset_x", w.x / (2 * w.half_width), p.at());
+    if (w.y != 0) add(out, "principal_point_offset_y", -w.y / (2 * w.half_height), p.at());
   }
 
   Element perspective(Params& p) {
     const double radius = p.number("lensradius", 0);
     Element out = made("sensor", radius > 0 ? "thinlens" : "perspective", p.at());
-    add(out, "fov", p.number("fov", 90), p.at());
-    add(out, "string", "fov_axis", "smaller", p.at());
+    const double fov = p.has("halffov") ? 2 * p.number("halffov", 45) : p.number("fov", 90);
+    const auto shown = window(p);
+    if (shown) {
+      look_through(out, p, *shown, fov);
+    } else {
+      add(out, "fov", fov, p.at());
+      add(out, "string", "fov_axis", "smaller", p.at());
+    }
     // Here a perspective camera must have no scale. A uniform scale changes only the sizes of the lens radius
     // and the focus distance in the world, so these two are multiplied by it instead.
     const auto [world, scale] = without_scale(s_.camera_ctm.from);
@@ -175,7 +263,12 @@ class SettingsTranslator {
       add(out, "aperture_radius", radius * scale, p.at());
       add(out, "focus_distance", focus * scale, p.at());
     }
-    place(out, facing(world), p.at());
+    Transform placed = facing(world);
+    if (shown && (shown->half_width < 0 || shown->half_height < 0))
+      placed = multiply(
+          placed,
+          scaled(Vec3{{std::copysign(1, shown->half_width), std::copysign(1, shown->half_height), 1}}).to);
+    place(out, placed, p.at());
     return out;
   }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <map>
 #include <utility>
@@ -23,7 +24,7 @@ constexpr std::string_view kDefaultMaterial = "default material";
 class Loader {
  public:
   Loader(AssetSource& assets, const ReadOptions& options, Report& report)
-      : report_(report), options_(options), t_{assets, report, {}, 1, {}, {}, {}} {}
+      : report_(report), options_(options), t_{.assets = assets, .report = report} {}
 
   std::optional<Document> run(std::string_view file_name, std::string_view text) {
     const auto file = opened(std::string(file_name), std::string(text), nullptr);
@@ -50,6 +51,8 @@ class Loader {
   }
 
   std::optional<std::uint32_t> opened(std::string name, std::string text, const Span* included_at) {
+    constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+    if (text.starts_with(kByteOrderMark)) text.erase(0, kByteOrderMark.size());
     total_bytes_ += text.size();
     const bool too_large = text.size() > kMaxTextBytes || total_bytes_ > kMaxTotalTextBytes;
     const std::uint32_t file =
@@ -174,6 +177,8 @@ class Loader {
   std::optional<std::vector<Param>> parameters() {
     auto params = read_params(*tokens_, report_);
     lost_ = lost_ || !params;
+    if (params)
+      for (Param& p : *params) p.space = now_.space;
     return params;
   }
 
@@ -240,26 +245,51 @@ class Loader {
   }
   void color_space(const Token& d) {
     const auto name = quoted(d);
-    if (name && *name != "srgb")
-      report_.error(last_,
-                    fmt::format("the colour space \"{}\" is not read: write colours in \"srgb\"", *name));
+    if (!name) return;
+    if (const auto space = colour_space(*name)) return void(now_.space = *space);
+    const std::vector<std::string> known{"srgb", "dci-p3", "rec2020", "aces2065-1"};
+    report_.error(last_, fmt::format("there is no ColorSpace \"{}\"{}", *name, suggestion(*name, known)));
   }
   void option(const Token& d) {
-    const Span at = d.at;
-    const auto all = parameters();
-    if (!all) return;
-    static constexpr std::string_view kIdle[] = {
-        "seed", "disablewavelengthjitter", "msereferenceimage", "msereferenceout", "rendercoordsys", "quiet"};
-    for (const Param& p : *all)
-      if (std::find(std::begin(kIdle), std::end(kIdle), p.name) == std::end(kIdle))
-        report_.error(p.at, fmt::format("the Option '{}' is not read: leave it out", p.name));
-    if (all->empty()) report_.error(at, "Option wants a \"type name\" and a value");
+    // pbrt-v4 reads a name and one value, and files may also have the type before the name.
+    auto name = quoted(d);
+    if (!name) return;
+    const Span at = last_;
+    name->erase(0, name->find_last_of(" \t") + 1);
+    const Token* next = tokens_->peek();
+    if (!next || next->kind == Token::Kind::open || next->kind == Token::Kind::close) {
+      lost_ = true;
+      if (!tokens_->broken()) report_.error(at, fmt::format("the Option '{}' has no value", *name));
+      return;
+    }
+    const std::string value = tokens_->take().text;
+    std::string lower;
+    for (const char c : *name)
+      if (c != '-') lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    static constexpr std::string_view kIdle[] = {"seed",
+                                                 "disabletexturefiltering",
+                                                 "disablewavelengthjitter",
+                                                 "displacementedgescale",
+                                                 "msereferenceimage",
+                                                 "msereferenceout",
+                                                 "rendercoordsys",
+                                                 "pixelstats",
+                                                 "wavefront",
+                                                 "quiet"};
+    const bool changes_pixels = lower == "forcediffuse" || lower == "disablepixeljitter";
+    if (std::find(std::begin(kIdle), std::end(kIdle), lower) != std::end(kIdle))
+      report_.warning(at, fmt::format("the Option '{}' has no effect here: how the picture is computed is "
+                                      "chosen by the command line or the job",
+                                      *name));
+    else if (!changes_pixels || value != "false")
+      report_.error(at, fmt::format("the Option '{}' is not read: leave it out", *name));
   }
 
   // Directives for the graphics state.
   void world_begin(const Token& d) {
     if (in_world_) return report_.error(d.at, "a second WorldBegin: a file has one scene");
     in_world_ = true;
+    now_.at_start = true;
     now_.ctm = {};
     systems_["world"] = {};
   }
@@ -285,8 +315,8 @@ class Loader {
     saved_.pop_back();
   }
 
-  void grow(const Placed& inner) { now_.ctm = then(now_.ctm, inner); }
-  void identity(const Token&) { now_.ctm = {}; }
+  void grow(const Placed& inner) { set_ctm(then(now_.ctm, inner)); }
+  void identity(const Token&) { set_ctm({}); }
   void translate(const Token& d) {
     if (const auto n = numbers(d, 3)) grow(moved(Vec3{{(*n)[0], (*n)[1], (*n)[2]}}));
   }
@@ -319,7 +349,7 @@ class Loader {
     return p;
   }
   void transform(const Token& d) {
-    if (const auto p = matrix(d)) now_.ctm = *p;
+    if (const auto p = matrix(d)) set_ctm(*p);
   }
   void concat_transform(const Token& d) {
     if (const auto p = matrix(d)) grow(*p);
@@ -331,15 +361,29 @@ class Loader {
     const auto name = quoted(d);
     if (!name) return;
     if (const auto found = systems_.find(*name); found != systems_.end())
-      now_.ctm = found->second;
+      set_ctm(found->second);
     else
       report_.error(last_, fmt::format("no CoordinateSystem \"{}\" stands before this", *name));
   }
   void active_transform(const Token& d) {
     const Token* next = tokens_->peek();
-    if (next && next->kind == Token::Kind::word && next->text == "All") return void(tokens_->take());
-    report_.error(d.at, "only ActiveTransform All is read: motion is not rendered here, so leave it out");
-    lost_ = true;
+    const std::string which = next && next->kind == Token::Kind::word ? tokens_->take().text : "";
+    if (which != "All" && which != "StartTime" && which != "EndTime") {
+      lost_ = true;
+      if (!tokens_->broken())
+        report_.error(d.at, "ActiveTransform wants one of All, StartTime and EndTime after it");
+      return;
+    }
+    now_.at_start = which != "EndTime";
+    if (!now_.at_start)
+      t_.warn_once(
+          d.at,
+          "transforms of EndTime are left out: motion is not rendered here, and the picture shows the "
+          "scene as it is at StartTime");
+  }
+  // Sets the current transform, unless only that of EndTime is active.
+  void set_ctm(const Placed& ctm) {
+    if (now_.at_start) now_.ctm = ctm;
   }
   void transform_times(const Token& d) { (void)numbers(d, 2); }
   void reverse_orientation(const Token&) { now_.reversed = !now_.reversed; }
@@ -390,11 +434,12 @@ class Loader {
     if (!kind) return;
     if (*kind != "float" && *kind != "spectrum" && *kind != "color")
       report_.error(last_, fmt::format("a Texture is \"float\" or \"spectrum\", not \"{}\"", *kind));
+    const TextureOf what = *kind == "float" ? TextureOf::numbers : TextureOf::colours;
     auto p = object(d);
     if (p)
-      add_texture(t_, *name, *p);
+      add_texture(t_, what, *name, *p);
     else
-      t_.textures.emplace(*name, Texture{Rgb{1, 1, 1}, {}});
+      set_texture(t_, what, *name, Texture{Rgb{1, 1, 1}, {}});
   }
   void light_source(const Token& d) {
     need_world(d);
@@ -564,12 +609,6 @@ const std::map<std::string_view, Loader::Directive>& Loader::directives() {
 }
 
 }  // namespace
-
-void Translation::warn_once(const Span& at, std::string text) {
-  if (std::find(warned.begin(), warned.end(), text) != warned.end()) return;
-  warned.push_back(text);
-  report.warning(at, std::move(text));
-}
 
 bool is_pbrt(std::string_view file_name) { return has_ending(file_name, {".pbrt"}); }
 

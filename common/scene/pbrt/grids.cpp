@@ -128,8 +128,8 @@ class GridLight {
 // gives is 0 outside the grid.
 class Colours {
  public:
-  Colours(const Param* absorption, const Param* scattering, const std::array<int, 3>& sides)
-      : absorption_(with_border(absorption, sides)), scattering_(with_border(scattering, sides)) {}
+  Colours(Translation& t, const Param* absorption, const Param* scattering, const std::array<int, 3>& sides)
+      : absorption_(with_border(t, absorption, sides)), scattering_(with_border(t, scattering, sides)) {}
 
   MadeGrid extinction() const {
     MadeGrid sum = absorption_;
@@ -168,9 +168,10 @@ class Colours {
   }
 
  private:
-  static MadeGrid with_border(const Param* p, const std::array<int, 3>& sides) {
+  static MadeGrid with_border(Translation& t, const Param* p, const std::array<int, 3>& sides) {
+    const auto numbers = p ? srgb_numbers(t, *p, RgbOf::matter) : std::vector<double>();
     return padded(
-        sides, 3, [&](std::size_t i, std::size_t k) { return p ? p->numbers[3 * i + k] : 1; }, p ? 0 : 1);
+        sides, 3, [&](std::size_t i, std::size_t k) { return p ? numbers[3 * i + k] : 1; }, p ? 0 : 1);
   }
   double extinction(std::size_t i) const {
     return double{absorption_.values[i]} + double{scattering_.values[i]};
@@ -205,8 +206,8 @@ bool add_colours(MediumSource& m, Element& out, const Param& light, const std::a
   const double scale = m.p.number("Lescale", 1);
   if (scale == 0) return true;
   add(out, "emission_scale", scale * kPhotometric * m.t.exposure(), m.p.at());
-  const MadeGrid grid =
-      padded(sides, 3, [&](std::size_t i, std::size_t k) { return light.numbers[3 * i + k]; });
+  const auto numbers = srgb_numbers(m.t, light, RgbOf::light);
+  const MadeGrid grid = padded(sides, 3, [&](std::size_t i, std::size_t k) { return numbers[3 * i + k]; });
   return add_grid(m, out, "source_radiance", grid, box, Filling::border);
 }
 
@@ -264,7 +265,7 @@ bool rgb_grid(MediumSource& m, Element& out) {
   if (!read_sides(m, sides) || !read_box(m, box) || (!a && !s) || (light && !a)) return false;
   for (const Param* p : {a, s, light})
     if (!fits(m, p, 3, sides)) return false;
-  const Colours colours(a, s, sides);
+  const Colours colours(m.t, a, s, sides);
   add(out, "scale", m.p.number("scale", 1), m.p.at());
   if (!add_grid(m, out, "sigma_t", colours.extinction(), box, Filling::border)) return false;
   if (const auto albedo = colours.one_albedo()) {

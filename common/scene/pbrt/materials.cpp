@@ -139,7 +139,7 @@ class MaterialTranslator {
     const std::string metal = metal_of(eta, "-eta"), same = metal_of(k, "-k");
     if (metal.empty() && same.empty()) {
       for (const auto& [p, name] : {std::pair{eta, "eta"}, {k, "k"}})
-        if (const auto c = surface_colour(t_, *p)) add(out, name, *c, p->at);
+        if (const auto c = surface_colour(t_, *p, RgbOf::matter)) add(out, name, *c, p->at);
       return;
     }
     if (metal != same)
@@ -196,8 +196,8 @@ class MaterialTranslator {
       const Param* p = p_.take(name);
       if (!p) return fallback;
       if (p->type == "texture") {
-        const auto found = t_.textures.find(p->texts.empty() ? "" : p->texts[0]);
-        if (found != t_.textures.end() && found->second.value) return (*found->second.value)[0];
+        const Texture* found = find_texture(t_, TextureOf::numbers, p->texts.empty() ? "" : p->texts[0]);
+        if (found && found->value) return (*found->value)[0];
       } else if (p->numbers.size() == 1 && p->numbers[0] >= 0) {
         return p->numbers[0];
       }

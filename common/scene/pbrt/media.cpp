@@ -86,7 +86,7 @@ namespace {
 
 Rgb one(MediumSource& m, std::string_view name) {
   const Param* p = m.p.take(name);
-  return p ? surface_colour(m.t, *p).value_or(Rgb{1, 1, 1}) : Rgb{1, 1, 1};
+  return p ? surface_colour(m.t, *p, RgbOf::matter).value_or(Rgb{1, 1, 1}) : Rgb{1, 1, 1};
 }
 
 bool homogeneous(MediumSource& m, Element& out) {

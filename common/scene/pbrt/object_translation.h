@@ -57,8 +57,11 @@ struct AreaLight {
 
 // The state that AttributeBegin saves and AttributeEnd restores.
 struct Attributes {
-  Placed ctm;
+  Placed ctm;  // with motion, that of the time at which the shutter opens
+  // False if transforms that follow are those of the time at which the shutter closes (ActiveTransform).
+  bool at_start = true;
   bool reversed = false;
+  ColourSpace space = ColourSpace::srgb;
   Material material;
   std::optional<AreaLight> light;
   std::string inside, outside;  // media on the surface's two sides, by name; empty: none
@@ -84,24 +87,39 @@ struct Translation {
     lit = true;
     return exposure_factor;
   }
-  std::map<std::string, Texture> textures;
+  // As in pbrt, a texture of numbers and one of colours may have the same name.
+  std::map<std::string, Texture> float_textures, colour_textures;
   std::map<std::string, Material> materials;
   std::vector<MadeCloud> clouds;
-  std::vector<std::string> warned;  // texts of warnings that are given only once per file
 
-  void warn_once(const Span& at, std::string text);
+  // Gives a warning only once per scene.
+  void warn_once(const Span& at, std::string text) { report.warning_once(at, std::move(text)); }
 };
 
+// What the numbers of an rgb mean: light; the share that a surface sends on, 0 to 1; or another property of
+// matter, such as an absorption, without an upper limit.
+enum class RgbOf { light, surface, matter };
 // In colours.cpp: functions that return the colour that a parameter gives. nullopt: the value was reported as
 // wrong. light_colour() gives lights the luminance that they have in pbrt: an rgb is relative to the white of
-// sRGB, all other notations are scaled to luminance 1.
+// its colour space, all other notations are scaled to luminance 1.
 std::optional<Rgb> light_colour(Translation& t, const Param& p);
-std::optional<Rgb> surface_colour(Translation& t, const Param& p);
+std::optional<Rgb> surface_colour(Translation& t, const Param& p, RgbOf meaning = RgbOf::surface);
+// Returns the colour space of this name in any case; nullopt: pbrt has none of this name.
+std::optional<ColourSpace> colour_space(std::string_view name);
+// Returns the numbers of an rgb parameter, converted from its colour space to linear sRGB. Light keeps its X,
+// Y, Z; a colour of matter is adapted to the white of sRGB, so that grey stays grey. What sRGB cannot hold is
+// cut off, with a warning.
+std::vector<double> srgb_numbers(Translation& t, const Param& p, RgbOf meaning);
 // Takes the parameter `name`, the colour of a light. Returns white if it is not given or is wrong.
 Rgb light_colour(Translation& t, Params& params, std::string_view name);
 
 // Defined in textures.cpp.
-void add_texture(Translation& t, const std::string& name, Params& p);
+enum class TextureOf { numbers, colours };
+void add_texture(Translation& t, TextureOf what, const std::string& name, Params& p);
+// Makes the texture known under this name without reporting an error if there is one already.
+void set_texture(Translation& t, TextureOf what, const std::string& name, Texture texture);
+// Returns the texture of this name, or one of the other kind if only this has the name. nullptr: none.
+const Texture* find_texture(const Translation& t, TextureOf what, const std::string& name);
 struct Names {
   std::string_view theirs, ours;
 };

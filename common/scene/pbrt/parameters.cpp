@@ -139,6 +139,7 @@ class ParamReader {
                  text.substr(name, end - name),
                  token.at,
                  {},
+                 {},
                  {}};
   }
 
@@ -274,6 +275,14 @@ void Params::missing(std::string_view name) {
   report_->error(at_, fmt::format("{} needs '{}'", title(), name));
 }
 
+// True if the parameter has the value that the table gives as its default.
+bool Params::is_default(const Param& p, const Word& word) {
+  if (p.texts.size() == 1 && p.numbers.empty()) return p.texts[0] == word.fallback;
+  const auto x = ls::parse_number<double>(word.fallback);
+  return x && p.texts.empty() && !p.numbers.empty() &&
+         std::all_of(p.numbers.begin(), p.numbers.end(), [&](double given) { return given == *x; });
+}
+
 void Params::finish() {
   for (const Given& g : given_) {
     if (g.taken) continue;
@@ -283,7 +292,11 @@ void Params::finish() {
       for (const Word& w : row_->words) known.emplace_back(w.name);
       report_->error(g.param.at, fmt::format("{} has no parameter '{}'{}", title(), g.param.name,
                                              suggestion(g.param.name, known)));
+    } else if (word->use == Word::Use::ignored) {
+      report_->warning_once(
+          g.param.at, fmt::format("'{}' of {} has no effect here: {}", word->name, title(), word->meaning));
     } else if (word->use == Word::Use::refused) {
+      if (is_default(g.param, *word)) continue;
       report_->error(g.param.at,
                      fmt::format("'{}' of {} is not read: {}", word->name, title(), word->meaning));
     } else if (word->use == Word::Use::read) {

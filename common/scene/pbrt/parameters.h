@@ -40,9 +40,13 @@ class Tokens {
   std::optional<Token> next_;
 };
 
+// The colour space that a directive ColorSpace names, in which the values of type rgb after it are given.
+enum class ColourSpace { srgb, dci_p3, rec2020, aces2065_1 };
+
 struct Param {
   std::string type, name;  // for example "rgb" and "reflectance"
   Span at;                 // place of the declaration
+  ColourSpace space = ColourSpace::srgb;
   std::vector<double> numbers;
   std::vector<std::string> texts;  // values that are quoted texts, and the words true and false
 };
@@ -51,8 +55,8 @@ struct Param {
 std::optional<std::vector<Param>> read_params(Tokens& tokens, Report& report);
 
 // The parameters of one object. The code that translates the object takes each parameter by its name.
-// finish() reports the parameters that were not taken, except those that the table in vocabulary.h marks as
-// ignored.
+// finish() reports the parameters that were not taken: as errors, or with a warning if the table in
+// vocabulary.h marks them as ignored. A parameter that is refused may be given with its default value.
 class Params {
  public:
   Params(const Row& row, const Span& at, std::vector<Param> params, Report& report);
@@ -79,6 +83,7 @@ class Params {
     bool taken = false;
   };
   bool is_one(const Param& p, std::size_t numbers, std::size_t texts);
+  static bool is_default(const Param& p, const Word& word);
   const Row* row_;
   Span at_;
   std::vector<Given> given_;

@@ -165,6 +165,16 @@ class ShapeTranslator {
     return p_.error(corners->at, "P has no corners"), nullptr;
   }
 
+  // Returns the parameter, which has `size` numbers for each corner; nullptr if it is not given, or is wrong,
+  // which was reported.
+  const std::vector<double>* per_corner(const char* name, std::size_t size, std::size_t corners) {
+    const Param* p = p_.take(name);
+    if (!p || p->numbers.size() == size * corners) return p ? &p->numbers : nullptr;
+    p_.error(p->at,
+             fmt::format("'{}' has {} numbers, but P has {} corners", name, p->numbers.size(), corners));
+    return nullptr;
+  }
+
   std::optional<Element> triangles() {
     const Param* corners = take_corners();
     if (!corners) return std::nullopt;
@@ -172,15 +182,8 @@ class ShapeTranslator {
     Mesh mesh{corners->numbers, {}, {}, indices(n, 3)};
     for (const auto& [name, size, list] : {std::tuple{"N", std::size_t{3}, &mesh.normals},
                                            {"uv", std::size_t{2}, &mesh.uvs},
-                                           {"st", std::size_t{2}, &mesh.uvs}}) {
-      if (!p_.has(name)) continue;
-      const Param* p = p_.take(name);
-      if (!p) return std::nullopt;
-      if (p->numbers.size() != size * n)
-        return p_.refuse(
-            p->at, fmt::format("'{}' has {} numbers, but P has {} corners", name, p->numbers.size(), n));
-      *list = p->numbers;
-    }
+                                           {"st", std::size_t{2}, &mesh.uvs}})
+      if (const auto* given = per_corner(name, size, n)) *list = *given;
     has_normals_ = !mesh.normals.empty();
     if (a_.light && a_.light->power) measure(mesh, 1);
     if (mesh.indices.empty()) return std::nullopt;
@@ -220,7 +223,9 @@ class ShapeTranslator {
     const std::vector<double> four = indices(x.size() / 3, 4);
     if (four.empty()) return std::nullopt;
     if (four.size() > kMaxOwnCorners) return too_many_corners();
-    // Patches share no corners, since u and v go from 0 to 1 on each patch.
+    const auto *normals = per_corner("N", 3, x.size() / 3), *uvs = per_corner("uv", 2, x.size() / 3);
+    has_normals_ = normals != nullptr;
+    // Patches share no corners, since u and v go from 0 to 1 on each patch if none are given.
     Mesh mesh;
     for (std::size_t i = 0; i < four.size(); i += 4) {
       std::array<Vec3, 3> side;  // vectors from corner 0 to the corners 1, 2 and 3
@@ -234,37 +239,62 @@ class ShapeTranslator {
       if (std::abs(dot(normal, side[2])) > 1e-5 * size)
         return p_.refuse(
             p_.at(), fmt::format("{} is bent, and only flat patches are read: give a plymesh", p_.title()));
+      const Vec3 apart = minus(minus(side[2], side[0]), side[1]);
+      if ((needs_uv() || normals) && dot(apart, apart) > 1e-10 * dot(side[2], side[2]))
+        t_.warn_once(p_.at(),
+                     fmt::format("a patch of {} that is no parallelogram is two triangles here, over "
+                                 "which textures and normals go otherwise than in pbrt",
+                                 p_.title()));
       for (const std::size_t k : {0, 1, 3, 0, 3, 2}) mesh.indices.push_back(static_cast<double>(i + k));
       for (std::size_t k = 0; k < 4; ++k) {
         const auto corner = x.begin() + 3 * static_cast<std::ptrdiff_t>(four[i + k]);
         mesh.positions.insert(mesh.positions.end(), corner, corner + 3);
-        mesh.uvs.insert(mesh.uvs.end(), {k % 2 == 0 ? 0. : 1., k < 2 ? 0. : 1.});
+        const auto own = [&](const std::vector<double>& from, std::ptrdiff_t size) {
+          return from.begin() + size * static_cast<std::ptrdiff_t>(four[i + k]);
+        };
+        if (normals) mesh.normals.insert(mesh.normals.end(), own(*normals, 3), own(*normals, 3) + 3);
+        if (uvs)
+          mesh.uvs.insert(mesh.uvs.end(), own(*uvs, 2), own(*uvs, 2) + 2);
+        else
+          mesh.uvs.insert(mesh.uvs.end(), {k % 2 == 0 ? 0. : 1., k < 2 ? 0. : 1.});
       }
     }
     if (a_.light && a_.light->power) measure(mesh, 2);
     return kept(mesh);
   }
 
-  // In pbrt ReverseOrientation flips the normal, and mirroring a mesh leaves its normal on the original side.
-  // Here mirroring reverses the order of a mesh's corners and so its normal, if the mesh has no vertex
-  // normals; and the normals of a mirrored sphere point inwards. Adds flip_normals if the normals would
-  // otherwise be on the other side than in pbrt.
-  void orient(Element& out) {
-    const bool mirrored = determinant3(a_.ctm.to) < 0;
+  // The original side of a shape is the one that its normal points to without ReverseOrientation and
+  // mirrors: outside of a sphere, and where the corners of a mesh run counterclockwise or its vertex normals
+  // point. In pbrt the normal is on the other side if the shape is reversed; of a sphere, disk or cylinder,
+  // if it is either reversed or mirrored, so that both together cancel (Sphere, Disk and Cylinder in
+  // src/pbrt/shapes.h against Triangle, whose corners are mirrored, too).
+  bool is_turned() const { return is_quadric() ? a_.reversed != is_mirrored() : a_.reversed; }
+  bool is_mirrored() const { return determinant3(a_.ctm.to) < 0; }
+  bool is_quadric() const {
     const std::string_view type = p_.row().type;
-    const bool by_corners = (type == "trianglemesh" && !has_normals_) || type == "bilinearmesh";
-    const bool has_sides =
-        (a_.light && !a_.light->two_sided) || a_.inside != a_.outside || a_.material.transmits;
-    if (mirrored && has_sides && (!by_corners || a_.reversed))
-      p_.error(
+    return type == "sphere" || type == "disk" || type == "cylinder";
+  }
+
+  // Adds flip_normals if the normals would otherwise be on the other side than in pbrt. Here a mirrored
+  // sphere, and a mirrored mesh without vertex normals, have their normals on the side that is not the
+  // original one; all others on the original side.
+  void orient(Element& out) {
+    const std::string_view type = p_.row().type;
+    const bool one_sided = a_.light && !a_.light->two_sided;
+    if (type == "plymesh" && is_mirrored() && (one_sided || a_.inside != a_.outside || a_.material.transmits))
+      p_.error(p_.at(),
+               fmt::format("{} is mirrored by its transform, and its sides matter, as it gives light, bounds "
+                           "a medium or lets light through, but whether the file has normals, which decides "
+                           "which side is which, is not known here: mirror the mesh in its file",
+                           p_.title()));
+    if (is_quadric() && is_mirrored() && one_sided)
+      t_.warn_once(
           p_.at(),
-          fmt::format(
-              "{} is mirrored by its transform, and its sides matter, as it gives light, bounds a medium or "
-              "lets light through: leave the mirror out (and turn ReverseOrientation round if it is on)",
-              p_.title()));
-    const bool turned_round =
-        type == "sphere" ? mirrored != (determinant3(to_world_.to) < 0) : mirrored && by_corners;
-    if (a_.reversed != turned_round) add(out, "boolean", "flip_normals", "true", p_.at());
+          "a mirrored sphere, disk or cylinder gives light here on the side from which pbrt shows it "
+          "shining; when it samples lights, pbrt takes the other side");
+    const bool by_corners = (type == "trianglemesh" || type == "bilinearmesh") && !has_normals_;
+    const bool turned_here = determinant3(to_world_.to) < 0 && (type == "sphere" || by_corners);
+    if (is_turned() != turned_here) add(out, "boolean", "flip_normals", "true", p_.at());
   }
 
   void surface(Element& out) {
@@ -291,9 +321,11 @@ class ShapeTranslator {
       add(out, std::move(area));
     }
     if (a_.inside == a_.outside) return;
-    // Here the interior medium of a mirrored sphere is always within the sphere. In pbrt the inside medium is
-    // on the side that the normals point away from, which may be outside of the sphere.
-    const bool swapped = a_.reversed && determinant3(a_.ctm.to) * determinant3(to_world_.to) < 0;
+    // In pbrt the inside medium is on the side that the normals point away from. So it is here, except that
+    // the interior of a mirrored sphere or mesh is always on the side away from the original one.
+    const std::string_view type = p_.row().type;
+    const bool swapped =
+        determinant3(to_world_.to) < 0 && type != "disk" && type != "cylinder" && is_turned();
     const std::string &inside = swapped ? a_.outside : a_.inside, &outside = swapped ? a_.inside : a_.outside;
     if (!inside.empty()) refer(out, "interior", medium_id(inside), p_.at());
     if (!outside.empty()) refer(out, "exterior", medium_id(outside), p_.at());

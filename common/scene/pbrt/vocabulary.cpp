@@ -23,8 +23,11 @@ Words camera_words() {
   return {{"shutteropen", "float", "0", "see shutterclose"},
           {"shutterclose", "float", "1",
            "all light is multiplied by shutterclose - shutteropen; motion is not rendered"},
-          {"frameaspectratio", "float", "", "give the film that shape instead", kRefused},
-          {"screenwindow", "float", "", "give the film that shape, or a crop, instead", kRefused}};
+          {"frameaspectratio", "float", "that of the film",
+           "width over height of what the frame shows; pixels of `perspective` must come out square"},
+          {"screenwindow", "float", "1 to each side along the shorter side of the frame",
+           "x0 x1 y0 y1: what the frame shows of the plane on which `fov` sees [-1, 1]; pixels of "
+           "`perspective` must come out square (to 0.1 %)"}};
 }
 
 Words film_words() {
@@ -40,6 +43,10 @@ Words film_words() {
       {"maxcomponentvalue", "float", "", "samples are not clamped, as that darkens the image", kIgnored},
       {"diagonal", "float", "35", "only lenses of the camera \"realistic\" depend on it", kIgnored},
       {"filename", "string", "", "the command line or the job says where images go", kIgnored},
+      {"coordinatesystem", "string", "camera", "AOVs are in world coordinates", kIgnored},
+      {"nbuckets", "integer", "16", "spectra are not followed", kIgnored},
+      {"lambdamin", "float", "360", "spectra are not followed", kIgnored},
+      {"lambdamax", "float", "830", "spectra are not followed", kIgnored},
       {"savefp16", "bool", "true", "the output format is chosen by the command line or the job", kIgnored}};
 }
 
@@ -106,6 +113,7 @@ Words integrator_words() {
           {"sampleLights", "bool", "true", kSampling, kIgnored},
           {"samplelights", "bool", "true", kSampling, kIgnored},
           {"samplebsdf", "bool", "true", kSampling, kIgnored},
+          {"samplebsdfs", "bool", "true", kSampling, kIgnored},
           {"regularize", "bool", "false", "surfaces keep their roughness", kIgnored}};
 }
 
@@ -120,7 +128,7 @@ void add_settings(std::vector<Row>& r) {
                Words{{"fov", "float", "90", "degrees, along the shorter side of the frame"},
                      {"lensradius", "float", "0", "radius of the lens"},
                      {"focaldistance", "float", "1e6", "distance that is sharp"},
-                     {"halffov", "float", "", "give fov, which is twice that", kRefused}} +
+                     {"halffov", "float", "", "half of fov, in its place"}} +
                    camera_words()});
   r.push_back({"Camera", "orthographic", true,
                "an `orthographic` camera; the frame's shorter side sees [-1, 1]",
@@ -128,7 +136,13 @@ void add_settings(std::vector<Row>& r) {
                      {"focaldistance", "float", "", "see lensradius", kRefused}} +
                    camera_words()});
   r.push_back({"Camera", "realistic", false, "lens systems are not traced: write it as \"perspective\"", {}});
-  r.push_back({"Camera", "spherical", false, "its maps differ: write it in XML as \"spherical\"", {}});
+  r.push_back({"Camera", "spherical", true, "a `spherical` camera, if its mapping is equirectangular",
+               Words{{"mapping", "string", "equalarea",
+                      "only equirectangular is read: the other maps all directions to squares of equal area"},
+                     {"lensradius", "float", "0", "it has no lens", kIgnored},
+                     {"focaldistance", "float", "", "it has no lens", kIgnored},
+                     {"fov", "float", "", "it sees all directions", kIgnored}} +
+                   camera_words()});
   const Words radii{{"xradius", "float", "", "half width in pixels"},
                     {"yradius", "float", "xradius", "half height; it must be the same"}};
   r.push_back({"PixelFilter", "box", true, "`box`; its radius is 0.5 if none is given", radii});
@@ -140,8 +154,18 @@ void add_settings(std::vector<Row>& r) {
              {"alpha", "float", "", "pbrt-v3's alpha is 1 / (2 sigma^2): give sigma", kRefused},
              {"xradius", "float", "1.5", "it is cut off at 4 sigma", kIgnored},
              {"yradius", "float", "1.5", "it is cut off at 4 sigma", kIgnored}}});
+  constexpr std::string_view kGaussian = "a Gaussian stands for it";
   for (const auto type : {"mitchell", "sinc"})
-    r.push_back({"PixelFilter", type, false, "it has negative lobes: use gaussian, triangle or box", {}});
+    r.push_back({"PixelFilter",
+                 type,
+                 true,
+                 "`gaussian` of sigma 0.5, with a warning: it has negative lobes, which samples that each "
+                 "belong to one pixel can't follow",
+                 {{"xradius", "float", "", kGaussian, kIgnored},
+                  {"yradius", "float", "", kGaussian, kIgnored},
+                  {"B", "float", "", kGaussian, kIgnored},
+                  {"C", "float", "", kGaussian, kIgnored},
+                  {"tau", "float", "", kGaussian, kIgnored}}});
   for (const auto type : {"independent", "halton", "paddedsobol", "zsobol", "sobol", "pmj02bn", "02sequence",
                           "lowdiscrepancy", "random", "maxmindist"})
     r.push_back({"Sampler",
@@ -195,6 +219,7 @@ void add_shapes(std::vector<Row>& r) {
   r.push_back({"Shape", "trianglemesh", true, "a `ply`, which is written of its numbers",
                Words{{"P", "point3", "needed", "corners"},
                      {"indices", "integer", "0 1 2", "three corners a triangle"},
+                     {"faceIndices", "integer", "", "only Ptex images are chosen by it", kIgnored},
                      {"N", "normal", "", "normals at the corners"},
                      {"uv", "point2|float", "", "texture coordinates at the corners"},
                      {"st", "point2|float", "", "uv of pbrt-v3"},
@@ -204,8 +229,9 @@ void add_shapes(std::vector<Row>& r) {
                "if its patches are flat, two triangles each, as `trianglemesh`",
                Words{{"P", "point3", "needed", "corners"},
                      {"indices", "integer", "0 1 2 3", "four corners a patch"},
-                     {"N", "normal", "", "give a trianglemesh", kRefused},
-                     {"uv", "point2", "", "give a trianglemesh", kRefused},
+                     {"N", "normal", "", "normals at the corners"},
+                     {"uv", "point2|float", "0 0, 1 0, 0 1 and 1 1", "texture coordinates at the corners"},
+                     {"faceIndices", "integer", "", "only Ptex images are chosen by it", kIgnored},
                      {"emissionfilename", "string", "", "it only steers sampling", kIgnored}} +
                    shape_words()});
   r.push_back({"Shape", "plymesh", true, "a `ply`",
@@ -308,15 +334,14 @@ void add_textures(std::vector<Row>& r) {
              {"filter", "string", "bilinear", "point is `nearest`, all others `bilinear`"},
              {"wrap", "string", "repeat", "or clamp; black is refused"},
              {"encoding", "string", "sRGB", "of PNG files: sRGB or linear; other 8-bit files are sRGB"},
-             {"scale", "float", "1", "only 1 is read"},
+             {"scale", "float", "1", "factor on the image"},
              {"invert", "bool", "false", "only false is read"},
              {"maxanisotropy", "float", "8", "it is not filtered over pixels", kIgnored},
              {"trilinear", "bool", "false", "it is not filtered over pixels", kIgnored}} +
            mapping_words()});
   r.push_back({"Texture", "constant", true, "a colour or a number",
                Words{{"value", "float|rgb|spectrum", "1", "the value"}}});
-  r.push_back({"Texture", "scale", true,
-               "a product, of which one factor at most is a texture, and the others make 1 with it",
+  r.push_back({"Texture", "scale", true, "the product of its two parameters",
                Words{{"tex", "float|rgb|spectrum|texture", "1", "what is scaled"},
                      {"scale", kNumber, "1", "factor"}}});
   r.push_back({"Texture", "checkerboard", true, "a `checkerboard`",
@@ -493,9 +518,15 @@ std::span<const Plain> plain_directives() {
       {"ObjectEnd", "see ObjectBegin"},
       {"ObjectInstance", "an `instance` of such shapes"},
       {"Accelerator", "no effect: how rays find shapes is chosen here"},
-      {"ColorSpace", "only \"srgb\" is read"},
-      {"Option", "no effect, but those that change pixels by themselves are refused"},
-      {"ActiveTransform", "only All: motion is not rendered, and StartTime and EndTime are refused"},
+      {"ColorSpace",
+       "the space of the `rgb` values that follow, until AttributeEnd: srgb, rec2020, dci-p3 or aces2065-1"},
+      {"Option",
+       "no effect, which is a warning; forcediffuse and disablepixeljitter, which change pixels, are refused "
+       "unless they are false"},
+      {"ActiveTransform",
+       "All, StartTime or EndTime: transforms of EndTime alone are left out, with a warning, as motion is "
+       "not "
+       "rendered"},
       {"TransformTimes", "no effect without motion"},
       {"Attribute", "refused: write the parameter into each object"},
   };

@@ -150,7 +150,16 @@ ReconstructionFilter Reader::read_filter(const Element& e) {
     p.finish();
     filter = kind;
   };
-  if (!with_kind_named<ReconstructionFilter>(e.get("type"), read)) unknown_plugin(e, report_);
+  if (with_kind_named<ReconstructionFilter>(e.get("type"), read)) return filter;
+  if (!is_read_plugin("rfilter", e.get("type"))) return unknown_plugin(e, report_), filter;
+  // A filter with negative lobes. Each sample belongs to one pixel, so it cannot have a weight below 0 in
+  // others.
+  Params p(*this, e);
+  report_.warning(value_place(e, "type"),
+                  fmt::format("{} is read as \"gaussian\", which blurs a little more: it has negative lobes, "
+                              "which samples that each belong to one pixel can't follow",
+                              p.title()));
+  p.finish();
   return filter;
 }
 

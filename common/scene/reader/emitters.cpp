@@ -5,6 +5,15 @@
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene {
+namespace {
+
+// Adds the ids to which references in the element refer.
+void note_references(const Element& e, std::unordered_set<std::string_view>& ids) {
+  if (e.tag == "ref") ids.insert(e.get("id"));
+  for (const Element& child : e.children) note_references(child, ids);
+}
+
+}  // namespace
 
 // Reads an emitter whose parameters are all listed by describe() (common/scene/schema). Kinds of emitters
 // that need more have specialisations below.
@@ -117,7 +126,12 @@ void Reader::read_emitter_as<GoniometricEmitter>(const Element& e) {
 
 void Reader::read_emitter(const Element& e) {
   const std::string_view type = e.get("type");
-  if (type == "area") return report_.error(e.at, "an emitter \"area\" stands in the shape that shines");
+  if (type == "area") {
+    // As any other object it may stand elsewhere than where it is used.
+    if (!referred_) note_references(document_.root, referred_.emplace());
+    if (e.find("id") && referred_->contains(e.get("id"))) return;
+    return report_.error(e.at, "an emitter \"area\" stands in the shape that shines");
+  }
   if (!with_kind_named<Emitter>(type, [&]<class Kind>() { read_emitter_as<Kind>(e); }))
     unknown_plugin(e, report_);
 }

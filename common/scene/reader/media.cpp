@@ -78,6 +78,15 @@ void check_medium(const Params& p, const Factors& given, const HeterogeneousMedi
 }
 void check_medium(const Params&, const Factors&, const HomogeneousMedium&, Report&) {}
 
+// True if the object has a parameter of this name that is a volume "gridvolume".
+bool has_grid(Reader& reader, const Element& e, std::string_view name) {
+  return std::ranges::any_of(e.children, [&](const Element& c) {
+    if (c.get("name") != name || (c.tag != "volume" && c.tag != "ref")) return false;
+    const Element* volume = c.tag == "ref" ? reader.resolve(c) : &c;
+    return volume && volume->tag == "volume" && volume->get("type") == "gridvolume";
+  });
+}
+
 }  // namespace
 
 std::optional<VolumeIndex> Reader::read_volume(const Element& e) {
@@ -130,6 +139,7 @@ std::optional<PhaseIndex> Reader::read_phase(const Element& e) {
 }
 
 std::optional<MediumIndex> Reader::read_medium(const Element& e) {
+  if (e.get("type") == "homogeneous" && !e.old && has_grid(*this, e, "albedo")) return read_unbounded(e);
   std::optional<MediumIndex> read;
   if (!with_kind_named<Medium>(e.get("type"), [&]<class Kind>() { read = read_medium_as<Kind>(e); }))
     unknown_plugin(e, report_);
@@ -156,6 +166,24 @@ std::optional<MediumIndex> Reader::read_medium_as(const Element& e) {
   const auto index = added<MediumIndex>(medium);
   if constexpr (std::is_same_v<T, HeterogeneousMedium>)
     if (e.old && !report_.has_errors()) unbound_constant_density(e);
+  return index;
+}
+
+// Reads a medium "homogeneous" whose albedo is a grid, which Mitsuba 3 allows: a medium "heterogeneous" whose
+// density is the same in a box that is larger than any scene.
+std::optional<MediumIndex> Reader::read_unbounded(const Element& e) {
+  const auto index = read_medium_as<HeterogeneousMedium>(e);
+  if (!index || report_.has_errors()) return index;
+  auto& medium = std::get<HeterogeneousMedium>(scene_.media.back());
+  const Rgb* density = constant(medium.sigma_t);
+  if (!density)
+    return report_.refuse(e.at,
+                          "sigma_t of medium \"homogeneous\" is the same everywhere: of a grid make it "
+                          "\"heterogeneous\"");
+  constexpr double kReach = 1e9;  // in scene units, from the origin
+  const Transform box{
+      {2 * kReach, 0, 0, -kReach, 0, 2 * kReach, 0, -kReach, 0, 0, 2 * kReach, -kReach, 0, 0, 0, 1}};
+  medium.sigma_t = added<VolumeIndex>(ConstVolume{*density, box});
   return index;
 }
 

@@ -115,8 +115,23 @@ void Params::not_one_of(std::string_view name, const Element& e, const std::stri
                                                               given, suggestion(given, names)));
 }
 
+namespace {
+
+// The smallest roughness of microfacets, as in Mitsuba (MicrofacetDistribution), which takes 0 for it.
+constexpr double kSmallestAlpha = 1e-4;
+
+bool is_alpha(const Field& f) { return f.name == "alpha" || f.name == "alpha_u" || f.name == "alpha_v"; }
+
+}  // namespace
+
 bool Params::in_range(const Field& f, const Element& e, double x) {
   if (f.range.contains(x)) return true;
+  if (x == 0 && object_.tag == "bsdf" && is_alpha(f)) {
+    reader_.report().warning_once(value_place(e, "value"),
+                                  fmt::format("'{}' of {} is 0, which is read as {}, the smallest roughness",
+                                              f.name, title(), kSmallestAlpha));
+    return true;
+  }
   reader_.report().error(value_place(e, "value"), fmt::format("'{}' of {} is {}, out of its range {}", f.name,
                                                               title(), x, range_text(f.name, f.range)));
   return false;
@@ -156,7 +171,8 @@ void Params::convert(const Field& f, const Element& e, double& value) {
   const auto number = e.tag == "float" || e.tag == "integer" ? parse_number(e.get("value")) : std::nullopt;
   if (!number)
     return wrong_type(f.name, e, f.named_ior ? "a <float> or the <string> name of a material" : "a <float>");
-  if (in_range(f, e, *number)) value = *number;
+  if (!in_range(f, e, *number)) return;
+  value = f.range.contains(*number) ? *number : kSmallestAlpha;
 }
 
 void Params::convert(const Field& f, const Element& e, int& value) {

@@ -110,6 +110,7 @@ class Reader {
   std::optional<MediumIndex> read_medium(const Element& e);
   template <class Kind>
   std::optional<MediumIndex> read_medium_as(const Element& e);
+  std::optional<MediumIndex> read_unbounded(const Element& e);
   void unbound_constant_density(const Element& e);
 
   void read_shape(const Element& e);
@@ -158,6 +159,8 @@ class Reader {
   // parts_: the films, filters and samplers at the top level. used_parts_: the films, filters and samplers
   // that have been read for a sensor.
   std::vector<const Element*> parts_;
+  std::optional<std::unordered_set<std::string_view>>
+      referred_;  // ids with references; nullopt: not looked for
   std::unordered_set<const Element*> used_parts_;
   // Entry i belongs to scene_.textures[i] or scene_.bsdfs[i]. bounds() and traits() add entries when they are
   // needed.

@@ -23,6 +23,8 @@ const std::vector<MeaninglessRow>& meaningless_table() {
     add("film", "", "sample_border", "pixels at the border see samples from beyond it in any case");
     add("film", "ldrfilm", "gamma exposure tonemap_method key burn", "colours stay linear");
     add("film", "mfilm", "digits variable", output);
+    add("rfilter", "mitchell", "A B C", "a Gaussian stands for it");
+    add("rfilter", "lanczos", "lobes", "a Gaussian stands for it");
     add("sampler", "", "seed scramble jitter dimension strict", "samples are this program's own (--seed)");
     add("integrator", "", "strict_normals samples_per_pass block_size timeout render_time_step",
         "it does not change the exact answer");

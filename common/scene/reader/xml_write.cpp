@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <variant>
 
@@ -9,6 +10,7 @@
 #include "common/scene/json/serialize.h"
 #include "common/scene/schema/describe_fields.h"
 #include "common/scene/schema/integrators.h"
+#include "common/scene/schema/mitsuba_plugins.h"
 
 namespace ls {
 namespace scene {
@@ -70,7 +72,7 @@ class Writer {
     name_assets();
   }
 
-  std::string run() {
+  WrittenScene run() {
     out_ = "<scene version=\"3.0.0\">\n";
     write_integrator();
     pool(scene_.textures, TextureIndex{});
@@ -82,7 +84,7 @@ class Writer {
     for (const Instance& instance : scene_.instances) object(instance);
     for (const Emitter& emitter : scene_.emitters) std::visit([&](const auto& e) { object(e); }, emitter);
     write_sensor();
-    return out_ + "</scene>\n";
+    return {out_ + "</scene>\n", std::move(ours_)};
   }
 
   template <class T>
@@ -111,15 +113,30 @@ class Writer {
     }
   }
 
+  // Adds what Mitsuba 3 does not read to the list.
+  void note(std::string text) {
+    if (std::ranges::find(ours_, text) == ours_.end()) ours_.push_back(std::move(text));
+  }
+  void note_parameter(std::string_view name) {
+    if (name.empty() || objects_.empty()) return;
+    const auto& [tag, type] = objects_.back();
+    if (is_our_parameter(tag, type, name)) note(fmt::format("'{}' of {} \"{}\"", name, tag, type));
+  }
+
   // Functions that write XML elements.
   void line(std::string_view text) { out_ += fmt::format("{:{}}{}\n", "", 2 * depth_, text); }
   void open(std::string_view tag, std::string_view type, const std::string& id, std::string_view name) {
     line(fmt::format("<{} type=\"{}\"{}{}>", tag, type, id.empty() ? "" : fmt::format(" id=\"{}\"", id),
                      name.empty() ? "" : fmt::format(" name=\"{}\"", name)));
+    note_parameter(name);
+    const PluginRow* row = plugin_row(tag, type);
+    if (row && row->origin != Origin::mitsuba3) note(fmt::format("{} \"{}\"", tag, type));
+    objects_.emplace_back(tag, type);
     ++depth_;
     opened_ = out_.size();
   }
   void close(std::string_view tag) {
+    objects_.pop_back();
     --depth_;
     if (out_.size() == opened_) {  // the object has no members
       out_.replace(out_.size() - 2, 1, "/>");
@@ -128,12 +145,14 @@ class Writer {
     line(fmt::format("</{}>", tag));
   }
   void value(std::string_view tag, std::string_view name, std::string_view text) {
+    note_parameter(name);
     line(fmt::format("<{} name=\"{}\" value=\"{}\"/>", tag, name, escaped(text)));
   }
   void matrix(std::string_view name, const std::array<double, 16>& m) {
     line(fmt::format("<transform name=\"{}\"><matrix value=\"{}\"/></transform>", name, numbers(m)));
   }
   void reference(std::string_view name, const std::string& id) {
+    note_parameter(name);
     line(fmt::format("<ref {}id=\"{}\"/>", name.empty() ? "" : fmt::format("name=\"{}\" ", name), id));
   }
 
@@ -304,10 +323,16 @@ class Writer {
                      f.given_as == "vector" ? "vector" : "point", f.name, shortest_number(x[0]),
                      shortest_number(x[1]), shortest_number(x[2])));
   }
-  void property(const Field& f, const Rgb& x) {
+  void property(const Field& f, const Rgb& x) { colour(f, x, f.constvolume); }
+  void colour(const Field& f, const Rgb& x, bool stands_for_volume) {
     const bool grey = is_grey(x);
     if (grey && x[0] == f.unwritten) return;
-    value(grey ? "float" : "rgb", f.name, grey ? shortest_number(x[0]) : numbers(x));
+    if (grey) return value("float", f.name, shortest_number(x[0]));
+    // Mitsuba 3 takes an <rgb> that stands for a volume for a reflectance, which is at most 1.
+    if (!stands_for_volume || std::max({x[0], x[1], x[2]}) <= 1) return value("rgb", f.name, numbers(x));
+    open("volume", kInfo<ConstVolume>.name, "", f.name);
+    value("rgb", "value", numbers(x));
+    close("volume");
   }
   void property(const Field& f, const Transform& x) {
     if (x != Transform{}) matrix(f.name, x.m);
@@ -316,12 +341,18 @@ class Writer {
     if (x != UvTransform{})
       matrix(f.name, {x.m[0], x.m[1], 0, x.m[2], x.m[3], x.m[4], 0, x.m[5], 0, 0, 1, 0, 0, 0, 0, 1});
   }
-  void property(const Field& f, const AssetIndex& i) { value("string", f.name, asset_names_[i.value]); }
+  void property(const Field& f, const AssetIndex& i) {
+    const std::string& name = asset_names_[i.value];
+    if (objects_.back().first == "volume" && !name.ends_with(".vol"))
+      note(fmt::format("grids that are no .vol, such as {}", name));
+    value("string", f.name, name);
+  }
   template <class Tag>
   requires(std::is_same_v<Tag, TextureTag> ||
            std::is_same_v<Tag, VolumeTag>) void property(const Field& f, const Index<Tag>& i) {
-    const Rgb* value = inline_value(i);
-    value ? property(f, *value) : reference(f.name, id_of(i));
+    const Rgb* x = inline_value(i);
+    if (!x) return reference(f.name, id_of(i));
+    colour(f, *x, std::is_same_v<Tag, VolumeTag>);
   }
   void property(const Field& f, const std::optional<TextureIndex>& x) {
     if (x) property(f, *x);
@@ -335,12 +366,15 @@ class Writer {
   std::vector<std::string> asset_names_;         // names of assets as written to the file
   std::string out_;
   int depth_ = 1;
+  std::vector<std::pair<std::string, std::string>> objects_;  // tag and type of the objects that are open
+  std::vector<std::string> ours_;
   std::size_t opened_ = 0;  // offset at which the text of the last opened object begins
 };
 
 }  // namespace
 }  // namespace scene
 
-std::string write_xml(const Scene& s) { return scene::Writer(s).run(); }
+WrittenScene write_scene(const Scene& s) { return scene::Writer(s).run(); }
+std::string write_xml(const Scene& s) { return write_scene(s).text; }
 
 }  // namespace ls

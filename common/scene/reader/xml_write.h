@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "common/scene/scene.h"
 
@@ -14,5 +15,13 @@ namespace ls {
 // index, so that equal scenes give equal text. Colours that only one object uses are nested in that object.
 // `scene` must come from the reader, or be consistent and compacted (validate.h).
 std::string write_xml(const Scene& scene);
+
+// The text, and what of it Mitsuba 3.9 does not read: plugins ("bsdf \"coatedconductor\""), parameters
+// ("'tint' of medium \"heterogeneous\"") and kinds of files, each once.
+struct WrittenScene {
+  std::string text;
+  std::vector<std::string> only_ours;
+};
+WrittenScene write_scene(const Scene& scene);
 
 }  // namespace ls

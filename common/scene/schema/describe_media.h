@@ -79,7 +79,8 @@ void describe(V& v, T& m) {
            .constvolume = true},
           m.sigma_t);
   v.field({.name = "albedo",
-           .doc = "share of extinction that is scattering",
+           .doc = "share of extinction that is scattering; with a grid it becomes a `heterogeneous` medium "
+                  "of one density within 1e9 of the origin",
            .range = kUnit,
            .constvolume = true},
           m.albedo);

@@ -90,7 +90,8 @@ void describe(V& v, T& s) {
 LS_TYPE(BoxFilter, "rfilter", "box", "", "each sample counts in its own pixel")
 template <class V, Of<BoxFilter> T>
 void describe(V& v, T& f) {
-  v.field(quantity("radius", "half width", "pixels", {0, 32, true}), f.radius);
+  v.field({.name = "radius", .doc = "half width", .unit = "pixels", .range = {0, 32, true}, .unwritten = .5},
+          f.radius);
 }
 
 LS_TYPE(TentFilter, "rfilter", "tent", "", "falls off linearly")
@@ -129,11 +130,13 @@ void describe_perspective(V& v, T& s) {
   v.field({.name = "fov_axis", .doc = "what fov measures"}, s.fov_axis);
   v.field({.name = "principal_point_offset_x",
            .doc = "how far right of its place the camera looks",
-           .unit = "frame widths"},
+           .unit = "frame widths",
+           .unwritten = 0},
           s.principal_point_offset[0]);
   v.field({.name = "principal_point_offset_y",
            .doc = "how far below its place the camera looks",
-           .unit = "frame heights"},
+           .unit = "frame heights",
+           .unwritten = 0},
           s.principal_point_offset[1]);
 }
 template <class V, Of<Sensor> T>

@@ -18,8 +18,8 @@ constexpr std::string_view kOneMethod = "with a warning: the same picture by oth
 constexpr std::string_view kCountOnly =
     "only `sample_count`: which samples are taken is this program's own matter";
 constexpr std::string_view kNegativeLobes =
-    "it has negative lobes, which samples that each belong to one pixel can't follow; use box, tent or "
-    "gaussian";
+    "`gaussian`, with a warning: it has negative lobes, which samples that each belong to one pixel can't "
+    "follow";
 constexpr std::string_view kCurves = "curves are not rendered; write them as meshes in a \"ply\"";
 constexpr std::string_view kSplats = "volumetric splats are not rendered; write the surface as a mesh";
 constexpr std::string_view kSky =
@@ -228,10 +228,10 @@ constexpr PluginRow kPlugins[] = {
     {"sampler", "sobol", kInPart, kCountOnly, kOlder},
 
     {"rfilter", "box", kRead, ""},
-    {"rfilter", "catmullrom", kRefused, kNegativeLobes},
+    {"rfilter", "catmullrom", kInPart, kNegativeLobes},
     {"rfilter", "gaussian", kRead, ""},
-    {"rfilter", "lanczos", kRefused, kNegativeLobes},
-    {"rfilter", "mitchell", kRefused, kNegativeLobes},
+    {"rfilter", "lanczos", kInPart, kNegativeLobes},
+    {"rfilter", "mitchell", kInPart, kNegativeLobes},
     {"rfilter", "tent", kRead, ""},
 };
 
@@ -282,6 +282,41 @@ const PluginRow* plugin_row(std::string_view tag, std::string_view name) {
 bool is_read_plugin(std::string_view tag, std::string_view name) {
   const PluginRow* row = plugin_row(tag, name);
   return row && row->standing != Standing::refused;
+}
+
+bool is_our_parameter(std::string_view tag, std::string_view plugin, std::string_view parameter) {
+  struct Ours {
+    std::string_view tag, plugin;  // empty: all plugins of the tag
+    std::vector<std::string_view> parameters;
+  };
+  static const std::vector<Ours> all = {
+      {"shape", "", {"flat_without_normals"}},
+      {"shape", "obj", {"shape_index"}},
+      {"shape", "ply", {"shape_index"}},
+      {"bsdf", "", {"multiple_scattering"}},
+      {"texture", "bitmap", {"channel"}},
+      {"emitter", "area", {"cutoff_angle", "beam_width", "falloff", "two_sided"}},
+      {"emitter", "directional", {"angular_radius"}},
+      {"emitter", "envmap", {"mapping"}},
+      {"emitter", "projector", {"as_intensity"}},
+      {"medium",
+       "",
+       {"tint", "emission", "source_radiance", "temperature", "emission_scale", "temperature_scale",
+        "temperature_offset", "peak_one", "emission_weight", "priority"}},
+      {"volume", "gridvolume", {"grid_name", "node_centred", "border", "order"}},
+      {"sensor", "", {"aperture_scale"}},
+      {"sensor", "perspective", {"aperture_radius", "focus_distance"}},
+      {"sensor", "thinlens", {"principal_point_offset_x", "principal_point_offset_y"}},
+      {"rfilter", "box", {"radius"}},
+      {"integrator",
+       "",
+       {"phase_only", "camera_points", "light_vertices", "equiangular", "lamp_flights", "light_tree",
+        "path_reuse", "shadow_roulette", "sky_samples", "sky_portals", "local_lights", "path_splitting"}},
+  };
+  return std::ranges::any_of(all, [&](const Ours& row) {
+    return row.tag == tag && (row.plugin.empty() || row.plugin == plugin) &&
+           std::ranges::find(row.parameters, parameter) != row.parameters.end();
+  });
 }
 
 std::vector<std::string> read_plugins(std::string_view tag) {

@@ -30,5 +30,8 @@ std::span<const PluginRow> mitsuba_plugins();
 const PluginRow* plugin_row(std::string_view tag, std::string_view name);  // nullptr: unknown
 bool is_read_plugin(std::string_view tag, std::string_view name);
 std::vector<std::string> read_plugins(std::string_view tag);  // the names of the plugins that are read
+// True if Mitsuba 3.9 has the plugin, but not this parameter of it, or reads no plugin of this name. Known
+// for all parameters that write_xml() writes.
+bool is_our_parameter(std::string_view tag, std::string_view plugin, std::string_view parameter);
 
 }  // namespace ls::scene

@@ -12,6 +12,7 @@ constexpr unsigned kAnyColor = kColor | kFloat;
 constexpr unsigned kTriple = kPoint | kVector;
 constexpr Range kRightAngle{.min = 0, .max = 90};  // degrees
 constexpr std::string_view kSampling = "it only steers sampling, which is chosen here";
+constexpr std::string_view kGaussian = "a Gaussian stands for it";
 
 const Parameter kToWorld{"toWorld", kTransform, "identity", "places it"};
 const Parameter kIntIor{"intIOR", kNumber, "1.5046", "index of refraction inside", kPositive};
@@ -220,8 +221,15 @@ std::vector<Plugin> camera_and_shapes() {
       {"rfilter",
        "gaussian",
        "`gaussian`",
-       {{"radius", kNumber, "4 stddev", "where it ends; only 4 stddev can be", kPositive},
+       {{"radius", kNumber, "4 stddev", "where it ends; another than 4 stddev is a warning", kPositive},
         {"stddev", kNumber, "0.5", "pixels", kPositive}}},
+      {"rfilter",
+       "mitchell",
+       "`gaussian`, with a warning: it has negative lobes, which samples that each belong to one pixel can't "
+       "follow",
+       {{"radius", kNumber, "", "", kAny, kGaussian},
+        {"B", kNumber, "", "", kAny, kGaussian},
+        {"C", kNumber, "", "", kAny, kGaussian}}},
       {"rfilter", "tent", "`tent`", {}},
       {"rfilter", "box", "`box`", {}},
       {"mesh", "obj", "`obj`", {kFilename, kToWorld}},
@@ -282,9 +290,6 @@ constexpr Refused kRefused[] = {
      "each author's falls off otherwise; write it as an emitter \"spot\", which is linear in the angle"},
     {"texture", "checkerboard_float", "no number here may vary; use checkerboard_color"},
     {"texture", "constant_float", "no number here may vary; write it as a <float>"},
-    {"rfilter", "mitchell",
-     "it has negative lobes, which samples that each belong to one pixel can't follow; use gaussian, tent or "
-     "box"},
 };
 
 }  // namespace

@@ -159,6 +159,10 @@ void Report::warning(const Span& at, std::string text) {
   add(strict_ ? Diagnostic::Severity::error : Diagnostic::Severity::warning, at, std::move(text));
 }
 
+void Report::warning_once(const Span& at, std::string text) {
+  if (takes_warnings() && warned_.insert(text).second) warning(at, std::move(text));
+}
+
 void Report::add(Diagnostic::Severity severity, const Span& at, std::string text) {
   // Up to kMax errors and up to kMax warnings are kept, so that warnings never displace an error. take() then
   // reduces them to kMax in all.

@@ -7,6 +7,7 @@
 #include <deque>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -73,6 +74,8 @@ class Report {
     return std::nullopt;
   }
   void warning(const Span& at, std::string text);  // becomes an error under --strict
+  // As warning(), but only the first time that this text is given.
+  void warning_once(const Span& at, std::string text);
 
   bool has_errors() const { return errors_ > 0; }
   // True if further errors would be discarded, so that reading may stop.
@@ -93,6 +96,7 @@ class Report {
   bool strict_;
   std::deque<SourceText> files_;
   std::vector<Diagnostic> found_;
+  std::set<std::string> warned_;
   std::size_t errors_ = 0, warnings_ = 0;
 };
 

@@ -86,7 +86,7 @@ class Camera {
 
 // Applies a reconstruction filter by importance sampling. Each sample belongs to one pixel, and its position
 // is drawn from the filter around that pixel; so no sample contributes to the pixels of another tile (Ernst,
-// Stamminger, Greiner 2006). Filters with negative lobes are rejected when the scene file is read.
+// Stamminger, Greiner 2006). Filters with negative lobes are read as a Gaussian.
 class PixelFilter {
  public:
   PixelFilter() = default;

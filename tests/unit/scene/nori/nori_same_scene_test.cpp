@@ -266,5 +266,35 @@ TEST(NoriScene, ADiskOfLightAllAroundIsAConstantOne) {
   EXPECT_DOUBLE_EQ(sun.irradiance[0], 5 * std::numbers::pi / 4);
 }
 
+// Some descendants of Nori write a version. Mitsuba called its sensors cameras before 0.4.
+TEST(NoriScenes, AreKnownByTheirElements) {
+  const std::string objects = R"(<mesh type="sphere"/>)" + kNoriCamera;
+  const ReadResult with = read("<scene version=\"0.5.0\">" + objects + "</scene>"),
+                   without = read("<scene>" + objects + "</scene>");
+
+  ASSERT_TRUE(with.scene) << messages(with);
+  ASSERT_TRUE(without.scene) << messages(without);
+  EXPECT_EQ(*with.scene, *without.scene);
+  EXPECT_THAT(
+      messages(read(R"(<scene version="0.3.0"><shape type="sphere"/><camera type="perspective"/></scene>)")),
+      ::testing::HasSubstr("there is no element <camera>"));
+}
+
+TEST(NoriScenes, FiltersThatDifferAreWarnings) {
+  for (const auto& [filter, said] :
+       {std::pair<std::string, std::string>{
+            R"(<rfilter type="mitchell"><float name="radius" value="2"/></rfilter>)",
+            "is read as \"gaussian\""},
+        {R"(<rfilter type="gaussian"><float name="radius" value="3"/></rfilter>)",
+         "here it always ends at four times its stddev, 2"}}) {
+    const ReadResult r = read(R"(<scene><integrator type="path_mis"/><camera type="perspective">)" + filter +
+                              R"(</camera><mesh type="sphere"/></scene>)");
+
+    ASSERT_TRUE(r.scene) << messages(r);
+    EXPECT_EQ(r.scene->film.filter, ReconstructionFilter(GaussianFilter{}));
+    EXPECT_THAT(messages(r), ::testing::HasSubstr(said));
+  }
+}
+
 }  // namespace
 }  // namespace ls

@@ -136,8 +136,13 @@ what is refused says what to do instead.
   sends along and `convert` puts beside its XML. Over HTTP the sender does that.
 - **Camera**: pbrt has +x on the right, our sensors on the left, so `to_world` is the inverse of the transform before `Camera` times
   scale(-1, 1, 1). Coordinates of the world stay as they are. A camera that is scaled alike along all axes keeps its picture, and its
-  lens is scaled. It sees from 1e-4 to 1e7 scene units.
-- **Light**: `rgb` is relative to the white of sRGB; a `blackbody`, a `spectrum` by pairs, and one in a file (.spd) are scaled to
+  lens is scaled. It sees from 1e-4 to 1e7 scene units. A `screenwindow` becomes a `fov` and the `principal_point_offset`, or the
+  scale and place of an `orthographic` camera.
+- **Colour spaces**: `rgb` values after a ColorSpace become linear sRGB by their primaries. Light keeps its X, Y, Z, so that the white
+  of ACES stays a little yellow; colours of surfaces and media are adapted to the other white by Bradford's matrix, so that grey stays
+  grey. What sRGB cannot hold is cut off at 0 (a reflectance at 1, too), with a warning. Images keep the space that they have
+  without it, and pictures are always written in linear sRGB.
+- **Light**: `rgb` is relative to the white of its colour space; a `blackbody`, a `spectrum` by pairs, and one in a file (.spd) are scaled to
   luminance 1, as in pbrt; `stdillum-D65` is white. `scale`, `power` and `illuminance` multiply that. `iso / 100` of the film
   and `shutterclose - shutteropen` of the camera multiply all light.
 - **Surfaces and media**: `rgb` is linear sRGB; pairs are what the CIE observer sees of them under D65, and the same value everywhere
@@ -159,13 +164,19 @@ what is refused says what to do instead.
   15.7 cells per unit or, with wispiness, 19.9. One grid has at most 2^24 nodes, those of a file 2^25: a finer cloud gets fewer
   nodes a cell, with a warning, and is refused below 2.
 - **Depth**: `maxdepth` counts scatterings; `max_depth` of ours is one more. `thindielectric` does not count here.
-- **Sides**: a shape that gives light, bounds a medium or lets light through, and is mirrored by its transform, is refused unless it is a
-  mesh without normals in the text: which way its normal points is not the same everywhere in pbrt itself.
+- **Sides**: a sphere, disk or cylinder turns its normal to the other side if it is mirrored by its transform, and once more by
+  ReverseOrientation; a mesh by ReverseOrientation alone. If a mirrored sphere, disk or cylinder gives light on one side, that is a
+  warning: where pbrt samples lights, it takes the other side. A mirrored `plymesh` that gives light, bounds a medium or lets light
+  through is refused, as whether its file has normals decides there.
+- **Motion**: the picture shows everything where it stands at StartTime, with a warning.
+- **Textures**: a `float` and a `spectrum` one may have the same name.
 - **Meshes** without normals are flat, in the text and in files.
 - **Texture coordinates** are those of pbrt: on spheres v is 1 at +z, for which a sphere with a texture is mirrored along its axis; a
-  patch goes from (0, 0) to (1, 1); a triangle without any has (0, 0), (1, 0) and (1, 1). Two differ: on a `disk` u is the distance from the centre
+  patch without any goes from (0, 0) to (1, 1); a triangle without any has (0, 0), (1, 0) and (1, 1). Two differ: on a `disk` u is the distance from the centre
   and v the angle, which is a warning, and a `plymesh` whose file has none is laid out by its triangles otherwise.
 - **The filter** is a Gaussian of sigma 0.5, cut off at 4 sigma; pbrt cuts it off at radius 1.5.
+- **Parameters without an effect** here are warnings that name them, one for each kind of object. A refused parameter may be given with
+  its default value.
 )";
 
 // Escapes "|", which would end a table's cell.
@@ -225,7 +236,7 @@ namespace {
 
 constexpr std::string_view kIntroduction = R"(## Files of Nori
 
-A `<scene>` without a version that has a `<camera>` or a `<mesh>` is a scene of Nori (or of a renderer that descends from it, such
+A `<scene>` that has a `<camera>` or a `<mesh>`, and if it has a version neither a `<shape>` nor a `<sensor>`, is a scene of Nori (or of a renderer that descends from it, such
 as Kombu). It becomes the same scene as one of Mitsuba that means the same, with the same digest; `lightshaft convert` shows which.
 What Nori means otherwise than Mitsuba:
 

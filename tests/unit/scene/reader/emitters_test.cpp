@@ -219,5 +219,18 @@ TEST(EnvmapScenes, ASceneHasOneEnvironmentAtMost) {
   }
 }
 
+TEST(Emitters, AnAreaLightMayStandApartFromItsShape) {
+  const std::string lamp = R"(<emitter type="area" id="lamp"><rgb name="radiance" value="1 2 3"/></emitter>)",
+                    ball = R"(<shape type="sphere"><ref id="lamp"/></shape>)";
+  for (const std::string& objects : {lamp + ball, ball + lamp}) {
+    const Scene s = must_read(with_sensor(objects));
+
+    ASSERT_EQ(s.shapes.size(), 1u);
+    EXPECT_TRUE(s.shapes[0].emitter);
+    EXPECT_TRUE(s.emitters.empty());
+  }
+  EXPECT_FALSE(read(with_sensor(lamp)).scene);
+}
+
 }  // namespace
 }  // namespace ls

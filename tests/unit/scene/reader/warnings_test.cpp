@@ -154,5 +154,63 @@ TEST(Warnings, TellOfACameraInAMediumThatItsSensorDoesNotName) {
   }
 }
 
+TEST(Warnings, FiltersOfNegativeLobesBecomeGaussians) {
+  for (const std::string filter :
+       {"<rfilter type=\"mitchell\"><float name=\"A\" value=\"0.3\"/><float name=\"B\" "
+        "value=\"0.3\"/></rfilter>",
+        "<rfilter type=\"lanczos\"><integer name=\"lobes\" value=\"3\"/></rfilter>",
+        "<rfilter type=\"catmullrom\"/>"}) {
+    const auto r = read("<scene version=\"3.0.0\"><sensor type=\"perspective\"><film type=\"hdrfilm\">" +
+                        filter + "</film></sensor></scene>");
+
+    ASSERT_TRUE(r.scene) << messages(r);
+    EXPECT_EQ(r.scene->film.filter, ReconstructionFilter(GaussianFilter{}));
+    EXPECT_THAT(first(r), HasSubstr("is read as \"gaussian\""));
+  }
+}
+
+// Mitsuba 3 takes a homogeneous medium whose albedo is a grid: its density has no bounds.
+TEST(Warnings, AHomogeneousMediumMayHaveAGridOfAlbedos) {
+  const auto with = [](std::string_view sigma_t) {
+    return read(with_sensor(fmt::format(R"(
+<volume type="gridvolume" id="a"><string name="filename" value="cloud.vol"/></volume>
+<medium type="homogeneous" id="m">{}<ref name="albedo" id="a"/><float name="scale" value="3"/></medium>
+<shape type="cube"><bsdf type="null"/><ref name="interior" id="m"/></shape>)",
+                                        sigma_t)));
+  };
+  const auto r = with(R"(<rgb name="sigma_t" value="2 3 4"/>)");
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  const auto& medium = std::get<HeterogeneousMedium>(r.scene->media.at(0));
+  const auto& density = std::get<ConstVolume>(r.scene->volumes.at(medium.sigma_t.value));
+  EXPECT_EQ(density.value, (Rgb{2, 3, 4}));
+  EXPECT_EQ(density.to_world.m[0], 2e9);
+  EXPECT_EQ(density.to_world.m[3], -1e9);
+  EXPECT_EQ(medium.scale, 3);
+  EXPECT_TRUE(std::holds_alternative<GridVolume>(r.scene->volumes.at(medium.albedo.value)));
+  EXPECT_THAT(first(with(R"(<ref name="sigma_t" id="a"/>)")), HasSubstr("is the same everywhere"));
+}
+
+// As in Mitsuba, whose microfacets have at least this roughness.
+TEST(Warnings, ARoughnessOfZeroIsTheSmallestOne) {
+  const auto with = [](std::string_view plugin, std::string_view alpha) {
+    return read(
+        with_sensor(fmt::format(R"(<shape type="sphere"><bsdf type="{}">{}</bsdf></shape>)", plugin, alpha)));
+  };
+  for (const std::string_view plugin : {"roughplastic", "roughdielectric", "roughconductor"})
+    for (const std::string_view alpha :
+         {R"(<float name="alpha" value="0"/>)",
+          R"(<texture name="alpha" type="checkerboard"><float name="color0" value="0"/></texture>)"}) {
+      if (plugin == "roughplastic" && alpha.starts_with("<texture")) continue;  // it takes a number only
+      const auto r = with(plugin, alpha);
+
+      ASSERT_TRUE(r.scene) << messages(r);
+      EXPECT_THAT(first(r), HasSubstr("is 0, which is read as 0.0001, the smallest roughness"));
+    }
+  const auto r = with("roughplastic", R"(<float name="alpha" value="0"/>)");
+  EXPECT_EQ(std::get<RoughPlasticBsdf>(r.scene->bsdfs.at(0)).alpha, 1e-4);
+  EXPECT_FALSE(with("roughplastic", R"(<float name="alpha" value="-1"/>)").scene);
+}
+
 }  // namespace
 }  // namespace ls

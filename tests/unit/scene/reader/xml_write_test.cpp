@@ -166,5 +166,51 @@ TEST(XmlWrite, TellsAPinholeFromALens) {
   proven(s);
 }
 
+// Mitsuba 3 takes an <rgb> in place of a volume for a reflectance, and refuses values above 1.
+TEST(XmlWrite, WritesColoursOfMediaAsMitsubaTakesThem) {
+  const auto medium = [](std::string_view type, std::string_view colour) {
+    return proven(must_read(with_sensor(fmt::format(
+        R"(<medium type="{}" id="m"><rgb name="sigma_t" value="{}"/></medium>
+           <shape type="cube"><bsdf type="null"/><ref name="interior" id="m"/></shape>)",
+        type, colour))));
+  };
+  for (const std::string_view type : {"homogeneous", "heterogeneous"}) {
+    EXPECT_THAT(medium(type, "1.4 1.3 1.01"), HasSubstr("<volume type=\"constvolume\" name=\"sigma_t\">"));
+    EXPECT_THAT(medium(type, "0.4 0.3 1"), HasSubstr("<rgb name=\"sigma_t\" value=\"0.4 0.3 1\"/>"));
+    EXPECT_THAT(medium(type, "7"), HasSubstr("<float name=\"sigma_t\" value=\"7\"/>"));
+  }
+}
+
+TEST(XmlWrite, WritesNoDefaultsThatMitsubaDoesNotKnow) {
+  const std::string text = proven(must_read(
+      R"(<scene version="3.0.0"><sensor type="thinlens"><float name="aperture_radius" value="0.1"/>
+<film type="hdrfilm"><rfilter type="box"/></film></sensor></scene>)"));
+
+  EXPECT_THAT(text, ::testing::Not(HasSubstr("principal_point_offset")));
+  EXPECT_THAT(text, HasSubstr("<rfilter type=\"box\"/>"));
+}
+
+TEST(XmlWrite, SaysWhatOnlyLightshaftReads) {
+  const auto ours = [](const std::string& objects) {
+    return write_scene(must_read(with_sensor(objects))).only_ours;
+  };
+  using ::testing::ElementsAre;
+
+  EXPECT_THAT(ours(R"(<shape type="sphere"/><medium type="homogeneous" id="m"/>)"), ::testing::IsEmpty());
+  EXPECT_THAT(ours(R"(<shape type="ply"><string name="filename" value="mesh.ply"/>
+                        <boolean name="flat_without_normals" value="true"/></shape>)"),
+              ElementsAre("'flat_without_normals' of shape \"ply\""));
+  EXPECT_THAT(ours(R"(<shape type="sphere"><bsdf type="roughplastic">
+                        <boolean name="multiple_scattering" value="true"/></bsdf></shape>
+                      <shape type="sphere"><bsdf type="coatedconductor"/></shape>)"),
+              ElementsAre("'multiple_scattering' of bsdf \"roughplastic\"", "bsdf \"coatedconductor\""));
+  EXPECT_THAT(
+      ours(R"(<medium type="heterogeneous" id="m">
+                        <volume type="gridvolume" name="sigma_t"><string name="filename" value="steam.vdb"/></volume>
+                        <float name="emission" value="1"/></medium>
+                      <shape type="cube"><bsdf type="null"/><ref name="interior" id="m"/></shape>)"),
+      ElementsAre("grids that are no .vol, such as steam.vdb", "'emission' of medium \"heterogeneous\""));
+}
+
 }  // namespace
 }  // namespace ls

@@ -1,0 +1,422 @@
+// What files of pbrt's exporters have besides the objects themselves: windows of cameras, colour spaces,
+// mirrored shapes, options, and parameters without an effect here.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "common/scene/pbrt/vocabulary.h"
+#include "common/scene/xml/transform_element.h"
+#include "tests/unit/scene/pbrt/pbrt_testing.h"
+
+namespace ls {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+// Returns the scene of a camera with this film, and its messages.
+ReadResult seen(int width, int height, std::string_view camera) {
+  return read_pbrt(fmt::format(R"(Film "rgb" "integer xresolution" {} "integer yresolution" {}
+Camera {} WorldBegin Shape "sphere")",
+                               width, height, camera));
+}
+
+Sensor sensor_of(int width, int height, std::string_view camera) {
+  const ReadResult r = seen(width, height, camera);
+  EXPECT_TRUE(r.scene) << messages(r);
+  return r.scene ? r.scene->sensor : Sensor{};
+}
+
+// In camera.cpp of the renderer a point (u, v) of the frame, from its top left corner, sees the direction
+// (x, y, 1), x to the left, with x = t (1 - 2 ox - 2 u), y = t (1 - 2 oy - 2 v) / aspect and t = tan(fov /
+// 2).
+struct Seen {
+  double left, right, bottom, top;  // x to the right
+};
+Seen edges(const Sensor& s, double aspect) {
+  EXPECT_EQ(s.fov_axis, FovAxis::x);
+  const double t = std::tan(s.fov / 2 * kDegree), ox = s.principal_point_offset[0],
+               oy = s.principal_point_offset[1];
+  return {-t * (1 - 2 * ox), t * (1 + 2 * ox), t * (-1 - 2 * oy) / aspect, t * (1 - 2 * oy) / aspect};
+}
+
+constexpr double kRoundings = 8 * 16 * 2.3e-16;  // a few roundings of doubles below 8
+
+TEST(PbrtWindow, OfThePerspectiveCameraIsInUnitsOfItsFieldOfView) {
+  const double unit = std::tan(22.5 * kDegree);
+  const Seen e = edges(
+      sensor_of(32, 24, R"("perspective" "float fov" 45 "float screenwindow" [ -1 1 -0.75 0.75 ])"), 4. / 3);
+
+  EXPECT_NEAR(e.left, -unit, kRoundings);
+  EXPECT_NEAR(e.right, unit, kRoundings);
+  EXPECT_NEAR(e.bottom, -.75 * unit, kRoundings);
+  EXPECT_NEAR(e.top, .75 * unit, kRoundings);
+}
+
+TEST(PbrtWindow, OffTheMiddleMovesThePrincipalPoint) {
+  for (const std::string_view lens : {"", R"("float lensradius" 0.1 "float focaldistance" 3)"}) {
+    const Seen e =
+        edges(sensor_of(20, 10,
+                        fmt::format(R"("perspective" "float screenwindow" [ -0.5 1.5 0.25 1.25 ] {})", lens)),
+              2);
+
+    EXPECT_NEAR(e.left, -.5, kRoundings);
+    EXPECT_NEAR(e.right, 1.5, kRoundings);
+    EXPECT_NEAR(e.bottom, .25, kRoundings);
+    EXPECT_NEAR(e.top, 1.25, kRoundings);
+  }
+}
+
+TEST(PbrtWindow, ThatIsMirroredMirrorsThePicture) {
+  const Sensor plain = sensor_of(20, 10, R"("perspective" "float screenwindow" [ -0.5 1.5 -0.5 0.5 ])"),
+               mirrored = sensor_of(20, 10, R"("perspective" "float screenwindow" [ 1.5 -0.5 -0.5 0.5 ])");
+  const Seen one = edges(plain, 2), other = edges(mirrored, 2);
+
+  EXPECT_EQ(scene::column(mirrored.to_world, 0)[0], -scene::column(plain.to_world, 0)[0]);
+  EXPECT_NEAR(other.left, -one.right, kRoundings);
+  EXPECT_NEAR(other.right, -one.left, kRoundings);
+}
+
+TEST(PbrtWindow, OfTheOrthographicCameraMayHaveAnyShape) {
+  const Sensor s = sensor_of(30, 10, R"("orthographic" "float screenwindow" [ -2 6 1 2 ])");
+  // Our frame reaches from x = 1 on its left to -1 on its right, and from y = 1/3 above to -1/3.
+  const Vec3 top_left = scene::transform_point(s.to_world, Vec3{{1, 1. / 3, 0}}),
+             bottom_right = scene::transform_point(s.to_world, Vec3{{-1, -1. / 3, 0}});
+
+  EXPECT_NEAR(top_left[0], -2, kRoundings);
+  EXPECT_NEAR(top_left[1], 2, kRoundings);
+  EXPECT_NEAR(bottom_right[0], 6, kRoundings);
+  EXPECT_NEAR(bottom_right[1], 1, kRoundings);
+}
+
+TEST(PbrtWindow, ThatIsTheDefaultSeesTheSame) {
+  const Sensor given =
+      sensor_of(20, 10, R"("perspective" "float fov" 40 "float screenwindow" [ -2 2 -1 1 ])");
+  const Sensor shaped = sensor_of(20, 10, R"("perspective" "float fov" 40 "float frameaspectratio" 2)");
+
+  // The shorter side, the height, has the field of view of 40 degrees.
+  EXPECT_NEAR(edges(given, 2).top, std::tan(20 * kDegree), kRoundings);
+  EXPECT_EQ(shaped, sensor_of(20, 10, R"("perspective" "float fov" 40)"));
+}
+
+TEST(PbrtWindow, IsReadIfItsShapeIsThatOfTheFilmToFourDigits) {
+  EXPECT_TRUE(seen(1998, 1080, R"("perspective" "float screenwindow" [ -1 1 -0.5405 0.5405 ])").scene);
+}
+
+TEST(PbrtWindow, OfOblongPixelsIsRefused) {
+  for (const std::string_view camera : {R"("perspective" "float screenwindow" [ -1 1 -1 1 ])",
+                                        R"("perspective" "float frameaspectratio" 1)"}) {
+    const ReadResult r = seen(20, 10, camera);
+
+    EXPECT_FALSE(r.scene);
+    EXPECT_THAT(messages(r), HasSubstr("2:9: error: Camera \"perspective\" shows a window of the shape 1 : 1 "
+                                       "on a film of 2 : 1"));
+  }
+  EXPECT_THAT(messages(seen(20, 10, R"("perspective" "float screenwindow" [ -1 1 ])")),
+              HasSubstr("wants four numbers: x0 x1 y0 y1"));
+}
+
+TEST(Pbrt, HalfAFieldOfViewIsReadInItsPlace) {
+  EXPECT_EQ(sensor_of(10, 10, R"("perspective" "float halffov" 20)"),
+            sensor_of(10, 10, R"("perspective" "float fov" 40)"));
+}
+
+// The directions that are named by pbrt's SphericalCamera and by our `spherical`.
+TEST(Pbrt, SphericalCamerasByLatitudeAreRead) {
+  const Sensor s = sensor_of(20, 10, R"("spherical" "string mapping" "equirectangular")");
+
+  EXPECT_EQ(s.projection, Projection::spherical);
+  for (const double u : {0., .25, .6}) {
+    const double phi = 2 * std::numbers::pi * u, theta = 1;
+    const Vec3 ours{{std::sin(phi) * std::sin(theta), std::cos(theta), -std::cos(phi) * std::sin(theta)}};
+    const Vec3 at = scene::transform_vector(s.to_world, ours);
+    EXPECT_NEAR(at[0], std::sin(theta) * std::cos(phi), kRoundings);
+    EXPECT_NEAR(at[1], std::cos(theta), kRoundings);
+    EXPECT_NEAR(at[2], std::sin(theta) * std::sin(phi), kRoundings);
+  }
+  EXPECT_THAT(messages(seen(20, 10, R"("spherical")")), HasSubstr("only equirectangular is read"));
+}
+
+// On which side of a shape pbrt has its normal, and the media: outside of a sphere or cylinder, or +z of a
+// disk or of a triangle that runs counterclockwise as seen from there.
+struct Sides {
+  bool normal_is_original, inside_is_original;  // the medium inside is on the side of the original normal
+  bool operator==(const Sides&) const = default;
+};
+
+// What the renderer makes of a shape (orientation_of() and mirrored_inwards() of geometry_build.cpp).
+Sides rendered(const Shape& s, bool vertex_normals) {
+  const bool mirrored = scene::determinant3(s.to_world) < 0;
+  const bool sphere = std::holds_alternative<SphereShape>(s.geometry),
+             mesh = std::holds_alternative<MeshShape>(s.geometry);
+  // A mirrored sphere is inside out, and so is a mesh whose corners alone say which side is which.
+  const bool turns = mirrored && (sphere || (mesh && !vertex_normals));
+  const bool original = turns == s.flip_normals;
+  // The interior is on the side that the normal points away from; of a mirrored sphere or mesh, always on the
+  // side away from the original normal.
+  const bool interior_is_original = mirrored && (sphere || mesh) ? false : !original;
+  return {original, s.interior ? interior_is_original : !interior_is_original};
+}
+
+TEST(PbrtSides, OfMirroredAndReversedShapesAreThoseOfPbrt) {
+  struct Kind {
+    std::string_view shape;
+    bool quadric, vertex_normals;
+  };
+  const Kind kinds[] = {
+      {R"(Shape "sphere")", true, false},
+      {R"(Shape "sphere" "float alpha" 1)", true, false},  // it is mirrored once more, for its uv
+      {R"(Shape "cylinder")", true, false},
+      {R"(Shape "disk")", true, false},
+      {R"(Shape "trianglemesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 ])", false, false},
+      {R"(Shape "trianglemesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 ] "normal N" [ 0 0 1 0 0 1 0 0 1 ])", false,
+       true},
+      {R"(Shape "bilinearmesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 1 1 0 ])", false, false},
+  };
+  for (const Kind& kind : kinds)
+    for (const bool mirrored : {false, true})
+      for (const bool reversed : {false, true}) {
+        const Scene s = pbrt(fmt::format(
+            R"(MakeNamedMedium "fog" "string type" "homogeneous" MediumInterface "fog" "" Material "dielectric"
+{}{}{})",
+            mirrored ? "Scale 1 1 -1\n" : "", reversed ? "ReverseOrientation\n" : "", kind.shape));
+        ASSERT_EQ(s.shapes.size(), 1u);
+        const bool turned = kind.quadric ? mirrored != reversed : reversed;
+
+        EXPECT_EQ(rendered(s.shapes[0], kind.vertex_normals), (Sides{!turned, turned}))
+            << kind.shape << mirrored << reversed;
+      }
+}
+
+TEST(PbrtSides, AMirroredLampIsAWarning) {
+  const ReadResult r = read_pbrt(pbrt_scene(R"(AreaLightSource "diffuse" Scale -1 1 1 Shape "sphere")"));
+
+  EXPECT_TRUE(r.scene);
+  EXPECT_THAT(messages(r), HasSubstr("when it samples lights, pbrt takes the other side"));
+}
+
+TEST(PbrtSides, OfAMirroredFileAreNotKnown) {
+  EXPECT_THAT(
+      refusal(R"(Material "dielectric" Scale -1 1 1 Shape "plymesh" "string filename" "mesh.ply")"),
+      HasSubstr("whether the file has normals, which decides which side is which, is not known here"));
+}
+
+TEST(Pbrt, FiltersOfNegativeLobesBecomeGaussians) {
+  for (const std::string_view filter :
+       {R"("mitchell" "float B" 0.3 "float C" 0.3 "float xradius" 2)", R"("sinc" "float tau" 3)"}) {
+    const ReadResult r = read_pbrt(
+        fmt::format(R"({}Camera "perspective" PixelFilter {} WorldBegin Shape "sphere")", kPbrtFilm, filter));
+
+    ASSERT_TRUE(r.scene) << messages(r);
+    EXPECT_EQ(r.scene->film.filter, ReconstructionFilter(GaussianFilter{}));
+    EXPECT_THAT(messages(r), HasSubstr("is read as \"gaussian\""));
+  }
+}
+
+// Returns the reflectance of a diffuse sphere whose colour is given in this space.
+Rgb reflectance(std::string_view space, std::string_view rgb) {
+  const Scene s = pbrt(fmt::format(
+      R"(ColorSpace "{}" Material "diffuse" "rgb reflectance" [ {} ] ColorSpace "srgb" Shape "sphere")",
+      space, rgb));
+  for (const Texture& t : s.textures)
+    if (const auto* c = std::get_if<ConstantTexture>(&t)) return c->value;
+  ADD_FAILURE() << "no constant texture";
+  return {};
+}
+
+void expect_near(const Rgb& got, const Rgb& want, double tolerance) {
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(got[i], want[i], tolerance) << i;
+}
+
+// The values are those of the colorimetric matrices from the primaries and whites of each space, as tables of
+// them print them with four digits: BT.2020 to BT.709 (ITU-R BT.2087), P3-D65 to BT.709.
+TEST(PbrtColours, AreConvertedFromTheirSpace) {
+  expect_near(reflectance("rec2020", "0.25 0.5 0.25"), {.1031, .5332, .2249}, 1e-4);
+  expect_near(reflectance("srgb", "0.25 0.5 0.25"), {.25, .5, .25}, 0);
+  // The columns of the matrix, each 1/2 of a primary with 1/4 of white.
+  expect_near(reflectance("rec2020", "0.75 0.25 0.25"), {1, .25 - .5 * .1246, .25 - .5 * .0182}, 1e-4);
+  expect_near(reflectance("dci-p3", "0.25 0.5 0.25"),
+              {.25 - .25 * .2249, .25 + .25 * 1.0420, .25 - .25 * .0786}, 1e-4);
+}
+
+TEST(PbrtColours, OfMatterKeepTheirGrey) {
+  for (const std::string_view space : {"rec2020", "dci-p3", "ACES2065-1"})
+    EXPECT_EQ(reflectance(space, "0.3 0.3 0.3"), (Rgb{.3, .3, .3})) << space;
+  const Scene s = pbrt(R"(ColorSpace "aces2065-1"
+MakeNamedMedium "fog" "string type" "homogeneous" "rgb sigma_a" [ 1 1 1 ] "rgb sigma_s" [ 3 3 3 ]
+MediumInterface "fog" "" Material "interface" Shape "sphere")");
+  EXPECT_EQ(std::get<HomogeneousMedium>(s.media.at(0)).sigma_t, (Rgb{4, 4, 4}));
+}
+
+// ACES AP0 to linear sRGB with the Bradford adaptation, as it is printed for ACES (for example in the OCIO
+// configurations): 2.5216 -1.1341 -0.3876; -0.2765 1.3727 -0.0962; -0.0154 -0.1530 1.1684.
+TEST(PbrtColours, OfAcesAreAdaptedToTheWhite) {
+  expect_near(reflectance("aces2065-1", "0.3 0.25 0.2"),
+              {2.5216 * .3 - 1.1341 * .25 - .3876 * .2, -.2765 * .3 + 1.3727 * .25 - .0962 * .2,
+               -.0154 * .3 - .1530 * .25 + 1.1684 * .2},
+              2e-4);
+}
+
+// Light is not adapted: the white of ACES, (x, y) = (.32168, .33767), is what it is.
+TEST(PbrtColours, OfLightAreThoseThatTheObserverSees) {
+  const Scene s = pbrt(R"(ColorSpace "aces2065-1" LightSource "point" "rgb I" [ 1 1 1 ] Shape "sphere")");
+  const double x = .32168 / .33767, z = (1 - .32168 - .33767) / .33767;
+  const Rgb want{3.2404542 * x - 1.5371385 - .4985314 * z, -.9692660 * x + 1.8760108 + .0415560 * z,
+                 .0556434 * x - .2040259 + 1.0572252 * z};
+
+  const auto& light = std::get<PointEmitter>(s.emitters.at(0));
+  // The matrix is printed for a white with other digits: (.31272, .32903) against (.3127, .3290).
+  expect_near(light.intensity, want, 1e-3);
+}
+
+TEST(PbrtColours, ThatSrgbCannotHoldAreCutOffWithAWarning) {
+  const ReadResult r = read_pbrt(
+      pbrt_scene(R"(ColorSpace "rec2020" Material "diffuse" "rgb reflectance" [ 0 1 0 ] Shape "sphere")"));
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  EXPECT_THAT(messages(r), HasSubstr("3:42: warning: 'reflectance' has colours that linear sRGB can't hold"));
+}
+
+TEST(PbrtColours, HaveTheSpaceOfTheirAttributeBlock) {
+  const Scene s = pbrt(R"(AttributeBegin ColorSpace "rec2020" AttributeEnd
+Material "diffuse" "rgb reflectance" [ 0.25 0.5 0.25 ] Shape "sphere")");
+
+  bool found = false;
+  for (const Texture& t : s.textures)
+    if (const auto* c = std::get_if<ConstantTexture>(&t)) found |= c->value == Rgb{.25, .5, .25};
+  EXPECT_TRUE(found);
+  EXPECT_THAT(refusal(R"(ColorSpace "rec202")"), HasSubstr("did you mean 'rec2020'?"));
+}
+
+TEST(PbrtTextures, OfNumbersAndOfColoursMayHaveOneName) {
+  const Scene s = pbrt(R"(Texture "t" "float" "constant" "float value" 0.25
+Texture "t" "spectrum" "constant" "rgb value" [ 0.5 0.5 0.5 ]
+Texture "alpha" "float" "imagemap" "string filename" "wood.png"
+Material "diffuse" "texture reflectance" "t" Shape "sphere" "texture alpha" "t")");
+
+  const auto& mask = std::get<MaskBsdf>(s.bsdfs.at(s.shapes.at(0).bsdf.value));
+  EXPECT_EQ(std::get<ConstantTexture>(s.textures.at(mask.opacity.value)).value, (Rgb{.25, .25, .25}));
+  const auto& sides = std::get<TwoSidedBsdf>(s.bsdfs.at(mask.bsdf.value));
+  const auto& diffuse = std::get<DiffuseBsdf>(s.bsdfs.at(sides.front.value));
+  EXPECT_EQ(std::get<ConstantTexture>(s.textures.at(diffuse.reflectance.value)).value, (Rgb{.5, .5, .5}));
+  EXPECT_THAT(refusal(R"(Texture "t" "float" "constant" Texture "t" "float" "constant")"),
+              HasSubstr("a second Texture \"t\" of the type \"float\""));
+}
+
+TEST(PbrtTextures, AreMultiplied) {
+  const Scene s = pbrt(R"(Texture "wood" "spectrum" "imagemap" "string filename" "wood.png" "float scale" 0.5
+Texture "t" "spectrum" "scale" "texture tex" "wood" "float scale" 0.25
+Material "diffuse" "texture reflectance" "t" Shape "sphere")");
+
+  std::vector<double> factors;
+  for (const Texture& t : s.textures)
+    if (const auto* p = std::get_if<ProductTexture>(&t))
+      for (const TextureIndex i : {p->first, p->second})
+        if (const auto* c = std::get_if<ConstantTexture>(&s.textures.at(i.value)))
+          factors.push_back(c->value[0]);
+  EXPECT_THAT(factors, ::testing::UnorderedElementsAre(.5, .25));
+}
+
+TEST(PbrtTextures, LieOtherwiseOnPatchesThatAreNoParallelograms) {
+  const auto said = [](std::string_view last) {
+    return messages(read_pbrt(pbrt_scene(fmt::format(
+        R"(Shape "bilinearmesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 {} ] "normal N" [ 0 0 1 0 0 1 0 0 1 0 0 1 ])",
+        last))));
+  };
+
+  EXPECT_THAT(said("2 2 0"), HasSubstr("that is no parallelogram is two triangles here"));
+  EXPECT_EQ(said("1 1 0"), "");
+}
+
+TEST(Pbrt, AByteOrderMarkIsSkipped) {
+  EXPECT_TRUE(read_pbrt("\xEF\xBB\xBF" + pbrt_scene("Shape \"sphere\"")).scene);
+  KeepingAssets assets;
+  assets.memory.files["in.pbrt"] = "\xEF\xBB\xBFShape \"sphere\"";
+  EXPECT_TRUE(read_pbrt(pbrt_scene("Include \"in.pbrt\""), assets).scene);
+}
+
+TEST(Pbrt, ParametersWithoutAnEffectAreNamedOnce) {
+  const ReadResult r = read_pbrt(R"(Film "rgb" "string filename" "a.exr" "float maxcomponentvalue" 10
+Camera "perspective" Sampler "halton" "integer seed" 3
+WorldBegin Material "coateddiffuse" "integer maxdepth" 3 Material "coateddiffuse" "integer maxdepth" 4
+Shape "sphere")");
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  const std::string said = messages(r);
+  EXPECT_THAT(said, HasSubstr("1:13: warning: 'filename' of Film \"rgb\" has no effect here"));
+  EXPECT_THAT(said, HasSubstr("'maxcomponentvalue' of Film \"rgb\" has no effect here"));
+  EXPECT_THAT(said, HasSubstr("'seed' of Sampler \"halton\" has no effect here"));
+  EXPECT_THAT(said, HasSubstr("3:38: warning: 'maxdepth' of Material \"coateddiffuse\" has no effect here"));
+  EXPECT_THAT(said, Not(HasSubstr("3:84: warning")));
+}
+
+// Asks every parameter of the table that is not read: it is named, as an error or as a warning.
+TEST(Pbrt, NoParameterIsPassedOverInSilence) {
+  for (const auto& row : scene::pbrt::rows()) {
+    if (!row.is_read || row.directive == "MakeNamedMedium") continue;
+    for (const auto& word : row.words) {
+      if (word.use == scene::pbrt::Word::Use::read) continue;
+      const std::string_view type = word.types.substr(0, word.types.find('|'));
+      const std::string value = type == "string" || type == "texture" ? "\"x\""
+                                : type == "bool"                      ? "true"
+                                                                      : "[ 7 7 7 ]";
+      const bool before = row.directive == "Film" || row.directive == "Camera" ||
+                          row.directive == "PixelFilter" || row.directive == "Sampler" ||
+                          row.directive == "Integrator";
+      const std::string object =
+          fmt::format("{} {}\"{}\" \"{} {}\" {}", row.directive,
+                      row.directive == "Texture" ? "\"t\" \"float\" " : "", row.type, type, word.name, value);
+      const ReadResult r = read_pbrt(before ? fmt::format("{} WorldBegin", object)
+                                            : fmt::format("Camera \"perspective\" WorldBegin {}", object));
+      EXPECT_THAT(messages(r), HasSubstr(fmt::format("'{}' of {}", word.name, row.directive))) << object;
+    }
+  }
+}
+
+TEST(Pbrt, OtherFilmsAndFiltersOfImagesAreWarnings) {
+  EXPECT_THAT(messages(read_pbrt(R"(Film "gbuffer" Camera "perspective" WorldBegin Shape "sphere")")),
+              HasSubstr("Film \"gbuffer\" gives the picture in red, green and blue"));
+  EXPECT_THAT(
+      messages(read_pbrt(pbrt_scene(
+          R"(Texture "t" "float" "imagemap" "string filename" "wood.png" "string filter" "trilinear")"))),
+      HasSubstr("the filter \"trilinear\" of Texture \"imagemap\" is read as \"bilinear\""));
+}
+
+TEST(Pbrt, RefusedParametersMayHaveTheirDefault) {
+  EXPECT_TRUE(seen(8, 8, R"("orthographic" "float lensradius" 0)").scene);
+  EXPECT_FALSE(seen(8, 8, R"("orthographic" "float lensradius" 1)").scene);
+}
+
+TEST(Pbrt, OptionsAreANameAndAValue) {
+  const auto with = [](std::string_view option) {
+    return read_pbrt(
+        fmt::format(R"({}Camera "perspective" Option {} WorldBegin Shape "sphere")", kPbrtFilm, option));
+  };
+  for (const std::string_view option :
+       {R"("seed" 42)", R"("wavefront" true)", R"("msereferenceout" "a.exr")", R"("integer seed" 3)"}) {
+    const ReadResult r = with(option);
+    EXPECT_TRUE(r.scene) << messages(r);
+    EXPECT_THAT(messages(r), HasSubstr("has no effect here"));
+  }
+  EXPECT_TRUE(with(R"("forcediffuse" false)").scene);
+  EXPECT_THAT(messages(with(R"("forcediffuse" true)")), HasSubstr("the Option 'forcediffuse' is not read"));
+  EXPECT_THAT(messages(read_pbrt(R"(Option "seed")")), HasSubstr("the Option 'seed' has no value"));
+}
+
+TEST(Pbrt, MovingObjectsStandWhereTheyAreWhenTheShutterOpens) {
+  const ReadResult r = read_pbrt(pbrt_scene(R"(AttributeBegin ActiveTransform StartTime Translate 1 0 0
+ActiveTransform EndTime Translate 5 0 0 ActiveTransform All Translate 0 2 0 Shape "sphere" AttributeEnd
+AttributeBegin ActiveTransform EndTime AttributeEnd Translate 7 0 0 Shape "sphere")"));
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  EXPECT_EQ(origin_of(r.scene->shapes.at(0).to_world), (Vec3{{1, 2, 0}}));
+  EXPECT_EQ(origin_of(r.scene->shapes.at(1).to_world), (Vec3{{7, 0, 0}}));
+  EXPECT_THAT(messages(r), HasSubstr("4:1: warning: transforms of EndTime are left out"));
+  EXPECT_THAT(refusal("ActiveTransform Middle"), HasSubstr("wants one of All, StartTime and EndTime"));
+}
+
+}  // namespace
+}  // namespace ls
