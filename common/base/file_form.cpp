@@ -1,6 +1,7 @@
 #include "common/base/file_form.h"
 
 #include <fmt/format.h>
+#include <strings.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -94,6 +95,18 @@ bool is_gzip(std::string_view head) { return head.starts_with("\x1f\x8b\x08"); }
 std::string why_placeholder(std::string_view head) {
   if (!without_mark(head).starts_with(kPointer)) return {};
   return "is a pointer of Git LFS, not the file itself: run `git lfs pull` in the repository it comes from";
+}
+
+std::string why_perhaps_cut(std::string_view name, std::string_view head, char last) {
+  if (head.empty() || is_gzip(head) || last == '\n' || last == '\r') return {};
+  const auto ends_in = [&](std::string_view end) {
+    return name.size() >= end.size() &&
+           ::strncasecmp(name.data() + name.size() - end.size(), end.data(), end.size()) == 0;
+  };
+  const bool is_ply = without_mark(head).starts_with("ply");
+  const bool is_text = is_ply ? head.find("format ascii") != head.npos : ends_in(".obj");
+  if (!is_text) return {};
+  return "ends within a line: it may have been cut short; if it is whole, put a line end at its end";
 }
 
 std::string why_no_utf8(std::string_view text) {
