@@ -27,6 +27,25 @@ TEST(Warnings, MeaninglessParametersAreWarningsAndErrorsWhenStrict) {
   EXPECT_EQ(strict.diagnostics.at(0).severity, Diagnostic::Severity::error);
 }
 
+TEST(Warnings, ARoughnessOfZeroIsTheLeast) {
+  const std::string checks =
+      "<texture name=\"alpha\" type=\"checkerboard\"><float name=\"color0\" value=\"0\"/><float "
+      "name=\"color1\" "
+      "value=\".4\"/></texture>";
+  for (const std::string& bsdf :
+       {"<bsdf type=\"roughdielectric\">" + checks + "</bsdf>",
+        std::string("<bsdf type=\"roughconductor\"><float name=\"alpha_u\" value=\"0\"/></bsdf>"),
+        std::string("<bsdf type=\"roughplastic\"><float name=\"alpha\" value=\"0\"/></bsdf>")}) {
+    const auto r = read(with_sensor(shape(bsdf) + "<emitter type=\"constant\"/>"));
+    ASSERT_TRUE(r.scene) << messages(r);
+    ASSERT_EQ(r.diagnostics.size(), 1u) << messages(r);
+    EXPECT_THAT(r.diagnostics[0].text, HasSubstr("is 0, which is read as the least roughness, 0.0001"));
+    if (const auto* plastic = std::get_if<RoughPlasticBsdf>(&r.scene->bsdfs[0])) {
+      EXPECT_EQ(plastic->alpha, 1e-4);
+    }
+  }
+}
+
 TEST(Warnings, FieldsWithoutEffectAreToldOf) {
   const struct {
     std::string sensor, objects, said;
