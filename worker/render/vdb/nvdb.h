@@ -41,8 +41,9 @@ inline float* room_for(std::uint64_t values) {
 // such grid.
 std::size_t choose_grid(const std::vector<std::string>& names, const std::string& wanted);
 
-// Sets out.size. Throws Refused if the grid is larger than 2^14 voxels along an axis, or has more than
-// max_values values; for this, out.channels must be set already. `name` is the grid's name, for messages.
+// Sets out.size. Throws Refused if the grid is larger than 2^14 voxels along an axis (the file is at fault),
+// or has more than max_values values; for this, out.channels must be set already. `name` is the grid's name,
+// for messages.
 void set_size(const std::string& name, const std::array<std::int64_t, 3>& size, std::uint64_t max_values,
               LsVdbGrid& out);
 

@@ -121,7 +121,7 @@ void set_size(const std::string& name, const std::array<std::int64_t, 3>& size, 
     const std::int64_t n = size[k];
     if (n <= 0 || n > (1 << 14))
       throw Refused{
-          2, "grid '" + name + "' spans " + std::to_string(n) + " voxels along an axis; the limit is 16384"};
+          1, "grid '" + name + "' spans " + std::to_string(n) + " voxels along an axis; the limit is 16384"};
     out.size[k] = static_cast<std::int32_t>(n);
     count *= static_cast<std::uint64_t>(n);
   }
