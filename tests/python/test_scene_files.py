@@ -35,6 +35,13 @@ def test_files_are_known_by_the_names_that_the_farm_looks_for(folder):
     assert found(folder, text) == {"a.ply": b"a.ply", "parts/b.ply": b"parts/b.ply"}
 
 
+def test_names_of_windows_and_macos_are_found(folder):
+    (folder / "man\u0303ana.ply").write_bytes(b"n")  # an n and its tilde apart, as macOS stores it
+    windows, composed = "parts\\b.ply", "ma\u00f1ana.ply"
+    text = f'<scene version="3.0.0">{mesh(windows)}{mesh(composed)}</scene>'
+    assert found(folder, text) == {windows: b"parts/b.ply", composed: b"n"}
+
+
 def test_parameters_are_put_in_the_longest_name_first(folder):
     text = (
         f'<scene version="3.0.0"><default name="dir" value="parts"/><default name="d" value="x"/>'

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import itertools
 import os
 import pathlib
 import re
 import stat
+import unicodedata
 from collections.abc import Iterable, Iterator, Mapping
 from typing import BinaryIO
 from xml.parsers import expat
@@ -25,6 +27,7 @@ MAX_INCLUDES, MAX_INCLUDE_DEPTH = 256, 15  # as the scene format allows
 MAX_FILES = 100_000
 MAX_FRAMES = 10_000
 MAX_ELEMENTS = 500_000  # as the scene format allows
+MAX_NAMES_LOOKED_AT = 4096  # in one folder
 MAX_NAME = 4096  # characters of a file's name
 MAX_VALUE = 64 << 10  # characters of an attribute after its parameters were put in
 READ_BYTES = 1 << 20
@@ -93,6 +96,39 @@ def read_scene(path: pathlib.Path) -> bytes:
     return text
 
 
+def written_otherwise(folder: pathlib.Path, name: str) -> pathlib.Path | None:
+    """The file `name` in `folder`, or the one that it means although none is called exactly so.
+
+    Such a name has backslashes between its folders, as on Windows, or its letters and accents are composed
+    otherwise than on this disk (macOS stores them apart). None: there is no such file, or there are several.
+    """
+    place = folder / name
+    if place.exists():
+        return place
+    place = folder
+    for part in pathlib.PurePosixPath(name.replace("\\", "/")).parts:
+        there = place / part
+        if not there.exists():
+            alike = [entry for entry in _names_in(place) if _composed(entry) == _composed(part)]
+            if len(alike) != 1:
+                return None
+            there = place / alike[0]
+        place = there
+    return place
+
+
+def _composed(name: str) -> str:
+    return unicodedata.normalize("NFC", name)
+
+
+def _names_in(folder: pathlib.Path) -> list[str]:
+    try:
+        with os.scandir(folder) as entries:
+            return [entry.name for entry in itertools.islice(entries, MAX_NAMES_LOOKED_AT)]
+    except OSError:
+        return []
+
+
 class Folders:
     """Where files are taken from: `folder` for names that are relative, and what else the caller allows."""
 
@@ -130,7 +166,10 @@ class Folders:
     def _locate(self, place: str) -> pathlib.Path | None:
         if "\0" in place:
             return None
-        real = pathlib.Path(os.path.realpath(self._folder / place))
+        found = written_otherwise(self._folder, place)
+        if found is None:
+            return None
+        real = pathlib.Path(os.path.realpath(found))
         if not real.is_file():
             return None
         if not any(real.is_relative_to(root) for root in self._roots):
