@@ -16,6 +16,7 @@ import pathlib
 import re
 import stat
 import unicodedata
+import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from typing import BinaryIO
 from xml.parsers import expat
@@ -91,6 +92,7 @@ def read_scene(path: pathlib.Path) -> bytes:
         raise FileRefused(f"there is no file {path}") from None
     except OSError as error:
         raise FileRefused(f"{path} cannot be read: {error.strerror or error}") from None
+    text = unpacked(text, str(path))
     if len(text) > MAX_SCENE_BYTES:
         raise FileRefused(f"{path} is larger than the {MAX_SCENE_BYTES >> 20} MiB of a scene file")
     return text
@@ -127,6 +129,20 @@ def _names_in(folder: pathlib.Path) -> list[str]:
             return [entry.name for entry in itertools.islice(entries, MAX_NAMES_LOOKED_AT)]
     except OSError:
         return []
+
+
+def unpacked(text: bytes, name: str) -> bytes:
+    """The text of a scene file that may be packed by gzip, at most one byte more than a scene may have."""
+    if not text.startswith(b"\x1f\x8b"):
+        return text
+    unpacker = zlib.decompressobj(wbits=31)  # 31: the largest window, in the format of gzip
+    try:
+        plain = unpacker.decompress(text, MAX_SCENE_BYTES + 1)
+    except zlib.error as error:
+        raise FileRefused(f"{name} is packed by gzip, and damaged: {error}") from None
+    if not unpacker.eof and len(plain) <= MAX_SCENE_BYTES:
+        raise FileRefused(f"{name} is packed by gzip, and cut short")
+    return plain
 
 
 class Folders:
@@ -180,7 +196,9 @@ class Folders:
         return real
 
     def text(self, place: str) -> bytes | None:
-        return self.sources[place].read(0, MAX_SCENE_BYTES + 1) if self.find(place) else None
+        if not self.find(place):
+            return None
+        return unpacked(self.sources[place].read(0, MAX_SCENE_BYTES + 1), place)
 
 
 def join(folder: str, name: str) -> str:
