@@ -79,10 +79,10 @@ Result<Source> find_colour(const Imf::MultiPartInputFile& file, const std::strin
       "{}: no flat part with channels R, G, B or Y (deep and luminance/chroma images are not read)", name));
 }
 
-using Matrix = std::array<double, 9>;  // row by row
+using ColourMatrix = std::array<double, 9>;  // row by row
 
-Matrix product(const Matrix& a, const Matrix& b) {
-  Matrix m{};
+ColourMatrix matrix_product(const ColourMatrix& a, const ColourMatrix& b) {
+  ColourMatrix m{};
   for (std::size_t r = 0; r < 3; ++r)
     for (std::size_t c = 0; c < 3; ++c)
       for (std::size_t k = 0; k < 3; ++k) m[3 * r + c] += a[3 * r + k] * b[3 * k + c];
@@ -90,27 +90,27 @@ Matrix product(const Matrix& a, const Matrix& b) {
 }
 
 // Returns the inverse by the adjugate; its entries are not finite if m cannot be inverted.
-Matrix inverse(const Matrix& m) {
-  const auto minor = [&](std::size_t r, std::size_t c) {
+ColourMatrix matrix_inverse(const ColourMatrix& m) {
+  const auto cofactor = [&](std::size_t r, std::size_t c) {
     const std::size_t r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
     return m[3 * r1 + c1] * m[3 * r2 + c2] - m[3 * r1 + c2] * m[3 * r2 + c1];
   };
-  const double det = m[0] * minor(0, 0) + m[1] * minor(0, 1) + m[2] * minor(0, 2);
-  Matrix out{};
+  const double det = m[0] * cofactor(0, 0) + m[1] * cofactor(0, 1) + m[2] * cofactor(0, 2);
+  ColourMatrix out{};
   for (std::size_t r = 0; r < 3; ++r)
-    for (std::size_t c = 0; c < 3; ++c) out[3 * r + c] = minor(c, r) / det;
+    for (std::size_t c = 0; c < 3; ++c) out[3 * r + c] = cofactor(c, r) / det;
   return out;
 }
 
 // Returns the matrix from R, G, B of these primaries to CIE XYZ, in which white has Y = 1: the columns are
 // the XYZ of the primaries, scaled so that their sum is the white point (SMPTE RP 177-1993).
-Matrix to_xyz(const Imf::Chromaticities& c) {
+ColourMatrix to_xyz(const Imf::Chromaticities& c) {
   const auto xyz = [](const Imath::V2f& p) {
     return std::array<double, 3>{p.x, p.y, 1 - double{p.x} - double{p.y}};
   };
   const std::array<double, 3> r = xyz(c.red), g = xyz(c.green), b = xyz(c.blue), w = xyz(c.white);
-  Matrix m{r[0], g[0], b[0], r[1], g[1], b[1], r[2], g[2], b[2]};
-  const Matrix back = inverse(m);
+  ColourMatrix m{r[0], g[0], b[0], r[1], g[1], b[1], r[2], g[2], b[2]};
+  const ColourMatrix back = matrix_inverse(m);
   for (std::size_t k = 0; k < 3; ++k) {
     double scale = 0;
     for (std::size_t i = 0; i < 3; ++i) scale += back[3 * k + i] * w[i] / w[1];
@@ -131,12 +131,12 @@ bool is_rec709(const Imf::Chromaticities& c) {
 
 Result<std::optional<std::array<float, 9>>> srgb_matrix(const Imf::Header& header, const Source& source,
                                                         const std::string& name) {
-  Matrix m = inverse(to_xyz(Imf::Chromaticities()));
+  ColourMatrix m = matrix_inverse(to_xyz(Imf::Chromaticities()));
   if (source.channels[0] != std::string_view("X")) {
     if (source.channels[0] != std::string_view("R") || !Imf::hasChromaticities(header) ||
         is_rec709(Imf::chromaticities(header)))
       return std::nullopt;
-    m = product(m, to_xyz(Imf::chromaticities(header)));
+    m = matrix_product(m, to_xyz(Imf::chromaticities(header)));
   }
   std::array<float, 9> out{};
   for (std::size_t i = 0; i < 9; ++i) out[i] = static_cast<float>(m[i]);

@@ -7,7 +7,7 @@
 namespace ls::scene {
 namespace {
 
-using Use = bool TextureUse::*;
+using UseFlag = bool TextureUse::*;
 
 class UseWalk {
  public:
@@ -40,7 +40,7 @@ class UseWalk {
   template <class T>
   void go(const T&) {}
 
-  void note(TextureIndex t, Use as) {
+  void note(TextureIndex t, UseFlag as) {
     as_ = as;
     go(t);
   }
@@ -49,7 +49,7 @@ class UseWalk {
  private:
   const Scene& scene_;
   std::vector<TextureUse> uses_;
-  Use as_ = &TextureUse::colour;
+  UseFlag as_ = &TextureUse::colour;
   bool in_texture_ = false, is_bump_map_ = false;
 };
 
