@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cctype>
 #include <fstream>
 #include <iterator>
@@ -9,6 +10,7 @@
 #include <set>
 #include <utility>
 
+#include "common/base/file_form.h"
 #include "common/job/frame_diagnostics.h"
 #include "common/scene/analysis/prune.h"
 #include "common/scene/file_names.h"
@@ -57,6 +59,18 @@ class RecordedFolder final : public AssetSource {
   // Returns the files requested since the previous call.
   std::map<std::string, LocalFile> take_files() { return std::exchange(files_, {}); }
   std::string take_included_texts() { return std::exchange(texts_, {}); }
+  // Returns warnings (errors if `strict`) about files that may be damaged, of those requested since the
+  // previous call.
+  std::vector<Diagnostic> take_doubts(bool strict) {
+    std::vector<Diagnostic> out;
+    for (const auto& [name, why] : folder_.take_doubts()) {
+      Diagnostic& d = out.emplace_back();
+      d.severity = strict ? Diagnostic::Severity::error : Diagnostic::Severity::warning;
+      d.place.file = name;
+      d.text = "the file " + why;
+    }
+    return out;
+  }
 
  private:
   FolderAssets folder_;
@@ -104,7 +118,7 @@ tl::unexpected<coordinator::Rejected> unreadable(const std::string& path,
 }
 
 tl::expected<std::string, coordinator::Rejected> read_text(const std::string& path) {
-  if (std::string why = scene::why_no_scene(path); !why.empty()) return refused(path, why);
+  if (std::string why = scene::why_no_scene(without_gz(path)); !why.empty()) return refused(path, why);
   std::error_code error;
   const auto status = fs::status(path, error);
   if (status.type() == fs::file_type::not_found) return refused(path, "there is no such file");
@@ -118,7 +132,9 @@ tl::expected<std::string, coordinator::Rejected> read_text(const std::string& pa
   std::ifstream file(path, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) return refused(path, "cannot be read");
-  return text;
+  auto plain = plain_bytes(path, std::move(text), scene::kMaxTextBytes);
+  if (!plain) return refused(path, plain.error().message);
+  return std::move(*plain);
 }
 
 }  // namespace
@@ -149,6 +165,9 @@ tl::expected<LocalScene, coordinator::Rejected> SceneReader::read(std::optional<
   ReadResult read = read_scene(in.path, in.text, in.folder, {in.defines, in.strict, frame, labels});
   const std::string included = in.folder.take_included_texts();
   auto files = in.folder.take_files();
+  std::ranges::move(in.folder.take_doubts(in.strict), std::back_inserter(read.diagnostics));
+  const auto is_error = [](const Diagnostic& d) { return d.severity == Diagnostic::Severity::error; };
+  if (std::ranges::any_of(read.diagnostics, is_error)) read.scene.reset();
   if (!read.scene) return unreadable(in.path, std::move(read.diagnostics));
   // The glTF reader checks the -D options itself.
   if (!scene::gltf::is_gltf(in.path))

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <fstream>
+#include <utility>
+
+#include "common/base/file_form.h"
 
 namespace ls {
 
@@ -19,7 +22,7 @@ Result<std::vector<std::byte>> read_asset(const std::filesystem::path& path, std
   in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
   if (!in || static_cast<std::uint64_t>(in.gcount()) != size)
     return fail(Errc::unavailable, fmt::format("'{}': could not be read to its end", name));
-  return bytes;
+  return plain_bytes(name, std::move(bytes));
 }
 
 }  // namespace ls

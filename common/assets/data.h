@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -49,12 +50,15 @@ struct MeshData {
 };
 
 // An image, row by row from the top; the channels of a pixel are adjacent. Exactly one of `u8` (codes 0..255)
-// and `f32` is filled. channels: 1 grey, 2 grey + alpha, 3 RGB, 4 RGBA; alpha is never premultiplied here.
+// and `f32` is filled. channels: 1 grey, 2 grey + alpha, 3 RGB, 4 RGBA. Colours are as stored: by custom
+// those of an OpenEXR image are multiplied by its alpha, and those of other formats are not.
 struct ImageData {
   std::uint32_t width = 0, height = 0, channels = 0;
   std::vector<std::uint8_t> u8;
   std::vector<float> f32;
   bool srgb = false;  // true: the values are sRGB-encoded (8- and 16-bit files); false: linear
+  // If linear colours are not those of sRGB, the matrix (row by row) that makes them so: see ExrImage.
+  std::optional<std::array<float, 9>> to_srgb = std::nullopt;
 
   bool operator==(const ImageData&) const = default;
 };
@@ -68,7 +72,8 @@ struct GridData {
   std::uint64_t negatives = 0;  // number of values below zero in the file, which were set to 0
 };
 
-// Reads a file of at most `limit` bytes. `name` is the file's name as written in the scene, for messages.
+// Reads a file of at most `limit` bytes, and unpacks it if it is packed by gzip (file_form.h). `name` is the
+// file's name as written in the scene, for messages.
 Result<std::vector<std::byte>> read_asset(const std::filesystem::path& path, std::string_view name,
                                           std::uint64_t limit = kMaxAssetBytes);
 

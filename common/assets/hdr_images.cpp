@@ -58,20 +58,42 @@ bool read_planes(ByteReader& r, std::vector<Rgbe>& row) {
   return true;
 }
 
+// Reads a row of pixels as they are. A pixel of three ones is none: in the older run-length coding it repeats
+// the pixel before it, as often as its exponent says; directly after another such one, 256 times as often.
+bool read_pixels(ByteReader& r, Rgbe first, std::vector<Rgbe>& row) {
+  unsigned shift = 0;
+  for (std::size_t x = 0; x < row.size();) {
+    const auto p = x == 0 && shift == 0 ? std::optional(first) : r.take<Rgbe>();
+    if (!p) return false;
+    if ((*p)[0] != 1 || (*p)[1] != 1 || (*p)[2] != 1) {
+      row[x++] = *p;
+      shift = 0;
+      continue;
+    }
+    if (x == 0 || shift > 16) return false;
+    const std::size_t n = std::size_t{(*p)[3]} << shift;
+    if (n > row.size() - x) return false;
+    for (std::size_t i = 0; i < n; ++i, ++x) row[x] = row[x - 1];
+    shift += 8;
+  }
+  return true;
+}
+
 bool read_row(ByteReader& r, std::vector<Rgbe>& row) {
   const auto first = r.take<Rgbe>();
   if (!first) return false;
   const std::size_t width = row.size();
   if (width >= 8 && width < 32768 && (*first)[0] == 2 && (*first)[1] == 2 && (*first)[2] < 128)
     return std::size_t{(*first)[2]} * 256 + (*first)[3] == width && read_planes(r, row);
-  row[0] = *first;
-  for (std::size_t x = 1; x < width; ++x) {
-    const auto p = r.take<Rgbe>();
-    if (!p) return false;
-    row[x] = *p;
-  }
-  return true;
+  return read_pixels(r, *first, row);
 }
+
+// The matrix from CIE XYZ to linear sRGB, whose white is that of Rec. 709 (ITU-R BT.709, IEC 61966-2-1).
+constexpr std::array<float, 9> kXyzToSrgb{3.2409699f, -1.5373832f, -0.4986108f, -0.9692436f, 1.8759675f,
+                                          0.0415551f, 0.0556301f,  -0.2039770f, 1.0569715f};
+
+// Returns the line without the blanks at its end, such as the carriage return of a file of Windows.
+std::string_view trimmed(std::string_view line) { return line.substr(0, line.find_last_not_of(" \t\r") + 1); }
 
 }  // namespace
 
@@ -80,13 +102,15 @@ Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> f
   const BrokenImage broken{name, "HDR image"};
   std::string_view text = as_text(file);
   if (!text.starts_with("#?")) return broken("it does not begin with \"#?\"");
-  bool rgbe = false, blank = false;
+  bool rgbe = false, xyze = false, blank = false;
   for (std::size_t i = 0; i < kMaxHdrLines && !blank && !text.empty(); ++i) {
-    const std::string_view line = next_line(text);
+    const std::string_view line = trimmed(next_line(text));
     rgbe |= line == "FORMAT=32-bit_rle_rgbe";
+    xyze |= line == "FORMAT=32-bit_rle_xyze";
     blank = line.empty();
   }
-  if (!blank || !rgbe) return broken("its header is not that of a 32-bit_rle_rgbe image");
+  if (!blank || rgbe == xyze)
+    return broken("its header does not say that it is a 32-bit_rle_rgbe or 32-bit_rle_xyze image");
   const auto size = resolution(next_line(text));
   if (!size) return broken("its resolution line is not \"-Y height +X width\" of a believable size");
   if (std::uint64_t{size->width} * size->height > max_pixels)
@@ -98,6 +122,7 @@ Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> f
   if (std::uint64_t{size->width} * size->height / 16 > r.left() || r.left() < std::uint64_t{size->height} * 4)
     return broken("it is too short for its size");
   ImageData image{size->width, size->height, 3, {}, {}, false};
+  if (xyze) image.to_srgb = kXyzToSrgb;
   image.f32.reserve(std::uint64_t{size->width} * size->height * 3);
   std::vector<Rgbe> row(size->width);
   for (std::uint32_t y = 0; y < size->height; ++y) {

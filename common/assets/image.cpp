@@ -4,12 +4,14 @@
 #include <strings.h>
 
 #include "common/base/bytes.h"
+#include "common/base/file_form.h"
 #include "common/image/exr/exr_file.h"
 
 namespace ls {
 namespace {
 
 bool ends_in_tga(std::string_view name) {
+  name = without_gz(name);
   return name.size() >= 4 && ::strncasecmp(name.data() + name.size() - 4, ".tga", 4) == 0;
 }
 
@@ -22,7 +24,7 @@ Result<ImageData> decode_image(std::string_view name, std::span<const std::byte>
   if (head.starts_with("\xff\xd8\xff")) return decode_jpeg(name, file, max_pixels);
   if (head.starts_with("BM")) return decode_bmp(name, file, max_pixels);
   if (head.starts_with("\x76\x2f\x31\x01")) return decode_exr(name, file, max_pixels);
-  if (head.starts_with("#?RADIANCE") || head.starts_with("#?RGBE")) return decode_hdr(name, file, max_pixels);
+  if (head.starts_with("#?")) return decode_hdr(name, file, max_pixels);
   if (head.starts_with("qoif")) return decode_qoi(name, file, max_pixels);
   for (const std::string_view pfm : {"PF ", "PF\n", "PF\r", "Pf ", "Pf\n", "Pf\r"})
     if (head.starts_with(pfm)) return decode_pfm(name, file, max_pixels);
@@ -52,15 +54,16 @@ tl::unexpected<Error> too_many_pixels(std::string_view name, std::uint64_t width
 
 Result<ImageData> decode_exr(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels) {
-  auto image = read_exr_rgb(
+  auto image = read_exr_image(
       file, std::string(name),
       ExrLimits{.max_bytes = kMaxAssetBytes, .max_pixels = max_pixels, .max_side = kMaxImageSide});
   if (!image) return tl::unexpected(image.error());
   ImageData out;
   out.width = static_cast<std::uint32_t>(image->size.width);
   out.height = static_cast<std::uint32_t>(image->size.height);
-  out.channels = 3;
-  out.f32 = std::move(image->rgb);
+  out.channels = image->channels;
+  out.f32 = std::move(image->values);
+  out.to_srgb = image->to_srgb;
   return out;
 }
 

@@ -36,10 +36,11 @@ Result<ImageData> decode_tga(std::string_view name, std::span<const std::byte> f
 // QOI: colour and alpha, 8 bits per channel, sRGB or linear.
 Result<ImageData> decode_qoi(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
-// OpenEXR: channels R, G, B and optionally A, or Y alone, of type half or float.
+// OpenEXR: channels R, G, B, or X, Y, Z, or Y alone, and optionally A, of type half or float, in any
+// compression and with any `chromaticities`.
 Result<ImageData> decode_exr(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
-// Radiance HDR: RGBE pixels (three mantissas with one common exponent).
+// Radiance HDR: RGBE or XYZE pixels (three mantissas with one common exponent), in either run-length coding.
 Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
 // PFM: grey or colour, float32 in either byte order.

@@ -33,6 +33,9 @@ struct CornerHash {
   }
 };
 
+// The secret of all CornerHashes of this process, a random number.
+std::uint64_t secret_of_this_process();
+
 inline bool is_drawable(const MeshData& m, std::uint32_t a, std::uint32_t b, std::uint32_t c) {
   double p[3][3];
   const std::uint32_t corner[] = {a, b, c};

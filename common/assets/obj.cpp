@@ -9,29 +9,25 @@
 #include "common/assets/mesh.h"
 #include "common/assets/mesh_parts.h"
 #include "common/base/bytes.h"
+#include "common/base/file_form.h"
 
 namespace ls {
 
 namespace {
-
-std::uint64_t secret_of_this_process() {
-  static const std::uint64_t secret = [] {
-    std::random_device word;
-    const std::uint64_t high = word();
-    return high << 32 | word();
-  }();
-  return secret;
-}
 
 class ObjReader {
  public:
   explicit ObjReader(std::string_view name) : name_(name) {}
 
   Result<MeshData> read(std::string_view text) {
+    if (const std::string why = why_no_utf8(text); !why.empty())
+      return bad_argument(fmt::format("'{}': {}", name_, why));
+    text = without_mark(text);
+    const char end = line_end_of(text);
     while (!text.empty()) {
       ++line_;
-      std::string_view line = next_line(text);
-      if (!statement(line)) return bad();
+      is_whole_ = text.find(end) != text.npos;
+      if (!statement(next_line(text, end), text, end)) return bad();
     }
     if (mesh_.indices.empty() && mesh_.dropped_triangles == 0)
       return bad_argument(fmt::format("'{}': has no faces", name_));
@@ -41,9 +37,14 @@ class ObjReader {
   }
 
  private:
-  bool statement(std::string_view line) {
+  // Reads the statement in `line`. `rest` is the text after it, from which lines that continue the statement
+  // are removed.
+  bool statement(std::string_view line, std::string_view& rest, char end) {
     const std::string_view key = next_word(line);
     if (key.empty() || key[0] == '#') return true;
+    // A statement goes on in the next line if its own ends in a backslash. Names (of materials, of files) may
+    // end in one that means nothing.
+    if (key == "v" || key == "vt" || key == "vn" || key == "f") line = continued(line, rest, end);
     if (key == "v") return numbers<3>(line, v_, 3);
     if (key == "vt") return numbers<2>(line, vt_, 1);
     if (key == "vn") return numbers<3>(line, vn_, 3);
@@ -55,6 +56,26 @@ class ObjReader {
           "end",    "con",    "fo",    "bmat",       "step",      "ctech", "stech"})
       if (key == known) return true;
     return complain(fmt::format("unknown statement '{}'", key.substr(0, 40)));
+  }
+
+  std::string_view continued(std::string_view line, std::string_view& rest, char end) {
+    const auto goes_on = [](std::string_view l) {
+      if (l.ends_with('\r')) l.remove_suffix(1);
+      return l.ends_with('\\');
+    };
+    if (!goes_on(line)) return line;
+    joined_.clear();
+    for (bool more = true; more;) {
+      more = goes_on(line) && !rest.empty();
+      joined_ += line.substr(0, goes_on(line) ? line.rfind('\\') : line.size());
+      joined_ += ' ';
+      if (more) {
+        ++line_;
+        is_whole_ = rest.find(end) != rest.npos;
+        line = next_line(rest, end);
+      }
+    }
+    return joined_;
   }
 
   // Parses N numbers, of which the first `needed` are required. The rest of the line, such as w or a vertex
@@ -88,7 +109,11 @@ class ObjReader {
       if (polygon_.size() >= kMaxPolygonCorners) return complain("a face of too many corners");
       polygon_.push_back(vertex(*c));
     }
-    if (polygon_.size() < 3) return complain("a face needs at least three corners");
+    // Some programs write points and edges as faces. These cover nothing, as in PLY files.
+    if (polygon_.size() < 3) {
+      if (polygon_.empty() || !is_whole_) return complain("a face needs at least three corners");
+      return true;
+    }
     if (mesh_.triangle_count() + polygon_.size() > kMaxMeshTriangles ||
         mesh_.vertex_count() > kMaxMeshVertices)
       return complain("too many triangles");
@@ -150,6 +175,8 @@ class ObjReader {
 
   std::string_view name_;
   std::uint64_t line_ = 0;
+  bool is_whole_ = true;  // true if the current line has a line end
+  std::string joined_;    // a statement that goes over several lines
   std::string problem_;
   std::vector<std::array<float, 3>> v_, vn_;
   std::vector<std::array<float, 2>> vt_;
@@ -161,6 +188,15 @@ class ObjReader {
 
 }  // namespace
 
+std::uint64_t secret_of_this_process() {
+  static const std::uint64_t secret = [] {
+    std::random_device word;
+    const std::uint64_t high = word();
+    return high << 32 | word();
+  }();
+  return secret;
+}
+
 Result<MeshData> decode_obj(std::string_view name, std::span<const std::byte> file) {
   return ObjReader(name).read(as_text(file));
 }
@@ -170,7 +206,8 @@ Result<MeshData> load_mesh(const std::filesystem::path& path, std::string_view n
   const auto bytes = read_asset(path, name);
   if (!bytes) return tl::unexpected(bytes.error());
   if (is_serialized(*bytes)) return decode_serialized(name, *bytes, index);
-  return as_text(*bytes).starts_with("ply") ? decode_ply(name, *bytes, attributes) : decode_obj(name, *bytes);
+  const bool is_ply = without_mark(as_text(*bytes)).starts_with("ply");
+  return is_ply ? decode_ply(name, *bytes, attributes) : decode_obj(name, *bytes);
 }
 
 }  // namespace ls

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -9,10 +10,13 @@
 #include <optional>
 #include <string>
 #include <type_traits>
+#include <unordered_map>
+#include <utility>
 
 #include "common/assets/mesh.h"
 #include "common/assets/mesh_parts.h"
 #include "common/base/bytes.h"
+#include "common/base/file_form.h"
 
 namespace ls {
 
@@ -82,7 +86,10 @@ int vertex_slot(std::string_view name) {
 class PlyReader {
  public:
   PlyReader(std::string_view name, std::span<const std::byte> file, std::span<const std::string> wanted)
-      : name_(name), file_(file), wanted_(wanted), body_(file) {}
+      : name_(name), file_(file), wanted_(wanted), body_({}) {
+    file_ = file_.subspan(as_text(file_).size() - without_mark(as_text(file_)).size());
+    body_ = ByteReader(file_);
+  }
 
   Result<MeshData> read() {
     if (!header() || !elements()) return bad_argument(fmt::format("'{}': {}", name_, problem_));
@@ -100,10 +107,11 @@ class PlyReader {
 
   bool header() {
     std::string_view text = as_text(file_);
+    const char end = line_end_of(text);
     bool has_format = false;
     for (std::size_t line = 1; line <= kMaxPlyLines; ++line) {
       if (text.empty()) return complain("ends within the header (no end_header)");
-      std::string_view rest = next_line(text);
+      std::string_view rest = next_line(text, end);
       const std::string_view key = next_word(rest);
       if (line == 1) {
         if (key != "ply") return complain("does not begin with \"ply\"");
@@ -122,7 +130,8 @@ class PlyReader {
       } else if (key == "end_header") {
         if (!has_format) return complain("the header has no format line");
         body_.skip(file_.size() - text.size());
-        rest_ = text;
+        // Where files of a header and of numbers were joined, a mark may stand between them.
+        rest_ = without_mark(text);
         return true;
       } else if (!key.empty() && key != "comment" && key != "obj_info") {
         return complain_line(line, fmt::format("unknown header line '{}'", key.substr(0, 40)));
@@ -161,15 +170,28 @@ class PlyReader {
     return true;
   }
 
+  // A place in the file's body.
+  struct Cursor {
+    ByteReader body;
+    std::string_view rest;
+  };
+
   bool elements() {
+    // Faces may stand before the vertices that they name: they are read after them.
+    std::vector<std::pair<const Element*, Cursor>> early;
     for (const Element& e : elements_) {
       if (e.properties.empty()) continue;
       const std::uint64_t left = coding_ == Coding::ascii ? rest_.size() : body_.left();
       if (e.count > left / e.least_bytes(coding_))
         return complain(
             fmt::format("{} elements '{}' are announced, but only {} bytes follow", e.count, e.name, left));
-      const bool ok = e.name == "vertex" ? vertices(e) : e.name == "face" ? faces(e) : skip(e);
-      if (!ok) return false;
+      const bool has_vertices = vertex_count_ > 0 || e.name == "vertex";
+      if (!has_vertices) early.emplace_back(&e, Cursor{body_, rest_});
+      if (!(has_vertices ? read_element(e) : skip(e))) return false;
+    }
+    for (const auto& [e, cursor] : early) {
+      body_ = cursor.body, rest_ = cursor.rest;
+      if (!read_element(*e)) return false;
     }
     if (mesh_.indices.empty() && mesh_.dropped_triangles == 0) return complain("has no faces");
     // A file may have several elements of the same name. If an attribute does not have a value for every
@@ -179,6 +201,12 @@ class PlyReader {
           a.components * (a.name.starts_with("face_") ? mesh_.triangle_count() : mesh_.vertex_count()))
         return complain(fmt::format("not all of it has the attribute '{}'", a.name));
     return true;
+  }
+
+  bool read_element(const Element& e) {
+    if (e.name == "vertex") return vertices(e);
+    if (e.name == "face") return faces(e);
+    return e.name == "tristrips" ? strips(e) : skip(e);
   }
 
   // Returns the next number of the file's body; nullopt at the end of the body, or if the text is not a
@@ -263,38 +291,150 @@ class PlyReader {
     return true;
   }
 
+  static bool is_corner_list(const Property& p) {
+    return p.count && (p.name == "vertex_indices" || p.name == "vertex_index");
+  }
+  bool wants_corner_list(const Element& e) {
+    if (std::ranges::count_if(e.properties, is_corner_list) == 1) return true;
+    return complain("its faces need one list 'vertex_indices' or 'vertex_index'");
+  }
+  bool adds_too_many(std::size_t triangles) {
+    if (mesh_.triangle_count() + triangles <= kMaxMeshTriangles) return false;
+    complain("has too many triangles");
+    return true;
+  }
+  std::optional<std::uint32_t> vertex_named(const Element& e, std::uint64_t i, double v) {
+    if (v >= 0 && v < static_cast<double>(vertex_count_)) return static_cast<std::uint32_t>(v);
+    complain(fmt::format("{} {} names vertex {} of {}", e.name, i, v, vertex_count_));
+    return std::nullopt;
+  }
+
   bool faces(const Element& e) {
-    const auto is_list = [](const Property& p) {
-      return p.count && (p.name == "vertex_indices" || p.name == "vertex_index");
-    };
-    if (std::ranges::count_if(e.properties, is_list) != 1)
-      return complain("its faces need one list 'vertex_indices' or 'vertex_index'");
+    if (!wants_corner_list(e)) return false;
+    const auto is_uv_list = [](const Property& p) { return p.count && p.name == "texcoord"; };
+    const bool has_uvs = std::ranges::any_of(e.properties, is_uv_list);
     std::vector<std::uint32_t> corners;
+    std::vector<float> uvs;
     const auto places = attribute_places(e, "face_");
     for (std::uint64_t i = 0; i < e.count; ++i) {
       const std::size_t before = mesh_.triangle_count();
       make_room(places);
-      for (std::size_t k_property = 0; k_property < e.properties.size(); ++k_property) {
-        const Property& p = e.properties[k_property];
-        if (!is_list(p)) {
-          if (!attribute_property(p, places[k_property])) return broken(e, i);
-          continue;
+      for (std::size_t k = 0; k < e.properties.size(); ++k) {
+        const Property& p = e.properties[k];
+        if (is_corner_list(p)) {
+          if (!corner_list(e, i, p, corners)) return false;
+        } else if (is_uv_list(p)) {
+          if (!uv_list(p, uvs)) return broken(e, i);
+        } else if (!attribute_property(p, places[k])) {
+          return broken(e, i);
         }
-        const auto n = list_length(p);
-        if (!n) return broken(e, i);
-        corners.clear();
-        for (std::uint32_t k = 0; k < *n; ++k) {
-          const auto v = number(*p.type);
-          if (!v) return broken(e, i);
-          if (!(*v >= 0 && *v < static_cast<double>(vertex_count_)))
-            return complain(fmt::format("face {} names vertex {} of {}", i, *v, vertex_count_));
-          corners.push_back(static_cast<std::uint32_t>(*v));
-        }
-        if (mesh_.triangle_count() + corners.size() > kMaxMeshTriangles)
-          return complain("has too many triangles");
-        add_polygon(mesh_, corners);
       }
+      if (adds_too_many(corners.size())) return false;
+      if (has_uvs && !split_by_uv(i, corners, uvs)) return false;
+      add_polygon(mesh_, corners);
       share_among_triangles(places, mesh_.triangle_count() - before);
+    }
+    return true;
+  }
+
+  bool corner_list(const Element& e, std::uint64_t i, const Property& p,
+                   std::vector<std::uint32_t>& corners) {
+    const auto n = list_length(p);
+    if (!n) return broken(e, i);
+    corners.clear();
+    for (std::uint32_t k = 0; k < *n; ++k) {
+      const auto v = number(*p.type);
+      if (!v) return broken(e, i);
+      const auto vertex = vertex_named(e, i, *v);
+      if (!vertex) return false;
+      corners.push_back(*vertex);
+    }
+    return true;
+  }
+
+  bool uv_list(const Property& p, std::vector<float>& uvs) {
+    const auto n = list_length(p);
+    if (!n) return false;
+    uvs.clear();
+    for (std::uint32_t k = 0; k < *n; ++k) {
+      const auto v = number(*p.type);
+      if (!v) return false;
+      uvs.push_back(static_cast<float>(*v));
+    }
+    return true;
+  }
+
+  // Gives the corners of face i their texture coordinates; no uvs mean (0, 0). Replaces each corner by the
+  // vertex that has its position and its coordinates: the vertex of the file where it comes up first, a copy
+  // of it for each further pair of coordinates.
+  bool split_by_uv(std::uint64_t i, std::span<std::uint32_t> corners, std::vector<float>& uvs) {
+    if (uvs.empty()) uvs.resize(2 * corners.size());
+    if (uvs.size() != 2 * corners.size())
+      return complain(fmt::format("face {} of {} corners has {} numbers of texture coordinates", i,
+                                  corners.size(), uvs.size()));
+    if (split_.empty()) mesh_.uvs.assign(2 * mesh_.vertex_count(), 0);
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      const std::array<float, 2> uv{uvs[2 * k], uvs[2 * k + 1]};
+      const auto bits = [](float x) { return static_cast<std::int64_t>(std::bit_cast<std::uint32_t>(x)); };
+      const std::uint32_t original = corners[k];
+      const auto [it, is_new] = split_.try_emplace(Corner{original, bits(uv[0]), bits(uv[1])}, original);
+      if (is_new) {
+        // The key (v, -1, -1) says that vertex v of the file has coordinates.
+        if (!split_.try_emplace(Corner{original, -1, -1}, original).second) {
+          if (mesh_.vertex_count() >= kMaxMeshVertices) return complain("has too many vertices");
+          it->second = copy_of(original);
+        }
+        std::ranges::copy(uv, mesh_.uvs.begin() + std::ptrdiff_t{2} * it->second);
+      }
+      corners[k] = it->second;
+    }
+    return true;
+  }
+
+  std::uint32_t copy_of(std::uint32_t vertex) {
+    const auto copy = static_cast<std::uint32_t>(mesh_.vertex_count());
+    const auto repeat = [&](std::vector<float>& values, std::size_t components) {
+      if (values.empty()) return;
+      for (std::size_t c = 0; c < components; ++c) values.push_back(values[vertex * components + c]);
+    };
+    repeat(mesh_.positions, 3);
+    repeat(mesh_.normals, 3);
+    repeat(mesh_.uvs, 2);
+    for (MeshAttribute& a : mesh_.attributes)
+      if (a.name.starts_with("vertex_")) repeat(a.values, a.components);
+    return copy;
+  }
+
+  // Reads lists of vertices of which each triple of neighbours is a triangle, every other one turned round.
+  // -1 ends a strip within a list.
+  bool strips(const Element& e) {
+    if (!wants_corner_list(e)) return false;
+    for (std::uint64_t i = 0; i < e.count; ++i)
+      for (const Property& p : e.properties)
+        if (!(is_corner_list(p) ? strip(e, i, p) : skip_property(p))) return problem_.empty() && broken(e, i);
+    return true;
+  }
+  bool strip(const Element& e, std::uint64_t i, const Property& p) {
+    const auto n = number(*p.count);
+    if (!n || !(*n >= 0)) return false;
+    std::vector<std::uint32_t> last;  // up to two vertices before the next one
+    bool is_odd = false;
+    for (double k = 0; k < *n; ++k) {
+      const auto v = number(*p.type);
+      if (!v) return false;
+      if (*v == -1) {
+        last.clear(), is_odd = false;
+        continue;
+      }
+      const auto vertex = vertex_named(e, i, *v);
+      if (!vertex || adds_too_many(1)) return false;
+      if (last.size() == 2) {
+        const std::array<std::uint32_t, 3> corners{last[is_odd ? 1 : 0], last[is_odd ? 0 : 1], *vertex};
+        add_polygon(mesh_, corners);
+        is_odd = !is_odd;
+        last.erase(last.begin());
+      }
+      last.push_back(*vertex);
     }
     return true;
   }
@@ -365,7 +505,9 @@ class PlyReader {
   std::string_view rest_;  // rest of an ascii file after the header
   Coding coding_ = Coding::ascii;
   std::vector<Element> elements_;
-  std::uint64_t vertex_count_ = 0;
+  std::uint64_t vertex_count_ = 0;  // of the file; split_by_uv() adds copies to the mesh
+  // The vertices of the mesh by vertex of the file and texture coordinates, as numbers of their bits
+  std::unordered_map<Corner, std::uint32_t, CornerHash> split_{0, CornerHash{secret_of_this_process()}};
   std::string problem_;
   MeshData mesh_;
 };

@@ -31,7 +31,11 @@ void on_error(png_structp png, png_const_charp text) {
   std::snprintf(s->message, sizeof s->message, "%s", text);
   std::longjmp(png_jmpbuf(png), 1);
 }
-void on_warning(png_structp, png_const_charp) {}
+// libpng leaves out a damaged chunk that an image can do without, with a warning that begins with its name.
+// The opacities of a palette or of a colour are such a chunk to it, but not to us.
+void on_warning(png_structp png, png_const_charp text) {
+  if (std::strstr(text, "tRNS")) on_error(png, text);
+}
 
 struct Png {
   png_structp png = nullptr;

@@ -41,11 +41,22 @@ class Inflater {
       const std::size_t step = std::min<std::size_t>(bytes, kStep);
       z_.next_out = out;
       z_.avail_out = static_cast<uInt>(step);
-      while (z_.avail_out > 0 && ok_) ok_ = refill() && advance();
+      while (z_.avail_out > 0 && ok_) ok_ = !ended_ && refill() && advance();
       out += step;
       bytes -= step;
     }
     return ok_;
+  }
+  // Reads on to the end of the stream, where zlib compares its checksum of all data. Returns false if they
+  // are damaged, or if the stream does not end.
+  bool finish() {
+    std::array<Bytef, 256> unused;
+    while (ok_ && !ended_) {
+      z_.next_out = unused.data();
+      z_.avail_out = unused.size();
+      ok_ = refill() && advance();
+    }
+    return ended_;
   }
   template <class T>
   std::optional<T> take() {
@@ -66,12 +77,13 @@ class Inflater {
   }
   bool advance() {
     const int result = inflate(&z_, Z_NO_FLUSH);
-    return result == Z_OK || (result == Z_STREAM_END && z_.avail_out == 0);
+    ended_ = result == Z_STREAM_END;
+    return result == Z_OK || ended_;
   }
 
   std::span<const std::byte> data_;
   z_stream z_{};
-  bool ok_ = false;
+  bool ok_ = false, ended_ = false;
 };
 
 class SerializedReader {
@@ -152,7 +164,8 @@ class SerializedReader {
                  {(*flags & kHasColours) != 0, 3, unused, "colours"}};
     for (const auto& part : parts)
       if (part.there && !numbers(in, wide, *vertices * part.width, part.values)) return damaged(part.what);
-    return faces(in, *triangles);
+    if (!faces(in, *triangles)) return false;
+    return in.finish() || damaged("data");
   }
 
   static bool skip_name(Inflater& in) {

@@ -65,13 +65,20 @@ inline std::string_view next_word(std::string_view& line) {
   line.remove_prefix(b);
   return word;
 }
-// Removes the text up to and including the next line feed from the front of `text`, and returns it without
-// the line feed.
-inline std::string_view next_line(std::string_view& text) {
-  const std::size_t n = std::min(text.find('\n'), text.size());
+// Removes the text up to and including the next `end` (a line feed, unless said otherwise) from the front of
+// `text`, and returns it without `end`.
+inline std::string_view next_line(std::string_view& text, char end = '\n') {
+  const std::size_t n = std::min(text.find(end), text.size());
   const std::string_view line = text.substr(0, n);
   text.remove_prefix(std::min(n + 1, text.size()));
   return line;
+}
+// Returns the character at the end of each line of `text`: a carriage return if the first line ends in one
+// that no line feed follows, as in files of old Macintosh programs, else a line feed.
+inline char line_end_of(std::string_view text) {
+  const std::size_t first = text.find_first_of("\r\n");
+  const bool lone = first != text.npos && text[first] == '\r' && text.substr(first + 1, 1) != "\n";
+  return lone ? '\r' : '\n';
 }
 
 }  // namespace ls

@@ -2,11 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
 #include <system_error>
+#include <utility>
 #include <vector>
 
+#include "common/base/file_form.h"
+#include "common/base/name_forms.h"
 #include "common/base/suggest.h"
 #include "common/scene/limits.h"
 
@@ -30,6 +34,20 @@ std::string names_like(const fs::path& missing) {
     return fs::is_directory(folder, error) ? "; its folder is empty" : "; its folder does not exist";
   const auto near = nearest_name(missing.filename().string(), names);
   return near ? fmt::format("; did you mean '{}'?", *near) : "";
+}
+
+// The first bytes of a file, and its last one.
+struct FileEnds {
+  std::string head;
+  char last = 0;
+};
+FileEnds ends_of(const fs::path& path, std::uintmax_t bytes) {
+  FileEnds ends;
+  ends.head.resize(std::min<std::uintmax_t>(bytes, kFormBytes));
+  std::ifstream in(path, std::ios::binary);
+  in.read(ends.head.data(), static_cast<std::streamsize>(ends.head.size()));
+  if (bytes > 0) in.seekg(-1, std::ios::end).get(ends.last);
+  return ends;
 }
 
 }  // namespace
@@ -70,16 +88,30 @@ Result<Asset> FolderAssets::keep(std::string_view name, const std::string& bytes
 Result<fs::path> FolderAssets::locate(std::string_view name) const {
   if (name.empty() || name.find('\0') != std::string_view::npos)
     return fail(Errc::invalid_argument, "this is not the name of a file");
-  const fs::path path = folder_ / fs::path(name);  // an absolute name is used unchanged
+  fs::path path = folder_ / fs::path(name);  // an absolute name is used unchanged
   std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (status.type() == fs::file_type::not_found)
-    return fail(Errc::not_found, fmt::format("there is no file \"{}\"{}", name, names_like(path)));
+  fs::file_status status = fs::status(path, error);
+  if (status.type() == fs::file_type::not_found) {
+    if (fs::is_symlink(fs::symlink_status(path, error)))
+      return fail(Errc::not_found, fmt::format("\"{}\" is a link to \"{}\", where there is no file", name,
+                                               fs::read_symlink(path, error).string()));
+    const auto other = written_otherwise(folder_, name);
+    if (!other) return missing(name);
+    path = *other;
+    status = fs::status(path, error);
+  }
   if (error)
     return fail(Errc::invalid_argument, fmt::format("\"{}\" can't be opened: {}", name, error.message()));
   if (!fs::is_regular_file(status))
     return fail(Errc::invalid_argument, fmt::format("\"{}\" is not a regular file", name));
   return path;
+}
+
+tl::unexpected<Error> FolderAssets::missing(std::string_view name) const {
+  const std::string plain = with_slashes(name);
+  const char* hint = plain == name ? "" : "; write / between folders, not \\";
+  return fail(Errc::not_found,
+              fmt::format("there is no file \"{}\"{}{}", name, names_like(folder_ / fs::path(plain)), hint));
 }
 
 Result<Asset> FolderAssets::find(std::string_view name) {
@@ -94,6 +126,11 @@ Result<Asset> FolderAssets::find(std::string_view name) {
                 fmt::format("\"{}\" can't be read: {}", name, digest.error().message));
   if (error)
     return fail(Errc::invalid_argument, fmt::format("\"{}\" can't be read: {}", name, error.message()));
+  const FileEnds ends = ends_of(*path, bytes);
+  if (const std::string why = why_placeholder(ends.head); !why.empty())
+    return fail(Errc::invalid_argument, fmt::format("\"{}\" {}", name, why));
+  if (std::string why = why_perhaps_cut(name, ends.head, ends.last); !why.empty())
+    doubts_.emplace(name, std::move(why));
   const Asset asset{std::string(name), *digest, bytes};
   found_.emplace(asset.name, asset);
   paths_.emplace(asset.name, *path);
@@ -111,7 +148,7 @@ Result<std::string> FolderAssets::text(std::string_view name) {
   std::ifstream in(*path, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   if (!in.good() && !in.eof()) return fail(Errc::invalid_argument, fmt::format("\"{}\" can't be read", name));
-  return text;
+  return plain_bytes(name, std::move(text), scene::kMaxTextBytes);
 }
 
 std::optional<fs::path> FolderAssets::path_of(std::string_view name) const {

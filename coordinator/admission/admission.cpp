@@ -5,11 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <ranges>
 #include <set>
 
+#include "common/base/file_form.h"
+#include "common/base/name_forms.h"
 #include "common/job/health_notes.h"
 #include "common/job/limits.h"
 #include "common/protocol/limits.h"
@@ -155,7 +158,10 @@ class UploadedAssets final : public AssetSource {
  public:
   UploadedAssets(const std::map<std::string, Digest>& assets, const BlobStore& blobs, bool strict)
       : blobs_(blobs), strict_(strict) {
-    for (const auto& [name, digest] : assets) assets_.emplace(plain_name(name), digest);
+    for (const auto& [name, digest] : assets) {
+      assets_.emplace(plain_name(name), digest);
+      by_plain_text_.emplace(composed(with_slashes(plain_name(name))), digest);
+    }
   }
 
   Result<Asset> find(std::string_view name) override { return find(name, false); }
@@ -168,8 +174,10 @@ class UploadedAssets final : public AssetSource {
                                  scene::kMaxTextBytes));
     const auto bytes = blobs_.read(asset->digest, 0, asset->bytes);
     if (!bytes) return tl::unexpected(bytes.error());
-    text_bytes += bytes->size();
-    return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+    auto text = plain_bytes(name, std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size()),
+                            scene::kMaxTextBytes);
+    if (text) text_bytes += text->size();
+    return text;
   }
 
   std::size_t text_bytes = 0;     // bytes of the scene files that the main file includes
@@ -177,18 +185,26 @@ class UploadedAssets final : public AssetSource {
 
  private:
   Result<Asset> find(std::string_view name, bool of_text) {
-    const auto found = assets_.find(plain_name(name));
-    if (found == assets_.end())
+    const Digest* found = digest_of(plain_name(name));
+    if (!found)
       return fail(Errc::not_found,
                   fmt::format("\"{}\" was not sent along: name it among the assets, with its SHA-256{}", name,
                               offered()));
-    const auto bytes = blobs_.size(found->second);
+    const auto bytes = blobs_.size(*found);
     if (!bytes && (strict_ || of_text))
       return fail(Errc::not_found,
                   fmt::format("the bytes of \"{}\" have not been uploaded: PUT them to /api/v1/blobs/{}",
-                              name, found->second.hex()));
-    if (!bytes) not_uploaded.insert(found->second);
-    return Asset{std::string(name), found->second, bytes.value_or(0)};
+                              name, found->hex()));
+    if (!bytes) not_uploaded.insert(*found);
+    return Asset{std::string(name), *found, bytes.value_or(0)};
+  }
+
+  // Returns the digest of the file of this name or, if there is none, of the only one whose name is the same
+  // but for backslashes between folders and for how its letters are composed (name_forms.h).
+  const Digest* digest_of(const std::string& name) const {
+    if (const auto found = assets_.find(name); found != assets_.end()) return &found->second;
+    const auto [first, last] = by_plain_text_.equal_range(composed(with_slashes(name)));
+    return first != last && std::next(first) == last ? &first->second : nullptr;
   }
 
   std::string offered() const {
@@ -203,6 +219,7 @@ class UploadedAssets final : public AssetSource {
   }
 
   std::map<std::string, Digest> assets_;
+  std::multimap<std::string, Digest> by_plain_text_;
   const BlobStore& blobs_;
   const bool strict_;
 };

@@ -1,11 +1,12 @@
 """Which files are sent with a scene: those that it names, as the farm looks for them, none from outside."""
 
+import gzip
 import os
 
 import pytest
 
 from lightshaft import FileRefused
-from lightshaft.scene_files import Folders, find_files, join
+from lightshaft.scene_files import Folders, find_files, join, read_scene
 
 
 def found(folder, text, given=None, allow=(), **options):
@@ -33,6 +34,24 @@ def test_files_are_known_by_the_names_that_the_farm_looks_for(folder):
     meshes = mesh("./a.ply") + mesh("b.ply") + mesh("gone.ply")
     text = f'<scene version="3.0.0"><path value="parts"/>{meshes}</scene>'
     assert found(folder, text) == {"a.ply": b"a.ply", "parts/b.ply": b"parts/b.ply"}
+
+
+def test_names_of_windows_and_macos_are_found(folder):
+    (folder / "man\u0303ana.ply").write_bytes(b"n")  # an n and its tilde apart, as macOS stores it
+    windows, composed = "parts\\b.ply", "ma\u00f1ana.ply"
+    text = f'<scene version="3.0.0">{mesh(windows)}{mesh(composed)}</scene>'
+    assert found(folder, text) == {windows: b"parts/b.ply", composed: b"n"}
+
+
+def test_scenes_may_be_packed_by_gzip(folder):
+    more = gzip.compress(f'<scene version="3.0.0">{mesh("a.ply")}</scene>'.encode())
+    (folder / "more.xml.gz").write_bytes(more)
+    text = '<scene version="3.0.0"><include filename="more.xml.gz"/></scene>'
+    assert found(folder, text) == {"more.xml.gz": more, "a.ply": b"a.ply"}
+    (folder / "cut.xml.gz").write_bytes(more[:-9])
+    with pytest.raises(FileRefused, match="cut.xml.gz is packed by gzip, and cut short"):
+        read_scene(folder / "cut.xml.gz")
+    assert read_scene(folder / "more.xml.gz").startswith(b"<scene")
 
 
 def test_parameters_are_put_in_the_longest_name_first(folder):

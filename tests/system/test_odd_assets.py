@@ -3,6 +3,7 @@
 Everything is written here, byte by byte or by OpenVDB's own module, with no more in it than the oddity.
 """
 
+import gzip
 import json
 import math
 import os
@@ -101,6 +102,38 @@ def test_luminance_and_chroma_are_refused_with_what_they_are(tmp_path):
     said = render(tmp_path, textured("t.exr"), code=2).stderr
 
     assert "t.exr" in said and "luminance/chroma" in said
+
+
+def test_the_alpha_of_an_exr_masks(tmp_path):
+    """The left half of the picture is there, the right half is not: as if the card ended there."""
+    half = {c: .5 for c in "RGB"} | {"A": lambda x, y: 1 if x < 2 else 0}
+    (tmp_path / "t.exr").write_bytes(exr(4, 4, half))
+    card = '<emitter type="constant"/><shape type="rectangle"><transform name="to_world"><rotate x="1" angle="90"/>%s</transform>%s</shape>'
+    black = '<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>'
+    image = '<texture type="bitmap" name="opacity"><string name="filename" value="t.exr"/><string name="filter_type" value="nearest"/>%s</texture>'
+    seen = []
+    for channel in ("", '<string name="channel" value="alpha"/>'):
+        render(tmp_path, card % ("", f'<bsdf type="mask">{image % channel}{black}</bsdf>'))
+        seen.append(pixels(tmp_path))
+    render(tmp_path, card % ('<scale x=".5"/><translate x="-.5"/>', black))
+
+    assert seen == [pixels(tmp_path)] * 2
+
+
+def test_files_packed_by_gzip_are_the_same_picture(tmp_path):
+    ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n" \
+          "element face 1\nproperty list uchar int vertex_indices\nend_header\n-1 0 -1\n1 0 -1\n0 0 1\n3 0 1 2\n"
+    body = '<emitter type="constant"/><shape type="ply"><string name="filename" value="%s"/></shape>'
+    (tmp_path / "a.ply").write_text(ply)
+    (tmp_path / "a.ply.gz").write_bytes(gzip.compress(ply.encode()))
+    render(tmp_path, body % "a.ply")
+    plain = pixels(tmp_path)
+    render(tmp_path, body % "a.ply.gz")
+
+    assert pixels(tmp_path) == plain
+    (tmp_path / "scene.xml.gz").write_bytes(gzip.compress((tmp_path / "scene.xml").read_bytes()))
+    lightshaft("render", tmp_path / "scene.xml.gz", "-o", tmp_path / "out.exr", "--spp", 16, "--threads", 1, "--report", tmp_path / "r.json")
+    assert pixels(tmp_path) == plain
 
 
 @pytest.mark.parametrize("scene", [textured, sky], ids=["texture", "environment"])

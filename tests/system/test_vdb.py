@@ -5,10 +5,11 @@ The files are written here with OpenVDB's own Python module (Debian: python3-ope
 
 import math
 import subprocess
+import sys
 
 import pytest
 from cli_kit import FOG, digest, fog_values, lightshaft, load, write_fog
-from local_farm import PATIENCE, bin_dir
+from local_farm import PATIENCE, ROOT, bin_dir
 
 vdb = pytest.importorskip("pyopenvdb", reason="python3-openvdb is not installed")
 numpy = pytest.importorskip("numpy")
@@ -115,6 +116,32 @@ def test_every_truncation_of_a_vdb_is_an_error_and_no_crash(tmp_path):
         path.write_bytes(whole[: len(whole) * part // 16])
         ended = subprocess.run([bin_dir() / "lightshaft", "inspect", scene], capture_output=True, text=True, timeout=PATIENCE)
         assert ended.returncode == 2 and "fog.vdb" in ended.stderr, (part, ended.stderr)
+
+
+def test_a_vdb_without_a_codec_that_ends_early_is_refused(tmp_path):
+    sys.path.insert(0, str(ROOT / "scenes" / "bath"))
+    try:
+        from vdb import write_vdb
+    finally:
+        sys.path.pop(0)
+    scene = write_scene(tmp_path)
+    for half in (False, True):
+        write_vdb(tmp_path / "fog.vdb", fog_array(), "density", (-1, -1, -1), 2 / N, half=half)
+        lightshaft("inspect", scene)
+        whole = (tmp_path / "fog.vdb").read_bytes()
+        (tmp_path / "fog.vdb").write_bytes(whole[: len(whole) // 6])
+
+        assert "fog.vdb: not a readable OpenVDB or NanoVDB file: damaged, or cut short" in lightshaft("inspect", scene, code=2).stderr
+
+
+def test_a_grid_of_too_many_voxels_is_a_fault_of_the_scene(tmp_path):
+    stray = grid(fog_array())
+    stray.getAccessor().setValueOn((20000, 0, 0), 1.0)
+    vdb.write(str(tmp_path / "fog.vdb"), grids=[stray])
+
+    said = render(write_scene(tmp_path), tmp_path, code=2).stderr
+
+    assert "fog.vdb: grid 'density' spans 20003 voxels along an axis; the limit is 16384" in said and "tile" not in said
 
 
 def test_a_negative_density_counts_as_nothing_and_is_counted(tmp_path):

@@ -3,11 +3,13 @@
 // appears here, and none of its exceptions escapes.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -37,6 +39,20 @@ struct ExrLimits {
 // allocated.
 Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::string& name,
                               const ExrLimits& limits = {});
+
+// An image whose colours and alpha are wanted, such as a texture.
+struct ExrImage {
+  FrameSize size;              // size of the image's data window, in pixels
+  std::uint32_t channels = 3;  // 3: R, G, B; 4: also A, if the file has it
+  std::vector<float> values;   // row by row from the top, as stored; the channels of a pixel are adjacent
+  // If the stored colours are not linear sRGB, the matrix M (row by row) by which they become that:
+  // (R, G, B) of sRGB = M (R, G, B) as stored. Whites are not adapted, as in Mitsuba 3.9.
+  std::optional<std::array<float, 9>> to_srgb = std::nullopt;
+};
+// As read_exr_rgb(), but with the alpha channel, and with the meaning of the colours: the header's
+// `chromaticities` other than those of Rec. 709, or channels X, Y, Z (CIE 1931) in place of R, G, B.
+Result<ExrImage> read_exr_image(std::span<const std::byte> bytes, const std::string& name,
+                                const ExrLimits& limits = {});
 // Reads a whole file. not_found: the file cannot be opened; unavailable: it cannot be read;
 // resource_exhausted: it has more than limits.max_bytes bytes.
 Result<std::vector<std::byte>> read_exr_bytes(const std::filesystem::path& path,

@@ -1,18 +1,23 @@
 // Reads EXR files: external images, and final EXRs of this program.
 #include <ImfChannelList.h>
+#include <ImfChromaticities.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <ImfInputPart.h>
 #include <ImfMultiPartInputFile.h>
 #include <ImfPartType.h>
+#include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 #include <half.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <fstream>
 #include <initializer_list>
 #include <optional>
+#include <string_view>
 
 #include "common/image/exr/exr_file.h"
 #include "common/image/exr/final_image.h"
@@ -24,20 +29,42 @@ namespace ls {
 
 namespace {
 
+// Which channels of a part are read: their names, and for each channel of the image the index of its name.
 struct Source {
   int part = 0;
-  std::vector<const char*> channels;  // names of the channels to read: three colours, or one grey channel
+  std::vector<const char*> channels;
+  std::vector<std::size_t> layout{0, 1, 2};
 };
 
-Result<Source> find_colour(const Imf::MultiPartInputFile& file, const std::string& name) {
+bool has_all(const Imf::ChannelList& list, std::initializer_list<const char*> names) {
+  return std::ranges::all_of(names, [&](const char* c) { return list.findChannel(c) != nullptr; });
+}
+
+// Wanted: what a caller makes of the image. `rgb`: only its numbers in R, G, B. `texture`: its colours in any
+// form that can be converted, and its alpha channel.
+enum class Wanted { rgb, texture };
+
+Result<Source> find_colour(const Imf::MultiPartInputFile& file, const std::string& name, Wanted wanted) {
   for (int p = 0; p < file.parts(); ++p) {
     const Imf::Header& header = file.header(p);
     if (header.hasType() && !Imf::isImage(header.type())) continue;  // skips deep parts
     const Imf::ChannelList& list = header.channels();
-    const bool rgb = list.findChannel("R") && list.findChannel("G") && list.findChannel("B");
+    const bool rgb = has_all(list, {"R", "G", "B"});
+    const bool xyz = !rgb && wanted == Wanted::texture && has_all(list, {"X", "Y", "Z"});
     const bool chroma = list.findChannel("RY") || list.findChannel("BY");
-    if (!rgb && (!list.findChannel("Y") || chroma)) continue;
-    Source source{p, rgb ? std::vector<const char*>{"R", "G", "B"} : std::vector<const char*>{"Y"}};
+    if (!rgb && !xyz && (!list.findChannel("Y") || chroma)) continue;
+    Source source;
+    source.part = p;
+    if (rgb)
+      source.channels = {"R", "G", "B"};
+    else if (xyz)
+      source.channels = {"X", "Y", "Z"};
+    else
+      source.channels = {"Y"}, source.layout = {0, 0, 0};
+    if (wanted == Wanted::texture && list.findChannel("A")) {
+      source.layout.push_back(source.channels.size());
+      source.channels.push_back("A");
+    }
     for (const char* c : source.channels) {
       const Imf::Channel& channel = list[c];
       if (channel.xSampling != 1 || channel.ySampling != 1)
@@ -52,19 +79,87 @@ Result<Source> find_colour(const Imf::MultiPartInputFile& file, const std::strin
       "{}: no flat part with channels R, G, B or Y (deep and luminance/chroma images are not read)", name));
 }
 
+using ColourMatrix = std::array<double, 9>;  // row by row
+
+ColourMatrix matrix_product(const ColourMatrix& a, const ColourMatrix& b) {
+  ColourMatrix m{};
+  for (std::size_t r = 0; r < 3; ++r)
+    for (std::size_t c = 0; c < 3; ++c)
+      for (std::size_t k = 0; k < 3; ++k) m[3 * r + c] += a[3 * r + k] * b[3 * k + c];
+  return m;
+}
+
+// Returns the inverse by the adjugate; its entries are not finite if m cannot be inverted.
+ColourMatrix matrix_inverse(const ColourMatrix& m) {
+  const auto cofactor = [&](std::size_t r, std::size_t c) {
+    const std::size_t r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
+    return m[3 * r1 + c1] * m[3 * r2 + c2] - m[3 * r1 + c2] * m[3 * r2 + c1];
+  };
+  const double det = m[0] * cofactor(0, 0) + m[1] * cofactor(0, 1) + m[2] * cofactor(0, 2);
+  ColourMatrix out{};
+  for (std::size_t r = 0; r < 3; ++r)
+    for (std::size_t c = 0; c < 3; ++c) out[3 * r + c] = cofactor(c, r) / det;
+  return out;
+}
+
+// Returns the matrix from R, G, B of these primaries to CIE XYZ, in which white has Y = 1: the columns are
+// the XYZ of the primaries, scaled so that their sum is the white point (SMPTE RP 177-1993).
+ColourMatrix to_xyz(const Imf::Chromaticities& c) {
+  const auto xyz = [](const Imath::V2f& p) {
+    return std::array<double, 3>{p.x, p.y, 1 - double{p.x} - double{p.y}};
+  };
+  const std::array<double, 3> r = xyz(c.red), g = xyz(c.green), b = xyz(c.blue), w = xyz(c.white);
+  ColourMatrix m{r[0], g[0], b[0], r[1], g[1], b[1], r[2], g[2], b[2]};
+  const ColourMatrix back = matrix_inverse(m);
+  for (std::size_t k = 0; k < 3; ++k) {
+    double scale = 0;
+    for (std::size_t i = 0; i < 3; ++i) scale += back[3 * k + i] * w[i] / w[1];
+    for (std::size_t row = 0; row < 3; ++row) m[3 * row + k] *= scale;
+  }
+  return m;
+}
+
+bool is_rec709(const Imf::Chromaticities& c) {
+  // As in Mitsuba 3.9: primaries closer than this to those of Rec. 709 are the same, written with fewer
+  // digits.
+  constexpr float kSame = 1e-6f;
+  const Imf::Chromaticities rec709;
+  return (c.red - rec709.red).length2() + (c.green - rec709.green).length2() +
+             (c.blue - rec709.blue).length2() + (c.white - rec709.white).length2() <
+         kSame;
+}
+
+Result<std::optional<std::array<float, 9>>> srgb_matrix(const Imf::Header& header, const Source& source,
+                                                        const std::string& name) {
+  ColourMatrix m = matrix_inverse(to_xyz(Imf::Chromaticities()));
+  if (source.channels[0] != std::string_view("X")) {
+    if (source.channels[0] != std::string_view("R") || !Imf::hasChromaticities(header) ||
+        is_rec709(Imf::chromaticities(header)))
+      return std::nullopt;
+    m = matrix_product(m, to_xyz(Imf::chromaticities(header)));
+  }
+  std::array<float, 9> out{};
+  for (std::size_t i = 0; i < 9; ++i) out[i] = static_cast<float>(m[i]);
+  if (!std::ranges::all_of(out, [](float x) { return std::isfinite(x); }))
+    return bad_argument(fmt::format(
+        "{}: the `chromaticities` in its header are those of no colour space; write them anew", name));
+  return out;
+}
+
 FrameSize size_of(const Imath::Box2i& window) {
   return {window.max.x - window.min.x + 1, window.max.y - window.min.y + 1};
 }
 
 // The rows are read and appended in bands, so that a small file that claims a large size costs little memory.
-Result<RgbImage> read_part(Imf::MultiPartInputFile& file, const Source& source) {
+// Returns the channels of each pixel, in the order of source.layout.
+std::vector<float> read_part(Imf::MultiPartInputFile& file, const Source& source) {
   const Imath::Box2i window = file.header(source.part).dataWindow();
   const FrameSize size = size_of(window);
   Imf::InputPart part(file, source.part);
   constexpr int kBand = 64;
   const auto width = static_cast<std::size_t>(size.width);
   std::vector<std::vector<float>> planes(source.channels.size(), std::vector<float>(width * kBand));
-  RgbImage image{size, {}};
+  std::vector<float> values;
   for (int y0 = 0; y0 < size.height; y0 += kBand) {
     const int rows = std::min(kBand, size.height - y0);
     Imf::FrameBuffer buffer;
@@ -74,13 +169,14 @@ Result<RgbImage> read_part(Imf::MultiPartInputFile& file, const Source& source) 
                                      size.width, rows, sizeof(float), sizeof(float) * width));
     part.setFrameBuffer(buffer);
     part.readPixels(window.min.y + y0, window.min.y + y0 + rows - 1);
-    const std::size_t first = image.rgb.size(), count = width * static_cast<std::size_t>(rows);
-    image.rgb.resize(first + 3 * count);
+    const std::size_t first = values.size(), count = width * static_cast<std::size_t>(rows),
+                      channels = source.layout.size();
+    values.resize(first + channels * count);
     for (std::size_t i = 0; i < count; ++i)
-      for (std::size_t c = 0; c < 3; ++c)
-        image.rgb[first + 3 * i + c] = planes[planes.size() == 3 ? c : 0][i];
+      for (std::size_t c = 0; c < channels; ++c)
+        values[first + channels * i + c] = planes[source.layout[c]][i];
   }
-  return image;
+  return values;
 }
 
 constexpr const char* kErrors[3] = {"stderr.R", "stderr.G", "stderr.B"};
@@ -100,7 +196,7 @@ std::optional<Source> find_error(const Imf::MultiPartInputFile& file, const Sour
   const Imf::ChannelList& list = file.header(colour.part).channels();
   for (const char* c : kErrors)
     if (!channel_of(list, c, {Imf::HALF, Imf::FLOAT})) return std::nullopt;
-  return Source{colour.part, {std::begin(kErrors), std::end(kErrors)}};
+  return Source{colour.part, {std::begin(kErrors), std::end(kErrors)}, {0, 1, 2}};
 }
 
 std::map<std::string, std::string> strings_of(const Imf::Header& header) {
@@ -111,26 +207,31 @@ std::map<std::string, std::string> strings_of(const Imf::Header& header) {
   return out;
 }
 
-Result<RgbWithError> read_colour(std::span<const std::byte> bytes, const std::string& name,
-                                 const ExrLimits& limits, bool with_error) {
+// Opens a file, after its headers were checked, and calls f(file), which returns a Result<T>.
+template <class T, class F>
+Result<T> opened(std::span<const std::byte> bytes, const std::string& name, const ExrLimits& limits, F f) {
   if (bytes.size() > limits.max_bytes)
     return fail(Errc::resource_exhausted, fmt::format("{}: the file has {} bytes, more than the limit of {}",
                                                       name, bytes.size(), limits.max_bytes));
   return exr::guarded(
-      Errc::invalid_argument, fmt::format("{}: cannot read this EXR", name), [&]() -> Result<RgbWithError> {
+      Errc::invalid_argument, fmt::format("{}: cannot read this EXR", name), [&]() -> Result<T> {
         if (const auto ok = exr::check_headers(bytes, name, limits); !ok) return tl::unexpected(ok.error());
         exr::MemoryReader in(bytes, name);
         Imf::MultiPartInputFile file(in, /*numThreads=*/0, /*reconstructChunkOffsetTable=*/false);
-        const auto source = find_colour(file, name);
+        return f(file);
+      });
+}
+
+Result<RgbWithError> read_colour(std::span<const std::byte> bytes, const std::string& name,
+                                 const ExrLimits& limits, bool with_error) {
+  return opened<RgbWithError>(
+      bytes, name, limits, [&](Imf::MultiPartInputFile& file) -> Result<RgbWithError> {
+        const auto source = find_colour(file, name, Wanted::rgb);
         if (!source) return tl::unexpected(source.error());
-        auto image = read_part(file, *source);
-        if (!image) return tl::unexpected(image.error());
-        RgbWithError out{std::move(*image), {}, strings_of(file.header(source->part))};
-        const auto layers = with_error ? find_error(file, *source) : std::nullopt;
-        if (!layers) return out;
-        auto error = read_part(file, *layers);
-        if (!error) return tl::unexpected(error.error());
-        out.error = std::move(error->rgb);
+        const Imf::Header& header = file.header(source->part);
+        RgbWithError out{{size_of(header.dataWindow()), read_part(file, *source)}, {}, strings_of(header)};
+        if (const auto layers = with_error ? find_error(file, *source) : std::nullopt)
+          out.error = read_part(file, *layers);
         return out;
       });
 }
@@ -142,6 +243,19 @@ Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::strin
   auto read = read_colour(bytes, name, limits, false);
   if (!read) return tl::unexpected(read.error());
   return std::move(read->image);
+}
+
+Result<ExrImage> read_exr_image(std::span<const std::byte> bytes, const std::string& name,
+                                const ExrLimits& limits) {
+  return opened<ExrImage>(bytes, name, limits, [&](Imf::MultiPartInputFile& file) -> Result<ExrImage> {
+    const auto source = find_colour(file, name, Wanted::texture);
+    if (!source) return tl::unexpected(source.error());
+    const Imf::Header& header = file.header(source->part);
+    const auto to_srgb = srgb_matrix(header, *source, name);
+    if (!to_srgb) return tl::unexpected(to_srgb.error());
+    return ExrImage{size_of(header.dataWindow()), static_cast<std::uint32_t>(source->layout.size()),
+                    read_part(file, *source), *to_srgb};
+  });
 }
 
 Result<RgbWithError> read_exr_with_error(std::span<const std::byte> bytes, const std::string& name,

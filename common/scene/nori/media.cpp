@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "common/base/file_form.h"
 #include "common/scene/nori/object.h"
 #include "common/scene/xml/transform_element.h"
 #include "common/scene/xml/values.h"
@@ -81,7 +82,7 @@ std::optional<Element> grid(const Element* filename, const Element* order, std::
   set(out, "name", std::move(name), at);
   add_as(out, filename, "filename");
   add_as(out, order, "order");
-  if (!filename->get("value").ends_with(".vol")) return out;
+  if (!without_gz(filename->get("value")).ends_with(".vol")) return out;
   if (!mesh.low)
     return report.refuse(
         filename->at,

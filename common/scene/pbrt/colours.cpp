@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/base/file_form.h"
 #include "common/scene/pbrt/object_translation.h"
 #include "common/scene/xml/spectrum.h"
 #include "common/scene/xml/transform_element.h"
@@ -138,7 +139,7 @@ std::optional<SpectralCurve> curve_of(Translation& t, const Param& p) {
       return t.report.refuse(
           p.at, fmt::format("the spectrum \"{}\" is no name that is known here, and as a file: {}",
                             p.texts[0], text.error().message));
-    const auto read = numbers_in(*text);
+    const auto read = numbers_in(without_mark(*text));
     if (!read) return t.report.refuse(p.at, fmt::format("\"{}\" is no list of numbers", p.texts[0]));
     numbers = *read;
   }

@@ -8,6 +8,7 @@
 #include <map>
 #include <utility>
 
+#include "common/base/file_form.h"
 #include "common/base/frame_range.h"
 #include "common/base/parse_number.h"
 #include "common/base/suggest.h"
@@ -51,8 +52,7 @@ class Loader {
   }
 
   std::optional<std::uint32_t> opened(std::string name, std::string text, const Span* included_at) {
-    constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-    if (text.starts_with(kByteOrderMark)) text.erase(0, kByteOrderMark.size());
+    text.erase(0, text.size() - without_mark(text).size());
     total_bytes_ += text.size();
     const bool too_large = text.size() > kMaxTextBytes || total_bytes_ > kMaxTotalTextBytes;
     const std::uint32_t file =
@@ -64,8 +64,9 @@ class Loader {
                     fmt::format("scene text is limited to {} MiB a file and {} MiB with everything included",
                                 kMaxTextBytes >> 20, kMaxTotalTextBytes >> 20));
     else if (bad != std::string::npos)
-      report_.error({file, bad, 1},
-                    "this is no UTF-8 text: a pbrt file is text, and if its name ends in .gz unpack it");
+      report_.error({file, bad, 1}, fmt::format("this file {}", why_no_utf8(kept).empty()
+                                                                    ? "is no UTF-8 text, as a pbrt file is"
+                                                                    : why_no_utf8(kept)));
     else
       return file;
     return std::nullopt;

@@ -94,9 +94,6 @@ class ShapeTranslator {
       p_.missing("filename");
       return std::nullopt;
     }
-    if (file.ends_with(".gz"))
-      return p_.refuse(p_.at(),
-                       fmt::format("\"{}\" is packed: unpack it by gunzip, and name it without .gz", file));
     return ply(file);
   }
 

@@ -235,7 +235,7 @@ void add_shapes(std::vector<Row>& r) {
                      {"emissionfilename", "string", "", "it only steers sampling", kIgnored}} +
                    shape_words()});
   r.push_back({"Shape", "plymesh", true, "a `ply`",
-               Words{{"filename", "string", "needed", "the file; `.ply.gz` must be unpacked"},
+               Words{{"filename", "string", "needed", "the file, `.ply` or `.ply.gz`"},
                      {"displacement", "texture|string", "", "put it into the mesh", kRefused},
                      {"edgelength", "float", "1", "of displacement", kIgnored}} +
                    shape_words()});

@@ -1,6 +1,7 @@
 // Reads volumes, phase functions and media.
 #include <fmt/format.h>
 
+#include "common/base/file_form.h"
 #include "common/scene/reader/reader.h"
 #include "common/scene/xml/transform_element.h"
 
@@ -101,9 +102,8 @@ std::optional<VolumeIndex> Reader::read_volume(const Element& e) {
     GridVolume volume;
     bind(p, volume);
     if (const auto name = p.take_string("gridname")) volume.grid_name = *name;
-    const std::string_view file = volume.file.value < scene_.assets.size()
-                                      ? std::string_view(scene_.assets[volume.file.value].name)
-                                      : "";
+    const std::string_view file =
+        volume.file.value < scene_.assets.size() ? without_gz(scene_.assets[volume.file.value].name) : "";
     if (volume.order != GridOrder{} && !file.ends_with(".bin"))
       report_.error(e.at, "'order' is of .bin files; others say for themselves how their values lie");
     if (file.ends_with(".bin") && volume.wrap != Wrap::clamp)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "common/base/suggest.h"
 #include "common/scene/reader/reader.h"
@@ -13,6 +14,11 @@
 #include "common/scene/xml/values.h"
 
 namespace ls::scene {
+namespace {
+
+constexpr double kLeastAlpha = 1e-4;  // as of the renderer and of Mitsuba: kMinAlpha in microfacet.h
+
+}  // namespace
 
 Params::Params(Reader& reader, const Element& object) : reader_(reader), object_(object) {
   std::map<std::string_view, const Element*> names;
@@ -115,21 +121,14 @@ void Params::not_one_of(std::string_view name, const Element& e, const std::stri
                                                               given, suggestion(given, names)));
 }
 
-namespace {
-
-// The smallest roughness of microfacets, as in Mitsuba (MicrofacetDistribution), which takes 0 for it.
-constexpr double kSmallestAlpha = 1e-4;
-
-bool is_alpha(const Field& f) { return f.name == "alpha" || f.name == "alpha_u" || f.name == "alpha_v"; }
-
-}  // namespace
-
 bool Params::in_range(const Field& f, const Element& e, double x) {
   if (f.range.contains(x)) return true;
-  if (x == 0 && object_.tag == "bsdf" && is_alpha(f)) {
-    reader_.report().warning_once(value_place(e, "value"),
-                                  fmt::format("'{}' of {} is 0, which is read as {}, the smallest roughness",
-                                              f.name, title(), kSmallestAlpha));
+  // Many programs write 0 for a smooth surface. Mitsuba, too, reads it as its least roughness.
+  if (x == 0 && f.name.starts_with("alpha")) {
+    if (std::exchange(warned_of_, &e) != &e)
+      reader_.report().warning(value_place(e, "value"),
+                               fmt::format("'{}' of {} is 0, which is read as the least roughness, {}",
+                                           f.name, title(), kLeastAlpha));
     return true;
   }
   reader_.report().error(value_place(e, "value"), fmt::format("'{}' of {} is {}, out of its range {}", f.name,
@@ -172,7 +171,7 @@ void Params::convert(const Field& f, const Element& e, double& value) {
   if (!number)
     return wrong_type(f.name, e, f.named_ior ? "a <float> or the <string> name of a material" : "a <float>");
   if (!in_range(f, e, *number)) return;
-  value = f.range.contains(*number) ? *number : kSmallestAlpha;
+  value = f.range.contains(*number) ? *number : kLeastAlpha;
 }
 
 void Params::convert(const Field& f, const Element& e, int& value) {

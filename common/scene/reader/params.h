@@ -125,6 +125,7 @@ class Params {
   const Element& object_;
   std::vector<Child> children_;
   std::vector<std::string> known_;
+  const Element* warned_of_ = nullptr;  // the element whose roughness of 0 was told last
 };
 
 // Reads the fields of an object from its parameters. describe() (common/scene/schema) lists the fields of

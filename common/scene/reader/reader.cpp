@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/base/file_form.h"
 #include "common/base/frame_range.h"
 #include "common/base/suggest.h"
 #include "common/scene/analysis/shape_place.h"
@@ -250,18 +251,20 @@ ReadResult read_scene(std::string_view file_name, std::string_view text, AssetSo
                       const ReadOptions& options) {
   scene::Report report(options.strict);
   ReadResult result;
+  text = without_mark(text);
+  const std::string_view kind = without_gz(file_name);  // its ending tells the language
   // The Python package converts a USD stage to XML and sends the XML under the stage's name. So a text with a
   // <scene> is read even if its name has the ending of another format.
   const bool has_scene_element = text.substr(0, 4096).find("<scene") != text.npos;
-  if (std::string why = scene::why_no_scene(file_name); !why.empty() && !has_scene_element) {
+  if (std::string why = scene::why_no_scene(kind); !why.empty() && !has_scene_element) {
     const std::uint32_t file = report.add_file(scene::SourceText(std::string(file_name), ""));
     report.error({file, 0, 1}, std::move(why));
     result.diagnostics = report.take();
     return result;
   }
-  const auto load = scene::pbrt::is_pbrt(file_name)   ? scene::pbrt::load_document
-                    : scene::gltf::is_gltf(file_name) ? scene::gltf::load_document
-                                                      : scene::load_document;
+  const auto load = scene::pbrt::is_pbrt(kind)   ? scene::pbrt::load_document
+                    : scene::gltf::is_gltf(kind) ? scene::gltf::load_document
+                                                 : scene::load_document;
   auto document = load(file_name, text, assets, options, report);
   if (document && scene::nori::translate(*document, report)) {
     const Scene read = scene::Reader(*document, assets, report).read();

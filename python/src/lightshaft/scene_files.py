@@ -10,10 +10,13 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import itertools
 import os
 import pathlib
 import re
 import stat
+import unicodedata
+import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from typing import BinaryIO
 from xml.parsers import expat
@@ -25,6 +28,7 @@ MAX_INCLUDES, MAX_INCLUDE_DEPTH = 256, 15  # as the scene format allows
 MAX_FILES = 100_000
 MAX_FRAMES = 10_000
 MAX_ELEMENTS = 500_000  # as the scene format allows
+MAX_NAMES_LOOKED_AT = 4096  # in one folder
 MAX_NAME = 4096  # characters of a file's name
 MAX_VALUE = 64 << 10  # characters of an attribute after its parameters were put in
 READ_BYTES = 1 << 20
@@ -88,9 +92,57 @@ def read_scene(path: pathlib.Path) -> bytes:
         raise FileRefused(f"there is no file {path}") from None
     except OSError as error:
         raise FileRefused(f"{path} cannot be read: {error.strerror or error}") from None
+    text = unpacked(text, str(path))
     if len(text) > MAX_SCENE_BYTES:
         raise FileRefused(f"{path} is larger than the {MAX_SCENE_BYTES >> 20} MiB of a scene file")
     return text
+
+
+def written_otherwise(folder: pathlib.Path, name: str) -> pathlib.Path | None:
+    """The file `name` in `folder`, or the one that it means although none is called exactly so.
+
+    Such a name has backslashes between its folders, as on Windows, or its letters and accents are composed
+    otherwise than on this disk (macOS stores them apart). None: there is no such file, or there are several.
+    """
+    place = folder / name
+    if place.exists():
+        return place
+    place = folder
+    for part in pathlib.PurePosixPath(name.replace("\\", "/")).parts:
+        there = place / part
+        if not there.exists():
+            alike = [entry for entry in _names_in(place) if _composed(entry) == _composed(part)]
+            if len(alike) != 1:
+                return None
+            there = place / alike[0]
+        place = there
+    return place
+
+
+def _composed(name: str) -> str:
+    return unicodedata.normalize("NFC", name)
+
+
+def _names_in(folder: pathlib.Path) -> list[str]:
+    try:
+        with os.scandir(folder) as entries:
+            return [entry.name for entry in itertools.islice(entries, MAX_NAMES_LOOKED_AT)]
+    except OSError:
+        return []
+
+
+def unpacked(text: bytes, name: str) -> bytes:
+    """The text of a scene file that may be packed by gzip, at most one byte more than a scene may have."""
+    if not text.startswith(b"\x1f\x8b"):
+        return text
+    unpacker = zlib.decompressobj(wbits=31)  # 31: the largest window, in the format of gzip
+    try:
+        plain = unpacker.decompress(text, MAX_SCENE_BYTES + 1)
+    except zlib.error as error:
+        raise FileRefused(f"{name} is packed by gzip, and damaged: {error}") from None
+    if not unpacker.eof and len(plain) <= MAX_SCENE_BYTES:
+        raise FileRefused(f"{name} is packed by gzip, and cut short")
+    return plain
 
 
 class Folders:
@@ -130,7 +182,10 @@ class Folders:
     def _locate(self, place: str) -> pathlib.Path | None:
         if "\0" in place:
             return None
-        real = pathlib.Path(os.path.realpath(self._folder / place))
+        found = written_otherwise(self._folder, place)
+        if found is None:
+            return None
+        real = pathlib.Path(os.path.realpath(found))
         if not real.is_file():
             return None
         if not any(real.is_relative_to(root) for root in self._roots):
@@ -141,7 +196,9 @@ class Folders:
         return real
 
     def text(self, place: str) -> bytes | None:
-        return self.sources[place].read(0, MAX_SCENE_BYTES + 1) if self.find(place) else None
+        if not self.find(place):
+            return None
+        return unpacked(self.sources[place].read(0, MAX_SCENE_BYTES + 1), place)
 
 
 def join(folder: str, name: str) -> str:

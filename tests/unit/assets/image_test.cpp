@@ -165,6 +165,86 @@ TEST(Jpeg, RefusesTruncatedFilesInsteadOfPaddingThemAndSurvivesMutations) {
   test::survive_mutations(file, kJpeg, expect_sound);
 }
 
+std::string with_segment(const std::string& file, std::size_t at, const std::string& bytes) {
+  return file.substr(0, at) + bytes + file.substr(at);
+}
+
+TEST(Jpeg, WhatTheLibraryOnlyWarnsOfIsReadIfNoPixelIsLost) {
+  const std::string file = jpeg(32, 32, 3, 77);
+  const auto whole = decode_jpeg("a.jpg", bytes_of(file));
+  ASSERT_TRUE(whole);
+  std::string newer = file;
+  newer[newer.find("JFIF") + 5] = 2;  // the major number of its revision
+  const std::size_t scan = file.find("\xff\xda");
+  for (const std::string& odd :
+       {newer, with_segment(file, scan, "abc"), with_segment(file, file.size() - 2, "abc"), file + "rest",
+        file.substr(0, file.size() - 2)}) {
+    const auto read = decode_jpeg("a.jpg", bytes_of(odd));
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_TRUE(*read == *whole);
+  }
+}
+
+TEST(Jpeg, FourColoursAreNamed) {
+  jpeg_compress_struct c{};
+  jpeg_error_mgr errors;
+  c.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&c);
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&c, &bytes, &size);
+  c.image_width = c.image_height = 1;
+  c.input_components = 4;
+  c.in_color_space = JCS_CMYK;
+  jpeg_set_defaults(&c);
+  jpeg_start_compress(&c, TRUE);
+  std::uint8_t pixel[4] = {1, 2, 3, 4}, *row = pixel;
+  jpeg_write_scanlines(&c, &row, 1);
+  jpeg_finish_compress(&c);
+  const std::string file(reinterpret_cast<char*>(bytes), size);
+  jpeg_destroy_compress(&c);
+  std::free(bytes);
+
+  const auto read = decode_jpeg("a.jpg", bytes_of(file));
+
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().message, HasSubstr("CMYK"));
+}
+
+TEST(Exr, KeepsItsAlphaChannel) {
+  ExrPicture picture{{2, 1}, {}, {}};
+  for (const char* c : {"R", "G", "B"}) picture.channels[c] = ExrFloat{{.25f, .5f}};
+  picture.channels["A"] = ExrFloat{{0, 1}};
+  const auto file = write_exr(picture);
+  ASSERT_TRUE(file);
+
+  const auto i = decode_image("a.exr", *file);
+
+  ASSERT_TRUE(i) << i.error().message;
+  EXPECT_EQ(i->channels, 4u);
+  EXPECT_THAT(i->f32, ElementsAre(.25f, .25f, .25f, 0, .5f, .5f, .5f, 1));
+  EXPECT_FALSE(i->to_srgb);
+}
+
+TEST(Exr, XyzIsConverted) {
+  ExrPicture picture{{1, 1}, {}, {}};
+  picture.channels["X"] = ExrFloat{{.3127f / .3290f}};
+  picture.channels["Y"] = ExrFloat{{1}};
+  picture.channels["Z"] = ExrFloat{{(1 - .3127f - .3290f) / .3290f}};
+  const auto file = write_exr(picture);
+  ASSERT_TRUE(file);
+
+  const auto i = decode_image("a.exr", *file);
+
+  ASSERT_TRUE(i && i->to_srgb);
+  // It is the white of Rec. 709, which is 1, 1, 1 there. The entries of the matrix are rounded to 1e-7 of 3.
+  for (std::size_t row = 0; row < 3; ++row) {
+    float sum = 0;
+    for (std::size_t k = 0; k < 3; ++k) sum += (*i->to_srgb)[3 * row + k] * i->f32[k];
+    EXPECT_NEAR(sum, 1, 2e-6);
+  }
+}
+
 TEST(Exr, ReadsColourAsLinearFloats) {
   ExrPicture picture;
   picture.size = {2, 1};
@@ -194,6 +274,35 @@ TEST(Hdr, ReadsRunsAndPlainRows) {
   EXPECT_EQ(i->f32[2], .125f);
   EXPECT_EQ(i->f32[24], .5f);  // the second row
   EXPECT_EQ(i->f32[26], .125f);
+}
+
+TEST(Hdr, HeadersOfOtherProgramsAreRead) {
+  const std::string pixels(std::size_t{4} * 4, '\x80');
+  for (const std::string& header : {"#?RADIANCE\r\nFORMAT=32-bit_rle_rgbe\r\n\r\n-Y 2 +X 2\n",
+                                    "#?RADIANCE\nFORMAT=32-bit_rle_rgbe \n\n-Y 2 +X 2\n",
+                                    "#?AUTOPANO\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 2\n"}) {
+    const auto i = decode_image("a.hdr", bytes_of(header + pixels));
+    ASSERT_TRUE(i) << i.error().message;
+    EXPECT_THAT(i->f32, Each(.5f));  // 128 x 2^(128 - 136)
+    EXPECT_FALSE(i->to_srgb);
+  }
+  const auto xyze =
+      decode_image("a.hdr", bytes_of("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 2 +X 2\n" + pixels));
+  ASSERT_TRUE(xyze) << xyze.error().message;
+  EXPECT_TRUE(xyze->to_srgb);
+}
+
+// Two rows of 4 pixels: a pixel and its repetition by three, by the exponent of a pixel of three ones; and
+// four pixels as they are.
+TEST(Hdr, TheOlderRunsAreRead) {
+  const std::string file = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n" +
+                           std::string("\x80\x40\x20\x80\1\1\1\3", 8) + std::string(16, '\x80');
+
+  const auto i = decode_image("a.hdr", bytes_of(file));
+
+  ASSERT_TRUE(i) << i.error().message;
+  for (std::size_t x = 0; x < 4; ++x) EXPECT_EQ(i->f32[3 * x + 1], .25f) << x;
+  EXPECT_EQ(i->f32[12], .5f);
 }
 
 TEST(Hdr, NeverAcceptsATruncatedFileAndSurvivesMutations) {

@@ -99,7 +99,7 @@ TEST(Obj, ErrorsNameFileAndLine) {
               HasSubstr("'m.obj', line 2: index 2 in '2' is out of range: 1 so far"));
   EXPECT_THAT(obj_error("v 0 0 zero\n"), HasSubstr("line 1: expected 3 numbers, found 'zero'"));
   EXPECT_THAT(obj_error("v 0 0 0\nf 0 1 1\n"), HasSubstr("line 2"));
-  EXPECT_THAT(obj_error("v 0 0 0\nf 1 1\n"), HasSubstr("at least three corners"));
+  EXPECT_THAT(obj_error("v 0 0 0\nf\n"), HasSubstr("at least three corners"));
   EXPECT_THAT(obj_error("v 0 0 0\nf 1/x 1 1\n"), HasSubstr("no corner of a face"));
   EXPECT_THAT(obj_error("\nfrobnicate\n"), HasSubstr("line 2: unknown statement 'frobnicate'"));
   EXPECT_THAT(obj_error(""), HasSubstr("has no faces"));
@@ -376,6 +376,143 @@ TEST(Serialized, SurvivesTruncationAndMutation) {
   test::survive_mutations(file, decode_second, [](const MeshData& m) {
     for (const std::uint32_t i : m.indices) EXPECT_LT(i, m.vertex_count());
   });
+}
+
+TEST(Obj, AStatementGoesOnAfterABackslash) {
+  const std::string joined = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+  const auto plain = decode_obj("m.obj", bytes_of(joined));
+  ASSERT_TRUE(plain);
+  for (const std::string& text :
+       {std::string("v 0 0 0\nv 1 \\\n0 0\nv 1 1 0\nv 0 1 0\nf 1 2 \\\n  3 \\\n4\n"),
+        std::string("v 0 0 0\r\nv 1 \\\r\n0 0\r\nv 1 1 0\r\nv 0 1 0\r\nf 1 2 \\\r\n3 4\r\n")}) {
+    const auto m = decode_obj("m.obj", bytes_of(text));
+    ASSERT_TRUE(m) << m.error().message;
+    EXPECT_EQ(m->positions, plain->positions);
+    EXPECT_EQ(m->indices, plain->indices);
+  }
+  // A name may end in a backslash; the line after it is a statement of its own.
+  EXPECT_TRUE(decode_obj("m.obj", bytes_of("# a comment \\\nusemtl wood\\\n" + joined)));
+}
+
+TEST(Obj, FacesOfOneOrTwoCornersAreLeftOut) {
+  const auto m = decode_obj("m.obj", bytes_of("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1\nf 1 2\nf 1 2 3\n"));
+
+  ASSERT_TRUE(m) << m.error().message;
+  EXPECT_EQ(m->triangle_count(), 1u);
+  // Where the line has no end, the rest of the face may be missing.
+  EXPECT_THAT(obj_error("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\nf 1 2"), HasSubstr("at least three corners"));
+}
+
+TEST(Obj, LinesMayEndInCarriageReturnsAndTheTextBeginWithAMark) {
+  const auto m = decode_obj("m.obj", bytes_of("\xef\xbb\xbf# old\rv 0 0 0\rv 1 0 0\rv 1 1 0\rf 1 2 3\r"));
+
+  ASSERT_TRUE(m) << m.error().message;
+  EXPECT_EQ(m->triangle_count(), 1u);
+  EXPECT_THAT(obj_error(std::string("\xff\xfev\0 \0", 6)), HasSubstr("'m.obj': is text in UTF-16"));
+  EXPECT_THAT(obj_error(std::string("v\0 \0000\0", 6)), HasSubstr("UTF-16"));
+}
+
+// ---- PLY files of other programs ----
+
+const std::string kPlyVertices = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+std::string header_of(const std::string& faces, bool faces_first = false, int count = 4) {
+  const std::string vertices =
+      "element vertex " + std::to_string(count) + "\nproperty float x\nproperty float y\nproperty float z\n";
+  return "ply\nformat ascii 1.0\n" + (faces_first ? faces + vertices : vertices + faces) + "end_header\n";
+}
+Result<MeshData> ply_of(const std::string& text) { return decode_ply("m.ply", bytes_of(text)); }
+
+TEST(Ply, TriangleStripsTurnEveryOtherTriangleAndEndAtMinusOne) {
+  const auto m = ply_of(header_of("element tristrips 1\nproperty list int int vertex_indices\n") +
+                        kPlyVertices + "8 0 1 3 2 -1 0 2 3\n");
+
+  ASSERT_TRUE(m) << m.error().message;
+  // 0 1 3, then 1 3 2 turned round; both face +z, as does the triangle of the second strip.
+  EXPECT_THAT(m->indices, ElementsAre(0, 1, 3, 3, 1, 2, 0, 2, 3));
+  const auto wrong = ply_of(header_of("element tristrips 1\nproperty list int int vertex_indices\n") +
+                            kPlyVertices + "3 0 1 9\n");
+  ASSERT_FALSE(wrong);
+  EXPECT_THAT(wrong.error().message, HasSubstr("tristrips 0 names vertex 9 of 4"));
+}
+
+TEST(Ply, FacesMayStandBeforeTheirVertices) {
+  const auto m = ply_of(header_of("element face 1\nproperty list uchar int vertex_indices\n", true) +
+                        "4 0 1 2 3\n" + kPlyVertices);
+
+  ASSERT_TRUE(m) << m.error().message;
+  EXPECT_THAT(m->indices, ElementsAre(0, 1, 2, 0, 2, 3));
+}
+
+TEST(Ply, TextureCoordinatesOfCornersSplitVertices) {
+  const auto m = ply_of(header_of("element face 2\nproperty list uchar int vertex_indices\n"
+                                  "property list uchar float texcoord\nproperty int texnumber\n") +
+                        kPlyVertices + "3 0 1 2 6 0 0 .5 0 .5 1 0\n3 0 2 3 6 .25 0 .5 1 0 1 0\n");
+
+  ASSERT_TRUE(m) << m.error().message;
+  ASSERT_EQ(m->vertex_count(), 5u);  // vertex 0 has two pairs of coordinates, vertex 2 the same twice
+  EXPECT_THAT(m->indices, ElementsAre(0, 1, 2, 4, 2, 3));
+  EXPECT_THAT(m->uvs, ElementsAre(0, 0, .5f, 0, .5f, 1, 0, 1, .25f, 0));
+  EXPECT_THAT(std::vector(m->positions.begin() + 12, m->positions.end()), ElementsAre(0, 0, 0));
+  const auto odd = ply_of(header_of("element face 1\nproperty list uchar int vertex_indices\n"
+                                    "property list uchar float texcoord\n") +
+                          kPlyVertices + "3 0 1 2 5 0 0 .5 0 .5\n");
+  ASSERT_FALSE(odd);
+  EXPECT_THAT(odd.error().message, HasSubstr("face 0 of 3 corners has 5 numbers"));
+}
+
+TEST(Ply, SplitVerticesKeepTheirNormalsAndAttributes) {
+  const std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "property float nx\nproperty float ny\nproperty float nz\nproperty float heat_x\n"
+      "element face 2\nproperty list uchar float texcoord\nproperty list uchar int "
+      "vertex_indices\nend_header\n"
+      "0 0 0 0 0 1 7\n1 0 0 0 1 0 8\n0 1 0 1 0 0 9\n6 0 0 1 0 0 1 3 0 1 2\n6 .5 0 1 0 0 1 3 0 1 2\n";
+  const std::vector<std::string> wanted{"vertex_heat"};
+
+  const auto m = decode_ply("m.ply", bytes_of(text), wanted);
+
+  ASSERT_TRUE(m) << m.error().message;
+  ASSERT_EQ(m->vertex_count(), 4u);
+  EXPECT_THAT(std::vector(m->normals.begin() + 9, m->normals.end()), ElementsAre(0, 0, 1));
+  ASSERT_EQ(m->attributes.size(), 1u);
+  EXPECT_THAT(m->attributes[0].values, ElementsAre(7, 8, 9, 7));
+}
+
+TEST(Ply, MayBeginWithAMarkAndHaveCarriageReturnsInItsHeader) {
+  const std::string text =
+      header_of("element face 1\nproperty list uchar int vertex_indices\n") + kPlyVertices + "4 0 1 2 3\n";
+  std::string old = text;
+  std::replace(old.begin(), old.end(), '\n', '\r');
+  std::string joined = text;
+  joined.insert(text.find("end_header\n") + 11, "\xef\xbb\xbf");
+  for (const std::string& file : {"\xef\xbb\xbf" + text, joined, old}) {
+    const auto m = ply_of(file);
+    ASSERT_TRUE(m) << m.error().message;
+    EXPECT_EQ(m->triangle_count(), 2u);
+  }
+}
+
+TEST(Ply, NoDamageOfStripsAndCornersDoesHarm) {
+  for (const std::string& file :
+       {header_of("element tristrips 1\nproperty list int int vertex_indices\n", true) +
+            "8 0 1 3 2 -1 0 2 3\n" + kPlyVertices,
+        header_of(
+            "element face 2\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\n") +
+            kPlyVertices + "3 0 1 2 6 0 0 .5 0 .5 1\n3 0 2 3 6 .25 0 .5 1 0 1\n"})
+    test::survive_mutations(
+        file, [](std::string_view name, std::span<const std::byte> bytes) { return decode_ply(name, bytes); },
+        expect_sound_mesh);
+}
+
+TEST(Serialized, AChangedByteIsFoundByItsChecksum) {
+  const std::string file = file_of({mesh()});
+  for (std::size_t at = 4; at < mesh().size(); ++at) {
+    std::string changed = file;
+    changed[at] = static_cast<char>(changed[at] ^ 0x11);
+    const auto m = decode_mesh(changed), whole = decode_mesh(file);
+    ASSERT_TRUE(whole);
+    EXPECT_TRUE(!m || (m->positions == whole->positions && m->indices == whole->indices)) << at;
+  }
 }
 
 TEST(Obj, MakesAFanOfAPolygonOfAnyNumberOfSides) {

@@ -163,5 +163,39 @@ TEST(BumpMap, StandsInOtherMaps) {
   EXPECT_NEAR(e.f_cos.x, inner.f_cos.x, 1e-5 * inner.f_cos.x);
 }
 
+// Only differences of heights count, so that a map may be shifted below 0.
+TEST(BumpMap, HeightsBelowZeroAreHeights) {
+  ImageData low = ramp(8, 8, .5f, -.25f);
+  for (float& h : low.f32) h -= 1.25f;
+  const Bumped above(diffuse({.5, .5, .5}), ramp(8, 8, .5f, -.25f)), below(diffuse({.5, .5, .5}), low);
+  ASSERT_EQ(below.textures.clamped_texels(), 0u);
+  for (const V2 uv : {V2(.2f, .3f), V2(.5f, .5f), V2(.7f, .4f)}) {
+    const V2 a = above.textures.slope(above.image, uv), b = below.textures.slope(below.image, uv);
+    // A height of up to 2 is rounded to 1.2e-7, and a slope is a difference of two times 8 texels.
+    EXPECT_NEAR(a.x, b.x, 4e-6);
+    EXPECT_NEAR(a.y, b.y, 4e-6);
+  }
+}
+
+// One image as colour and as heights: as a colour it is not negative.
+TEST(BumpMap, AnImageMayBeColourToo) {
+  Scene s = diffuse({.5, .5, .5});
+  s.assets.push_back({"heights.exr", {}, 0});
+  s.textures.emplace_back(BitmapTexture{.file = {0}});
+  const TextureIndex image{static_cast<std::uint32_t>(s.textures.size() - 1)};
+  const BsdfIndex coloured = add(s, DiffuseBsdf{image});
+  add(s, BumpMapBsdf{image, 1, coloured});
+  ImageData low = ramp(8, 8, .5f, 0);
+  for (float& h : low.f32) h -= 1.25f;
+
+  const auto textures = TextureTable::build(s, [&](const Asset&) -> Result<ImageData> { return low; });
+
+  ASSERT_TRUE(textures) << textures.error().message;
+  EXPECT_EQ(textures->eval(image, {.1f, .5f}).x, 0);
+  // At u = .1 all heights are below 0.
+  EXPECT_NEAR(textures->slope(image, {.1f, .5f}).x, .5, 4e-6);
+  EXPECT_GT(textures->clamped_texels(), 0u);
+}
+
 }  // namespace
 }  // namespace ls::render::test

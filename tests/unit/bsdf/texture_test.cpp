@@ -254,6 +254,42 @@ TEST(Bitmap, AnOpacityIsTheAlphaChannelIfThatMasks) {
   EXPECT_EQ(plain.eval({0}, right), C3(.5f));
 }
 
+// The image of one texel (.25, .5, .25) whose primaries are those of Rec. 2020, with the matrix to linear
+// sRGB.
+ImageData wide_colour() {
+  ImageData image{1, 1, 3, {}, {.25f, .5f, .25f}, false};
+  // ITU-R BT.2087-0, the inverse of the matrix of its annex
+  image.to_srgb = {1.660491f, -.587641f, -.072850f, -.124550f, 1.132900f,
+                   -.008349f, -.018151f, -.100579f, 1.118730f};
+  return image;
+}
+
+// The values are those of Mitsuba 3.9.1 for an EXR of these numbers and primaries, with `raw` and without.
+TEST(Bitmap, ColoursOfOtherPrimariesBecomeLinearSrgb) {
+  for (const bool raw : {false, true}) {
+    Scene s = with(BitmapTexture{.file = {0}, .raw = raw});
+    s.bsdfs.emplace_back(DiffuseBsdf{{0}});
+
+    const C3 c = table(s, wide_colour()).eval({0}, {.5f, .5f});
+
+    EXPECT_NEAR(c.x, .10309f, 1e-5f);
+    EXPECT_NEAR(c.y, .533225f, 1e-5f);
+    EXPECT_NEAR(c.z, .224855f, 1e-5f);
+  }
+}
+
+TEST(Bitmap, NumbersAndNormalsAreNoColoursToConvert) {
+  Scene normals = with(BitmapTexture{.file = {0}});
+  normals.textures.push_back(ConstantTexture{{.5, .5, .5}});
+  normals.bsdfs.emplace_back(DiffuseBsdf{{1}});
+  normals.bsdfs.emplace_back(NormalMapBsdf{{0}, {0}});
+  EXPECT_EQ(table(normals, wide_colour()).eval({0}, {.5f, .5f}), C3(.25f, .5f, .25f));
+
+  Scene opacity = with(BitmapTexture{.file = {0}, .channel = Channel::green});
+  opacity.bsdfs.emplace_back(DiffuseBsdf{{0}});
+  EXPECT_EQ(table(opacity, wide_colour()).eval({0}, {.5f, .5f}), C3(.5f));
+}
+
 TEST(Bitmap, GivesOneChannelAsANumber) {
   const ImageData codes{1, 1, 4, {51, 102, 153, 204}, {}, true};
   const std::pair<Channel, float> channels[] = {

@@ -1,4 +1,4 @@
-// The names of scene files, and the files of a scene on disk.
+// The names of scene files, the files of a scene on disk, and scene files that were cut short.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -8,6 +8,7 @@
 
 #include "common/scene/file_names.h"
 #include "common/scene/folder_assets.h"
+#include "tests/unit/scene/pbrt/pbrt_testing.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -94,10 +95,118 @@ TEST_F(Folder, AMissingFileIsToldWithNamesLikeIt) {
   EXPECT_THAT(assets_.find("nowhere/cloud.vol").error().message, HasSubstr("its folder does not exist"));
 }
 
+TEST_F(Folder, ANameMayHaveBackslashesBetweenFolders) {
+  EXPECT_EQ(assets_.text("sub\\base.xml").value(), "<scene/>");
+  EXPECT_EQ(assets_.find(".\\cloud.vol")->digest, sha256("volume"));
+  EXPECT_THAT(assets_.find("sub\\bse.xml").error().message,
+              HasSubstr("did you mean 'base.xml'?; write / between folders, not \\"));
+  write("a\\b.vol", "of this very name");
+  EXPECT_EQ(assets_.find("a\\b.vol")->digest, sha256("of this very name"));
+}
+
+// macOS stores letters and their accents apart.
+TEST_F(Folder, ALetterAndItsAccentMayBeWrittenApart) {
+  fs::create_directories(path_ / "man\u0303ana");
+  write("man\u0303ana/e\u0301te\u0301.vol", "apart");
+  write("\u00e9t\u00e9.vol", "composed");
+
+  EXPECT_EQ(assets_.find("ma\u00f1ana/\u00e9t\u00e9.vol")->digest, sha256("apart"));
+  EXPECT_EQ(assets_.find("e\u0301te\u0301.vol")->digest, sha256("composed"));
+  EXPECT_FALSE(assets_.find("e\u0300te\u0301.vol"));  // another accent
+}
+
+TEST_F(Folder, ALinkToNothingIsToldAsThat) {
+  fs::create_symlink("gone.vol", path_ / "link.vol");
+
+  EXPECT_EQ(assets_.find("link.vol").error().message,
+            "\"link.vol\" is a link to \"gone.vol\", where there is no file");
+}
+
+TEST_F(Folder, APointerOfGitLfsIsToldAsThat) {
+  write("mesh.ply", "version https://git-lfs.github.com/spec/v1\noid sha256:12\nsize 3\n");
+
+  EXPECT_THAT(assets_.find("mesh.ply").error().message, HasSubstr("\"mesh.ply\" is a pointer of Git LFS"));
+  EXPECT_THAT(assets_.text("mesh.ply").error().message, HasSubstr("git lfs pull"));
+}
+
+TEST_F(Folder, TextPackedByGzipIsUnpackedButKeepsItsDigest) {
+  // `printf '<scene/>' | gzip -n`
+  const std::string packed(
+      "\x1f\x8b\x08\x00\x00\x00\x00\x00\x00\x03\xb3\x29\x4e\x4e\xcd\x4b\xd5\xb7\x03"
+      "\x00\x19\x7a\xea\xf3\x08\x00\x00\x00",
+      28);
+  write("more.xml.gz", packed);
+
+  EXPECT_EQ(assets_.text("more.xml.gz").value(), "<scene/>");
+  EXPECT_EQ(assets_.find("more.xml.gz")->digest, sha256(packed));
+  write("cut.xml.gz", packed.substr(0, 20));
+  EXPECT_THAT(assets_.text("cut.xml.gz").error().message,
+              HasSubstr("'cut.xml.gz': is packed by gzip, and damaged"));
+}
+
+TEST_F(Folder, ATextFileWithoutALineEndIsDoubtful) {
+  write("whole.obj", "v 0 0 0\nf 1 1 1\n");
+  write("cut.obj", "v 0 0 0\nf 1 1 1");
+  write("cut.ply", "ply\nformat ascii 1.0\nelement");
+  write("binary.ply", "ply\nformat binary_little_endian 1.0\n...x");
+  for (const char* name : {"whole.obj", "cut.obj", "cut.ply", "binary.ply", "cloud.vol"})
+    ASSERT_TRUE(assets_.find(name));
+
+  const auto doubts = assets_.take_doubts();
+
+  ASSERT_EQ(doubts.size(), 2u);
+  EXPECT_THAT(doubts.find("cut.obj")->second, HasSubstr("ends within a line"));
+  EXPECT_TRUE(doubts.contains("cut.ply"));
+  EXPECT_TRUE(assets_.take_doubts().empty());
+}
+
 TEST_F(Folder, AFolderIsNoFile) {
   EXPECT_EQ(assets_.find("sub").error().code, Errc::invalid_argument);
   EXPECT_EQ(assets_.text("sub").error().code, Errc::invalid_argument);
   EXPECT_EQ(assets_.find("").error().code, Errc::invalid_argument);
+}
+
+// ---- scene files that were cut short ----
+
+constexpr std::size_t kTries = 200;
+
+// Reads the file cut at kTries places. Returns at how many of them it was read although it ended within a
+// line or became another scene; a cut that only loses blanks at the end loses nothing.
+std::size_t unnoticed(std::string_view name, const std::string& whole, const KeepingAssets& files) {
+  KeepingAssets assets = files;
+  const ReadResult right = read_scene(name, whole, assets);
+  EXPECT_TRUE(right.scene) << messages(right);
+  if (!right.scene) return kTries;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < kTries; ++i) {
+    KeepingAssets again = files;
+    const ReadResult r = read_scene(name, whole.substr(0, whole.size() * i / kTries), again);
+    if (!r.scene) {
+      EXPECT_FALSE(r.diagnostics.empty());
+    } else {
+      count += digest_of(*r.scene) != digest_of(*right.scene);
+    }
+  }
+  return count;
+}
+
+TEST(DamagedScenes, XmlThatWasCutIsRefused) { EXPECT_EQ(unnoticed("a.xml", kExample, {}), 0u); }
+
+// Within a directive a cut is found; between two of them nothing tells that more should follow.
+TEST(DamagedScenes, PbrtThatWasCutIsRefusedUnlessADirectiveEndsThere) {
+  std::string world;
+  for (int i = 0; i < 20; ++i)
+    world += fmt::format("AttributeBegin\n  Shape \"sphere\" \"float radius\" {}\nAttributeEnd\n", i + 1);
+  const std::string whole = pbrt_scene(world);
+  const std::size_t first = whole.find("WorldBegin");
+  for (std::size_t at = first; at < whole.size(); ++at) {
+    const ReadResult r = read_pbrt(whole.substr(0, at));
+    if (!r.scene) continue;
+    const std::string before = whole.substr(0, at);
+    const bool between =
+        before.ends_with("\n") || before.ends_with("WorldBegin") || before.ends_with("AttributeEnd");
+    EXPECT_TRUE(between) << before.substr(before.rfind('\n') + 1);
+  }
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "common/assets/grid_files.h"
+#include "common/base/file_form.h"
 #include "common/base/overloaded.h"
 #include "worker/render/base/build_stop.h"
 #include "worker/render/media/vdb_process.h"
@@ -13,8 +14,10 @@
 namespace ls::render {
 namespace {
 
-bool is_vdb(std::string_view name) { return name.ends_with(".vdb") || name.ends_with(".nvdb"); }
-bool is_raw(std::string_view name) { return name.ends_with(".bin"); }
+bool is_vdb(std::string_view name) {
+  return without_gz(name).ends_with(".vdb") || without_gz(name).ends_with(".nvdb");
+}
+bool is_raw(std::string_view name) { return without_gz(name).ends_with(".bin"); }
 
 // Returns the map from world to index coordinates for a given map from scene to index coordinates.
 Affine from_world(const Affine& scene_to_index, V3d center, double scale) {

@@ -108,7 +108,16 @@ bool has_alpha(const ImageData& image) {
   return transparent(image.u8, std::uint8_t{128}) || transparent(image.f32, .5f);
 }
 
-Result<void> check_texels(std::string_view name, Texels& t) {
+// Replaces the colours of t, which has three channels of floats, by those of linear sRGB.
+void convert(Texels& t, const std::array<float, 9>& m) {
+  for (std::size_t i = 0; i + 2 < t.f32.size(); i += 3) {
+    const float r = t.f32[i], g = t.f32[i + 1], b = t.f32[i + 2];
+    for (std::size_t k = 0; k < 3; ++k) t.f32[i + k] = m[3 * k] * r + m[3 * k + 1] * g + m[3 * k + 2] * b;
+  }
+}
+
+// Fails if a texel is not finite. Unless `signed_values`, negative values become 0 and are counted.
+Result<void> check_texels(std::string_view name, Texels& t, bool signed_values) {
   for (std::size_t i = 0; i < t.f32.size(); ++i) {
     float& v = t.f32[i];
     if (!std::isfinite(v)) {
@@ -118,7 +127,7 @@ Result<void> check_texels(std::string_view name, Texels& t) {
           fmt::format("texture '{}': the texel at x {}, y {} (from the top left) is {}; repair the image",
                       name, p % t.width, p / t.width, std::isnan(v) ? "not a number" : "infinite"));
     }
-    if (v < 0) {
+    if (v < 0 && !signed_values) {
       v = 0;
       ++t.clamped;
     }
@@ -149,7 +158,8 @@ V2 Texels::slope(const V2& uv, Wrap wrap) const {
           down * static_cast<float>(height) * fold_slope(uv.y, wrap)};
 }
 
-Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, bool alpha, Channel channel) {
+Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, bool alpha, Channel channel,
+                           Content content) {
   const std::uint64_t values = std::uint64_t{image.width} * image.height * image.channels;
   if (values == 0 || image.channels > 4 || (image.u8.empty() ? image.f32.size() : image.u8.size()) != values)
     return fail(Errc::invalid_argument, fmt::format("texture '{}' has no pixels", name));
@@ -170,7 +180,8 @@ Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, boo
   t.f32 = std::move(image.f32);
   drop_channels(t.u8, image.channels, first, keep);
   drop_channels(t.f32, image.channels, first, keep);
-  if (auto ok = check_texels(name, t); !ok) return tl::unexpected(ok.error());
+  if (image.to_srgb && t.channels == 3 && content == Content::colours) convert(t, *image.to_srgb);
+  if (auto ok = check_texels(name, t, content == Content::heights); !ok) return tl::unexpected(ok.error());
   if (decode)
     for (float& v : t.f32) v = static_cast<float>(srgb_to_linear(v));
   t.mean = mean_of(t);

@@ -16,6 +16,10 @@ namespace ls::render {
 // Decodes an sRGB component (IEC 61966-2-1); exactly 0 at 0 and 1 at 1.
 double srgb_to_linear(double v);
 
+// What an image's values are. Colours are converted to linear sRGB and are not negative. Numbers are not
+// negative either, but no conversion of colours changes them. Heights may have any sign.
+enum class Content : std::uint8_t { colours, numbers, heights };
+
 struct Texels {
   std::uint32_t width = 0, height = 0, channels = 3;  // 1 channel (grey) or 3 (RGB)
   std::vector<std::uint8_t> u8;                       // either u8 or f32 holds the texels; the other is empty
@@ -40,10 +44,12 @@ struct Texels {
 };
 
 // Makes texels of `image`; `name` is for messages. Drops the alpha channel, decodes sRGB unless `raw` is set,
-// and fails on NaN and infinity with a message that names the texel. If `alpha` is set and the image has an
-// alpha channel that is below 1/2 somewhere, that channel is kept and the colour dropped. If `channel`
-// selects one channel, only that one is kept, and it is not decoded; a missing alpha channel is 1 everywhere.
+// converts other colours by ImageData::to_srgb (whatever `raw` says, as Mitsuba does), and fails on NaN and
+// infinity with a message that names the texel. Negative values become 0 unless they are heights. If `alpha`
+// is set and the image has an alpha channel that is below 1/2 somewhere, that channel is kept and the colour
+// dropped. If `channel` selects one channel, only that one is kept, and it is not decoded; a missing alpha
+// channel is 1 everywhere.
 Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, bool alpha = false,
-                           Channel channel = Channel::all);
+                           Channel channel = Channel::all, Content content = Content::colours);
 
 }  // namespace ls::render

@@ -13,6 +13,7 @@
 
 #include "common/base/overloaded.h"
 #include "common/scene/limits.h"
+#include "common/scene/schema/texture_uses.h"
 #include "worker/render/texture/texels.h"
 
 namespace ls::render {
@@ -45,7 +46,8 @@ struct Entry {
   Wrap wrap = Wrap::repeat;
   // Indices whose meaning depends on the kind. A bitmap: `first` is the index of its texels. A checkerboard
   // or a product: the indices of its two textures. A peak or a hue: `first` is the index of its texture. A
-  // mesh attribute: `first` is the number of its name.
+  // mesh attribute: `first` is the number of its name. If a bump map reads a bitmap, `second` is the index of
+  // the texels of its heights.
   std::uint32_t first = 0, second = 0;
   C3 value{0, 0, 0};  // the value of a constant; for other textures the mean
   UvAffine to_uv;
@@ -63,38 +65,74 @@ struct TextureTable::Data {
 
 namespace {
 
-// Makes the texels of bitmaps. Bitmaps that read a file in the same way (raw, alpha, channel) share their
-// texels. A file is decoded once, even if bitmaps read it in several ways; the decoded image is freed after
-// it was read in the last of these ways.
+// Makes the texels of bitmaps. Bitmaps that read a file in the same way (Way) share their texels. A file is
+// decoded once, even if bitmaps read it in several ways; the decoded image is freed after it was read in the
+// last of these ways.
 class TexelsLoader {
  public:
   TexelsLoader(const Scene& scene, const ImageLoader& load, TextureTable::Data& data)
-      : scene_(scene), load_(load), data_(data) {
-    std::set<Key> keys;
-    for (const Texture& t : scene.textures)
-      if (const auto* b = std::get_if<BitmapTexture>(&t))
-        if (keys.insert(key_of(*b)).second) ++left_[b->file.value];
+      : scene_(scene), load_(load), data_(data), uses_(scene::texture_uses(scene)) {
+    std::set<Way> ways;
+    for (std::size_t i = 0; i < scene.textures.size(); ++i)
+      if (const auto* b = std::get_if<BitmapTexture>(&scene.textures[i]))
+        for (const Content content : contents_of(i))
+          if (ways.insert(way_of(*b, content)).second) ++left_[b->file.value];
   }
 
-  Result<std::uint32_t> texels_of(const BitmapTexture& b) {
+  // Returns the indices of the texels of texture i, the bitmap b: those that lookups read, and those that
+  // slopes are taken of.
+  Result<std::array<std::uint32_t, 2>> texels_of(std::size_t i, const BitmapTexture& b) {
     if (b.file.value >= scene_.assets.size())
       return fail(Errc::invalid_argument,
                   fmt::format("a bitmap names file {} of {}", b.file.value, scene_.assets.size()));
-    if (const auto it = made_.find(key_of(b)); it != made_.end()) return it->second;
-    const Asset& asset = scene_.assets[b.file.value];
-    auto image = image_of(b.file.value, asset);
-    if (!image) return tl::unexpected(image.error());
-    auto texels = make_texels(asset.name, std::move(*image), b.raw, b.alpha, b.channel);
-    if (!texels) return tl::unexpected(texels.error());
-    data_.clamped += texels->clamped;
-    data_.texels.push_back(std::move(*texels));
-    return made_[key_of(b)] = static_cast<std::uint32_t>(data_.texels.size() - 1);
+    std::array<std::uint32_t, 2> indices{};
+    const std::vector<Content> contents = contents_of(i);
+    for (std::size_t k = 0; k < contents.size(); ++k) {
+      const auto made = made_of(b, contents[k]);
+      if (!made) return tl::unexpected(made.error());
+      indices[k] = *made;
+    }
+    if (contents.size() == 1) indices[1] = indices[0];
+    return indices;
   }
 
  private:
-  // Index of the asset, then raw, alpha and channel of the bitmap
-  using Key = std::tuple<std::uint32_t, bool, bool, Channel>;
-  static Key key_of(const BitmapTexture& b) { return {b.file.value, b.raw, b.alpha, b.channel}; }
+  // Index of the asset, then raw, alpha and channel of the bitmap, and as what it is read
+  using Way = std::tuple<std::uint32_t, bool, bool, Channel, Content>;
+  static Way way_of(const BitmapTexture& b, Content content) {
+    return {b.file.value, b.raw, b.alpha, b.channel, content};
+  }
+
+  // Returns as what texture i is read: by lookups and, if a bump map reads it too, as heights.
+  std::vector<Content> contents_of(std::size_t i) const {
+    const scene::TextureUse& use = uses_[i];
+    const bool looked_up = use.colour || use.number || use.normals;
+    std::vector<Content> contents;
+    if (looked_up || !use.heights)
+      contents.push_back(use.colour || !looked_up ? Content::colours : Content::numbers);
+    if (use.heights) contents.push_back(Content::heights);
+    return contents;
+  }
+
+  Result<std::uint32_t> made_of(const BitmapTexture& b, Content content) {
+    const Way way = way_of(b, content);
+    if (const auto it = made_.find(way); it != made_.end()) return it->second;
+    const Asset& asset = scene_.assets[b.file.value];
+    auto image = image_of(b.file.value, asset);
+    if (!image) return tl::unexpected(image.error());
+    const bool is_bytes = image->f32.empty();
+    auto texels = make_texels(asset.name, std::move(*image), b.raw, b.alpha, b.channel, content);
+    if (!texels) return tl::unexpected(texels.error());
+    data_.clamped += texels->clamped;
+    data_.texels.push_back(std::move(*texels));
+    const auto index = static_cast<std::uint32_t>(data_.texels.size() - 1);
+    made_.emplace(way, index);
+    // Bytes are neither negative nor of other colours, so that they are the same as whatever they are read.
+    if (is_bytes)
+      for (const Content other : {Content::colours, Content::numbers, Content::heights})
+        made_.try_emplace(way_of(b, other), index);
+    return index;
+  }
 
   Result<ImageData> image_of(std::uint32_t file, const Asset& asset) {
     const bool last = --left_[file] == 0;
@@ -109,7 +147,8 @@ class TexelsLoader {
   TextureTable::Data& data_;
   std::map<std::uint32_t, int> left_;  // by file: number of ways in which it is still to be read
   std::map<std::uint32_t, ImageData> decoded_;
-  std::map<Key, std::uint32_t> made_;
+  std::map<Way, std::uint32_t> made_;
+  std::vector<scene::TextureUse> uses_;  // by texture
 };
 
 // Makes the entry of a mesh_attribute texture; if no mesh has the attribute, the entry is a black constant.
@@ -225,9 +264,10 @@ Result<TextureTable> TextureTable::build(const Scene& scene, const ImageLoader& 
   const auto bitmap = [&](const BitmapTexture& t) -> Result<Entry> {
     const auto to_uv = affine(t.to_uv);
     if (!to_uv) return tl::unexpected(to_uv.error());
-    const auto texels = loader.texels_of(t);
+    const auto texels = loader.texels_of(data.entries.size(), t);
     if (!texels) return tl::unexpected(texels.error());
-    return Entry{Kind::bitmap, t.filter, t.wrap, *texels, 0, data.texels[*texels].mean, *to_uv};
+    const auto [looked_up, heights] = *texels;
+    return Entry{Kind::bitmap, t.filter, t.wrap, looked_up, heights, data.texels[looked_up].mean, *to_uv};
   };
   const auto checkerboard = [&](const CheckerboardTexture& t) -> Result<Entry> {
     const auto to_uv = affine(t.to_uv);
@@ -274,7 +314,7 @@ float TextureTable::number(TextureIndex i, V2 uv, const FacePoint* face) const {
 V2 TextureTable::slope(TextureIndex i, V2 uv) const {
   const Entry& e = data_->entries[i.value];
   if (e.kind != Kind::bitmap || e.filter != TextureFilter::bilinear) return {0, 0};
-  const V2 s = data_->texels[e.first].slope(e.to_uv(uv), e.wrap);
+  const V2 s = data_->texels[e.second].slope(e.to_uv(uv), e.wrap);
   return {e.to_uv.a * s.x + e.to_uv.d * s.y, e.to_uv.b * s.x + e.to_uv.e * s.y};
 }
 

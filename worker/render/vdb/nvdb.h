@@ -13,6 +13,7 @@
 #include <new>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "worker/render/media/vdb_reply.h"
@@ -40,21 +41,22 @@ inline float* room_for(std::uint64_t values) {
 // such grid.
 std::size_t choose_grid(const std::vector<std::string>& names, const std::string& wanted);
 
-// Sets out.size. Throws Refused if the grid is larger than 2^14 voxels along an axis, or has more than
-// max_values values; for this, out.channels must be set already. `name` is the grid's name, for messages.
+// Sets out.size. Throws Refused if the grid is larger than 2^14 voxels along an axis (the file is at fault),
+// or has more than max_values values; for this, out.channels must be set already. `name` is the grid's name,
+// for messages.
 void set_size(const std::string& name, const std::array<std::int64_t, 3>& size, std::uint64_t max_values,
               LsVdbGrid& out);
 
-bool is_nvdb(const std::filesystem::path& path);  // true for an .nvdb file, decided by its first bytes
+// True for an .nvdb file, decided by `head`, its first 8 bytes or more.
+bool is_nvdb(std::string_view head);
 
-// Reads the grid `wanted` like ls_vdb_read(), but reports failure by throwing Refused or std::bad_alloc. The
-// caller must free out.values even then.
-void read_nvdb(const std::filesystem::path& path, const std::string& wanted, std::uint64_t max_values,
-               LsVdbGrid& out);
+// Returns all bytes of a file. Throws Refused if it has more than 8 GiB or cannot be read.
+std::vector<std::byte> file_bytes(const std::filesystem::path& path);
 
-// The two steps of read_nvdb(): decode_nvdb() finds the wanted grid in the bytes of a file, decompresses its
-// buffer and calls expand_nvdb(), which turns the buffer into values. `name` is the grid's name, for
-// messages.
+// decode_nvdb() reads the grid `wanted` of the bytes of an .nvdb file like ls_vdb_read(), but reports failure
+// by throwing Refused or std::bad_alloc. The caller must free out.values even then. It finds the grid,
+// decompresses its buffer and calls expand_nvdb(), which turns the buffer into values. `name` is the grid's
+// name, for messages.
 void decode_nvdb(std::span<const std::byte> file, const std::string& wanted, std::uint64_t max_values,
                  LsVdbGrid& out);
 void expand_nvdb(const std::string& name, std::span<const std::byte> buffer, std::uint64_t max_values,

@@ -25,19 +25,6 @@ enum Codec : std::uint16_t { kPlain, kZip, kBlosc };
 
 bool is_magic(std::string_view m) { return m == "NanoVDB0" || m == "NanoVDB2"; }
 
-std::vector<std::byte> contents(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary | std::ios::ate);
-  const auto size = static_cast<std::uint64_t>(std::max<std::streamoff>(0, in.tellg()));
-  if (!in) throw Refused{1, "the file cannot be read"};
-  if (size > kFileBytes)
-    throw Refused{2, "a NanoVDB file of " + std::to_string(size) + " bytes; the limit is 8 GiB"};
-  std::vector<std::byte> bytes(size);
-  in.seekg(0);
-  if (!in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size)))
-    throw Refused{1, "the file cannot be read"};
-  return bytes;
-}
-
 struct Entry {
   std::string name;
   // The grid's buffer: its offset and size in the file, and its decompressed size, in bytes
@@ -134,7 +121,7 @@ void set_size(const std::string& name, const std::array<std::int64_t, 3>& size, 
     const std::int64_t n = size[k];
     if (n <= 0 || n > (1 << 14))
       throw Refused{
-          2, "grid '" + name + "' spans " + std::to_string(n) + " voxels along an axis; the limit is 16384"};
+          1, "grid '" + name + "' spans " + std::to_string(n) + " voxels along an axis; the limit is 16384"};
     out.size[k] = static_cast<std::int32_t>(n);
     count *= static_cast<std::uint64_t>(n);
   }
@@ -144,15 +131,18 @@ void set_size(const std::string& name, const std::array<std::int64_t, 3>& size, 
                          std::to_string(most)};
 }
 
-bool is_nvdb(const std::filesystem::path& path) {
-  char magic[8] = {};
-  std::ifstream(path, std::ios::binary).read(magic, sizeof magic);
-  return is_magic({magic, sizeof magic});
-}
+bool is_nvdb(std::string_view head) { return is_magic(head.substr(0, 8)); }
 
-void read_nvdb(const std::filesystem::path& path, const std::string& wanted, std::uint64_t max_values,
-               LsVdbGrid& out) {
-  decode_nvdb(contents(path), wanted, max_values, out);
+std::vector<std::byte> file_bytes(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  const auto size = static_cast<std::uint64_t>(std::max<std::streamoff>(0, in.tellg()));
+  if (!in) throw Refused{1, "the file cannot be read"};
+  if (size > kFileBytes) throw Refused{2, "a file of " + std::to_string(size) + " bytes; the limit is 8 GiB"};
+  std::vector<std::byte> bytes(size);
+  in.seekg(0);
+  if (!in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size)))
+    throw Refused{1, "the file cannot be read"};
+  return bytes;
 }
 
 void decode_nvdb(std::span<const std::byte> bytes, const std::string& wanted, std::uint64_t max_values,

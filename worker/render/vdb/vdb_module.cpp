@@ -1,6 +1,8 @@
 #include "worker/render/media/vdb_reply.h"
 
-#include <openvdb/io/File.h>
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/GridDescriptor.h>
+#include <openvdb/io/io.h>
 #include <openvdb/openvdb.h>
 
 #include <array>
@@ -8,11 +10,19 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
+#include <istream>
+#include <iterator>
+#include <map>
 #include <mutex>
 #include <new>
+#include <streambuf>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
+#include "common/base/file_form.h"
 #include "worker/render/vdb/nvdb.h"
 
 namespace {
@@ -20,6 +30,7 @@ namespace {
 using ls::render::Refused;
 
 constexpr std::uintmax_t kSmallFile = 16 << 20;
+constexpr char kDamaged[] = "not a readable OpenVDB or NanoVDB file: damaged, or cut short";
 
 void initialize_once() {
   static std::once_flag flag;
@@ -93,19 +104,127 @@ void convert(const openvdb::GridBase::Ptr& base, std::uint64_t max_values, LsVdb
   copy_values(*grid, box, out);
 }
 
-void read(const char* path, const std::string& wanted, std::uint64_t max_values, LsVdbGrid& out) {
-  initialize_once();
-  openvdb::io::File file(path);
-  // `false` disables delayed loading, so that errors in the file occur here and not when values are used.
-  file.open(false);
-  // A file of a newer format version is rejected here; OpenVDB would only warn.
-  if (file.fileVersion() > openvdb::OPENVDB_FILE_VERSION)
-    throw Refused{1, "it is of version " + std::to_string(file.fileVersion()) +
-                         " of the OpenVDB format; versions up to " +
-                         std::to_string(openvdb::OPENVDB_FILE_VERSION) + " can be read"};
-  std::vector<std::string> names;
-  for (auto it = file.beginName(); it != file.endName(); ++it) names.push_back(it.gridName());
-  const openvdb::GridBase::Ptr base = file.readGrid(names[ls::render::choose_grid(names, wanted)]);
+// Refuses a grid whose values are no densities, by their type, before its voxels are read.
+void check_type(const openvdb::GridBase& grid, const std::string& name) {
+  if (grid.isType<openvdb::FloatGrid>() || grid.isType<openvdb::DoubleGrid>() ||
+      grid.isType<openvdb::Vec3SGrid>() || grid.isType<openvdb::Vec3DGrid>())
+    return;
+  if (grid.type().find("ptdataidx") != std::string::npos || grid.type().find("ptidx") != std::string::npos)
+    throw Refused{1,
+                  "grid '" + name +
+                      "' holds points, not a density; convert it to a fog volume, or give another grid_name"};
+  throw Refused{1, "grid '" + name + "' has values of type " + grid.valueType() +
+                       "; a density is float or double, one number or three"};
+}
+
+// An OpenVDB file. OpenVDB's own io::File does not notice that a file ends too early: where the values are
+// stored without a codec, it takes bytes beyond the end as whatever its buffers hold. Here a read beyond the
+// end throws, and a grid must end where the file says.
+class VdbFile : private openvdb::io::Archive {
+ public:
+  // `in` must outlive this object; `bytes` is the number of its bytes.
+  VdbFile(std::istream& in, std::uint64_t bytes) : in_(in), bytes_(bytes) {
+    in_.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
+    readHeader(in_);
+    // A file of a newer format version is rejected here; OpenVDB would only warn.
+    if (fileVersion() > openvdb::OPENVDB_FILE_VERSION)
+      throw Refused{1, "it is of version " + std::to_string(fileVersion()) +
+                           " of the OpenVDB format; versions up to " +
+                           std::to_string(openvdb::OPENVDB_FILE_VERSION) + " can be read"};
+    metadata_.reset(new openvdb::io::StreamMetadata);
+    metadata_->setSeekable(true);
+    openvdb::io::setStreamMetadataPtr(in_, metadata_, /*transfer=*/false);
+    setFormatVersion(in_);
+    setLibraryVersion(in_);
+    setDataCompression(in_);
+    openvdb::MetaMap().readMeta(in_);
+    const std::int32_t count = readGridCount(in_);
+    for (std::int32_t i = 0; i < count; ++i) read_entry();
+  }
+
+  // The names of the grids, in the order of their numbers for read_grid(). Of several grids of one name each
+  // has a number in brackets.
+  std::vector<std::string> names() const {
+    std::vector<std::string> all;
+    for (const auto& [name, entry] : entries_) all.push_back(openvdb::io::GridDescriptor::nameAsString(name));
+    return all;
+  }
+
+  openvdb::GridBase::Ptr read_grid(std::size_t index) {
+    const Entry& entry = std::next(entries_.begin(), static_cast<std::ptrdiff_t>(index))->second;
+    openvdb::GridBase::Ptr grid = read_alone(entry);
+    if (!entry.place.isInstance()) return grid;
+    // The grid shares the tree of another one, which alone has it in the file.
+    const auto parent = entries_.find(entry.place.instanceParentName());
+    if (parent == entries_.end() || parent->second.place.isInstance()) throw Refused{1, kDamaged};
+    grid->setTree(read_alone(parent->second)->baseTreePtr());
+    return grid;
+  }
+
+ private:
+  struct Entry {
+    openvdb::io::GridDescriptor place;
+    openvdb::GridBase::Ptr grid;  // without its tree, unless the file was read as a stream
+  };
+
+  // Reads the next entry of the file's list of grids. If the file has no offsets, because it was written as a
+  // stream, the whole grid follows its entry.
+  void read_entry() {
+    Entry entry;
+    entry.grid = entry.place.read(in_);
+    if (inputHasGridOffsets()) {
+      const auto end = static_cast<std::uint64_t>(entry.place.getEndPos());
+      if (end > bytes_)
+        throw Refused{1, std::string(kDamaged) + ": grid '" + entry.place.gridName() + "' ends at byte " +
+                             std::to_string(end) + " of " + std::to_string(bytes_)};
+      entry.place.seekToEnd(in_);
+    } else {
+      readGrid(entry.grid, entry.place, in_);
+    }
+    entries_.emplace(entry.place.uniqueName(), entry);
+  }
+
+  openvdb::GridBase::Ptr read_alone(const Entry& entry) {
+    if (entry.grid) check_type(*entry.grid, entry.place.gridName());
+    if (!entry.grid || !inputHasGridOffsets()) return entry.grid;
+    entry.place.seekToGrid(in_);
+    readGrid(entry.grid, entry.place, in_);
+    if (static_cast<std::int64_t>(in_.tellg()) != entry.place.getEndPos()) throw Refused{1, kDamaged};
+    return entry.grid;
+  }
+
+  std::istream& in_;
+  const std::uint64_t bytes_;
+  openvdb::io::StreamMetadata::Ptr metadata_;
+  std::multimap<std::string, Entry> entries_;  // by unique name
+};
+
+// A stream of bytes in memory, in which one can seek.
+class MemoryBuffer final : public std::streambuf {
+ public:
+  explicit MemoryBuffer(std::vector<std::byte>& bytes) {
+    auto* first = reinterpret_cast<char*>(bytes.data());
+    setg(first, first, first + bytes.size());
+  }
+
+ private:
+  pos_type seekoff(off_type by, std::ios::seekdir from, std::ios::openmode) override {
+    const off_type base = from == std::ios::beg   ? 0
+                          : from == std::ios::cur ? gptr() - eback()
+                                                  : egptr() - eback();
+    if (base + by < 0 || base + by > egptr() - eback()) return pos_type(off_type(-1));
+    setg(eback(), eback() + base + by, egptr());
+    return pos_type(base + by);
+  }
+  pos_type seekpos(pos_type to, std::ios::openmode which) override {
+    return seekoff(off_type(to), std::ios::beg, which);
+  }
+};
+
+void read(std::istream& in, std::uint64_t bytes, const std::string& wanted, std::uint64_t max_values,
+          LsVdbGrid& out) {
+  VdbFile file(in, bytes);
+  const openvdb::GridBase::Ptr base = file.read_grid(ls::render::choose_grid(file.names(), wanted));
   if (!base) throw Refused{1, "the grid cannot be read"};
   if (base->getGridClass() == openvdb::GRID_LEVEL_SET) {
     throw Refused{1,
@@ -118,15 +237,35 @@ void read(const char* path, const std::string& wanted, std::uint64_t max_values,
   if (base->isType<openvdb::FloatGrid>()) return convert<openvdb::FloatGrid>(base, max_values, out);
   if (base->isType<openvdb::DoubleGrid>()) return convert<openvdb::DoubleGrid>(base, max_values, out);
   if (base->isType<openvdb::Vec3SGrid>()) return convert<openvdb::Vec3SGrid>(base, max_values, out);
-  if (base->isType<openvdb::Vec3DGrid>()) return convert<openvdb::Vec3DGrid>(base, max_values, out);
-  if (base->type().find("ptdataidx") != std::string::npos ||
-      base->type().find("ptidx") != std::string::npos) {
-    throw Refused{1,
-                  "grid '" + base->getName() +
-                      "' holds points, not a density; convert it to a fog volume, or give another grid_name"};
+  convert<openvdb::Vec3DGrid>(base, max_values, out);
+}
+
+// Reads a .vdb or .nvdb file, which may be packed by gzip.
+void read_file(const std::filesystem::path& path, const std::string& wanted, std::uint64_t max_values,
+               LsVdbGrid& out) {
+  char head[ls::kFormBytes] = {};
+  std::ifstream in(path, std::ios::binary);
+  in.read(head, sizeof head);
+  const std::string_view start(head, static_cast<std::size_t>(in.gcount()));
+  if (const std::string why = ls::why_placeholder(start); !why.empty()) throw Refused{1, "it " + why};
+  const bool packed = ls::is_gzip(start);
+  if (packed || ls::render::is_nvdb(start)) {
+    auto bytes = ls::render::file_bytes(path);
+    if (packed) {
+      auto plain = ls::plain_bytes(path.filename().string(), std::move(bytes));
+      if (!plain)
+        throw Refused{plain.error().code == ls::Errc::resource_exhausted ? 2 : 1, plain.error().message};
+      bytes = std::move(*plain);
+    }
+    if (ls::render::is_nvdb({reinterpret_cast<const char*>(bytes.data()), bytes.size()}))
+      return ls::render::decode_nvdb(bytes, wanted, max_values, out);
+    MemoryBuffer buffer(bytes);
+    std::istream memory(&buffer);
+    return read(memory, bytes.size(), wanted, max_values, out);
   }
-  throw Refused{1, "grid '" + base->getName() + "' has values of type " + base->valueType() +
-                       "; a density is float or double, one number or three"};
+  in.clear();
+  in.seekg(0);
+  read(in, std::filesystem::file_size(path), wanted, max_values, out);
 }
 
 }  // namespace
@@ -136,17 +275,14 @@ extern "C" {
 int ls_vdb_read(const char* path, const char* grid_name, std::uint64_t max_values, LsVdbGrid* out,
                 char* error, std::uint64_t error_size) {
   *out = LsVdbGrid{};
-  constexpr char kDamaged[] = "not a readable OpenVDB or NanoVDB file: damaged, or cut short";
   const auto say = [&](int code, const std::string& text) {
     std::snprintf(error, error_size, "%s", text.c_str());
     ls_vdb_free(out);
     return code;
   };
   try {
-    if (ls::render::is_nvdb(path))
-      ls::render::read_nvdb(path, grid_name, max_values, *out);
-    else
-      read(path, grid_name, max_values, *out);
+    initialize_once();
+    read_file(path, grid_name, max_values, *out);
     return 0;
   } catch (const Refused& r) {
     return say(r.code, r.text);
@@ -157,6 +293,8 @@ int ls_vdb_read(const char* path, const char* grid_name, std::uint64_t max_value
     const auto bytes = std::filesystem::file_size(path, unknown);
     if (!unknown && bytes < kSmallFile) return say(1, kDamaged);
     return say(2, "the grid does not fit into memory");
+  } catch (const std::ios::failure&) {
+    return say(1, kDamaged);
   } catch (const std::exception& e) {
     return say(1, std::string("not a readable OpenVDB file: ") + e.what());
   } catch (...) {

@@ -16,7 +16,7 @@ from typing import Any
 from pxr import Ar, Usd
 
 from ..errors import FileRefused
-from ..scene_files import PathLike, Source
+from ..scene_files import PathLike, Source, written_otherwise
 from .problems import Problems
 
 
@@ -66,19 +66,25 @@ class Files:
             self._admit("the stage", layer.identifier, outer)
 
     def exists(self, value: Any) -> bool:
-        resolved = str(value.resolvedPath)
+        resolved = str(value.resolvedPath) or self._meant(value.path)
         return bool(resolved) and os.path.isfile(Ar.SplitPackageRelativePathOuter(resolved)[0])
 
     def find(self, prim: Any, value: Any) -> Asset | None:
         """The file of an asset path. None, with an error told, if there is none."""
-        outer, inner = Ar.SplitPackageRelativePathOuter(str(value.resolvedPath))
-        if not self.exists(value):
+        resolved = str(value.resolvedPath) or self._meant(value.path)
+        outer, inner = Ar.SplitPackageRelativePathOuter(resolved)
+        if not resolved or not os.path.isfile(outer):
             self._problems.error(
                 prim, f"the asset @{value.path}@ is not found. Put the file there, or mend the path"
             )
             return None
         real = self._admit(str(prim.GetPath()), value.path, outer)
         return Asset(real, inner, str(prim.GetPath()))
+
+    def _meant(self, path: str) -> str:
+        """The file that a path means which USD does not find, because it was written on Windows or macOS."""
+        found = written_otherwise(self._roots[0], path) if path else None
+        return "" if found is None else str(found)
 
     def _admit(self, owner: str, named: str, place: str) -> pathlib.Path:
         real = pathlib.Path(os.path.realpath(place))

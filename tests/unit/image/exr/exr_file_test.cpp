@@ -1,6 +1,7 @@
 #include "common/image/exr/exr_file.h"
 
 #include <ImfChannelList.h>
+#include <ImfChromaticities.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
@@ -8,16 +9,19 @@
 #include <ImfOutputFile.h>
 #include <ImfOutputPart.h>
 #include <ImfPartType.h>
+#include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 #include <ImfTiledOutputFile.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <climits>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 
 #include "common/image/exr/memory.h"
 
@@ -63,12 +67,14 @@ struct Foreign {
   std::vector<std::string> channels = {"R", "G", "B"};
   bool tiled = false;
   float (*value)(int x, int y, int c) = ls::value;
+  std::optional<Imf::Chromaticities> primaries = std::nullopt;
 };
 
 std::vector<std::byte> write(const Foreign& f) {
   exr::MemoryWriter out;
   const Imath::Box2i window({f.x0, f.y0}, {f.x0 + kExrWidth - 1, f.y0 + kExrHeight - 1});
   Imf::Header header(window, window, 1, {0, 0}, 1, Imf::INCREASING_Y, f.compression);
+  if (f.primaries) Imf::addChromaticities(header, *f.primaries);
   if (f.tiled) header.setTileDescription(Imf::TileDescription(16, 16, Imf::ONE_LEVEL));
   Imf::FrameBuffer buffer;
   std::vector<std::vector<float>> floats;
@@ -101,6 +107,70 @@ TEST(ExrRead, UnderstandsEveryLosslessCompressionTypeAndLayout) {
       for (const bool tiled : {false, true})
         expect_rgb(
             read_exr_rgb(write({.compression = compression, .type = type, .tiled = tiled}), "foreign"));
+}
+
+// ---- colours and alpha of textures ----
+
+// Returns the linear sRGB that an image's matrix makes of the stored colour (.25, .5, .25).
+std::array<double, 3> in_srgb(const Imf::Chromaticities& primaries) {
+  const auto image = read_exr_image(write({.primaries = primaries}), "wide");
+  std::array<double, 3> out{};
+  EXPECT_TRUE(image && image->to_srgb);
+  if (!image || !image->to_srgb) return out;
+  for (std::size_t row = 0; row < 3; ++row)
+    for (std::size_t k = 0; k < 3; ++k)
+      out[row] += double{(*image->to_srgb)[3 * row + k]} * (k == 1 ? .5 : .25);
+  return out;
+}
+
+// The expected values are those of Mitsuba 3.9.1, which computes in float: it and we are exact to about 1e-6.
+TEST(ExrImage, ChromaticitiesAreConvertedAsInMitsuba) {
+  using V2 = Imath::V2f;
+  const V2 d65(.3127f, .3290f), aces(.32168f, .33767f);
+  const struct {
+    Imf::Chromaticities primaries;
+    std::array<double, 3> srgb;
+  } rows[] = {
+      {{V2(.708f, .292f), V2(.17f, .797f), V2(.131f, .046f), d65},
+       {.10308978, .53322476, .2248553}},  // Rec. 2020
+      {{V2(.7347f, .2653f), V2(0, 1), V2(.0001f, -.077f), aces},
+       {-.01809171, .59013957, .1916973}},  // ACES AP0
+      {{V2(.713f, .293f), V2(.165f, .83f), V2(.128f, .044f), aces},
+       {.11076511, .53234595, .19739203}}  // ACES AP1
+  };
+  for (const auto& row : rows) {
+    const auto got = in_srgb(row.primaries);
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(got[k], row.srgb[k], 2e-6) << k;
+  }
+  // X, Y, Z by their chromaticities. Mitsuba's matrix for these has four digits after the point.
+  const auto xyz = in_srgb({V2(1, 0), V2(0, 1), V2(0, 0), V2(1 / 3.f, 1 / 3.f)});
+  EXPECT_NEAR(xyz[0], -.083089, 2e-4);
+  EXPECT_NEAR(xyz[1], .706071, 2e-4);
+  EXPECT_NEAR(xyz[2], .176218, 2e-4);
+}
+
+TEST(ExrImage, Rec709IsLeftAloneAndNonsenseRefused) {
+  EXPECT_FALSE(read_exr_image(write({}), "plain")->to_srgb);
+  EXPECT_FALSE(read_exr_image(write({.primaries = Imf::Chromaticities()}), "rec709")->to_srgb);
+  EXPECT_FALSE(read_exr_image(write({.channels = {"Y"}}), "grey")->to_srgb);
+  const Imath::V2f one(.3f, .3f);
+  const auto nonsense =
+      read_exr_image(write({.primaries = Imf::Chromaticities(one, one, one, one)}), "flat.exr");
+  ASSERT_FALSE(nonsense);
+  EXPECT_THAT(nonsense.error().message, HasSubstr("flat.exr: the `chromaticities`"));
+}
+
+TEST(ExrImage, HasAlphaIfTheFileHas) {
+  const auto with = read_exr_image(write({.channels = {"R", "G", "B", "A"}}), "alpha"),
+             without = read_exr_image(write({}), "none"),
+             grey = read_exr_image(write({.channels = {"Y", "A"}}), "grey");
+  ASSERT_TRUE(with && without && grey);
+  EXPECT_EQ(with->channels, 4u);
+  EXPECT_EQ(without->channels, 3u);
+  EXPECT_EQ(with->values.at(3), value(0, 0, 3));
+  EXPECT_EQ(grey->channels, 4u);
+  EXPECT_EQ(grey->values.at(2), value(0, 0, 0));
+  EXPECT_EQ(grey->values.at(3), value(0, 0, 1));
 }
 
 // ---- lossy compression: the largest error that its definition allows ----

@@ -56,6 +56,28 @@ Shape "plymesh" "string filename" "mesh.ply"
       << serialize(*one.scene) << serialize(*other.scene);
 }
 
+TEST(Pbrt, MayBeginWithAByteOrderMark) {
+  KeepingAssets assets;
+  const std::string mark = "\xef\xbb\xbf";
+  assets.memory.files["more.pbrt"] = mark + "Shape \"sphere\"";
+
+  const ReadResult r = read_pbrt(mark + pbrt_scene("Include \"more.pbrt\""), assets);
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  EXPECT_EQ(r.scene->shapes.size(), 1u);
+  EXPECT_NE(messages(read_pbrt(std::string("\xff\xfe#\0", 4))).find("is text in UTF-16"), std::string::npos);
+}
+
+TEST(Pbrt, MeshesMayBePackedByGzip) {
+  KeepingAssets assets;
+  assets.memory.files["a.ply.gz"] = "a mesh";
+
+  const ReadResult r = read_pbrt(pbrt_scene("Shape \"plymesh\" \"string filename\" \"a.ply.gz\""), assets);
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  EXPECT_EQ(r.scene->assets.at(0).name, "a.ply.gz");
+}
+
 TEST(Pbrt, TurnsAsTheXmlTurns) {
   const Scene s = pbrt("Rotate 90 0 1 0\nScale 2 3 4\nShape \"plymesh\" \"string filename\" \"mesh.ply\"");
   const ReadResult other = read(with_sensor(

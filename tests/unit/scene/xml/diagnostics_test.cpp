@@ -232,6 +232,10 @@ INSTANTIATE_TEST_SUITE_P(
             "<bsdf type=\"diffuse\"><texture type=\"checkerboard\" name=\"reflectance\"><rgb name=\"color1\" "
             "value=\"0 2 0\"/></texture></bsdf>",
             23, "'reflectance' of bsdf \"diffuse\" is 2, out of its range"},
+        Case{"RoughnessAboveOneByATexture",
+             "<bsdf type=\"principled\"><texture type=\"uniform\" name=\"roughness\"><float name=\"value\" "
+             "value=\"2\"/></texture></bsdf>",
+             26, "'roughness' of bsdf \"principled\" is 2, out of its range"},
         Case{"AlbedoAboveOneByAVolume",
              "<medium type=\"heterogeneous\"><volume type=\"constvolume\" name=\"albedo\"><float "
              "name=\"value\" value=\"2\"/></volume></medium>",
