@@ -293,6 +293,17 @@ TEST(Convert, TakesControlCharactersOutOfReceivedTexts) {
   pb::FromWorker wire = to_wire(FromWorker(kFromWorker[4]));
   wire.mutable_failure()->set_reason("a\x1b[31mb");
   EXPECT_EQ(std::get<UnitFailure>(from_wire(wire).value()).reason, "a [31mb");
+  wire.mutable_failure()->set_reason(
+      "a\nb\xc2\x9b"
+      "c\xe2\x80\xae"
+      "d");
+  EXPECT_EQ(std::get<UnitFailure>(from_wire(wire).value()).reason, "a\nb c d") << "a reason may have lines";
+
+  pb::FromWorker hello = to_wire(FromWorker(kFromWorker[0]));
+  hello.mutable_hello()->set_name(
+      "a\nb\xc2\x9b"
+      "c");
+  EXPECT_EQ(std::get<WorkerHello>(from_wire(hello).value()).name, "a b c") << "a name has one line";
 }
 
 }  // namespace
