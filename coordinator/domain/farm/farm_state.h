@@ -11,6 +11,7 @@
 #include <set>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "coordinator/domain/fair_share.h"
@@ -164,7 +165,10 @@ struct Farm::State {
   void give_back_beyond(Job& job);  // takes back leased units of rounds after the tiles' last ones
   // Returns the lease under which the worker holds the unit; null: none. Defined in farm_units.cpp, as is
   // count_failure()
-  LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker);
+  const LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker) const;
+  LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker) {
+    return const_cast<LeaseRecord*>(std::as_const(*this).lease_of(job, code, worker));
+  }
   void count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure);
 
   // Defined in farm_leases.cpp
