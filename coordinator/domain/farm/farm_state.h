@@ -5,6 +5,7 @@
 // class.
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -53,6 +54,9 @@ struct Farm::State {
   // units of the job from now on, so dispatch() considers all workers again
   bool pinned_for_others = false;
   std::set<WorkerIndex> dirty;  // workers that may want more work, since their state has changed
+  // Workers that were lost before they finished a unit (kLostNewcomersKept), longest ago first. Some may have
+  // come back since.
+  std::deque<WorkerId> lost_newcomers;
 
   // Defined in farm_jobs.cpp
   void on(const JobSubmitted& event);
@@ -96,6 +100,7 @@ struct Farm::State {
   void note_progress(Worker& worker);  // notes that the worker makes progress, so it is not stuck
   void expire_leases();
   void forgive_and_forget();
+  void forget(Worker& worker);
   void forget_names();  // forgets names of workers that are gone and that no job refers to
 
   // Defined in farm_units.cpp
