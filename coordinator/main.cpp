@@ -188,6 +188,7 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   if (!tokens) return tl::unexpected(tokens.error());
   const auto tls = tls_of(flags);
   if (!tls) return tl::unexpected(tls.error());
+  const auto worker_key = ls::http::read_or_make_token(secrets / "worker-key");
   others.reset();
   if (flags.shared && flags.secrets.empty())
     ls::log_warn(
@@ -211,6 +212,10 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   options.data = data;
   options.store = flags.store;
   options.may_join = may_join;
+  if (worker_key)
+    options.worker_key = *worker_key;
+  else  // the folder of secrets may be one that cannot be written
+    ls::log_info("", "workers get new ids when the coordinator restarts: " + worker_key.error().message);
   options.blobs_at = flags.blobs;
   options.shared = flags.shared;
   if (flags.keep_unused_hours)

@@ -139,6 +139,8 @@ Result<FromWorker> hello_from(const pb::Hello& in) {
   if (in.threads() < 1 || in.threads() > limits::kThreads)
     return wrong("hello.threads", fmt::format("is {}; it must be 1 to {}", in.threads(), limits::kThreads));
   LS_TRY(token, secret_from(in.join_token(), "hello.join_token"));
+  LS_TRY(secret, secret_from(in.secret(), "hello.secret"));
+  if (in.has_secret()) hello.secret = secret;
   const auto tag_from = [](const std::string& tag) {
     return text_from(tag, limits::kNameBytes, "hello.tags");
   };
@@ -300,7 +302,8 @@ Result<ToWorker> from_wire(const pb::ToWorker& in) {
   switch (in.message_case()) {
     case pb::ToWorker::kWelcome: {
       LS_TRY(worker, id_from(in.welcome().worker(), "welcome.worker"));
-      return Welcome{WorkerId{worker}, in.welcome().epoch()};
+      LS_TRY(secret, secret_from(in.welcome().secret(), "welcome.secret"));
+      return Welcome{WorkerId{worker}, in.welcome().epoch(), secret};
     }
     case pb::ToWorker::kRefused: {
       LS_TRY(problem, problem_from(in.refused().problem()));

@@ -306,5 +306,17 @@ TEST(Convert, TakesControlCharactersOutOfReceivedTexts) {
   EXPECT_EQ(std::get<WorkerHello>(from_wire(hello).value()).name, "a b c") << "a name has one line";
 }
 
+// A secret that is empty is another thing than none.
+TEST(Convert, KeepsTheSecretOfAWorker) {
+  for (const std::optional<std::string>& secret :
+       {std::optional<std::string>(), std::optional<std::string>(""), std::optional<std::string>("s")}) {
+    WorkerHello hello = std::get<WorkerHello>(kFromWorker[0]);
+    hello.secret = secret;
+    EXPECT_EQ(std::get<WorkerHello>(from_wire(to_wire(FromWorker{hello})).value()).secret, secret);
+  }
+  const Welcome welcome{{"w-1"}, 2, "secret"};
+  EXPECT_EQ(std::get<Welcome>(from_wire(to_wire(ToWorker{welcome})).value()), welcome);
+}
+
 }  // namespace
 }  // namespace ls::wire

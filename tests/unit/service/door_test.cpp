@@ -89,6 +89,68 @@ TEST(Service, AWorkerKeepsItsIdAndItsOlderStreamIsSilent) {
   EXPECT_EQ(coordinator->workers().at(0).state, "lost");
 }
 
+// Joins as `hello` says and returns the Welcome.
+Welcome join(Coordinator& coordinator, const WorkerHello& hello) {
+  const auto mail = std::make_shared<Mailbox>();
+  const auto session = coordinator.connect(hello, std::make_shared<MailSink>(mail, 0));
+  EXPECT_TRUE(session);
+  return std::get<Welcome>(mail->take()->second);
+}
+
+// Users see the ids of workers.
+TEST(Service, AnIdWithoutItsSecretIsNotGivenAgain) {
+  const auto coordinator = open_at({});
+  WorkerHello hello;
+  hello.name = "w";
+  hello.secret = "";
+  const Welcome first = join(*coordinator, hello);
+  EXPECT_EQ(first.secret.size(), 64u);
+  EXPECT_EQ(first.secret.find(first.worker.value), std::string::npos);
+
+  WorkerHello thief = hello;
+  thief.previous_id = first.worker;
+  for (const std::optional<std::string>& guess :
+       {std::optional<std::string>(), std::optional<std::string>(""), std::optional<std::string>("guess"),
+        std::optional<std::string>(join(*coordinator, hello).secret)}) {
+    thief.secret = guess;
+    EXPECT_NE(join(*coordinator, thief).worker, first.worker);
+  }
+
+  hello.previous_id = first.worker;
+  hello.secret = first.secret;
+  EXPECT_EQ(join(*coordinator, hello).worker, first.worker);
+}
+
+TEST(Service, AWorkerThatKeepsNoSecretIsKnownByItsIdAlone) {
+  const auto coordinator = open_at({});
+  WorkerHello old;
+  old.name = "w";
+  const Welcome first = join(*coordinator, old);
+  EXPECT_EQ(first.secret, "");
+
+  old.previous_id = first.worker;
+
+  EXPECT_EQ(join(*coordinator, old).worker, first.worker);
+}
+
+TEST(Service, AWorkerKeepsItsIdWhenTheCoordinatorStartsAnew) {
+  Coordinator::Options options;
+  options.worker_key = "a secret of the farm";
+  auto coordinator = Coordinator::open(options).value();
+  WorkerHello hello;
+  hello.name = "w";
+  hello.secret = "";
+  const Welcome first = join(*coordinator, hello);
+  coordinator = Coordinator::open(options).value();
+  hello.previous_id = first.worker;
+  hello.secret = first.secret;
+  EXPECT_EQ(join(*coordinator, hello).worker, first.worker);
+
+  options.worker_key = "a secret of another farm";
+  coordinator = Coordinator::open(options).value();
+  EXPECT_NE(join(*coordinator, hello).worker, first.worker);
+}
+
 // Anybody with the join token could otherwise write into the log of any job.
 TEST(Service, AFailureOfAUnitThatTheWorkerDoesNotHoldIsNotLogged) {
   const auto coordinator = open_at({});
