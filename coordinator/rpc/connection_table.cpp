@@ -147,13 +147,13 @@ ConnectionTable::CallBegan ConnectionTable::call_began(const std::string& peer, 
   return {std::nullopt, entry->id};
 }
 
-void ConnectionTable::call_met(const std::string& peer) {
+std::optional<ConnectionTable::Id> ConnectionTable::call_met(const std::string& peer) {
   Entry* entry = find(peer);
-  if (entry == nullptr || entry->unmet_calls == 0) return;
+  if (entry == nullptr || entry->unmet_calls == 0) return std::nullopt;
   --entry->unmet_calls;
   ++entry->met_calls;
-  entry->ever_met = true;
   end_unmet(*entry);
+  return std::exchange(entry->ever_met, true) ? std::nullopt : std::optional(entry->id);
 }
 
 void ConnectionTable::call_ended(const std::string& peer, bool met, TimePoint now) {
@@ -169,7 +169,7 @@ bool ConnectionTable::received(Id id, std::uint64_t bytes, TimePoint now) {
   if (!unmet_.contains(id) || bytes <= limits_.bytes) return false;
   Entry& entry = entries_.at(id);
   if (entry.ever_met) return false;  // most of its bytes came while it was met
-  if (bytes <= limits_.long_bytes) {
+  if (bytes <= limits_.long_bytes && entry.unmet_calls > 0) {
     if (entry.long_hello) return false;
     Group& group = groups_[entry.guest.group];
     if (long_hellos_ < limits_.long_hellos && group.long_hellos < limits_.long_hellos_of_group) {
@@ -201,7 +201,11 @@ std::vector<ConnectionTable::Id> ConnectionTable::overdue(TimePoint now) {
   std::vector<Id> late;
   for (const Id id : unmet_)
     if (now - entries_.at(id).unmet_since >= limits_.hello) late.push_back(id);
-  for (const Id id : late) doom(entries_.at(id), Closed::silent);
+  for (const Id id : late) {
+    Entry& entry = entries_.at(id);
+    if (entry.long_hello) shut_out(entry, now);
+    doom(entry, Closed::silent);
+  }
   std::erase_if(groups_, [&](const auto& group) {
     return group.second.unmet == 0 && (!group.second.shut_out_until || now >= *group.second.shut_out_until);
   });

@@ -45,11 +45,13 @@ class ConnectionTable {
     // An unmet connection of this age makes room if a new one finds no place: a worker says hello sooner
     Duration gives_way = std::chrono::seconds(2);
     // Bytes that an unmet connection may send, TLS handshake included. A hello that lists many files in the
-    // worker's cache is longer than `bytes`: some connections at a time may send up to `long_bytes`.
+    // worker's cache is longer than `bytes`: a few connections at a time, on which a call has begun, may send
+    // up to `long_bytes`.
     std::uint64_t bytes = 64 << 10;
-    std::uint64_t long_bytes = 512 << 10;
-    std::size_t long_hellos = 16, long_hellos_of_group = 4;
-    // Addresses that exceed `unmet_calls` or `long_bytes` get no new connection for this time
+    std::uint64_t long_bytes = 320 << 10;
+    std::size_t long_hellos = 8, long_hellos_of_group = 2;
+    // Addresses that exceed `unmet_calls` or their bytes, or do not end a long hello in time, get no new
+    // connection for this time
     Duration shut_out = std::chrono::seconds(30);
   };
 
@@ -80,8 +82,8 @@ class ConnectionTable {
   };
   // A call has begun on the connection with this peer.
   CallBegan call_began(const std::string& peer, TimePoint now);
-  // The call has shown the join token.
-  void call_met(const std::string& peer);
+  // The call has shown the join token. Returns its connection if that was never met before.
+  std::optional<Id> call_met(const std::string& peer);
   // The call has ended; `met`: call_met() was called for it.
   void call_ended(const std::string& peer, bool met, TimePoint now);
 

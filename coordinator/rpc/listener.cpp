@@ -29,24 +29,8 @@
 #include "coordinator/rpc/port_watch.h"
 
 namespace ls::coordinator::rpc {
-namespace {
 
-// How often the bytes and the age of unmet connections are looked at
-constexpr std::chrono::milliseconds kLook{20};
-// How long nothing is accepted after accept() failed for want of something else than files
-constexpr Duration kPause = std::chrono::milliseconds(100);
-// Connections accepted in a row before others are looked at
-constexpr int kAcceptedAtOnce = 64;
-// Least time between two lines of the log about connections that were refused or closed
-constexpr Duration kReportEvery = std::chrono::seconds(10);
-constexpr int kToldWithinMs = 1'000;
-constexpr int kBacklog = 1024;
-// Files kept open only to be closed when the process may open no more: then connections can still be accepted
-// and closed, instead of waiting for ever.
-constexpr std::size_t kReserve = 4;
-// Ids of epoll events that are no connection's
-constexpr std::uint64_t kWake = 0, kFirstPort = 1, kFirstConnection = 1024;
-
+// An open file, closed by its destructor.
 class File {
  public:
   explicit File(int fd = -1) : fd_(fd) {}
@@ -66,6 +50,28 @@ class File {
  private:
   int fd_;
 };
+
+namespace {
+
+// How often the bytes and the age of unmet connections are looked at
+constexpr std::chrono::milliseconds kLook{20};
+// How long nothing is accepted after accept() failed for want of something else than files
+constexpr Duration kPause = std::chrono::milliseconds(100);
+// Connections accepted in a row before others are looked at
+constexpr int kAcceptedAtOnce = 64;
+// Least time between two lines of the log about connections that were refused or closed
+constexpr Duration kReportEvery = std::chrono::seconds(10);
+constexpr int kReportWaitMs = 1'000;
+// gRPC parses what it has read at once to its end, even if the connection is closed meanwhile, and an endless
+// header takes it a time that grows as the square of its length. So an unmet connection may send little
+// ahead. A met one may send as much as the system allows.
+constexpr int kUnmetWindow = 16 << 10, kMetWindow = 1 << 30;
+constexpr int kBacklog = 1024;
+// Files kept open only to be closed when the process may open no more: then connections can still be accepted
+// and closed, instead of waiting for ever.
+constexpr std::size_t kReserve = 4;
+// Ids of epoll events that are no connection's
+constexpr std::uint64_t kWake = 0, kFirstPort = 1, kFirstConnection = 1024;
 
 struct Address {
   sockaddr_storage storage{};
@@ -180,7 +186,7 @@ Address local_address(const File& socket) {
 }
 
 // Ends the connection, also for gRPC, which has its socket under another number. What has arrived and was not
-// read is dropped: gRPC would read it first. The peer is told by a reset: without one, a peer that waits to
+// read is dropped: gRPC would read it first. The peer gets a reset: without one, a peer that waits to
 // send more would not notice.
 void cut(const File& socket) {
   const linger reset{1, 0};
@@ -188,6 +194,11 @@ void cut(const File& socket) {
   ::shutdown(socket.get(), SHUT_RDWR);
   while (::recv(socket.get(), nullptr, 1 << 30, MSG_TRUNC | MSG_DONTWAIT) > 0) {
   }
+}
+
+// Limits how many bytes the peer may send that gRPC has not read yet.
+void limit_window(const File& socket, int bytes) {
+  ::setsockopt(socket.get(), IPPROTO_TCP, TCP_WINDOW_CLAMP, &bytes, sizeof bytes);
 }
 
 std::uint64_t bytes_received(const File& socket) {
@@ -228,7 +239,7 @@ struct Listener::State {
   void refill_reserve();
   void admit(File socket, const Address& from);
   void look();
-  bool report();  // true: there is something to tell, but not yet
+  bool report();  // true: there is something to report, but not yet
 
   const SystemClock clock;
   std::vector<File> ports;
@@ -239,7 +250,7 @@ struct Listener::State {
   ConnectionTable::Id next_id = kFirstConnection;  // this and the following: used by the thread alone
   std::optional<TimePoint> paused_until;
   TimePoint reported{};
-  std::array<std::uint64_t, kClosedReasons> told{};
+  std::array<std::uint64_t, kClosedReasons> reported_counts{};
   std::jthread thread;
 };
 
@@ -310,10 +321,10 @@ void Listener::stop() {
 
 void Listener::State::run(const std::stop_token& token) {
   std::array<epoll_event, 128> events;
-  bool untold = false;
+  bool unreported = false;
   while (!token.stop_requested()) {
     const bool soon = !open.lock()->table.unmet().empty() || paused_until;
-    const auto wait = soon ? static_cast<int>(kLook.count()) : untold ? kToldWithinMs : -1;
+    const auto wait = soon ? static_cast<int>(kLook.count()) : unreported ? kReportWaitMs : -1;
     const int many = ::epoll_wait(poll.get(), events.data(), static_cast<int>(events.size()), wait);
     if (token.stop_requested()) return;
     if (paused_until && clock.now() >= *paused_until) {
@@ -341,7 +352,7 @@ void Listener::State::run(const std::stop_token& token) {
       now_open->files.erase(file);
     }
     look();
-    untold = report();
+    unreported = report();
   }
 }
 
@@ -403,11 +414,12 @@ void Listener::State::admit(File socket, const Address& from) {
     const auto admission = now_open->table.arrive(id, guest_of(from), clock.now());
     if (admission.closed) cut(now_open->files.at(*admission.closed));
     if (admission.refused) return;
+    limit_window(second, kUnmetWindow);
     // No events are asked for: epoll tells in any case when a connection has ended on both sides
     watch(second.get(), id, 0);
     now_open->files.emplace(id, std::move(second));
   }
-  take(socket.release());  // without the lock: gRPC may begin a call before it returns
+  take(socket.release());
 }
 
 void Listener::State::look() {
@@ -429,18 +441,18 @@ bool Listener::State::report() {
     for (int i = 0; i < kClosedReasons; ++i)
       closed[static_cast<std::size_t>(i)] = now_open->table.closed(static_cast<Closed>(i));
   }
-  if (closed == told) return false;
+  if (closed == reported_counts) return false;
   const TimePoint now = clock.now();
   if (now - reported < kReportEvery) return true;
   std::string text;
   for (std::size_t i = 0; i < closed.size(); ++i) {
-    if (closed[i] == told[i]) continue;
-    text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", closed[i] - told[i],
+    if (closed[i] == reported_counts[i]) continue;
+    text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", closed[i] - reported_counts[i],
                         to_string(static_cast<Closed>(i)));
   }
   log_warn("", "the workers' port refused or closed connections: " + text);
   reported = now;
-  told = closed;
+  reported_counts = closed;
   return false;
 }
 
@@ -450,7 +462,9 @@ Listener::Call::~Call() {
 }
 
 void Listener::Call::met() {
-  state_->open.lock()->table.call_met(guest_.peer);
+  const auto now_open = state_->open.lock();
+  const auto first = now_open->table.call_met(guest_.peer);
+  if (first) limit_window(now_open->files.at(*first), kMetWindow);
   met_ = true;
 }
 
@@ -463,7 +477,7 @@ std::unique_ptr<Listener::Call> Listener::call(std::string_view grpc_peer) {
   return std::make_unique<Call>(state_, *began.guest);
 }
 
-std::optional<bool> Listener::answers(std::chrono::milliseconds patience) const {
+std::optional<bool> Listener::answers(std::chrono::milliseconds time_limit) const {
   if (state_->ports.empty()) return std::nullopt;
   Address to = local_address(state_->ports.front());
   if (is_any(to)) {
@@ -472,7 +486,7 @@ std::optional<bool> Listener::answers(std::chrono::milliseconds patience) const 
     else
       reinterpret_cast<sockaddr_in&>(to.storage).sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   }
-  return port_answers(to.get(), to.length, patience);
+  return port_answers(to.get(), to.length, time_limit);
 }
 
 }  // namespace ls::coordinator::rpc

@@ -65,8 +65,8 @@ class Listener {
   std::unique_ptr<Call> call(std::string_view grpc_peer);
 
   // Connects to the port as a worker would, and returns true if the server at its other end answers or closes
-  // within `patience`. nullopt: that cannot be tried, since no file can be opened.
-  std::optional<bool> answers(std::chrono::milliseconds patience) const;
+  // within `time_limit`. nullopt: that cannot be tried, since no file can be opened.
+  std::optional<bool> answers(std::chrono::milliseconds time_limit) const;
 
  private:
   explicit Listener(std::shared_ptr<State> state);

@@ -13,20 +13,20 @@
 namespace ls::coordinator::rpc {
 
 // Connects to the address, says nothing, and returns true if the other end sends something or closes within
-// `patience`, as a gRPC server does with and without TLS. nullopt: that cannot be tried, since this process
+// `time_limit`, as a gRPC server does with and without TLS. nullopt: that cannot be tried, since this process
 // may open no more files.
 std::optional<bool> port_answers(const sockaddr* address, socklen_t length,
-                                 std::chrono::milliseconds patience);
+                                 std::chrono::milliseconds time_limit);
 
 // Time between two looks at the port, and how long each may take
 inline constexpr Duration kPortLook = std::chrono::seconds(10);
-inline constexpr std::chrono::milliseconds kPortPatience{5'000};
+inline constexpr std::chrono::milliseconds kPortTimeLimit{5'000};
 
 class PortWatch {
  public:
-  // So many looks in a row without an answer are told; with so many the port counts as dead. A machine that
-  // is very busy may miss some.
-  static constexpr int kTold = 2, kDead = 12;
+  // So many looks in a row without an answer are reported; with so many the port counts as dead. A machine
+  // that is very busy may miss some.
+  static constexpr int kReported = 2, kDead = 12;
 
   void looked(std::optional<bool> answered) {
     if (answered) silent_ = *answered ? 0 : silent_ + 1;

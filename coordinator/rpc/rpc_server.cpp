@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <grpcpp/grpcpp.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <map>
 #include <mutex>
@@ -35,6 +36,9 @@ constexpr std::size_t kGrpcMemory = std::size_t{1} << 30;
 // Number of threads that read blobs for transfers; many, because most of them may be waiting for blobs that
 // the coordinator must first fetch from another machine
 constexpr int kReadThreads = 64;
+// Number of threads that pass sockets to gRPC. It may read and parse what has come on a connection before it
+// returns, so the thread of the Listener, which closes connections that send too much, must not do that.
+constexpr int kTakeThreads = 4;
 // A worker can send at most this many bytes that the coordinator has not read yet; then its sending pauses.
 constexpr int kUnreadBytes = 64 << 10;
 constexpr int kHelloSeconds = 5;  // a worker must send its hello within this time after opening its stream
@@ -132,13 +136,22 @@ struct GrpcServer::Impl final : pb::Farm::CallbackService {
   // Looks whether the port answers; `on_dead` is called once if it is dead.
   void watch(const std::stop_token& token, const std::function<void()>& on_dead) {
     every(kPortLook, token, [&] {
-      const auto answered = listener->answers(kPortPatience);
+      const auto answered = listener->answers(kPortTimeLimit);
       const auto state = port.lock();
       const bool was_dead = state->dead();
       state->looked(answered);
       if (const std::string trouble = state->trouble(); !trouble.empty()) log_error("", trouble);
       if (state->dead() && !was_dead && on_dead) on_dead();
     });
+  }
+
+  void take_sockets(const std::stop_token& token) {
+    while (!token.stop_requested())
+      for (const int socket : sockets.pop(1, token)) {
+        grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+        connection.fd = socket;
+        acceptor->HandleNewConnection(&connection);
+      }
   }
 
   struct Fetches {
@@ -163,6 +176,8 @@ struct GrpcServer::Impl final : pb::Farm::CallbackService {
   std::unique_ptr<Listener> listener;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
   std::unique_ptr<grpc::Server> server;
+  WorkQueue<int> sockets;  // accepted, to be passed to gRPC
+  std::vector<std::jthread> takers;
   std::mutex mutex;
   std::set<WorkStream*> streams;  // guarded by mutex
   bool stopping = false;          // guarded by mutex
@@ -211,17 +226,12 @@ Result<int> GrpcServer::start(const std::string& address, const std::optional<Tl
   // limit grow to megabytes per worker.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kUnreadBytes);
-  // What gRPC reads at once it also parses, even if the connection is closed meanwhile: a stranger's endless
-  // header costs a time that grows as the square of this.
-  builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kUnreadBytes);
   impl_->server = builder.BuildAndStart();
   if (!impl_->server) return fail(Errc::internal, "gRPC cannot start its server for workers");
   impl_->listener = std::move(*listener);
-  impl_->listener->start([this](int socket) {
-    grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
-    connection.fd = socket;
-    impl_->acceptor->HandleNewConnection(&connection);
-  });
+  for (int i = 0; i < kTakeThreads; ++i)
+    impl_->takers.emplace_back([this](const std::stop_token& token) { impl_->take_sockets(token); });
+  impl_->listener->start([this](int socket) { impl_->sockets.push(socket); });
   for (int i = 0; i < kReadThreads; ++i)
     impl_->readers.emplace_back([&reads = impl_->reads](const std::stop_token& token) {
       while (!token.stop_requested())
@@ -240,6 +250,10 @@ void GrpcServer::stop() {
   impl_->watcher.request_stop();
   if (impl_->watcher.joinable()) impl_->watcher.join();
   impl_->listener->stop();
+  for (auto& taker : impl_->takers) taker.request_stop();
+  impl_->takers.clear();
+  while (impl_->sockets.size() > 0)
+    for (const int socket : impl_->sockets.pop(1, {})) ::close(socket);
   {
     const std::lock_guard lock(impl_->mutex);
     impl_->stopping = true;

@@ -30,6 +30,14 @@ def any_closed(connections):
     return bool(select.select(connections, [], [], 0)[0])
 
 
+def received(connection):
+    """The first bytes that the other side sends; none if it closes the connection."""
+    try:
+        return connection.recv(65536)
+    except ConnectionError:
+        return b""
+
+
 # gRPC's own listener would never accept again (CVE-2023-4785).
 @pytest.mark.parametrize("tls", [False, True])
 def test_the_port_takes_connections_again_when_files_can_be_opened_again(tmp_path, tls):
@@ -90,14 +98,13 @@ def test_many_calls_before_a_hello_close_the_connection_and_no_worker_is_refused
     assert closed_by_peer(stranger)
     a_worker_joins_and_renders(farm)
     again = socket.create_connection(("127.0.0.1", farm.grpc), timeout=60, source_address=("127.0.0.3", 0))
-    assert closed_by_peer(again)
-    wait_until(lambda: "their address sent too much before a hello" in farm.coordinator.output(), "its address is shut out for a while")
+    assert received(again) == b"", "its address is shut out for a while: gRPC's server would speak first"
 
 
 # gRPC 1.51 reads such a header for as long as it goes on (CVE-2023-33953).
 def test_an_endless_header_closes_the_connection(farm):
     stranger = connect(farm.grpc, "127.0.0.4")
-    endless = b"".join(frame(CONTINUATION, 0, 1, b"\x80" * 1000) for _ in range(64))
+    endless = b"".join(frame(CONTINUATION, 0, 1, b"\x80" * 10) for _ in range(1000))
     sent = 0
     try:
         stranger.sendall(frame(HEADERS, 0, 1, b"\x00\x7f"))  # a name whose length does not end

@@ -26,7 +26,7 @@ constexpr int kProgressWhenIdle = 5;  // an idle worker sends only every fifth p
 constexpr std::size_t kJobsRemembered = 64;
 // Number of cached files that the hello names. The coordinator remembers no more of them (kBlobsRemembered),
 // and takes a longer hello from few workers at a time.
-constexpr std::size_t kBlobsTold = 1024;
+constexpr std::size_t kBlobsReported = 1024;
 }  // namespace
 
 Agent::Impl::Impl(AgentOptions o, CoordinatorLink& l, RenderBackend& b, BlobFiles& f, const Clock& c)
@@ -147,7 +147,7 @@ void Agent::Impl::open_connection() {
   hello.threads = options.threads;
   hello.numeric_class = backend.numeric_class();
   hello.platform = backend.platform();
-  hello.blobs_held = files.held(kBlobsTold);
+  hello.blobs_held = files.held(kBlobsReported);
   hello.previous_id = id;
   hello.secret = secret;
   {

@@ -29,6 +29,11 @@ class Connections : public testing::Test {
     return table_.arrive(id, {peer(id), address}, now_);
   }
   bool taken(ConnectionTable::Id id, const std::string& address) { return !arrive(id, address).refused; }
+  // A connection on which a call has begun, and the hello is on its way
+  void begin_hello(ConnectionTable::Id id, const std::string& address) {
+    ASSERT_TRUE(taken(id, address));
+    ASSERT_TRUE(table_.call_began(peer(id), now_).guest);
+  }
   void say_hello(ConnectionTable::Id id) {
     ASSERT_TRUE(table_.call_began(peer(id), now_).guest);
     table_.call_met(peer(id));
@@ -82,8 +87,10 @@ TEST_F(Connections, AConnectionWhoseWorkerHasLeftIsUnmetAgain) {
 
 TEST_F(Connections, AConnectionIsMetWhileOneCallHasShownTheToken) {
   ASSERT_TRUE(taken(1, "a"));
-  say_hello(1);
-  say_hello(1);
+  ASSERT_TRUE(table_.call_began(peer(1), now_).guest);
+  ASSERT_TRUE(table_.call_began(peer(1), now_).guest);
+  EXPECT_EQ(table_.call_met(peer(1)), ConnectionTable::Id{1});
+  EXPECT_EQ(table_.call_met(peer(1)), std::nullopt) << "it was met before";
 
   table_.call_ended(peer(1), true, now_);
 
@@ -153,8 +160,27 @@ TEST_F(Connections, AMetConnectionIsNotClosedForManyCalls) {
   EXPECT_FALSE(one_more.closed);
 }
 
-TEST_F(Connections, BytesBeforeAHelloAreLimited) {
+TEST_F(Connections, BytesBeforeACallAreLimited) {
   ASSERT_TRUE(taken(1, "a"));
+  EXPECT_FALSE(table_.received(1, 1000, now_));
+
+  EXPECT_TRUE(table_.received(1, 1001, now_));
+
+  EXPECT_EQ(arrive(2, "a").refused, Closed::shut_out) << "it was a header without an end, not a hello";
+}
+
+TEST_F(Connections, ALongHelloThatDoesNotEndShutsItsAddressOut) {
+  begin_hello(1, "a");
+  EXPECT_FALSE(table_.received(1, 1001, now_));
+  now_ += 5s;
+
+  EXPECT_EQ(table_.overdue(now_), std::vector<ConnectionTable::Id>{1});
+
+  EXPECT_EQ(arrive(2, "a").refused, Closed::shut_out);
+}
+
+TEST_F(Connections, BytesBeforeAHelloAreLimited) {
+  begin_hello(1, "a");
   EXPECT_FALSE(table_.received(1, 1000, now_));
   EXPECT_FALSE(table_.received(1, 5000, now_)) << "a long hello";
 
@@ -165,14 +191,14 @@ TEST_F(Connections, BytesBeforeAHelloAreLimited) {
 }
 
 TEST_F(Connections, FewConnectionsAtATimeMaySendALongHello) {
-  for (ConnectionTable::Id id = 1; id <= 3; ++id) ASSERT_TRUE(taken(id, "a"));
+  for (ConnectionTable::Id id = 1; id <= 3; ++id) begin_hello(id, "a");
   EXPECT_FALSE(table_.received(1, 1001, now_));
   EXPECT_FALSE(table_.received(2, 1001, now_));
 
   EXPECT_TRUE(table_.received(3, 1001, now_));
 
-  EXPECT_TRUE(taken(4, "a")) << "it may try again: it may be a worker";
-  say_hello(1);
+  begin_hello(4, "a");  // it may try again: it may be a worker
+  table_.call_met(peer(1));
   EXPECT_FALSE(table_.received(4, 1001, now_)) << "the place of the first is free";
 }
 

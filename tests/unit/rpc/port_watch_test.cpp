@@ -21,8 +21,8 @@ sockaddr_in loopback(int port) {
   return address;
 }
 
-std::optional<bool> answers(const sockaddr_in& address, std::chrono::milliseconds patience) {
-  return port_answers(reinterpret_cast<const sockaddr*>(&address), sizeof address, patience);
+std::optional<bool> answers(const sockaddr_in& address, std::chrono::milliseconds time_limit) {
+  return port_answers(reinterpret_cast<const sockaddr*>(&address), sizeof address, time_limit);
 }
 
 TEST(PortWatch, AServerAnswers) {
