@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -16,6 +17,7 @@
 #include <fstream>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <variant>
 
 #include "common/base/clock.h"
@@ -42,6 +44,9 @@ namespace fs = std::filesystem;
 
 enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 
+// Time to stop in when the workers' port is dead
+constexpr unsigned kStopSeconds = 60;
+
 // Locks the folder until the process ends: two coordinators in one folder would destroy each other's data.
 Result<int> lock_folder(const fs::path& folder) {
   std::error_code ec;
@@ -62,13 +67,15 @@ Result<int> lock_folder(const fs::path& folder) {
   return fd;
 }
 
-// Raises the limit on file descriptors to the highest that the system allows. Every connection needs a
-// descriptor.
-void raise_file_limit() {
+// Raises the limit on file descriptors to the highest that the system allows, and returns it. Every
+// connection needs a descriptor.
+std::size_t raise_file_limit() {
+  constexpr std::size_t kUnknown = 1024;
   rlimit limit{};
-  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == limit.rlim_max) return;
-  limit.rlim_cur = limit.rlim_max;
-  ::setrlimit(RLIMIT_NOFILE, &limit);
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return kUnknown;
+  if (limit.rlim_cur == limit.rlim_max) return limit.rlim_cur;
+  const rlim_t before = std::exchange(limit.rlim_cur, limit.rlim_max);
+  return ::setrlimit(RLIMIT_NOFILE, &limit) == 0 ? limit.rlim_max : before;
 }
 
 // Writes the ports to ports.json, for scripts and tests that let the system choose them (port 0). The file is
@@ -181,6 +188,7 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   if (!tokens) return tl::unexpected(tokens.error());
   const auto tls = tls_of(flags);
   if (!tls) return tl::unexpected(tls.error());
+  const auto worker_key = ls::http::read_or_make_token(secrets / "worker-key");
   others.reset();
   if (flags.shared && flags.secrets.empty())
     ls::log_warn(
@@ -204,6 +212,10 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   options.data = data;
   options.store = flags.store;
   options.may_join = may_join;
+  if (worker_key)
+    options.worker_key = *worker_key;
+  else  // the folder of secrets may be one that cannot be written
+    ls::log_info("", "workers get new ids when the coordinator restarts: " + worker_key.error().message);
   options.blobs_at = flags.blobs;
   options.shared = flags.shared;
   if (flags.keep_unused_hours)
@@ -222,16 +234,23 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
 
   auto webhooks = start_webhooks(**coordinator, flags, data, *tracer);
   if (!webhooks) return tl::unexpected(webhooks.error());
+  std::atomic<bool> port_dead{false};
   ls::coordinator::GrpcServer grpc(**coordinator, may_join, guard_of(flags.limits));
   std::optional<ls::coordinator::GrpcServer::Tls> grpc_tls;
   if (*tls) grpc_tls = {(*tls)->ca, (*tls)->cert, (*tls)->key};
-  const auto grpc_port = grpc.start(flags.grpc, grpc_tls);
+  const auto grpc_port = grpc.start(flags.grpc, grpc_tls, [&port_dead] {
+    port_dead = true;
+    // If what has broken the port also keeps the coordinator from stopping, SIGALRM ends it
+    ::alarm(kStopSeconds);
+    ::kill(::getpid(), SIGTERM);
+  });
   if (!grpc_port) return tl::unexpected(grpc_port.error());
   ls::http::Limits limits = flags.limits;
   limits.spool = data / "spool";
   ls::http::Api api(**coordinator, **tokens, limits, ls::http::StaticFiles(ls::http::embedded_files()),
                     identity != nullptr);
   if (*webhooks) api.webhooks([&hooks = **webhooks] { return hooks.figures(); });
+  api.workers_port([&grpc] { return grpc.trouble(); });
   if (*tracer) api.traces([tracer = *tracer] { return tracer->figures(); });
   (*coordinator)
       ->announce(flags.public_http.empty()
@@ -254,6 +273,8 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   grpc.stop();
   webhooks->reset();
   coordinator->reset();
+  if (port_dead)
+    return fail(Errc::unavailable, "the workers' port did not answer any more; start the coordinator again");
   ls::log_info("", "stopped");
   return {};
 }
@@ -263,9 +284,11 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
 int main(int argc, char** argv) {
   const auto parsed = ls::coordinator::parse_flags(argc, argv);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
-  const auto& flags = std::get<Flags>(parsed);
+  auto flags = std::get<Flags>(parsed);
   ls::log_format(flags.log_format);
-  raise_file_limit();
+  // A quarter of the files is for HTTP, half of them at least for workers (connections_for in rpc/listener.h)
+  flags.limits.connections =
+      std::min(flags.limits.connections, std::max<std::size_t>(1, raise_file_limit() / 4));
   keep_freed_memory();
   // Signals are blocked before any thread starts, since threads inherit the mask
   const sigset_t signals = block_signals();

@@ -31,12 +31,12 @@ source.backup(target)
 target.close()
 END
 kept=()
-for name in blobs webhooks node-id token tokens join-token webhook-secret tls; do
+for name in blobs webhooks node-id token tokens join-token worker-key webhook-secret tls; do
   if [ -e "$data/$name" ]; then kept+=("$name"); fi
 done
 if [ -n "$secrets" ]; then
   mkdir "$stage/secrets"
-  for name in token tokens join-token tls; do
+  for name in token tokens join-token worker-key tls; do
     if [ -e "$secrets/$name" ]; then cp -a "$secrets/$name" "$stage/secrets/"; fi
   done
   [ -e "$stage/secrets/token" ] || { echo "error: $secrets is no folder of secrets: it has no token" >&2; exit 1; }

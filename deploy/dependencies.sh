@@ -25,3 +25,18 @@ while read -r line; do
   dpkg-query -W -f='| `${Package}` | ${Version} | ${binary:Summary} |\n' "$line" 2>/dev/null ||
     { echo "error: $line is not installed: deploy/install-deps.sh --tests first" >&2; exit 1; }
 done <"$here/packages.txt"
+
+cat <<'TAIL'
+## Known faults of gRPC 1.51
+
+Debian 12's gRPC is 1.51.1, without fixes of its own for these; Debian 13 and Ubuntu 24.04 have 1.51.1 as well. What each means for the workers' port, and what stops it ([decision 43](../decisions/0043-connections-of-workers.md)); `tests/system/test_workers_port.py` tries the first two on a running coordinator.
+
+| fault | what it is | here |
+|---|---|---|
+| CVE-2023-4785 | after "too many open files" gRPC's listener accepts nothing any more (1.23 to before the fixes of 2023) | its listener is not used: the coordinator accepts connections itself, with and without TLS |
+| CVE-2023-33953 | headers of any length are read and kept, in a time that grows as the square of their length | before a hello a connection may send 64 KB, few at a time 320 KB, and 16 KB ahead of what is read; an address that sends more is refused for 30 s. With `--tls` a certificate is needed first. A worker with the join token can still do it |
+| CVE-2023-44487 (rapid reset) | calls that are begun and cancelled at once | a connection without a hello is closed at its 17th open call and after 64 KB; what a worker with the join token may do is not limited |
+| CVE-2023-1428 | some headers together with more than 8 KB of others end the process | tried with many sets of headers against 1.51.1, without effect |
+| CVE-2023-32731 | a peer's header table gets out of step | came with a change of February 2023 ([#32309](https://github.com/grpc/grpc/pull/32309)), which 1.51.1 does not have |
+| CVE-2023-32732, CVE-2024-7246 | a client makes a proxy's connection to the server fail, or its header table wrong, for other clients of the proxy | workers connect without a proxy that reads HTTP/2; do not put one before the port that strangers reach |
+TAIL

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/base/safe_text.h"
 #include "proto/convert.h"
 
 // Defines `name` as the value of `expression`, a Result; if that is an error, the enclosing function returns
@@ -33,15 +34,25 @@ Result<std::string> id_from(const std::string& text, const char* field) {
   return text;
 }
 
-// Returns the text, which must have at most `limit` bytes. Control characters except line breaks are replaced
-// by spaces, so that a worker cannot control the terminal on which the text is shown.
-Result<std::string> text_from(const std::string& text, std::size_t limit, const char* field) {
+// Returns the text, which must have at most `limit` bytes. Characters that would control the terminal on
+// which the text is shown, or reorder its letters, are replaced by spaces. Line breaks stay.
+Result<std::string> lines_from(const std::string& text, std::size_t limit, const char* field) {
   if (text.size() > limit)
     return wrong(field, fmt::format("has {} bytes; at most {} are allowed", text.size(), limit));
-  std::string clean = text;
-  for (char& c : clean)
-    if (static_cast<unsigned char>(c) < 0x20 && c != '\n') c = ' ';
-  return clean;
+  return plain_lines(text);
+}
+
+// The same for a text of one line.
+Result<std::string> text_from(const std::string& text, std::size_t limit, const char* field) {
+  LS_TRY(lines, lines_from(text, limit, field));
+  std::ranges::replace(lines, '\n', ' ');
+  return lines;
+}
+
+// Returns a secret or a part of one, which is never shown.
+Result<std::string> secret_from(const std::string& text, const char* field) {
+  if (text.size() > limits::kTokenBytes) return wrong(field, "is too long");
+  return text;
 }
 
 Result<double> seconds_from(double value, const char* field) {
@@ -90,7 +101,7 @@ Result<UnitKey> key_from(const pb::UnitKey& in) {
 }
 
 Result<Error> problem_from(const pb::Problem& in) {
-  LS_TRY(text, text_from(in.message(), limits::kTextBytes, "problem.message"));
+  LS_TRY(text, lines_from(in.message(), limits::kTextBytes, "problem.message"));
   const auto* code = std::ranges::find(kErrcNames, in.code());
   return Error{code == kErrcNames.end() ? Errc::internal : static_cast<Errc>(code - kErrcNames.begin()),
                text};
@@ -114,7 +125,7 @@ Result<JobBrief> brief_from(const pb::JobBrief& in) {
   if (in.settings().size() > limits::kSettingsBytes) return wrong("brief.settings", "is too long");
   LS_TRY(settings, parse_render_settings(in.settings()));
   LS_TRY(assets, list_from(in.assets(), limits::kAssetsPerJob, "brief.assets", asset_from));
-  LS_TRY(needs, text_from(in.needs(), limits::kNeedsBytes, "brief.needs"));
+  LS_TRY(needs, lines_from(in.needs(), limits::kNeedsBytes, "brief.needs"));
   return JobBrief{JobId{job}, scene, settings, digest_of(settings), std::move(assets), needs};
 }
 
@@ -127,7 +138,9 @@ Result<FromWorker> hello_from(const pb::Hello& in) {
   LS_TRY(platform, text_from(in.platform(), limits::kNameBytes, "hello.platform"));
   if (in.threads() < 1 || in.threads() > limits::kThreads)
     return wrong("hello.threads", fmt::format("is {}; it must be 1 to {}", in.threads(), limits::kThreads));
-  if (in.join_token().size() > limits::kTokenBytes) return wrong("hello.join_token", "is too long");
+  LS_TRY(token, secret_from(in.join_token(), "hello.join_token"));
+  LS_TRY(secret, secret_from(in.secret(), "hello.secret"));
+  if (in.has_secret()) hello.secret = secret;
   const auto tag_from = [](const std::string& tag) {
     return text_from(tag, limits::kNameBytes, "hello.tags");
   };
@@ -146,7 +159,7 @@ Result<FromWorker> hello_from(const pb::Hello& in) {
   hello.numeric_class = numeric_class;
   hello.threads = in.threads();
   hello.memory_bytes = in.memory_bytes();
-  hello.join_token = in.join_token();
+  hello.join_token = token;
   hello.fake = in.fake();
   hello.platform = platform;
   return hello;
@@ -217,7 +230,7 @@ Result<FromWorker> failure_from(const pb::UnitFailure& in) {
   UnitFailure failure;
   LS_TRY(unit, key_from(in.unit()));
   LS_TRY(lease, id_from(in.lease(), "failure.lease"));
-  LS_TRY(reason, text_from(in.reason(), limits::kTextBytes, "failure.reason"));
+  LS_TRY(reason, lines_from(in.reason(), limits::kTextBytes, "failure.reason"));
   failure.unit = unit;
   failure.lease = LeaseId{lease};
   failure.scene_at_fault = in.scene_at_fault();
@@ -289,7 +302,8 @@ Result<ToWorker> from_wire(const pb::ToWorker& in) {
   switch (in.message_case()) {
     case pb::ToWorker::kWelcome: {
       LS_TRY(worker, id_from(in.welcome().worker(), "welcome.worker"));
-      return Welcome{WorkerId{worker}, in.welcome().epoch()};
+      LS_TRY(secret, secret_from(in.welcome().secret(), "welcome.secret"));
+      return Welcome{WorkerId{worker}, in.welcome().epoch(), secret};
     }
     case pb::ToWorker::kRefused: {
       LS_TRY(problem, problem_from(in.refused().problem()));

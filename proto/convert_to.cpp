@@ -84,6 +84,7 @@ void put(const WorkerHello& hello, pb::FromWorker& out) {
   h->set_previous_id(hello.previous_id.value);
   h->set_fake(hello.fake);
   h->set_platform(sendable(hello.platform, limits::kNameBytes));
+  if (hello.secret) h->set_secret(*hello.secret);
 }
 
 void put(const WorkerProgress& progress, pb::FromWorker& out) {
@@ -144,6 +145,7 @@ void put(const WorkerDraining&, pb::FromWorker& out) { out.mutable_draining(); }
 void put(const Welcome& welcome, pb::ToWorker& out) {
   out.mutable_welcome()->set_worker(welcome.worker.value);
   out.mutable_welcome()->set_epoch(welcome.epoch);
+  out.mutable_welcome()->set_secret(welcome.secret);
 }
 
 void put(const Refused& refused, pb::ToWorker& out) {

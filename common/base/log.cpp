@@ -7,6 +7,8 @@
 #include <atomic>
 #include <nlohmann/json.hpp>
 
+#include "common/base/safe_text.h"
+
 namespace ls {
 namespace {
 
@@ -23,15 +25,6 @@ spdlog::logger& logger() {
     return l;
   }();
   return *instance;
-}
-
-bool control(char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }
-
-// Replaces control characters by spaces, so that names and file contents in a message cannot forge log lines.
-std::string one_line(std::string_view text) {
-  std::string line(text);
-  std::replace_if(line.begin(), line.end(), control, ' ');
-  return line;
 }
 
 // Adds the pairs in `keys`, such as "a=1 b=two words c=3", to `line`. A word without '=' belongs to the value
@@ -85,18 +78,19 @@ void log_warn(std::string_view keys, std::string_view text) { write(spdlog::leve
 void log_error(std::string_view keys, std::string_view text) { write(spdlog::level::err, keys, text); }
 
 std::string log_value(std::string_view text) {
-  std::string value(text);
+  std::string value = plain_text(text);
   std::replace_if(
-      value.begin(), value.end(), [](char c) { return control(c) || c == ' ' || c == '='; }, '_');
+      value.begin(), value.end(), [](char c) { return c == ' ' || c == '='; }, '_');
   return value;
 }
 
 std::string log_line(LogFormat format, std::string_view keys, std::string_view text) {
+  // Names and file contents in a message must not forge lines, nor control the terminal that shows them
   if (format == LogFormat::text)
-    return keys.empty() ? one_line(text) : fmt::format("{} {}", one_line(keys), one_line(text));
+    return keys.empty() ? plain_text(text) : fmt::format("{} {}", plain_text(keys), plain_text(text));
   nlohmann::ordered_json line;
-  line["text"] = text;
-  add_keys(line, keys);
+  line["text"] = plain_lines(text);
+  add_keys(line, plain_text(keys));
   // With error_handler_t::replace, dump() gives valid JSON whatever bytes a name contains. The opening brace
   // is removed, since kJsonPattern already writes one.
   return line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).substr(1);

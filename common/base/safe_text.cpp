@@ -36,9 +36,10 @@ bool is_shown(std::uint32_t code) {
   const auto within = [code](std::uint32_t first, std::uint32_t last) {
     return code >= first && code <= last;
   };
-  // These are not shown: control characters; line and paragraph separators, directional embeddings and
-  // overrides (together 0x2028 to 0x202E); directional isolates.
-  return !within(0, 0x1F) && !within(0x7F, 0x9F) && !within(0x2028, 0x202E) && !within(0x2066, 0x2069);
+  // These are not shown: control characters; directional marks (0x061C, 0x200E, 0x200F); line and paragraph
+  // separators, directional embeddings and overrides (together 0x2028 to 0x202E); directional isolates.
+  return !within(0, 0x1F) && !within(0x7F, 0x9F) && code != 0x061C && !within(0x200E, 0x200F) &&
+         !within(0x2028, 0x202E) && !within(0x2066, 0x2069);
 }
 
 bool needs_no_quotes(char c) {
@@ -61,6 +62,17 @@ std::string plain_text(std::string_view text) {
     text.remove_prefix(bytes);
   }
   return plain;
+}
+
+std::string plain_lines(std::string_view text) {
+  std::string plain;
+  for (;;) {
+    const std::size_t end = text.find('\n');
+    plain += plain_text(text.substr(0, end));
+    if (end == std::string_view::npos) return plain;
+    plain += '\n';
+    text.remove_prefix(end + 1);
+  }
 }
 
 std::string shell_word(std::string_view text) {

@@ -9,8 +9,10 @@ namespace ls {
 
 // Replaces each character that could move the cursor, colour the terminal, forge lines or reorder letters by
 // one space, so that columns stay aligned. These are control characters (C0, DEL, C1, also single bytes that
-// are not UTF-8), line and paragraph separators, and directional overrides.
+// are not UTF-8), line and paragraph separators, and directional marks and overrides.
 std::string plain_text(std::string_view text);
+// The same for each line of the text: line feeds stay.
+std::string plain_lines(std::string_view text);
 
 // Quotes `text` as one word of a shell command, which a person can copy: returns it unchanged if none of its
 // characters has a special meaning in a shell, otherwise quoted. Control characters are written as escapes

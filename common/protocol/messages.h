@@ -133,6 +133,9 @@ struct WorkerHello {
   WorkerId previous_id;
   bool fake = false;     // true if the worker generates fake pixels instead of rendering
   std::string platform;  // machine type and build that its numeric class stands for, as text; may be empty
+  // The secret that came with previous_id; empty for a new worker. nullopt: the worker is of a version that
+  // keeps no secret.
+  std::optional<std::string> secret = std::nullopt;
   bool operator==(const WorkerHello&) const = default;
 };
 // This message renews the deadlines of the listed leases. The worker sends it about once a second while it
@@ -171,6 +174,8 @@ struct Welcome {
   // The number of this registration. Each time the worker registers, it gets a larger number, and the
   // coordinator closes the worker's connections that have smaller ones.
   std::uint64_t epoch = 0;
+  // Proves that the worker has this id when it connects again (WorkerHello::secret)
+  std::string secret = {};
   bool operator==(const Welcome&) const = default;
 };
 struct Refused {  // after this message the coordinator closes the connection

@@ -116,6 +116,9 @@ inline constexpr std::uint32_t kUnhealthyJobs = 2;
 // A worker's failures are forgiven this long after the latest of them
 inline constexpr Duration kForgiveAfter = 1800s;
 inline constexpr Duration kForgetWorkerAfter = 3600s;  // a worker is forgotten this long after it was lost
+// Of workers that were lost before they finished a unit, only so many are remembered: otherwise one who joins
+// and leaves again and again would fill the table of workers
+inline constexpr std::size_t kLostNewcomersKept = 64;
 // Names of workers that nothing refers to are dropped when the number of names exceeds 2 n + kNamesKept,
 // where n is the number of names that the previous cleanup kept (WorkerTable::has_many_names)
 inline constexpr std::size_t kNamesKept = 256;

@@ -108,6 +108,10 @@ struct Worker {
     if (units_out < kUnitsAThread * static_cast<std::uint32_t>(threads)) return true;
     return leases.size() < kQueuedLeases && seconds_until_free() < kQueuedLeases * kLeaseSeconds;
   }
+  // True if nothing is known of it but that it was here
+  bool never_worked() const {
+    return units_done == 0 && failures.empty() && !unhealthy_since && !quarantined && leases.empty();
+  }
   bool available() const {
     return connected && !draining && pause == Pause::none && !unhealthy_since && !quarantined;
   }

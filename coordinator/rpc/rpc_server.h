@@ -2,6 +2,7 @@
 // workers to a Coordinator.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -27,7 +28,12 @@ class GrpcServer {
   // workers must present a certificate signed by Tls::ca. unavailable: the address is in use (also by another
   // coordinator, because ports are never shared) or does not belong to this machine. Starts threads, which
   // inherit the signal mask: block SIGTERM before the call.
-  Result<int> start(const std::string& address, const std::optional<Tls>& tls = {});
+  // The port is looked at from time to time; `on_dead` is called once, on a thread of the server, when it has
+  // not answered for minutes.
+  Result<int> start(const std::string& address, const std::optional<Tls>& tls = {},
+                    const std::function<void()>& on_dead = {});
+  // What is wrong with the port, as a text for a person; empty: nothing.
+  std::string trouble() const;
   // Ends all streams with UNAVAILABLE, so that the workers try to reconnect. Returns when all streams have
   // ended.
   void stop();

@@ -73,10 +73,12 @@ void Outlet::State::pump() {
 }
 
 WorkStream::WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context, const JoinGuard& guard,
-                       TimePoint hello_deadline, std::function<void(WorkStream*)> on_gone)
+                       std::unique_ptr<Listener::Call> call, TimePoint hello_deadline,
+                       std::function<void(WorkStream*)> on_gone)
     : coordinator_(coordinator),
       context_(context),
       guard_(guard),
+      call_(std::move(call)),
       hello_deadline_(hello_deadline),
       on_gone_(std::move(on_gone)),
       outlet_(std::make_shared<Outlet>(this)) {}
@@ -160,6 +162,7 @@ void WorkStream::greet(FromWorker message) {
                                        session.error().code == Errc::resource_exhausted);
   }
   session_ = std::move(*session);
+  call_->met();
   greeted_ = true;
 }
 
@@ -193,18 +196,22 @@ void WorkStream::OnDone() {
   delete this;
 }
 
-BlobStream::BlobStream(Coordinator& coordinator, const pb::FetchBlobRequest& request,
-                       const JoinCheck& may_join, RunOn run, std::function<void()> on_gone)
+BlobStream::BlobStream(Coordinator& coordinator, grpc::CallbackServerContext* context,
+                       const pb::FetchBlobRequest& request, const JoinCheck& may_join,
+                       std::unique_ptr<Listener::Call> call, RunOn run, Watcher watcher)
     : coordinator_(coordinator),
+      context_(context),
       blobs_(coordinator.blobs()),
       request_(request),
       may_join_(may_join),
+      call_(std::move(call)),
       run_(std::move(run)),
-      on_gone_(std::move(on_gone)) {}
+      watcher_(std::move(watcher)) {}
 
 // Here and in the functions below, no member may be used after StartWrite() or Finish(): OnDone, which
 // deletes this object, may run immediately.
-void BlobStream::begin(const JoinGuard& guard, const std::string& address) {
+void BlobStream::begin(const JoinGuard& guard) {
+  const std::string address = address_of_peer(context_->peer());
   if (const int wait = guard.wait(address, request_.join_token()); wait > 0)
     return Finish({grpc::StatusCode::RESOURCE_EXHAUSTED, too_many_wrong_tokens(wait)});
   const bool right = may_join_(request_.join_token());
@@ -212,6 +219,9 @@ void BlobStream::begin(const JoinGuard& guard, const std::string& address) {
   if (!right)
     return Finish(
         {grpc::StatusCode::UNAUTHENTICATED, "wrong join token; the coordinator's is in DATA/join-token"});
+  call_->met();
+  if (!watcher_.admitted(this))
+    return Finish({grpc::StatusCode::UNAVAILABLE, "too many transfers at once; try again"});
   run_([this] { open(); });
 }
 
@@ -240,6 +250,7 @@ void BlobStream::next() {
   offset_ += bytes->size();
   coordinator_.blob_sent(bytes->size());
   chunk_.set_data(bytes->data(), bytes->size());
+  watcher_.waits(true);
   StartWrite(&chunk_);
 }
 
@@ -254,12 +265,13 @@ void BlobStream::refuse(const Error& why) {
 }
 
 void BlobStream::OnWriteDone(bool ok) {
+  watcher_.waits(false);
   if (!ok) return Finish({grpc::StatusCode::CANCELLED, "the worker left"});
   run_([this] { next(); });
 }
 
 void BlobStream::OnDone() {
-  on_gone_();
+  watcher_.gone();
   delete this;
 }
 

@@ -10,6 +10,7 @@
 #include "common/base/clock.h"
 #include "common/base/guarded.h"
 #include "coordinator/rpc/join_guard.h"
+#include "coordinator/rpc/listener.h"
 #include "coordinator/service/coordinator.h"
 #include "proto/farm.grpc.pb.h"
 #include "proto/farm.pb.h"
@@ -56,7 +57,8 @@ class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWo
   // The stream calls `on_gone` last, before it deletes itself. `guard` must outlive the stream. The server
   // disconnects a worker that has not sent its hello by `hello_deadline`.
   WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context, const JoinGuard& guard,
-             TimePoint hello_deadline, std::function<void(WorkStream*)> on_gone);
+             std::unique_ptr<Listener::Call> call, TimePoint hello_deadline,
+             std::function<void(WorkStream*)> on_gone);
 
   void begin() { StartRead(&incoming_); }
   // Sends the error to the worker, then ends the stream. `retry`: the worker should try again later.
@@ -77,6 +79,7 @@ class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWo
   Coordinator& coordinator_;
   grpc::CallbackServerContext* context_;
   const JoinGuard& guard_;
+  const std::unique_ptr<Listener::Call> call_;
   const TimePoint hello_deadline_;
   const std::function<void(WorkStream*)> on_gone_;
   std::shared_ptr<Outlet> outlet_;
@@ -93,10 +96,18 @@ using RunOn = std::function<void(std::function<void()>)>;  // runs the function 
 // minutes, and gRPC's few threads must stay free for the messages of workers.
 class BlobStream final : public grpc::ServerWriteReactor<pb::BlobChunk> {
  public:
-  BlobStream(Coordinator& coordinator, const pb::FetchBlobRequest& request, const JoinCheck& may_join,
-             RunOn run, std::function<void()> on_gone);
+  // How the server follows the transfer. It may end it with cut(), until `gone` was called.
+  struct Watcher {
+    std::function<bool(BlobStream*)> admitted;  // false: there is no place for it
+    std::function<void(bool)> waits;            // true: for its worker to take a chunk; false: no longer
+    std::function<void()> gone;                 // called last, before the stream deletes itself
+  };
+  BlobStream(Coordinator& coordinator, grpc::CallbackServerContext* context,
+             const pb::FetchBlobRequest& request, const JoinCheck& may_join,
+             std::unique_ptr<Listener::Call> call, RunOn run, Watcher watcher);
   // Starts the first write, or ends the call with an error.
-  void begin(const JoinGuard& guard, const std::string& address);
+  void begin(const JoinGuard& guard);
+  void cut() { context_->TryCancel(); }
 
   void OnWriteDone(bool ok) override;
   void OnDone() override;
@@ -107,11 +118,13 @@ class BlobStream final : public grpc::ServerWriteReactor<pb::BlobChunk> {
   void refuse(const Error& why);
 
   Coordinator& coordinator_;
+  grpc::CallbackServerContext* context_;
   BlobStore& blobs_;
   const pb::FetchBlobRequest& request_;  // owned by gRPC; exists until OnDone
   const JoinCheck& may_join_;
+  const std::unique_ptr<Listener::Call> call_;
   const RunOn run_;
-  const std::function<void()> on_gone_;
+  const Watcher watcher_;
   Digest digest_;
   std::uint64_t offset_ = 0, size_ = 0;
   pb::BlobChunk chunk_;

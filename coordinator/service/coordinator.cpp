@@ -89,7 +89,13 @@ struct Coordinator::Parts {
   Takeover takeover{core, *store, files, blobs, restore, writes, clock};
   ResultPipeline results{core, writes, clock};
   WorkerSessions sessions{
-      core, results, {options.may_join, options.allow_fake, options.version, start, lease_prefix}, clock};
+      core,
+      results,
+      {options.may_join, options.allow_fake, options.version, start, lease_prefix,
+       options.worker_key.empty() ? fmt::format("{:x}{:x}{:x}{:x}", random_number(), random_number(),
+                                                random_number(), random_number())
+                                  : options.worker_key},
+      clock};
   EventHub hub{[this](std::uint64_t count) { return store->reserve("events", count); }};
   std::vector<std::jthread> threads;
 };

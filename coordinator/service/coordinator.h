@@ -36,9 +36,12 @@ class Coordinator {
     // How long to keep a blob (file of a scene) that no job needs and nobody requests, and an interrupted
     // upload that is not continued. nullopt: blobs are kept forever, interrupted uploads for a day.
     std::optional<Duration> keep_unused = std::chrono::hours(24);
-    bool shared = false;      // true: other coordinators use the same job store and blob store
-    std::string join_token;   // the token that a worker needs to join; empty: any worker may join
-    JoinCheck may_join;       // if set, it decides which workers may join, and join_token is not used
+    bool shared = false;     // true: other coordinators use the same job store and blob store
+    std::string join_token;  // the token that a worker needs to join; empty: any worker may join
+    JoinCheck may_join;      // if set, it decides which workers may join, and join_token is not used
+    // With this secret, which no worker knows, workers prove after a restart, or at another coordinator that
+    // has it too, that an id is theirs. Empty: a random one, so that all workers get new ids
+    std::string worker_key;
     bool allow_fake = false;  // true: fake workers, which invent their pixels, may join (for tests)
     // Version of this program. Workers of another version finish the jobs of their numeric class (machines
     // that compute the same bits) but begin none, so that jobs submitted during an upgrade do not depend on

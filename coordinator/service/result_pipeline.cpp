@@ -226,7 +226,8 @@ void ResultPipeline::refuse(Core& core, const Arrived& a, const Error& error) {
   log_warn(fmt::format("job={} tile={} round={} worker={}", unit.job.value, unit.tile, unit.round,
                        a.from->worker.value),
            error.message);
-  core.records.log(unit.job, fmt::format("{} (worker {})", error.message, a.from->worker.value));
+  if (core.driver.farm().failure_is_new(a.from->worker, unit))
+    core.records.log(unit.job, fmt::format("{} (worker {})", error.message, a.from->worker.value));
   UnitFailure failure;
   failure.unit = unit;
   failure.lease = a.result.lease;

@@ -8,6 +8,7 @@
 
 #include "common/base/log.h"
 #include "common/base/overloaded.h"
+#include "common/base/secret.h"
 #include "common/protocol/limits.h"
 #include "coordinator/service/core.h"
 
@@ -46,12 +47,22 @@ bool well_formed(const WorkerId& id) {
          });
 }
 
-// Makes the id of a new worker. A worker that reconnects is recognised by its id, so anyone with the id could
-// take over its stream: ids must not be guessable.
-std::string new_worker_id(std::uint64_t start, std::uint64_t number) {
+// Digits of the last part of a worker's id. The longer ones are given to workers of an older version: they
+// show nothing but their id when they connect again, so anyone who guessed it could take over their stream.
+constexpr std::size_t kDigitsWithSecret = 8, kDigitsWithoutSecret = 12;
+
+// True if a worker must show its secret to get this id again.
+bool needs_secret(const WorkerId& id) {
+  return id.value.size() - id.value.rfind('-') - 1 == kDigitsWithSecret;
+}
+
+// Makes the id of a new worker.
+std::string new_worker_id(std::uint64_t start, std::uint64_t number, bool keeps_secret) {
   std::random_device device;
-  const std::uint64_t secret = (std::uint64_t{device()} << 32 | device()) & 0xffff'ffff'ffff;
-  return fmt::format("w-{:x}-{:x}-{:012x}", start, number, secret);
+  const std::uint64_t random = std::uint64_t{device()} << 32 | device();
+  return fmt::format(
+      "w-{:x}-{:x}-{}", start, number,
+      fmt::format("{:016x}", random).substr(0, keeps_secret ? kDigitsWithSecret : kDigitsWithoutSecret));
 }
 
 }  // namespace
@@ -94,8 +105,13 @@ Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello
   // If a worker of another name has this id already (for example, because a running machine was cloned), that
   // worker keeps the id, and this one gets a new id.
   const bool taken = known != workers.end() && known->second.hello.name != hello.name;
-  if (id.empty() || !well_formed(id) || taken)
-    id.value = new_worker_id(options_.start, last_epoch_ & 0xffffffff);
+  const bool proved =
+      !well_formed(id) || !needs_secret(id) || equal_secret(hello.secret.value_or(""), secret_of(id));
+  if (!proved)
+    log_warn(fmt::format("worker={} name={}", log_value(id.value), log_value(hello.name)),
+             "a worker shows this id without the secret that belongs to it, and gets another id");
+  if (id.empty() || !well_formed(id) || taken || !proved)
+    id.value = new_worker_id(options_.start, last_epoch_ & 0xffffffff, hello.secret.has_value());
   if (workers.size() >= limits::kMaxWorkers && !workers.contains(id))
     return fail(Errc::resource_exhausted,
                 fmt::format("{} workers are known; more are not taken", workers.size()));
@@ -106,10 +122,11 @@ Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello
   if (worker.connection) worker.connection->close();
   worker.hello = hello;
   worker.hello.join_token.clear();
+  worker.hello.secret.reset();
   worker.hello.blobs_held.clear();  // not needed in the table; the farm gets the list from `hello`
   worker.connection = connection;
   worker.last_seen = clock_.now();
-  connection->sink->send(Welcome{id, connection->epoch});
+  connection->sink->send(Welcome{id, connection->epoch, needs_secret(id) ? secret_of(id) : std::string()});
   log_info(fmt::format("worker={} name={} epoch={}", id.value, log_value(hello.name), connection->epoch),
            "joined");
   core->driver.run(WorkerJoined{id, connection->epoch, hello.name, hello.numeric_class, hello.threads,
@@ -117,6 +134,10 @@ Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello
                                 options_.version.empty() || hello.build == options_.version, hello.platform,
                                 principal});
   return std::make_unique<Session>(*this, std::move(connection));
+}
+
+std::string WorkerSessions::secret_of(const WorkerId& id) const {
+  return hmac_sha256(options_.id_key, "worker " + id.value);
 }
 
 void WorkerSessions::disconnected(Connection& connection) {
@@ -157,9 +178,10 @@ void WorkerSessions::handle(Core& core, Connection& from, FromWorker message) {
                    // If the acknowledgement came after that lease, the worker could mistake it for the answer
                    // to its new attempt.
                    from.sink->send(ResultAck{m.unit, std::nullopt});
-                   if (!core.jobs.find(m.unit.job)) return;  // a job that is not known has no log
-                   core.records.log(m.unit.job, fmt::format("tile {} round {} failed on {}: {}", m.unit.tile,
-                                                            m.unit.round, from.worker.value, m.reason));
+                   if (core.driver.farm().failure_is_new(from.worker, m.unit))
+                     core.records.log(m.unit.job,
+                                      fmt::format("tile {} round {} failed on {}: {}", m.unit.tile,
+                                                  m.unit.round, from.worker.value, m.reason));
                    core.driver.run(UnitFailed{from.worker, m});
                  },
                  [&](const LeaseReturned& m) {

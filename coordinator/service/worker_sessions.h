@@ -19,6 +19,9 @@ class WorkerSessions {
     std::string version;
     std::uint64_t start = 0;   // number of this start of the coordinator
     std::string lease_prefix;  // the ids of the farm's leases begin with this text
+    // A secret from which the secrets of workers are made. Worker ids are shown to users, so whoever shows
+    // one must also show its secret to get it.
+    std::string id_key;
   };
   WorkerSessions(Guarded<Core>& core, ResultPipeline& results, Options options, const Clock& clock)
       : core_(core),
@@ -44,6 +47,7 @@ class WorkerSessions {
   void handle(Core& core, Connection& from, FromWorker message);
   void note_progress(Core& core, Connection& from, WorkerEntry& worker, const WorkerProgress& progress);
   void disconnected(Connection& connection);
+  std::string secret_of(const WorkerId& id) const;
 
   Guarded<Core>& core_;
   ResultPipeline& results_;

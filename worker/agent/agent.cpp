@@ -24,6 +24,9 @@ constexpr Duration kFirstPause = std::chrono::milliseconds(100), kFirstTroublePa
 constexpr Duration kLongestWait = std::chrono::seconds(1);
 constexpr int kProgressWhenIdle = 5;  // an idle worker sends only every fifth progress report
 constexpr std::size_t kJobsRemembered = 64;
+// Number of cached files that the hello names. The coordinator remembers no more of them (kBlobsRemembered),
+// and takes a longer hello from few workers at a time.
+constexpr std::size_t kBlobsReported = 1024;
 }  // namespace
 
 Agent::Impl::Impl(AgentOptions o, CoordinatorLink& l, RenderBackend& b, BlobFiles& f, const Clock& c)
@@ -94,6 +97,7 @@ void Agent::Impl::handle_message(ToWorker& message) {
                    up_since = clock.now();
                    next_progress = up_since;
                    id = welcome.worker;
+                   secret = welcome.secret;
                    if (draining) outgoing.push_front(WorkerDraining{});
                    log_info(fmt::format("worker={}", id.value), "joined the coordinator");
                  },
@@ -149,8 +153,9 @@ void Agent::Impl::open_connection() {
   hello.threads = options.threads;
   hello.numeric_class = backend.numeric_class();
   hello.platform = backend.platform();
-  hello.blobs_held = files.held(limits::kBlobsHeld);
+  hello.blobs_held = files.held(kBlobsReported);
   hello.previous_id = id;
+  hello.secret = secret;
   {
     const std::lock_guard lock(mutex);
     connection = Connection::opening;

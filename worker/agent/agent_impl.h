@@ -225,6 +225,7 @@ struct Agent::Impl {
   TimePoint last_busy{};  // when this worker was last found to hold units or results
   std::optional<Result<void>> ended;
   WorkerId id;
+  std::string secret;  // proves to the coordinator that this worker has the id
 
   std::atomic<bool> drain_requested{false}, stop_requested{false};
   std::atomic<bool> stop_loading{false};  // tells the backend to abandon the world that it builds

@@ -129,6 +129,9 @@ class Farm {
   std::vector<JobRestored::Audit> open_audits(const JobId& id) const;
   std::vector<JobId> take_changed_audits();  // jobs whose open audits may have changed since the last call
   bool quarantined(const WorkerId& worker) const;
+  // True if a failure of this unit on this worker would count, and tells something new: the worker holds the
+  // unit, and has not failed so often that it gets no more units of the job.
+  bool failure_is_new(const WorkerId& worker, const UnitKey& unit) const;
   // True if the job has a numeric class already, or may be pinned to that of this worker (then only workers
   // of this class render it).
   bool may_pin(const JobId& id, const WorkerId& worker) const;

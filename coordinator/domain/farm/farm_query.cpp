@@ -229,6 +229,14 @@ std::vector<JobId> Farm::take_changed_audits() {
 }
 
 bool Farm::quarantined(const WorkerId& worker) const { return state_->quarantined.contains(worker); }
+bool Farm::failure_is_new(const WorkerId& worker, const UnitKey& unit) const {
+  const Job* job = state_->find(unit.job);
+  const Worker* known = std::as_const(state_->workers).find(worker);
+  if (job == nullptr || known == nullptr || job->ended() || unit.tile >= job->units.tiles()) return false;
+  const UnitCode code = unit_code(unit.round, unit.tile);
+  return job->queue.plans(code) && state_->lease_of(*job, code, *known) != nullptr &&
+         !known->blocked(job->seq, state_->now);
+}
 bool Farm::may_pin(const JobId& id, const WorkerId& worker) const {
   const Job* job = state_->find(id);
   const Worker* known = std::as_const(state_->workers).find(worker);

@@ -5,12 +5,14 @@
 // class.
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
 #include <set>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "coordinator/domain/fair_share.h"
@@ -53,6 +55,9 @@ struct Farm::State {
   // units of the job from now on, so dispatch() considers all workers again
   bool pinned_for_others = false;
   std::set<WorkerIndex> dirty;  // workers that may want more work, since their state has changed
+  // Workers that were lost before they finished a unit (kLostNewcomersKept), longest ago first. Some may have
+  // come back since.
+  std::deque<WorkerId> lost_newcomers;
 
   // Defined in farm_jobs.cpp
   void on(const JobSubmitted& event);
@@ -98,6 +103,7 @@ struct Farm::State {
   void note_progress(Worker& worker);  // notes that the worker makes progress, so it is not stuck
   void expire_leases();
   void forgive_and_forget();
+  void forget(Worker& worker);
   void forget_names();  // forgets names of workers that are gone and that no job refers to
 
   // Defined in farm_units.cpp
@@ -178,7 +184,10 @@ struct Farm::State {
   void give_back_beyond(Job& job);  // takes back leased units of rounds after the tiles' last ones
   // Returns the lease under which the worker holds the unit; null: none. Defined in farm_units.cpp, as is
   // count_failure()
-  LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker);
+  const LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker) const;
+  LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker) {
+    return const_cast<LeaseRecord*>(std::as_const(*this).lease_of(job, code, worker));
+  }
   void count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure);
 
   // Defined in farm_leases.cpp

@@ -156,18 +156,17 @@ void Farm::State::checkpoint(Job& job, RoundIndex round) {
   if (!job.adaptive) job.move_windows(workers.threads());
 }
 
-LeaseRecord* Farm::State::lease_of(const Job& job, UnitCode code, const Worker& worker) {
+const LeaseRecord* Farm::State::lease_of(const Job& job, UnitCode code, const Worker& worker) const {
+  const auto held = [&](LeaseSeq seq) {
+    const auto lease = leases.all().find(seq);
+    return lease != leases.all().end() && lease->second.worker == &worker ? &lease->second : nullptr;
+  };
   const auto audit = job.audits.find(code);
-  if (audit != job.audits.end() && audit->second.lease != 0) {
-    LeaseRecord* lease = leases.find(audit->second.lease);
-    return lease->worker == &worker ? lease : nullptr;
-  }
+  if (audit != job.audits.end() && audit->second.lease != 0) return held(audit->second.lease);
   const auto it = job.out.find(code);
   if (it == job.out.end()) return nullptr;
-  for (const LeaseSeq seq : it->second.lease) {
-    LeaseRecord* lease = seq == 0 ? nullptr : leases.find(seq);
-    if (lease != nullptr && lease->worker == &worker) return lease;
-  }
+  for (const LeaseSeq seq : it->second.lease)
+    if (const LeaseRecord* lease = held(seq)) return lease;
   return nullptr;
 }
 

@@ -62,6 +62,19 @@ void Farm::State::on(const WorkerLost& event) {
   Worker* worker = workers.find(event.worker);
   if (worker == nullptr || !worker->connected || worker->epoch != event.epoch) return;
   lose(*worker, FreedCause::worker_lost);
+  if (!worker->never_worked()) return;
+  lost_newcomers.push_back(worker->id);
+  while (lost_newcomers.size() > kLostNewcomersKept) {
+    Worker* first = workers.find(lost_newcomers.front());
+    lost_newcomers.pop_front();
+    if (first != nullptr && !first->connected && first->never_worked()) forget(*first);
+  }
+}
+
+void Farm::State::forget(Worker& worker) {
+  effects.emplace_back(WorkerForgotten{worker.id});
+  dirty.erase(worker.index);
+  workers.forget(worker);
 }
 
 void Farm::State::lose(Worker& worker, FreedCause why) {
@@ -188,11 +201,7 @@ void Farm::State::forgive_and_forget() {
     }
     if (!worker->connected && now - worker->lost_at >= kForgetWorkerAfter) gone.push_back(worker.get());
   }
-  for (Worker* worker : gone) {
-    effects.emplace_back(WorkerForgotten{worker->id});
-    dirty.erase(worker->index);
-    workers.forget(*worker);
-  }
+  for (Worker* worker : gone) forget(*worker);
   if (workers.has_many_names()) forget_names();
   if (proven.size() > kProvenKept)
     std::erase_if(proven, [&](const Digest& one) { return workers.of_class(one).workers == 0; });

@@ -70,6 +70,9 @@ class Api {
   // Sets the function from which /metrics gets the webhook counters; call this before the first request. If
   // it is never called, /metrics has no webhook counters.
   void webhooks(std::function<coordinator::WebhookFigures()> figures) { webhooks_ = std::move(figures); }
+  // Sets the function that says what is wrong with the workers' port (empty: nothing); /readyz asks it
+  void workers_port(std::function<std::string()> trouble) { workers_port_ = std::move(trouble); }
+  std::string workers_port_trouble() const { return workers_port_ ? workers_port_() : std::string(); }
   // Sets the function from which /metrics gets the counters of trace spans; call this before the first
   // request
   void traces(std::function<trace::Figures()> figures) { traces_ = std::move(figures); }
@@ -93,6 +96,7 @@ class Api {
   Counters counters_;
   std::function<coordinator::WebhookFigures()> webhooks_;
   std::function<trace::Figures()> traces_;
+  std::function<std::string()> workers_port_;
   std::stop_source stop_;
 };
 

@@ -42,6 +42,8 @@ Response get_healthz(Api&, const Request&, const Params&) { return text_response
 Response get_readyz(Api& api, const Request&, const Params&) {
   std::string why_not;
   if (!api.coordinator().ready(&why_not)) return problem(503, "not ready: " + why_not);
+  if (const std::string port = api.workers_port_trouble(); !port.empty())
+    return problem(503, "not ready: " + port);
   // Jobs continue while Redis is unavailable, so the coordinator reports the trouble but stays ready for
   // clients.
   const std::string trouble = api.coordinator().store_status().trouble;

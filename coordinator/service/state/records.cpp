@@ -5,6 +5,7 @@
 #include "common/base/clock.h"
 #include "common/base/failpoint.h"
 #include "common/base/log.h"
+#include "common/base/safe_text.h"
 
 namespace ls::coordinator {
 namespace {
@@ -85,7 +86,8 @@ void Records::log(const JobId& id, std::string text) {
   }
   if (const auto lost = std::exchange(lines_left_out_, 0))
     text += fmt::format(" (before it {} lines of this and other logs were left out: the disk is slow)", lost);
-  writes_.push([this, id, line = LogLine{system_unix_seconds(), std::move(text)}] {
+  // Some texts come from workers: none may look like more than one line
+  writes_.push([this, id, line = LogLine{system_unix_seconds(), plain_text(text)}] {
     if (const auto added = store_.add_log(id, line); !added)
       log_warn(fmt::format("job={}", id.value), added.error().message);
   });

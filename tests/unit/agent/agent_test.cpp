@@ -46,7 +46,9 @@ TEST_F(AgentTest, SendsUnacknowledgedResultsAgainAfterAReconnectAndShowsItsOldId
   coordinator_.wait_for([](auto& c) { return c.results.size() == 10; });
 
   EXPECT_TRUE(drain());
+  EXPECT_EQ(coordinator_.hellos[0].secret, "") << "it has none yet, and will keep one";
   EXPECT_EQ(coordinator_.hellos[1].previous_id, WorkerId{"w-1"});
+  EXPECT_EQ(coordinator_.hellos[1].secret, "secret of w-1");
   for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(coordinator_.results[i], coordinator_.results[i + 5]);
 }
 

@@ -142,7 +142,7 @@ class ScriptedCoordinator final : public CoordinatorLink {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::shared_ptr<LinkObserver> observer_;
-  ToWorker greeting_ = Welcome{WorkerId{"w-1"}, 1};
+  ToWorker greeting_ = Welcome{WorkerId{"w-1"}, 1, "secret of w-1"};
   std::map<Digest, std::string> blobs_;
   std::optional<Error> fetch_error_;
   bool acknowledge_ = true, refuse_ = false, cut_fetch_ = false;

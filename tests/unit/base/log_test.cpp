@@ -34,6 +34,24 @@ TEST(Log, LetsNoTextFromOutsideBeginALineOrAKey) {
   EXPECT_EQ(line["worker"], "w-1");
 }
 
+// U+009B controls a terminal as ESC [ does; U+202E turns the letters after it around.
+TEST(Log, LetsNoTextFromOutsideControlTheTerminalOrTurnLettersAround) {
+  const std::string name =
+      "a\xc2\x9b"
+      "2Jb\xe2\x80\xae"
+      "c\xe2\x81\xa6"
+      "d\xe2\x80\x8f"
+      "e\xe2\x80\xa8"
+      "f\x1b[0m";
+
+  EXPECT_EQ(log_line(LogFormat::text, "name=" + log_value(name), name),
+            "name=a_2Jb_c_d_e_f_[0m a 2Jb c d e f [0m");
+  const auto line = json_line("name=" + name, name + "\nsecond line");
+  EXPECT_EQ(line["text"], "a 2Jb c d e f [0m\nsecond line");
+  EXPECT_EQ(line["name"], "a 2Jb c d e f [0m");
+  EXPECT_EQ(log_value("Größe"), "Größe");
+}
+
 TEST(Log, IsJsonWhateverBytesAPathHas) { EXPECT_NO_THROW(json_line("file=\xff\xfe", "cannot read '\xc3'")); }
 
 TEST(Log, KeepsTheFirstOfTwoEqualKeys) { EXPECT_EQ(json_line("job=a job=b", "")["job"], "a"); }

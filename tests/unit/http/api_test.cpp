@@ -315,6 +315,18 @@ TEST_F(Routes, SayWhetherTheCoordinatorLivesAndIsReady) {
   EXPECT_NE(text(r).find("the disk is full"), std::string::npos);
 }
 
+TEST_F(Routes, SayWhetherTheWorkersPortAnswers) {
+  std::string trouble;
+  api.workers_port([&] { return trouble; });
+  EXPECT_EQ(ask(request(Method::get, "/readyz")).status, 200);
+  trouble = "the workers' port has not answered for 20 s";
+
+  const Response r = ask(request(Method::get, "/readyz"));
+
+  EXPECT_EQ(r.status, 503);
+  EXPECT_NE(text(r).find(trouble), std::string::npos) << text(r);
+}
+
 TEST_F(Routes, ShowMetrics) {
   submit();
   api.counters().answered(Method::get, 200);

@@ -294,6 +294,29 @@ TEST(Convert, TakesControlCharactersOutOfReceivedTexts) {
   pb::FromWorker wire = to_wire(FromWorker(kFromWorker[4]));
   wire.mutable_failure()->set_reason("a\x1b[31mb");
   EXPECT_EQ(std::get<UnitFailure>(from_wire(wire).value()).reason, "a [31mb");
+  wire.mutable_failure()->set_reason(
+      "a\nb\xc2\x9b"
+      "c\xe2\x80\xae"
+      "d");
+  EXPECT_EQ(std::get<UnitFailure>(from_wire(wire).value()).reason, "a\nb c d") << "a reason may have lines";
+
+  pb::FromWorker hello = to_wire(FromWorker(kFromWorker[0]));
+  hello.mutable_hello()->set_name(
+      "a\nb\xc2\x9b"
+      "c");
+  EXPECT_EQ(std::get<WorkerHello>(from_wire(hello).value()).name, "a b c") << "a name has one line";
+}
+
+// A secret that is empty is another thing than none.
+TEST(Convert, KeepsTheSecretOfAWorker) {
+  for (const std::optional<std::string>& secret :
+       {std::optional<std::string>(), std::optional<std::string>(""), std::optional<std::string>("s")}) {
+    WorkerHello hello = std::get<WorkerHello>(kFromWorker[0]);
+    hello.secret = secret;
+    EXPECT_EQ(std::get<WorkerHello>(from_wire(to_wire(FromWorker{hello})).value()).secret, secret);
+  }
+  const Welcome welcome{{"w-1"}, 2, "secret"};
+  EXPECT_EQ(std::get<Welcome>(from_wire(to_wire(ToWorker{welcome})).value()), welcome);
 }
 
 }  // namespace

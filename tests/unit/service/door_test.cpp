@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <thread>
 
 #include "common/image/frame/render_limits.h"
 #include "common/protocol/limits.h"
@@ -86,6 +87,107 @@ TEST(Service, AWorkerKeepsItsIdAndItsOlderStreamIsSilent) {
   EXPECT_EQ(coordinator->workers().at(0).state, "connected");
   second->disconnected();
   EXPECT_EQ(coordinator->workers().at(0).state, "lost");
+}
+
+// Joins as `hello` says and returns the Welcome.
+Welcome join(Coordinator& coordinator, const WorkerHello& hello) {
+  const auto mail = std::make_shared<Mailbox>();
+  const auto session = coordinator.connect(hello, std::make_shared<MailSink>(mail, 0));
+  EXPECT_TRUE(session);
+  return std::get<Welcome>(mail->take()->second);
+}
+
+// Users see the ids of workers.
+TEST(Service, AnIdWithoutItsSecretIsNotGivenAgain) {
+  const auto coordinator = open_at({});
+  WorkerHello hello;
+  hello.name = "w";
+  hello.secret = "";
+  const Welcome first = join(*coordinator, hello);
+  EXPECT_EQ(first.secret.size(), 64u);
+  EXPECT_EQ(first.secret.find(first.worker.value), std::string::npos);
+
+  WorkerHello thief = hello;
+  thief.previous_id = first.worker;
+  for (const std::optional<std::string>& guess :
+       {std::optional<std::string>(), std::optional<std::string>(""), std::optional<std::string>("guess"),
+        std::optional<std::string>(join(*coordinator, hello).secret)}) {
+    thief.secret = guess;
+    EXPECT_NE(join(*coordinator, thief).worker, first.worker);
+  }
+
+  hello.previous_id = first.worker;
+  hello.secret = first.secret;
+  EXPECT_EQ(join(*coordinator, hello).worker, first.worker);
+}
+
+TEST(Service, AWorkerThatKeepsNoSecretIsKnownByItsIdAlone) {
+  const auto coordinator = open_at({});
+  WorkerHello old;
+  old.name = "w";
+  const Welcome first = join(*coordinator, old);
+  EXPECT_EQ(first.secret, "");
+
+  old.previous_id = first.worker;
+
+  EXPECT_EQ(join(*coordinator, old).worker, first.worker);
+}
+
+TEST(Service, AWorkerKeepsItsIdWhenTheCoordinatorStartsAnew) {
+  Coordinator::Options options;
+  options.worker_key = "a secret of the farm";
+  auto coordinator = Coordinator::open(options).value();
+  WorkerHello hello;
+  hello.name = "w";
+  hello.secret = "";
+  const Welcome first = join(*coordinator, hello);
+  coordinator = Coordinator::open(options).value();
+  hello.previous_id = first.worker;
+  hello.secret = first.secret;
+  EXPECT_EQ(join(*coordinator, hello).worker, first.worker);
+
+  options.worker_key = "a secret of another farm";
+  coordinator = Coordinator::open(options).value();
+  EXPECT_NE(join(*coordinator, hello).worker, first.worker);
+}
+
+// Anybody with the join token could otherwise write into the log of any job.
+TEST(Service, AFailureOfAUnitThatTheWorkerDoesNotHoldIsNotLogged) {
+  const auto coordinator = open_at({});
+  const JobId job = submit(*coordinator);
+  WorkerHello hello;
+  hello.name = "honest";
+  const auto honest_mail = std::make_shared<Mailbox>();
+  const auto honest = coordinator->connect(hello, std::make_shared<MailSink>(honest_mail, 0)).value();
+  std::optional<AssignLease> lease;
+  while (!lease) {
+    const auto letter = honest_mail->take();
+    ASSERT_TRUE(letter);
+    if (const auto* assign = std::get_if<AssignLease>(&letter->second)) lease = *assign;
+  }
+  hello.name = "stranger";
+  hello.numeric_class = sha256("another class");
+  const auto mail = std::make_shared<Mailbox>();
+  const auto stranger = coordinator->connect(hello, std::make_shared<MailSink>(mail, 1)).value();
+  UnitFailure failure;
+  failure.unit = {job, lease->lease.units[0].tile, lease->lease.units[0].round};
+  failure.lease = lease->lease.id;
+  failure.reason = "forged";
+
+  stranger->receive(failure);
+  failure.reason = "crashed\n2026-01-01T00:00:00Z cancelled by the administrator\xc2\x9b";
+  honest->receive(failure);
+
+  const auto lines = [&](std::string_view text) {
+    const std::string log = coordinator->job_log(job).value();
+    std::size_t count = 0;
+    for (std::size_t at = log.find(text); at != std::string::npos; at = log.find(text, at + 1)) ++count;
+    return count;
+  };
+  while (lines("crashed") == 0) std::this_thread::yield();  // it is written in the background
+  EXPECT_EQ(lines("forged"), 0u);
+  EXPECT_EQ(lines("crashed 2026-01-01T00:00:00Z cancelled by the administrator "), 1u)
+      << coordinator->job_log(job).value();
 }
 
 TEST(Service, ASceneMayOnlyNameWhatWasSentAlong) {
