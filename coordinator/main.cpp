@@ -6,6 +6,7 @@
 #include <signal.h>
 #include <sys/file.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -65,6 +66,16 @@ Result<int> lock_folder(const fs::path& folder) {
                             folder.string()));
   }
   return fd;
+}
+
+// Takes from other users of the machine what rights they have on the folder: an older version, or somebody by
+// hand, made it with the usual ones.
+void shut_to_others(const fs::path& folder) {
+  std::error_code ec;
+  fs::permissions(folder, fs::perms::others_all, fs::perm_options::remove, ec);
+  if (ec)
+    ls::log_warn("",
+                 fmt::format("other users of this machine may read '{}': {}", folder.string(), ec.message()));
 }
 
 // Raises the limit on file descriptors to the highest that the system allows, and returns it. Every
@@ -178,6 +189,7 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   auto http = ls::http::Server::listen(flags.http);
   if (!http) return tl::unexpected(http.error());
   if (auto lock = lock_folder(data); !lock) return tl::unexpected(lock.error());
+  shut_to_others(data);
   std::error_code ignored;
   fs::remove(data / "ports.json", ignored);
   const fs::path secrets = secrets_of(flags);
@@ -226,6 +238,7 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   options.audit_rate = flags.audit_percent / 100;
   options.allow_fake = flags.allow_fake;
   options.version = LIGHTSHAFT_VERSION;
+  options.film_bytes = flags.film_memory;
   options.clock = std::make_shared<ls::SystemClock>();
   options.tick = std::chrono::milliseconds(100);
   options.tracer = *tracer;
@@ -258,7 +271,9 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
                      : flags.public_http,
                  flags.public_grpc.empty() ? with_port(flags.grpc, *grpc_port) : flags.public_grpc);
   (*http)->start(api, identity);
-  if (auto written = write_ports(data, (*http)->port(), *grpc_port); !written) return written;
+  // On a full disk the coordinator runs nevertheless, so that jobs can be removed.
+  if (auto written = write_ports(data, (*http)->port(), *grpc_port); !written)
+    ls::log_error("", written.error().message);
 
   const std::string host = flags.http.substr(0, flags.http.rfind(':'));
   ls::log_info("", fmt::format("dashboard: {}://{}:{}/ (token: {}); workers: port {} (token: {})",
@@ -290,6 +305,7 @@ int main(int argc, char** argv) {
   flags.limits.connections =
       std::min(flags.limits.connections, std::max<std::size_t>(1, raise_file_limit() / 4));
   keep_freed_memory();
+  ::umask(027);  // no file that the coordinator makes is for other users of the machine
   // Signals are blocked before any thread starts, since threads inherit the mask
   const sigset_t signals = block_signals();
   if (const auto served = serve(flags, signals); !served) {

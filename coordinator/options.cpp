@@ -28,7 +28,10 @@ void add_limits(CLI::App& app, http::Limits& limits) {
   hidden("--http-requests-per-second", limits.requests_per_second, 0);
   hidden("--http-wrong-tokens-per-minute", limits.wrong_tokens_per_minute, 0);
   hidden("--http-connections", limits.connections, 1);
+  hidden("--http-connections-each", limits.connections_each, 1);
+  hidden("--http-connections-of-address", limits.connections_of_address, 1);
   hidden("--http-event-streams", limits.event_streams, 1);
+  hidden("--http-event-streams-each", limits.event_streams_each, 1);
   hidden("--http-event-queue", limits.event_queue, 1);
   hidden("--http-blob-bytes", limits.blob_bytes, 1);
   hidden("--http-bundle-bytes", limits.bundle_bytes, 1);
@@ -48,6 +51,11 @@ void add_shares(CLI::App& app, Flags& flags) {
         "at most so many units of one job lent at once; 0: any number");
   limit("--workers-per-user", flags.shares.workers_per_user, "and on all jobs of one user");
   limit("--units-per-user", flags.shares.units_per_user, "and of all jobs of one user");
+  app.add_option(
+         "--film-memory", flags.film_memory,
+         "memory for the images of all jobs that are not done, half of it for one user, e.g. 16G; jobs "
+         "beyond it are refused; default: half of the machine's")
+      ->transform(CLI::AsSizeValue(false));
   app.add_option("--user-priority", flags.limits.user_priority,
                  "the highest priority that a job handed in with a token of the role 'submit' may have")
       ->check(CLI::Range(-1'000'000, 1'000'000))

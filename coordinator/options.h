@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/base/log.h"
+#include "common/base/machine_memory.h"
 #include "coordinator/http/message/limits.h"
 #include "coordinator/service/coordinator.h"
 
@@ -31,6 +32,7 @@ struct Flags {
   LogFormat log_format = LogFormat::text;
   http::Limits limits;
   ShareLimits shares;
+  std::uint64_t film_memory = usable_memory_bytes() / 2;  // as Coordinator::Options::film_bytes
   double audit_percent = 1;
   bool allow_fake = false;
 };

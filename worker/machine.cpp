@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <fstream>
 
 namespace ls::worker {
 
@@ -19,15 +18,6 @@ int usable_cpus() {
   cpu_set_t set;
   CPU_ZERO(&set);
   return ::sched_getaffinity(0, sizeof set, &set) == 0 ? std::max(1, CPU_COUNT(&set)) : 1;
-}
-
-std::uint64_t usable_memory_bytes() {
-  std::uint64_t bytes = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) *
-                        static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
-  std::uint64_t limit = 0;
-  if (std::ifstream group("/sys/fs/cgroup/memory.max"); group >> limit && limit > 0)
-    bytes = std::min(bytes, limit);
-  return bytes;
 }
 
 std::filesystem::path default_cache() {

@@ -9,8 +9,6 @@ namespace ls::worker {
 
 std::string host_name();
 int usable_cpus();  // number of CPUs on which this process may run
-// Returns the memory of the machine, or the limit of this process's control group if that is lower.
-std::uint64_t usable_memory_bytes();
 // Returns the default folder of the cache: in $XDG_CACHE_HOME if that is set, else in ~/.cache, else in the
 // system's temporary folder.
 std::filesystem::path default_cache();

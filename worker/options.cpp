@@ -1,12 +1,15 @@
 #include "worker/options.h"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdlib>
 #include <iostream>
 
+#include "common/base/log.h"
+#include "common/base/machine_memory.h"
 #include "common/base/secret.h"
 #include "common/command_line/command.h"
 #include "common/protocol/limits.h"
@@ -92,6 +95,10 @@ Result<void> read_tls(const Files& files, Options& o) {
     if (!pem) return tl::unexpected(pem.error());
     text = std::move(*pem);
   }
+  struct stat info {};
+  if (!files.tls_key.empty() && ::stat(files.tls_key.c_str(), &info) == 0 && (info.st_mode & 07) != 0)
+    log_warn("", fmt::format("everybody on this machine may read the TLS key '{0}': chmod o= '{0}'",
+                             files.tls_key));
   return {};
 }
 

@@ -165,7 +165,7 @@ MachineFacts observe_machine(const fs::path& cache, const fs::path& data) {
   facts.processor_target = LIGHTSHAFT_ARCH;
   facts.processor_fits = processor_fits(facts.processor_target);
   facts.numeric_class = render::numeric_class().hex();
-  facts.memory_bytes = worker::usable_memory_bytes();
+  facts.memory_bytes = usable_memory_bytes();
   facts.cpus = worker::usable_cpus();
   facts.cpu_quota = cpu_quota();
   rlimit files{};

@@ -187,7 +187,7 @@ Result<void> LocalFarm::start(std::function<void(const UnitResult&)> on_result) 
   agent.threads = options_.threads;
   agent.hello.name = "this machine";
   agent.hello.build = LIGHTSHAFT_VERSION;
-  agent.hello.memory_bytes = worker::usable_memory_bytes();
+  agent.hello.memory_bytes = usable_memory_bytes();
   agent_ = std::make_unique<worker::Agent>(std::move(agent), *link_, *backend_, files_, clock_);
   thread_ = std::jthread([this] {
     const auto ended = agent_->run();
@@ -226,7 +226,7 @@ std::optional<Error> LocalFarm::agent_error() const {
 int run_render_child(const char* threads) {
   const int count = parse_number<int>(threads).value_or(0);
   if (count < 1) return 2;
-  worker::child::confine(worker::usable_memory_bytes());
+  worker::child::confine(usable_memory_bytes());
   limit_calls();  // files are not restricted: those of a scene may be anywhere
   const auto limit = render::limit_threads(count);
   const auto backend = worker::make_inprocess_backend(count);

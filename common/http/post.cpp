@@ -21,12 +21,16 @@ struct FreeList {
 struct AnswerBody {
   std::string text;
   std::size_t most = 0;
+  bool longer = false;  // true: the answer has more than `most` bytes
 };
 
+// Ends the transfer, by not taking all bytes, once the answer is longer than what is kept of it.
 std::size_t receive(char* data, std::size_t size, std::size_t count, void* to) {
   auto& body = *static_cast<AnswerBody*>(to);
-  body.text.append(data, std::min(size * count, body.most - body.text.size()));
-  return size * count;
+  const std::size_t room = body.most - body.text.size();
+  body.text.append(data, std::min(size * count, room));
+  body.longer = size * count > room;
+  return body.longer ? CURL_WRITEFUNC_ERROR : size * count;
 }
 
 int look_up(void* request, curl_off_t, curl_off_t, curl_off_t, curl_off_t) {
@@ -57,7 +61,7 @@ Result<HttpAnswer> post(const HttpPost& request) {
   for (const auto& [name, value] : request.headers)
     headers.reset(curl_slist_append(headers.release(), fmt::format("{}: {}", name, value).c_str()));
   headers.reset(curl_slist_append(headers.release(), "Expect:"));
-  AnswerBody body{{}, request.most_answer_bytes};
+  AnswerBody body{{}, request.most_answer_bytes, false};
 
   CURL* c = curl.get();
   curl_easy_setopt(c, CURLOPT_URL, request.url.c_str());
@@ -79,7 +83,7 @@ Result<HttpAnswer> post(const HttpPost& request) {
     // After give_up() has returned true, do not wait for a name server that hangs.
     curl_easy_setopt(c, CURLOPT_QUICK_EXIT, 1L);
   }
-  if (const CURLcode code = curl_easy_perform(c); code != CURLE_OK)
+  if (const CURLcode code = curl_easy_perform(c); code != CURLE_OK && !body.longer)
     return fail(Errc::unavailable, curl_easy_strerror(code));
   long status = 0;
   curl_easy_getinfo(c, CURLINFO_RESPONSE_CODE, &status);

@@ -24,6 +24,7 @@
 #include "common/scene/schema/integrators.h"
 #include "common/scene/schema/nori_words.h"
 #include "coordinator/admission/cryptomatte_manifests.h"
+#include "coordinator/admission/decoded_reference.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/store/jobs/job_store.h"
 
@@ -382,7 +383,7 @@ Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const Blob
     return invalid(fmt::format("the reference has {} bytes; at most {} are read", *bytes, limits.max_bytes));
   const auto exr = blobs.read_whole(digest, *bytes);
   if (!exr) return tl::unexpected(exr.error());
-  return read_reference(*exr, "the reference", size, limits);
+  return decode_reference(*exr, size, limits);
 }
 
 std::string replay_of(const StoredJob& job) {

@@ -30,6 +30,24 @@ void note_if_all_are_one(std::vector<Admission>& frames) {
       frames.front().job.name, frames.size()));
 }
 
+// Returns the bytes of scene text that all frames are expected to have together, from kProbes of them that
+// are spread evenly: reading thousands of frames takes long, only to refuse them. 0 if one cannot be read, or
+// if there are few.
+std::uint64_t expected_size(const SubmitRequest& request, const BlobStore& blobs,
+                            const std::vector<std::uint32_t>& numbers) {
+  constexpr std::size_t kProbes = 8;
+  constexpr double kTolerance = 1.25;  // other frames may be smaller than those that were looked at
+  if (numbers.size() < 4 * kProbes) return 0;
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < kProbes; ++i) {
+    const auto frame = admit(request, blobs, numbers[i * (numbers.size() - 1) / (kProbes - 1)]);
+    if (!frame) return 0;
+    sum += std::max(frame->text_bytes, frame->scene_json.size());
+  }
+  return static_cast<std::uint64_t>(static_cast<double>(sum) / kProbes / kTolerance *
+                                    static_cast<double>(numbers.size()));
+}
+
 }  // namespace
 
 tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitRequest& request,
@@ -41,6 +59,8 @@ tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitReques
                                  numbers.size(), most, what)});
   };
   if (request.scene_text.size() > limits::kMaxSequenceText / numbers.size())
+    return too_much("bytes of scene text", limits::kMaxSequenceText);
+  if (const auto size = expected_size(request, blobs, numbers); size > limits::kMaxSequenceText)
     return too_much("bytes of scene text", limits::kMaxSequenceText);
   std::uint64_t text = 0, kept = 0, files = 0, tiles = 0;  // totals of all frames
   std::vector<Admission> frames;

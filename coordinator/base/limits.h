@@ -30,6 +30,16 @@ inline constexpr std::size_t kMaxWarnings = 100;    // warnings kept per job
 inline constexpr std::size_t kMaxShownName = 256;
 inline constexpr std::size_t kMaxJobs = 100'000;       // jobs kept; every frame of a sequence counts as one
 inline constexpr std::size_t kMaxJobsOfUser = 25'000;  // of these jobs, one user may own this many
+// Of a sequence so many frames count in the memory for images (Coordinator::Options::film_bytes)
+inline constexpr std::size_t kFilmsOfSequence = 4;
+// Memory that reading one byte of a scene's text takes at most: 110 bytes were measured for spheres
+inline constexpr std::uint64_t kMemoryPerTextByte = 128;
+inline constexpr std::uint64_t kMemoryOfReference = std::uint64_t{1}
+                                                    << 30;  // while one is decoded and checked
+// Memory that reading the scenes of all submissions may take at the same time; half of it for one user
+inline constexpr std::uint64_t kAdmissionBytes = std::uint64_t{8} << 30;
+// Submissions that are read at the same time; of one user, one
+inline constexpr std::size_t kAdmissions = 8;
 using ls::kMaxFramePixels;
 using ls::kMaxFrameSide;
 using ls::kMaxSpp;

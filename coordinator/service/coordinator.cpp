@@ -6,6 +6,7 @@
 #include <random>
 #include <thread>
 
+#include "common/base/log.h"
 #include "common/base/secret.h"
 #include "coordinator/base/work_queue.h"
 #include "coordinator/service/blob_watch.h"
@@ -36,6 +37,18 @@ constexpr Duration kBlobsLookedAt = std::chrono::seconds(5);
 std::uint64_t random_number() {
   std::random_device device;
   return std::uint64_t{device()} << 32 | device();
+}
+
+// Returns the number of this start, which no other start has. If it cannot be stored, as on a full disk,
+// takes a random one that is larger than any that is counted: a coordinator must run so that somebody can
+// remove jobs.
+std::uint64_t next_start(JobStore& store) {
+  const auto before = store.reserve("starts", 1);
+  if (before) return *before + 1;
+  log_error("", fmt::format("{}; the coordinator runs nevertheless, so that jobs can be removed",
+                            before.error().message));
+  constexpr std::uint64_t kUncounted = std::uint64_t{1} << 30;
+  return kUncounted + (random_number() & (kUncounted - 1));
 }
 
 }  // namespace
@@ -82,7 +95,7 @@ struct Coordinator::Parts {
   ImageWriter images{core, files, blobs, denoising, comparer, writes, clock};
   Pictures pictures{core, *store, files, blobs, denoising, clock};
   Videos videos{core, files, pictures, clock};
-  Submission submission{core, *store, files, blobs, denoising, clock};
+  Submission submission{core, *store, files, blobs, denoising, clock, options.film_bytes};
   const Restore restore{*store, files, blobs, clock};
   JobCommands commands{core, *store, files, restore, images, writes, clock};
   BlobWatch blob_watch{core, blobs, commands, options.keep_unused, clock};
@@ -168,10 +181,9 @@ Result<std::unique_ptr<Coordinator>> Coordinator::open(Options options) {
       blobs = std::move(*kept);
     }
   }
-  const auto start = store->reserve("starts", 1);
-  if (!start) return tl::unexpected(start.error());
-  auto parts = std::make_unique<Parts>(std::move(options), std::move(blobs), std::move(store),
-                                       std::move(lock), *start + 1);
+  const std::uint64_t start = next_start(*store);
+  auto parts =
+      std::make_unique<Parts>(std::move(options), std::move(blobs), std::move(store), std::move(lock), start);
   if (auto restored = parts->restore.restart(*parts->core.lock()); !restored)
     return tl::unexpected(restored.error());
   parts->start_threads();
@@ -194,10 +206,7 @@ Result<JobId> Coordinator::submit_again(const JobId& before, const JobSpec& chan
   return parts_->submission.submit_again(before, changes, owner, traceparent);
 }
 
-JobsPage Coordinator::list(const JobsAsked& asked) const {
-  const auto core = parts_->core.lock();
-  return list_jobs(core->jobs, core->views, asked);
-}
+JobsPage Coordinator::list(const JobsAsked& asked) const { return list_jobs(parts_->core, asked); }
 
 std::vector<JobView> Coordinator::jobs() const {
   const auto core = parts_->core.lock();
@@ -219,6 +228,15 @@ Result<JobView> Coordinator::job(const JobId& id) const {
 }
 
 Result<std::string> Coordinator::owner(const JobId& id) const { return parts_->core.lock()->jobs.owner(id); }
+
+std::uint64_t Coordinator::pixels_of(const JobId& id) const {
+  const auto core = parts_->core.lock();
+  const auto jobs = core->jobs.job_or_frames(id);
+  std::uint64_t most = 0;
+  if (jobs)
+    for (const EntryPtr& entry : *jobs) most = std::max(most, entry->stored.settings.size.pixels());
+  return most;
+}
 
 Result<void> Coordinator::change(const JobId& id, const JobChange& change) {
   return parts_->commands.change(id, change);
@@ -344,6 +362,16 @@ void Coordinator::blob_sent(std::uint64_t bytes) { parts_->blob_bytes += bytes; 
 void Coordinator::collect() { parts_->blob_watch.collect(); }
 
 bool Coordinator::ready(std::string* why_not) const {
+  bool store_failed = false;
+  {
+    const auto core = parts_->core.lock();
+    store_failed = !core->records.store_trouble().empty();
+  }
+  // Nothing else may be written for a long time, so whether the store takes records again is tried out.
+  if (store_failed) {
+    const auto taken = parts_->store->put_jobs({});
+    parts_->core.lock()->records.note(taken);
+  }
   const auto core = parts_->core.lock();
   const std::string& trouble =
       core->records.trouble().empty() ? parts_->blob_watch.trouble(*core) : core->records.trouble();

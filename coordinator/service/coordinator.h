@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -52,6 +53,8 @@ class Coordinator {
     std::shared_ptr<const Clock> clock;
     int denoise_threads = 0;  // 0: one per core that this process may use
     std::string denoiser;     // file of the library Open Image Denoise; empty: it is searched for
+    // Memory for the images of all jobs that are not done, in bytes. Jobs beyond it are refused.
+    std::uint64_t film_bytes = std::numeric_limits<std::uint64_t>::max();
     // Time between two Tick events, which a thread of the coordinator raises. nullopt: no such thread; the
     // caller calls tick()
     std::optional<Duration> tick;
@@ -74,6 +77,9 @@ class Coordinator {
   std::vector<JobView> jobs() const;  // returns all jobs; a sequence is listed as one job, without its frames
   Result<JobView> job(const JobId& id) const;
   Result<std::string> owner(const JobId& id) const;  // returns JobView::owner; faster than job()
+  // Returns the number of pixels of the job's image, or of a sequence's largest frame; 0 if there is no such
+  // job.
+  std::uint64_t pixels_of(const JobId& id) const;
   Result<void> change(const JobId& id, const JobChange& change);
   Result<void> cancel(const JobId& id);
   // Removes an ended job with all its results; a job that has not ended is cancelled and kept. Frames are

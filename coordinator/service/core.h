@@ -104,4 +104,9 @@ struct Core {
   std::condition_variable ended;  // notified when a job ends or is removed
 };
 
+// Selects and orders the jobs that a client's list shows (job_list.cpp). Makes views only of the jobs on the
+// page, unless the order needs the views of all. The lock is held for a few jobs at a time, so that a long
+// list does not hold up others: jobs may change while it is made.
+JobsPage list_jobs(Guarded<Core>& core, const JobsAsked& asked);
+
 }  // namespace ls::coordinator

@@ -34,6 +34,9 @@ tl::expected<JobId, Rejected> Submission::submit(const SubmitRequest& request) {
   const TimePoint began = clock_.now();
   if (request.spec.denoise)
     if (const auto possible = denoising_.available(); !possible) return rejected(possible.error());
+  const std::uint64_t memory = request.scene_text.size() * limits::kMemoryPerTextByte +
+                               (request.spec.reference ? limits::kMemoryOfReference : 0);
+  const Gate::Place turn(turns_, request.owner, memory);
   const auto in_use = blobs_.in_use();
   auto admitted = admit_all(request, blobs_);
   if (!admitted) return tl::unexpected(std::move(admitted.error()));
@@ -82,6 +85,8 @@ Result<JobId> Submission::take(std::vector<StoredJob> jobs, const std::optional<
   const auto core = core_.lock();
   if (const auto room = core->jobs.room_for(jobs.front().owner, jobs.size()); !room)
     return tl::unexpected(room.error());
+  if (const auto room = core->jobs.film_room_for(jobs, film_bytes_); !room)
+    return tl::unexpected(room.error());
   const JobId id = core->jobs.unused_id();
   const auto frames = range ? range->frames() : std::vector<std::uint32_t>();
   std::vector<std::shared_ptr<PartialLog>> logs(jobs.size());
@@ -92,7 +97,9 @@ Result<JobId> Submission::take(std::vector<StoredJob> jobs, const std::optional<
     if (!log) return tl::unexpected(log.error());
     logs[i] = std::move(*log);
   }
-  if (const auto put = store_.put_jobs(jobs); !put) return tl::unexpected(put.error());
+  const auto put = store_.put_jobs(jobs);
+  core->records.note(put);
+  if (!put) return tl::unexpected(put.error());
   std::vector<EntryPtr> entries;
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     entries.push_back(std::make_shared<JobEntry>(std::move(jobs[i]), clock_.now()));

@@ -2,6 +2,8 @@
 #pragma once
 
 #include "common/base/guarded.h"
+#include "coordinator/base/gate.h"
+#include "coordinator/base/limits.h"
 #include "coordinator/service/denoising.h"
 #include "coordinator/service/state/job_files.h"
 #include "coordinator/store/blobs/collected_blobs.h"
@@ -14,10 +16,17 @@ struct Core;
 class Submission {
  public:
   Submission(Guarded<Core>& core, JobStore& store, const JobFiles& files, CollectedBlobs& blobs,
-             const Denoising& denoising, const Clock& clock)
-      : core_(core), store_(store), files_(files), blobs_(blobs), denoising_(denoising), clock_(clock) {}
+             const Denoising& denoising, const Clock& clock, std::uint64_t film_bytes)
+      : core_(core),
+        store_(store),
+        files_(files),
+        blobs_(blobs),
+        denoising_(denoising),
+        clock_(clock),
+        film_bytes_(film_bytes) {}
 
-  // Returns the id of the job or sequence. All frames of a sequence are stored, or none.
+  // Returns the id of the job or sequence. Users take turns: the scenes of one user are read one after
+  // another, and those of all within kAdmissionBytes of memory. All frames of a sequence are stored, or none.
   tl::expected<JobId, Rejected> submit(const SubmitRequest& request);
 
   // Submits the scene of job `before`, which must not be a sequence, once more. Returns the id of the new
@@ -35,6 +44,11 @@ class Submission {
   CollectedBlobs& blobs_;
   const Denoising& denoising_;
   const Clock& clock_;
+  const std::uint64_t film_bytes_;  // as Coordinator::Options::film_bytes
+  Gate turns_{{.places = limits::kAdmissions,
+               .places_each = 1,
+               .bytes = limits::kAdmissionBytes,
+               .bytes_each = limits::kAdmissionBytes / 2}};
 };
 
 }  // namespace ls::coordinator

@@ -24,9 +24,22 @@ using nlohmann::json;
 using webhooks::Delivery;
 using webhooks::Line;
 
+// Bytes of an answer that are read; the rest is left to the receiver. Only its status counts.
+constexpr std::size_t kMostAnswer = 64u << 10;
+
 bool ended(const std::string& state) {
   return state == "done" || state == "failed" || state == "cancelled" || state == "removed" ||
          state == "moved";
+}
+
+// Returns "https://HOST" of an address: its user, path and query are often the secret that lets one post
+// there.
+std::string host_of(const std::string& url) {
+  const std::size_t scheme = url.find("://");
+  if (scheme == std::string::npos) return "the receiver";
+  const std::string host = url.substr(scheme + 3, url.find_first_of("/?#", scheme + 3) - scheme - 3);
+  const std::size_t user = host.rfind('@');
+  return url.substr(0, scheme + 3) + (user == std::string::npos ? host : host.substr(user + 1));
 }
 
 }  // namespace
@@ -74,7 +87,7 @@ struct webhooks::State {
     ++figures.failed_attempts;
     const std::string why = answer ? fmt::format("it answers {}", answer->status) : answer.error().message;
     log_warn(fmt::format("webhook={} attempt={}", receiver, line.attempts() + 1),
-             fmt::format("{} does not take a delivery: {}", url, why));
+             fmt::format("{} does not take a delivery: {}", host_of(url), why));
     if (const auto over = line.failed(now)) give_up(receiver, *over, why);
   }
 
@@ -230,6 +243,7 @@ class Webhooks::Impl {
                       {"Lightshaft-Delivery", delivery.id},
                       {"Lightshaft-Signature", webhook_signature(options_.secret, at, delivery.body)}},
                      delivery.body};
+    request.most_answer_bytes = kMostAnswer;
     const std::string job = delivery.id.substr(0, delivery.id.find('/'));
     const auto parent = options_.tracer ? coordinator_->trace_of(JobId{job}) : std::nullopt;
     if (!parent) return options_.send(request);

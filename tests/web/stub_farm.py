@@ -81,7 +81,8 @@ class StubFarm:
         self.submitted = []
         self.refusal = None  # problem details for the next POST /jobs
         self.requests = []  # (method, path)
-        self.role = "admin"  # of the token
+        self.role, self.user = "admin", ""  # of the token
+        self.other_tokens = {}  # token -> {"role", "user"}
         self.signed_in = False  # of the one browser that a test has
         self.broken = set()  # names under /api/v1/ that answer with 503
         self.put_gate = threading.Event()  # blobs are taken while it is set
@@ -92,6 +93,10 @@ class StubFarm:
         self._server.daemon_threads = True
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
         self.url = f"http://127.0.0.1:{self._server.server_address[1]}"
+
+    @property
+    def tokens(self):
+        return {TOKEN: {"role": self.role, "user": self.user}, **self.other_tokens}
 
     def __enter__(self):
         self._thread.start()
@@ -190,14 +195,19 @@ def _handler(farm):
             return self._send(200, file.read_bytes(), TYPES[file.suffix])
 
         def _session(self, body):
+            if self.command == "GET" and "Authorization" in self.headers:
+                asked = farm.tokens.get(self.headers["Authorization"].removeprefix("Bearer "))
+                return self._send(200, asked) if asked else self._problem(401, "This token is not known.")
             if self.command == "GET":
-                return self._send(200, {"role": farm.role, "user": ""}) if farm.signed_in else self._problem(401, "No session.")
+                return self._send(200, {"role": farm.role, "user": farm.user}) if farm.signed_in else self._problem(401, "No session.")
             if self.command == "DELETE":
                 farm.signed_in = False
                 return self._send(204)
-            if json.loads(body) != {"token": TOKEN}:
+            asked = farm.tokens.get(json.loads(body)["token"])
+            if not asked:
                 return self._problem(401, "This token is not known.")
             farm.signed_in = True
+            farm.role, farm.user = asked["role"], asked["user"]
             return self._send(204, headers=[("Set-Cookie", "session=1; HttpOnly; SameSite=Strict; Path=/")])
 
         def _list(self):

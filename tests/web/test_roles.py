@@ -4,7 +4,7 @@ coordinator, and once against the real one."""
 import json
 
 import pytest
-from local_farm import SCENE, LocalFarm
+from local_farm import SCENE, LocalFarm, wait_until
 from stub_farm import job
 
 ACTIONS = "[...document.querySelectorAll('main button, header nav a, main a.button')].map((e) => e.innerText).filter(Boolean).join('|')"
@@ -70,12 +70,52 @@ def test_start_over_stays_where_it_is_when_the_list_of_files_comes(farm, dashboa
     assert len({tuple(place) for _, *place in seen}) == 1, seen
 
 
+def test_a_link_with_another_users_token_asks_before_it_replaces_a_session(farm, dashboard):
+    farm.other_tokens["of-mallory"] = {"role": "submit", "user": "mallory"}
+    page = dashboard()
+
+    page.evaluate("void (location.hash = '#token=of-mallory')")
+    page.wait("document.querySelector('main .toast button')")
+    assert "signs in as mallory (submit)" in page.text("main .toast")
+    assert farm.role == "admin", "nobody has answered yet"
+    assert "of-mallory" not in page.evaluate("location.href")
+
+    page.evaluate("void [...document.querySelectorAll('main .toast button')].find((b) => b.innerText.includes('Stay')).click()")
+    page.wait("!document.querySelector('main .toast')")
+    assert farm.role == "admin"
+
+    page.evaluate("void (location.hash = '#token=of-mallory')")
+    page.wait("document.querySelector('main .toast button')")
+    page.evaluate("void [...document.querySelectorAll('main .toast button')].find((b) => b.innerText.includes('Go on')).click()")
+    wait_until(lambda: farm.user == "mallory", "the session is the other user's")
+
+
+def test_a_link_with_a_wrong_token_leaves_the_session_alone(farm, dashboard):
+    page = dashboard()
+
+    page.evaluate("void (location.hash = '#token=wrong')")
+    page.wait("document.querySelector('main .toast')")
+    assert "still signed in" in page.text("main .toast")
+    assert farm.signed_in and farm.role == "admin"
+
+
+def test_dots_in_the_address_are_no_job(farm, dashboard):
+    page = dashboard()
+    for route in ("#/jobs/..", "#/jobs/%2e%2e", "#/view/.", "#/jobs/../1"):
+        page.evaluate(f"void (location.hash = {route!r})")
+        page.wait("document.querySelector('h1')")
+    assert not [path for _, path in farm.requests if ".." in path or path in ("/api/v1/", "/api/v1/jobs/")]
+
+
 def test_the_real_coordinator_says_who_is_signed_in(open_page):
     with LocalFarm() as farm:
         made = {role: json.loads(farm.request("POST", "/api/v1/tokens", json.dumps({"role": role, "user": "ann"}).encode())) for role in ("read", "submit")}
         mine = json.loads(farm.request("POST", "/api/v1/jobs?spp=2", SCENE.encode(), "application/xml", made["submit"]["token"]))["id"]
         for role, offered in (("read", False), ("submit", True)):
             page = open_page(f"{farm.url()}/#token={made[role]['token']}")
+            if role == "submit":  # the reader is signed in already
+                page.wait("document.querySelector('main .toast button')")
+                page.evaluate("void document.querySelector('main .toast button').click()")
             page.wait(f"document.querySelector('[data-job=\"{mine}\"]')")
             assert ("Cancel" in page.evaluate(ACTIONS)) == offered
             assert ("ann" in page.text(f"[data-job='{mine}']")) == (role == "read")

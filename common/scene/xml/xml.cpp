@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <new>
 #include <pugixml.hpp>
 
 #include "common/scene/limits.h"
@@ -150,6 +151,7 @@ std::size_t find_open_quote(std::string_view text) {
 
 // Reports a malformed text at a more helpful place than where pugixml stopped.
 void malformed(std::uint32_t file, const pugi::xml_parse_result& result, Report& report) {
+  if (result.status == pugi::status_out_of_memory) throw std::bad_alloc();  // not a fault of the text
   const std::string& text = report.file(file).text();
   if (const std::size_t quote = find_open_quote(text); quote != std::string_view::npos)
     return report.error({file, quote, 1},

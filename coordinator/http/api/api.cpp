@@ -77,7 +77,11 @@ Api::Api(coordinator::Coordinator& coordinator, TokenRegistry& tokens, Limits li
                      {limits.wrong_tokens_per_minute / 60, std::max(1.0, limits.wrong_tokens_per_minute)},
                      secure}),
       limits_(limits),
-      files_(std::move(files)) {}
+      files_(std::move(files)),
+      pictures_({.places = limits.slow.threads,
+                 .places_each = limits.slow.each,
+                 .bytes = limits.picture_memory,
+                 .bytes_each = limits.picture_memory / 2}) {}
 
 std::variant<Response, Match> Api::admit(Request& request) {
   auto found = admit_route(request);
@@ -168,8 +172,14 @@ std::variant<Response, std::unique_ptr<BodySink>> Api::open_upload(const Match& 
 
 Response Api::handle(const Match& match, const Request& request) {
   return guarded(match.route->pattern, [&] {
-    auto refused = refuse_job(match, request);
-    return refused ? std::move(*refused) : match.route->handler(*this, request, match.params);
+    if (auto refused = refuse_job(match, request)) return std::move(*refused);
+    std::optional<coordinator::Gate::Place> turn;
+    if (match.route->of_pixels) {
+      const auto id = job_of(request, match.params);
+      const std::uint64_t pixels = id ? coordinator_.pixels_of(*id) : 0;
+      turn.emplace(pictures_, request.caller.token_id, pixels * kMemoryPerPixel);
+    }
+    return match.route->handler(*this, request, match.params);
   });
 }
 

@@ -10,7 +10,9 @@
 #include <stop_token>
 #include <variant>
 
+#include "coordinator/base/gate.h"
 #include "coordinator/http/api/metrics.h"
+#include "coordinator/http/api/partial_uploads.h"
 #include "coordinator/http/api/routes.h"
 #include "coordinator/http/api/static_files.h"
 #include "coordinator/http/auth/auth.h"
@@ -47,7 +49,8 @@ class Api {
   // Returns how this request's body is to be read: BodyKind::archive if its media type is in Route::unpacks,
   // else Route::body.
   BodyKind body_kind(const Route& route, const Request& request) const;
-  // Runs the route's handler; never throws.
+  // Runs the route's handler; never throws. Waits while the caller has so many large images in work that this
+  // one would exceed its share of Limits::picture_memory.
   Response handle(const Match& match, const Request& request);
   // True if `response` is a 404 for a job that another coordinator may have. The caller should then call
   // ask_other_coordinator(), which finds the job's coordinator and may block for a second. It returns a
@@ -67,6 +70,7 @@ class Api {
   TokenRegistry& tokens() { return tokens_; }
   Counters& counters() { return counters_; }
   const Limits& limits() const { return limits_; }
+  PartialUploads& partial_uploads() { return partial_uploads_; }
   // Sets the function from which /metrics gets the webhook counters; call this before the first request. If
   // it is never called, /metrics has no webhook counters.
   void webhooks(std::function<coordinator::WebhookFigures()> figures) { webhooks_ = std::move(figures); }
@@ -94,6 +98,8 @@ class Api {
   Limits limits_;
   StaticFiles files_;
   Counters counters_;
+  PartialUploads partial_uploads_{coordinator::limits::kMaxUnfinishedUploads / 4};
+  coordinator::Gate pictures_;  // callers take turns to have answers about images made
   std::function<coordinator::WebhookFigures()> webhooks_;
   std::function<trace::Figures()> traces_;
   std::function<std::string()> workers_port_;

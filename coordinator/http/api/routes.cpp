@@ -30,6 +30,11 @@ constexpr Route plain(Method method, std::string_view pattern, Access access, Ex
   return {method, pattern, access, executor, BodyKind::none, 0, handler};
 }
 
+// A route for what is made of a job's whole image.
+constexpr Route picture(std::string_view pattern, Handler handler) {
+  return {Method::get, pattern, Access::token, Executor::slow, BodyKind::none, 0, handler, {}, {}, true};
+}
+
 constexpr auto kRoutes = [] {
   using enum Method;
   using enum Access;
@@ -42,7 +47,7 @@ constexpr auto kRoutes = [] {
       plain(get, "/api/v1/openapi.json", token, here, get_openapi),
       Route{post, "/api/v1/session", open, here, buffered, kMaxSessionJson, post_session, kJson},
       plain(get, "/api/v1/session", token, here, get_session),
-      plain(del, "/api/v1/session", open, here, delete_session),
+      plain(del, "/api/v1/session", open, quick, delete_session),
       plain(get, "/api/v1/jobs", token, quick, get_jobs),
       Route{post, "/api/v1/jobs", submit, slow, buffered, scene::kMaxTextBytes, post_job, kJobTypes,
             kBundleTypes},
@@ -50,23 +55,23 @@ constexpr auto kRoutes = [] {
       Route{patch, "/api/v1/jobs/{id}", submit, quick, buffered, kMaxControlJson, of_job<patch_job>,
             kPatchJson},
       plain(del, "/api/v1/jobs/{id}", submit, quick, of_job<delete_job>),
-      plain(get, "/api/v1/jobs/{id}/image.exr", token, slow, of_job<get_image_exr>),
-      plain(get, "/api/v1/jobs/{id}/image.png", token, slow, of_job<get_image_png>),
-      plain(get, "/api/v1/jobs/{id}/thumbnail.png", token, slow, of_job<get_thumbnail>),
+      picture("/api/v1/jobs/{id}/image.exr", of_job<get_image_exr>),
+      picture("/api/v1/jobs/{id}/image.png", of_job<get_image_png>),
+      picture("/api/v1/jobs/{id}/thumbnail.png", of_job<get_thumbnail>),
       Route{post, "/api/v1/jobs/{id}/again", submit, slow, buffered, kMaxControlJson, of_job<post_again>,
             kJson},
       Route{post, "/api/v1/jobs/{id}/video", submit, slow, buffered, kMaxControlJson, of_job<post_video>,
             kJson},
       plain(get, "/api/v1/jobs/{id}/video", token, quick, of_job<get_video>),
       plain(get, "/api/v1/jobs/{id}/video.mp4", token, slow, of_job<get_video_mp4>),
-      plain(get, "/api/v1/jobs/{id}/error.png", token, slow, of_job<get_error_png>),
-      plain(get, "/api/v1/jobs/{id}/samples.png", token, slow, of_job<get_samples_png>),
-      plain(get, "/api/v1/jobs/{id}/layers", token, slow, of_job<get_layers>),
-      plain(get, "/api/v1/jobs/{id}/pixels", token, slow, of_job<get_pixels>),
-      plain(get, "/api/v1/jobs/{id}/report", token, slow, of_job<get_report>),
-      plain(get, "/api/v1/jobs/{id}/report.html", token, slow, of_job<get_report_page>),
+      picture("/api/v1/jobs/{id}/error.png", of_job<get_error_png>),
+      picture("/api/v1/jobs/{id}/samples.png", of_job<get_samples_png>),
+      picture("/api/v1/jobs/{id}/layers", of_job<get_layers>),
+      picture("/api/v1/jobs/{id}/pixels", of_job<get_pixels>),
+      picture("/api/v1/jobs/{id}/report", of_job<get_report>),
+      picture("/api/v1/jobs/{id}/report.html", of_job<get_report_page>),
       plain(get, "/api/v1/jobs/{id}/convergence.csv", token, quick, of_job<get_convergence>),
-      plain(get, "/api/v1/jobs/{id}/tiles", token, slow, of_job<get_tiles>),
+      picture("/api/v1/jobs/{id}/tiles", of_job<get_tiles>),
       plain(get, "/api/v1/jobs/{id}/log", token, quick, of_job<get_log>),
       plain(get, "/api/v1/jobs/{id}/events", token, quick, of_job<get_job_events>),
       plain(get, "/api/v1/events", token, quick, get_events),

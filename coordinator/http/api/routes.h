@@ -58,6 +58,8 @@ struct Route {
   Handler handler = nullptr;      // null for BodyKind::blob
   std::string_view accepts = {};  // allowed media types of a buffered body, separated by spaces
   std::string_view unpacks = {};  // media types of bodies that are archives (BodyKind::archive)
+  // True: the handler needs memory for each pixel of the job's image (kMemoryPerPixel)
+  bool of_pixels = false;
 };
 
 std::span<const Route> routes();

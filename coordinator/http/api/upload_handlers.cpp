@@ -150,9 +150,14 @@ class IgnoreSink final : public BodySink {
 
 class PartSink final : public BodySink {
  public:
-  PartSink(BlobStore& blobs, std::unique_ptr<BlobStore::Upload> upload, const Digest& digest,
+  PartSink(Api& api, std::string token, std::unique_ptr<BlobStore::Upload> upload, const Digest& digest,
            const ContentRange& range)
-      : blobs_(blobs), upload_(std::move(upload)), digest_(digest), range_(range) {}
+      : api_(api),
+        blobs_(api.coordinator().blobs()),
+        token_(std::move(token)),
+        upload_(std::move(upload)),
+        digest_(digest),
+        range_(range) {}
 
   std::optional<Response> append(std::span<const std::byte> bytes) override {
     if (bytes.size() > range_.bytes - received_)
@@ -170,12 +175,16 @@ class PartSink final : public BodySink {
       send_offset(response, range_.first + received_, false);
       return response;
     }
-    if (const auto done = upload_->finish(); !done) return refused_part(done.error(), blobs_, digest_);
+    const auto done = upload_->finish();
+    if (blobs_.received(digest_) == 0) api_.partial_uploads().ended(token_, digest_);
+    if (!done) return refused_part(done.error(), blobs_, digest_);
     return stored(digest_, 201);
   }
 
  private:
+  Api& api_;
   BlobStore& blobs_;
+  std::string token_;
   std::unique_ptr<BlobStore::Upload> upload_;
   Digest digest_;
   ContentRange range_;
@@ -201,9 +210,11 @@ std::variant<Response, std::unique_ptr<BodySink>> open_part(Api& api, const Requ
         400,
         fmt::format("Content-Range names {} bytes, the body has {}", range->bytes, *request.content_length),
         there);
+  const std::string& token = request.caller.token_id;
+  if (const auto dropped = api.partial_uploads().go_on(token, digest)) blobs.remove_unfinished(*dropped);
   auto upload = blobs.resume_upload(digest, range->first);
   if (!upload) return refused_part(upload.error(), blobs, digest);
-  return std::make_unique<PartSink>(blobs, std::move(*upload), digest, *range);
+  return std::make_unique<PartSink>(api, token, std::move(*upload), digest, *range);
 }
 
 Error no_spool(std::string_view what, int code) {

@@ -32,7 +32,8 @@ Auth::Auth(const TokenRegistry& tokens, Options options, UnixClock now)
       options_(options),
       cookie_name_("lightshaft_" + sha256("cookie name " + tokens.session_key()).hex().substr(0, 12)),
       now_(std::move(now)),
-      throttle_(options.requests, options.failures) {}
+      throttle_(options.requests, options.failures),
+      closed_(tokens.folder()) {}
 
 std::variant<Caller, Response> Auth::identify(const Request& request) {
   const std::string_view authorization = request.header("authorization");
@@ -107,21 +108,8 @@ std::string Auth::cookie(std::string_view value, std::int64_t seconds) const {
 }
 
 std::string Auth::close_session(const Request& request) {
-  if (const auto session = parse_session(session_of(request)); session && !is_closed(*session)) {
-    const std::lock_guard lock(mutex_);
-    const std::int64_t now = now_();
-    for (auto token = closed_.begin(); token != closed_.end();) {
-      auto& [sessions, refused_until] = token->second;
-      sessions.erase(sessions.begin(), sessions.lower_bound({now + 1, ""}));
-      token = sessions.empty() && refused_until <= now ? closed_.erase(token) : std::next(token);
-    }
-    Closed& closed = closed_[std::string(session->token_id)];
-    closed.sessions.emplace(session->expiry, session->text);
-    if (closed.sessions.size() > kMaxClosedSessions) {
-      closed.refused_until = closed.sessions.begin()->first;
-      closed.sessions.erase(closed.sessions.begin());
-    }
-  }
+  if (const auto session = parse_session(session_of(request)); session && !is_closed(*session))
+    closed_.close(session->token_id, session->expiry, session->text, now_());
   return cookie("", 0);
 }
 
@@ -146,11 +134,7 @@ std::optional<Auth::Session> Auth::parse_session(std::string_view cookie) const 
 }
 
 bool Auth::is_closed(const Session& session) const {
-  const std::lock_guard lock(mutex_);
-  const auto closed = closed_.find(session.token_id);
-  return closed != closed_.end() &&
-         (session.expiry <= closed->second.refused_until ||
-          closed->second.sessions.contains({session.expiry, std::string(session.text)}));
+  return closed_.contains(session.token_id, session.expiry, session.text);
 }
 
 std::string_view Auth::session_of(const Request& request) const {

@@ -2,23 +2,18 @@
 //
 // The cookie's text is `expiry.nonce.token-id.mac`; the key of the MAC is TokenRegistry::session_key(). The
 // coordinator stores no open session, so sessions survive its restart. A session becomes invalid when its
-// token is revoked. Sessions closed by DELETE /session are remembered, and rejected, until they expire or the
-// process ends. For each token at most kMaxClosedSessions closed sessions are remembered: beyond that, the
-// one that expires first is forgotten. All sessions of the token that do not expire later than the forgotten
-// one are then rejected, even open ones, so that no closed session becomes valid again.
+// token is revoked. Sessions closed by DELETE /session are remembered, and rejected, until they expire
+// (closed_sessions.h).
 #pragma once
 
 #include <cstdint>
 #include <functional>
-#include <map>
-#include <mutex>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <variant>
 
+#include "coordinator/http/auth/closed_sessions.h"
 #include "coordinator/http/auth/throttle.h"
 #include "coordinator/http/auth/token_registry.h"
 #include "coordinator/http/message/limits.h"
@@ -83,14 +78,7 @@ class Auth {
   std::string cookie_name_;
   UnixClock now_;
   Throttle throttle_;
-  mutable std::mutex mutex_;
-  struct Closed {
-    // Expiry time (seconds since 1970) and cookie text of each closed session
-    std::set<std::pair<std::int64_t, std::string>> sessions;
-    // Sessions that expire at this time or earlier are rejected (seconds since 1970)
-    std::int64_t refused_until = 0;
-  };
-  std::map<std::string, Closed, std::less<>> closed_;  // closed sessions of a token, by the token's id
+  ClosedSessions closed_;
 };
 
 // Clears the fields of `worker` that describe its work for other users' jobs.

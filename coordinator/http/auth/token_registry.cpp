@@ -165,6 +165,7 @@ Result<std::unique_ptr<TokenRegistry>> TokenRegistry::open(const std::filesystem
                             "admin; delete one to get a new one",
                             folder.string()));
   auto registry = std::make_unique<TokenRegistry>(*admin, *join);
+  registry->folder_ = folder;
   const auto tokens = registry->tokens_.lock();
   tokens->file = folder / "tokens";
   if (auto read = tokens->read_all(); !read) return tl::unexpected(read.error());

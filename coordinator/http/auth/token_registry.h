@@ -79,6 +79,8 @@ class TokenRegistry {
   Result<void> revoke(std::string_view id);
   std::vector<TokenInfo> list() const;
 
+  // The folder of the files; empty: the tokens are in memory only
+  const std::filesystem::path& folder() const { return folder_; }
   // Returns the key with which session cookies are signed. It is derived from the admin token, so that a new
   // admin token ends all sessions.
   const std::string& session_key() const { return session_key_; }
@@ -114,6 +116,7 @@ class TokenRegistry {
   Guarded<Tokens>::Lock latest() const;
 
   std::string session_key_;
+  std::filesystem::path folder_;
   mutable Guarded<Tokens> tokens_;  // mutable, since const functions reread the file
 };
 

@@ -47,18 +47,21 @@ inline constexpr std::size_t kReadBuffer = 64u << 10;  // buffer for the bytes r
 inline constexpr std::size_t kBodyChunk = 256u << 10;
 // Bytes written to a client between two checks of its deadline
 inline constexpr std::size_t kWriteSlice = 256u << 10;
-// Bytes of request bodies that all connections together may hold in memory
-inline constexpr std::uint64_t kMaxBuffered = 256u << 20;
-// Bytes of answers that all connections together may hold in memory, not counting bodies in files. A single
-// answer that is larger than this is sent once no other answer is in memory.
-inline constexpr std::uint64_t kMaxAnswers = 256u << 20;
-// Answers up to this size are not counted in kMaxAnswers
-inline constexpr std::uint64_t kSmallAnswer = 64u << 10;
 // Greatest number of bytes of a body that are read and dropped after an early rejection (see linger_seconds)
 inline constexpr std::uint64_t kLingerBytes = 16u << 20;
 
+// Memory that an answer about an image takes for each of its pixels while it is made: report.html of 8192 x
+// 8192 pixels takes 14 bytes, image.exr with its error layers 32
+inline constexpr std::uint64_t kMemoryPerPixel = 32;
+
 inline constexpr std::int64_t kSessionSeconds = 12 * 3600;
 inline constexpr std::size_t kMaxClosedSessions = 1000;  // closed sessions remembered per token, at most
+
+// Threads for one kind of work
+struct PoolSize {
+  std::size_t threads = 1;
+  std::size_t each = 1;  // of these, at most so many for one token or, without a token, for one address
+};
 
 // Limits that tests and the operator's config file may change
 struct Limits {
@@ -69,15 +72,26 @@ struct Limits {
   std::uint64_t unpacked_bytes = std::uint64_t{64} << 30;  // size of all files of a bundle together, unpacked
   std::size_t header_bytes = 16u << 10;
   std::size_t connections = 512;
+  std::size_t connections_each = 128;  // of these, at most so many of one token
+  // Connections of one address (an IPv6 /64 counts as one) on which nobody has shown a token yet. For a new
+  // one the oldest is closed.
+  std::size_t connections_of_address = 32;
   // How many of `connections` may be event streams; the rest is for requests.
   std::size_t event_streams = 128;
+  std::size_t event_streams_each = 32;  // of these, at most so many of one token
+  // Bytes of request bodies, and of answers that are not in files, that all connections together may hold in
+  // memory; of each a quarter for one token (net/shares.h)
+  std::uint64_t body_memory = 256u << 20;
+  std::uint64_t answer_memory = 256u << 20;
+  // Memory in which answers about images are made, half of it for one token. The largest image takes 2 GB.
+  std::uint64_t picture_memory = std::uint64_t{4} << 30;
   std::size_t event_queue = 4096;  // number of events that may wait for one reader of an event stream
   std::size_t event_queue_bytes = 4u << 20;
   double header_seconds = 10;  // allowed from the first byte of a request to the end of its header
   double idle_seconds = 60;    // a kept-alive connection is closed after this time without a request
-  // A body (in either direction) is cut off when its transfer takes longer than body_grace_seconds + (bytes
-  // so far) / min_rate. So a transfer of `length` bytes takes at most body_grace_seconds + length / min_rate,
-  // and a stalled one is cut off after the grace time, for any announced length.
+  // A body (in either direction) is cut off when it is body_grace_seconds behind min_rate, at any time
+  // (net/pace.h). So a transfer of `length` bytes takes at most body_grace_seconds + length / min_rate, and a
+  // stalled one is cut off after the grace time, however fast its first bytes came.
   double body_grace_seconds = 15;
   double min_rate = 8u << 10;  // in bytes per second
   // A silent event stream gets a comment this often, to keep the connection alive
@@ -92,11 +106,11 @@ struct Limits {
   // Further ones are answered with 429. 0: no limit
   double wrong_tokens_per_minute = 20;
   double stop_seconds = 5;  // how long a stopping coordinator waits for open requests
-  int quick_threads = 2;    // threads for requests that are answered from memory
-  int remote_threads = 8;   // threads for requests to other machines: blob stores, other coordinators
   int user_priority = 0;    // highest priority that a submit token may give to a job
-  int slow_threads = 4;     // threads that read scenes and write images and blobs
-  int bundle_threads = 2;   // threads that unpack bundles, so that unpacking never occupies the slow threads
+  PoolSize quick{4, 2};     // requests that are answered from memory
+  PoolSize slow{8, 3};      // reading scenes, writing images and blobs
+  PoolSize bundles{3, 1};   // unpacking bundles
+  PoolSize remote{12, 6};   // requests to other machines: blob stores, other coordinators
   // Folder for bundles while they are read; empty: the system's temporary folder
   std::filesystem::path spool;
 };

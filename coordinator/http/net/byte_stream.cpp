@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <openssl/err.h>
 #include <openssl/ssl.h>
+#include <poll.h>
 
 #include <boost/asio/ssl/context.hpp>
 
@@ -74,6 +75,12 @@ net::awaitable<Stream::Opened> Stream::open() {
 void Stream::cancel() {
   error_code ignored;
   socket_.cancel(ignored);
+}
+
+bool Stream::peer_has_left() {
+  // This way the end of the connection is also seen behind bytes that nobody has read yet.
+  pollfd asked{socket_.native_handle(), POLLRDHUP, 0};
+  return ::poll(&asked, 1, 0) == 1;
 }
 
 void Stream::close() {

@@ -59,6 +59,8 @@ class Stream {
   void close();
   net::awaitable<void> send_goodbye();  // ends writing: closes TLS, then the socket's sending side
 
+  bool peer_has_left();  // true: the client has ended or closed the connection
+
   std::string peer() const { return peer_; }  // address without port
 
  private:

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <boost/asio/buffer.hpp>
 #include <boost/beast/core/buffers_prefix.hpp>
@@ -23,16 +24,20 @@ Connection::Connection(Tcp::socket socket, std::shared_ptr<const TlsIdentity> tl
       shared_(shared),
       limits_(shared.api.limits()),
       watchdog_(shared.io),
+      opened_(SteadyClock::now()),
+      client_(Throttle::group_of(stream_.peer())),
       buffer_(kReadBuffer) {
   shared_.open.insert(this);
   ++shared_.api.counters().connections;
 }
 
 Connection::~Connection() {
-  charge(0);
-  charge_answer(0);
   shared_.open.erase(this);
   --shared_.api.counters().connections;
+}
+
+bool Connection::older_than(double seconds) const {
+  return SteadyClock::now() - opened_ > steady_seconds(seconds);
 }
 
 void Connection::wind_down() {
@@ -41,6 +46,7 @@ void Connection::wind_down() {
 }
 
 void Connection::cut() {
+  leaving_ = true;
   stream_.close();
   if (events_wait_ != nullptr) events_wait_->cancel();
 }
@@ -70,7 +76,8 @@ net::awaitable<bool> Connection::open() {
 }
 
 net::awaitable<bool> Connection::serve_one() {
-  charge(0);
+  body_memory_.give_back();
+  serving_ = false;
   Parser parser;
   prepare(parser, limits_);
   const Read read = co_await read_header(parser);
@@ -91,6 +98,14 @@ net::awaitable<bool> Connection::serve_one() {
     if (request.has_body) co_await linger();
     co_return kept;
   }
+  if (!note_caller(request)) {
+    const Response refusal =
+        problem(503, fmt::format("this token has {} connections open already; close some, or wait",
+                                 limits_.connections_each));
+    co_await answer(request, refusal, false);
+    co_await linger();
+    co_return false;
+  }
   co_return co_await serve_match(parser, std::get<Match>(admitted), request);
 }
 
@@ -107,43 +122,81 @@ net::awaitable<bool> Connection::serve_match(Parser& parser, const Match& match,
     co_await answer_failed_read(body.read);
     co_return false;
   }
+  serving_ = true;
   Response response;
   if (body.answer) {
     response = std::move(*body.answer);
   } else {
-    response = co_await handle_on_executor(match, request);
+    auto made = co_await handle_on_executor(match, request);
+    if (!made) co_return false;
+    response = std::move(*made);
   }
   if (response.events) {
     co_await stream_events(request, response);
     co_return false;
   }
-  if (!charge_answer(response.in_memory()))
-    response = problem(503, "too much is being sent to others that read slowly; try again");
+  if (!answer_memory_.take(shared_.answers, caller_, response.in_memory()))
+    response = problem(503, "too many large answers are being sent, which are read slowly; try again");
   const bool unread = request.has_body && !parser.is_done();
   const bool kept = co_await answer(request, response, parser.keep_alive() && !unread);
-  charge_answer(0);
+  answer_memory_.give_back();
   if (unread) co_await linger();
   co_return kept;
 }
 
-net::awaitable<Response> Connection::handle_on_executor(const Match& match, const Request& request) {
+bool Connection::note_caller(const Request& request) {
+  const std::string& token = request.caller.token_id;
+  caller_ = token.empty() ? Throttle::group_of(stream_.peer()) : "token " + token;
+  if (token.empty() || client_ == caller_) return true;
+  const auto same = [this](const Connection* other) { return other != this && other->client_ == caller_; };
+  const auto there = std::count_if(shared_.open.begin(), shared_.open.end(), same);
+  if (static_cast<std::size_t>(there) >= limits_.connections_each) return false;
+  client_ = caller_;
+  known_ = true;
+  return true;
+}
+
+Connection::Turn::Turn(Connection& connection, Pool& taken) : pool(taken), wait(connection.shared_.io) {
+  wait.expires_at(SteadyClock::time_point::max());
+  ticket = pool.turns.ask(connection.caller_, 0, [this] {
+    come_already = true;
+    wait.cancel();
+  });
+}
+
+net::awaitable<void> Connection::Turn::come() {
+  error_code ec;
+  while (!come_already) co_await wait.async_wait(awaiting(ec));
+}
+
+net::awaitable<std::optional<Response>> Connection::handle_on_executor(const Match& match,
+                                                                       const Request& request) {
   const Executor executor = match.route->executor;
   if (executor == Executor::here) co_return shared_.api.handle(match, request);
-  net::thread_pool& pool = executor == Executor::quick  ? shared_.quick
-                           : executor == Executor::slow ? shared_.slow
-                                                        : shared_.remote;
+  Pool& pool = executor == Executor::quick  ? shared_.quick
+               : executor == Executor::slow ? shared_.slow
+                                            : shared_.remote;
   bool another_coordinators = false;
-  auto work = [this, &match, &request, &another_coordinators] {
-    Response answer = shared_.api.handle(match, request);
-    another_coordinators = shared_.api.may_be_another_coordinators(match, answer);
-    return answer;
-  };
-  Response response = co_await run_on(pool, shared_.io, std::move(work));
+  Response response;
+  {
+    Turn turn(*this, pool);
+    const bool waited = !turn.come_already;
+    co_await turn.come();
+    // What changes something is done even if the client has left; what is only read is of no use to anybody.
+    const bool reads = request.method == Method::get || request.method == Method::head;
+    if (waited && reads && stream_.peer_has_left()) co_return std::nullopt;
+    auto work = [this, &match, &request, &another_coordinators] {
+      Response answer = shared_.api.handle(match, request);
+      another_coordinators = shared_.api.may_be_another_coordinators(match, answer);
+      return answer;
+    };
+    response = co_await run_on(pool.threads, shared_.io, std::move(work));
+  }
   if (!another_coordinators) co_return response;
   auto ask = [this, &match, &request, &response] {
     return shared_.api.ask_other_coordinator(match, request, std::move(response));
   };
-  co_return co_await run_on(shared_.remote, shared_.io, std::move(ask));
+  co_return co_await work_on(shared_.remote, std::move(ask));
 }
 
 // Sets the deadline of the operations that follow. Asio has no deadline for single reads; so when the
@@ -172,8 +225,8 @@ void Connection::disarm() {
   watchdog_.cancel();
 }
 
-SteadyClock::time_point Connection::pace(SteadyClock::time_point began, std::uint64_t bytes) const {
-  return began + steady_seconds(limits_.body_grace_seconds + static_cast<double>(bytes) / limits_.min_rate);
+TransferPace Connection::new_pace() const {
+  return {SteadyClock::now(), limits_.body_grace_seconds, limits_.min_rate};
 }
 
 net::awaitable<Read> Connection::fill() {
@@ -198,15 +251,15 @@ net::awaitable<Read> Connection::read_header(Parser& parser) {
 net::awaitable<Connection::Body> Connection::read_whole(Parser& parser, Request& request,
                                                         std::uint64_t limit) {
   if (!co_await send_continue(request)) co_return Body{Read::closed, {}};
-  const auto began = SteadyClock::now();
+  TransferPace pace = new_pace();
   std::uint64_t received = 0;
   while (!parser.is_done()) {
-    const Read read = co_await read_portion(parser, began, received);
+    const Read read = co_await read_portion(parser, pace, received);
     if (read != Read::ok) co_return Body{read, {}};
     if (received > limit)
       co_return Body{Read::ok,
                      problem(413, fmt::format("the body has more than the {} bytes accepted here", limit))};
-    if (!charge(received))
+    if (!body_memory_.take(shared_.bodies, caller_, received))
       co_return Body{Read::ok, problem(503, "too many large requests at once; try again")};
   }
   beast::flat_buffer body = std::exchange(parser.get().body(), beast::flat_buffer());
@@ -217,7 +270,7 @@ net::awaitable<Connection::Body> Connection::read_whole(Parser& parser, Request&
 net::awaitable<Connection::Body> Connection::read_streamed(Parser& parser, const Match& match,
                                                            const Request& request) {
   auto open = [this, &match, &request] { return shared_.api.open_upload(match, request); };
-  auto opened = co_await run_on(shared_.slow, shared_.io, std::move(open));
+  auto opened = co_await work_on(shared_.slow, std::move(open));
   if (auto* refused = std::get_if<Response>(&opened)) co_return Body{Read::ok, std::move(*refused)};
   auto sink = std::move(std::get<std::unique_ptr<BodySink>>(opened));
   Body body;
@@ -235,13 +288,13 @@ net::awaitable<Connection::Body> Connection::read_streamed(Parser& parser, const
     return answer;
   };
   const bool unpacks = whole && shared_.api.body_kind(*match.route, request) == BodyKind::archive;
-  auto answer = co_await run_on(unpacks ? shared_.bundles : shared_.slow, shared_.io, std::move(end));
+  auto answer = co_await work_on(unpacks ? shared_.bundles : shared_.slow, std::move(end));
   if (answer) body.answer = std::move(answer);
   co_return body;
 }
 
 net::awaitable<Connection::Body> Connection::read_into(Parser& parser, BodySink& sink) {
-  auto began = SteadyClock::now();
+  TransferPace pace = new_pace();
   std::uint64_t received = 0;
   beast::flat_buffer& chunk = parser.get().body();
   const auto append = [&sink, &chunk] {
@@ -249,32 +302,32 @@ net::awaitable<Connection::Body> Connection::read_into(Parser& parser, BodySink&
     return sink.append(std::span(static_cast<const std::byte*>(bytes.data()), bytes.size()));
   };
   while (!parser.is_done()) {
-    const Read read = co_await read_portion(parser, began, received);
+    const Read read = co_await read_portion(parser, pace, received);
     if (read == Read::ok && (chunk.size() == 0 || (chunk.size() < kBodyChunk && !parser.is_done()))) continue;
     disarm();
     // If the read has failed, the rest of the body will not arrive. The bytes that have arrived still go to
     // `sink`, so that an upload in parts makes progress even if every connection breaks within a chunk.
     const auto paused = SteadyClock::now();
     std::optional<Response> refused;
-    if (chunk.size() > 0) refused = co_await run_on(shared_.slow, shared_.io, append);
+    if (chunk.size() > 0) refused = co_await work_on(shared_.slow, append);
     if (read != Read::ok) co_return Body{read, {}};
     if (refused) co_return Body{Read::ok, std::move(refused)};
-    began += SteadyClock::now() - paused;  // time spent on the disk does not count against the client
+    pace.waited(SteadyClock::now() - paused);
     chunk.clear();
   }
   co_return Body{};
 }
 
-// Reads the bytes of the body that arrive next, or notes that the body has ended. The whole body began at
-// `began`; `received` is its number of bytes so far, to which this call adds.
-net::awaitable<Read> Connection::read_portion(Parser& parser, SteadyClock::time_point began,
-                                              std::uint64_t& received) {
+// Reads the bytes of the body that arrive next, or notes that the body has ended. `received` is the body's
+// number of bytes so far, to which this call adds.
+net::awaitable<Read> Connection::read_portion(Parser& parser, TransferPace& pace, std::uint64_t& received) {
   const std::size_t before = parser.get().body().size();
-  arm(pace(began, received));
+  arm(pace.deadline());
   error_code ec;
   co_await beast::http::async_read_some(stream_, buffer_, parser, awaiting(ec));
   const std::size_t got = parser.get().body().size() - before;
   received += got;
+  pace.moved(got, SteadyClock::now());
   shared_.api.counters().body_bytes += got;
   co_return read_result(ec, timed_out_);
 }
@@ -282,25 +335,6 @@ net::awaitable<Read> Connection::read_portion(Parser& parser, SteadyClock::time_
 net::awaitable<bool> Connection::send_continue(const Request& request) {
   if (request.header("expect").empty() || !request.has_body || buffer_.size() > 0) co_return true;
   co_return co_await write_all("HTTP/1.1 100 Continue\r\n\r\n", {});
-}
-
-bool Connection::charge(std::uint64_t bytes) {
-  shared_.buffered -= charged_;
-  charged_ = 0;
-  if (shared_.buffered + bytes > kMaxBuffered) return false;
-  charged_ = bytes;
-  shared_.buffered += bytes;
-  return true;
-}
-
-// Answers of at most kSmallAnswer bytes are not counted in Shared::answers and are always allowed. A single
-// answer may be larger than kMaxAnswers while no other answer is counted.
-bool Connection::charge_answer(std::uint64_t bytes) {
-  shared_.answers -= std::exchange(answer_charged_, 0);
-  if (bytes <= kSmallAnswer) return true;
-  if (shared_.answers > 0 && shared_.answers + bytes > kMaxAnswers) return false;
-  shared_.answers += answer_charged_ = bytes;
-  return true;
 }
 
 net::awaitable<bool> Connection::answer(const Request& request, const Response& response, bool keep_alive) {
@@ -329,7 +363,7 @@ net::awaitable<void> Connection::answer_failed_read(Read read) {
   if (read == Read::too_slow)
     response = problem(
         408, fmt::format("the request came too slowly: its header must arrive within {} s, its body at {} "
-                         "bytes/s after {} s",
+                         "bytes/s, with pauses of at most {} s",
                          limits_.header_seconds, limits_.min_rate, limits_.body_grace_seconds));
   if (read == Read::malformed) response = problem(400, "this is not a well-formed HTTP/1.1 request");
   if (read == Read::header_too_large)
@@ -338,31 +372,30 @@ net::awaitable<void> Connection::answer_failed_read(Read read) {
 }
 
 net::awaitable<bool> Connection::write_all(std::string_view head, std::span<const std::byte> body) {
-  std::uint64_t sent = 0;
-  const bool written = co_await write_paced(head, body, SteadyClock::now(), sent);
+  TransferPace pace = new_pace();
+  const bool written = co_await write_paced(head, body, pace);
   if (written) disarm();
   co_return written;
 }
 
 net::awaitable<bool> Connection::write_paced(std::string_view head, std::span<const std::byte> body,
-                                             SteadyClock::time_point began, std::uint64_t& sent) {
+                                             TransferPace& pace) {
   const std::array<net::const_buffer, 2> whole = {net::buffer(head), net::buffer(body.data(), body.size())};
   beast::buffers_suffix left(whole);
   while (beast::buffer_bytes(left) > 0) {
-    arm(pace(began, sent));
+    arm(pace.deadline());
     error_code ec;
     const auto slice = beast::buffers_prefix(kWriteSlice, left);
     const std::size_t n = co_await stream_.async_write_some(slice, awaiting(ec));
     left.consume(n);
-    sent += n;
+    pace.moved(n, SteadyClock::now());
     if (ec) co_return false;
   }
   co_return true;
 }
 
 net::awaitable<bool> Connection::write_file(std::string_view head, const FileBody& file) {
-  auto began = SteadyClock::now();
-  std::uint64_t sent = 0;
+  TransferPace pace = new_pace();
   std::vector<std::byte> slice(kWriteSlice);
   for (std::uint64_t offset = 0; offset < file.size;) {
     disarm();  // no deadline cancels operations of the connection while the disk is read
@@ -371,11 +404,10 @@ net::awaitable<bool> Connection::write_file(std::string_view head, const FileBod
       return read_slice(file, offset,
                         std::span(slice).first(std::min<std::uint64_t>(slice.size(), file.size - offset)));
     };
-    const std::size_t n = co_await run_on(shared_.slow, shared_.io, std::move(work));
+    const std::size_t n = co_await work_on(shared_.slow, std::move(work));
     if (n == 0) co_return false;
-    began += SteadyClock::now() - paused;  // time spent on the disk does not count against the client
-    if (!co_await write_paced(offset == 0 ? head : std::string_view(), std::span(slice).first(n), began,
-                              sent))
+    pace.waited(SteadyClock::now() - paused);
+    if (!co_await write_paced(offset == 0 ? head : std::string_view(), std::span(slice).first(n), pace))
       co_return false;
     offset += n;
   }

@@ -1,6 +1,7 @@
 // The functions of Connection that serve an event stream (Server-Sent Events) to one client.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/post.hpp>
@@ -16,9 +17,11 @@ namespace {
 // does this, since it also runs if the server is destroyed while the stream waits.
 struct Undo {
   Shared& shared;
+  bool& streaming;
   net::steady_timer*& events_wait;
   std::shared_ptr<EventQueue> queue;
   ~Undo() {
+    streaming = false;
     events_wait = nullptr;
     queue->close();
     --shared.event_streams;
@@ -36,7 +39,12 @@ struct Start {
 }  // namespace
 
 net::awaitable<void> Connection::stream_events(const Request& request, const Response& response) {
-  if (shared_.event_streams >= limits_.event_streams) {
+  const auto same = [this](const Connection* other) {
+    return other->streams_events() && other->client() == client_;
+  };
+  const auto own = std::count_if(shared_.open.begin(), shared_.open.end(), same);
+  if (shared_.event_streams >= limits_.event_streams ||
+      static_cast<std::size_t>(own) >= limits_.event_streams_each) {
     co_await answer(request, problem(503, "too many event streams are open; close one or try again later"),
                     false);
     co_return;
@@ -49,6 +57,7 @@ net::awaitable<void> Connection::stream_events(const Request& request, const Res
     return after > last ? Start{last, true} : Start{after, false};
   };
   net::steady_timer wait(shared_.io);
+  streaming_ = true;
   ++shared_.event_streams;
   ++shared_.api.counters().event_streams;
   auto wake = [this, &io = shared_.io, alive = std::weak_ptr(alive_)] {
@@ -56,11 +65,11 @@ net::awaitable<void> Connection::stream_events(const Request& request, const Res
       if (!alive.expired() && events_wait_ != nullptr) events_wait_->cancel();
     });
   };
-  const Start start = co_await run_on(shared_.quick, shared_.io, std::move(find_start));
+  const Start start = co_await work_on(shared_.quick, std::move(find_start));
   const EventQueue::Bounds bounds{limits_.event_queue, limits_.event_queue_bytes};
   auto queue = std::make_shared<EventQueue>(bounds, wanted.job, start.after, std::move(wake));
   events_wait_ = &wait;
-  const Undo undo{shared_, events_wait_, queue};
+  const Undo undo{shared_, streaming_, events_wait_, queue};
 
   shared_.api.counters().answered(request.method, response.status);
   std::string head = head_text(response, {.streamed = true, .method = request.method}, system_unix_clock()());
@@ -82,7 +91,7 @@ net::awaitable<void> Connection::stream_events(const Request& request, const Res
       queue->push(event, shown ? &*shown : nullptr);
     });
   };
-  auto subscription = co_await run_on(shared_.quick, shared_.io, std::move(subscribe));
+  auto subscription = co_await work_on(shared_.quick, std::move(subscribe));
   using namespace net::experimental::awaitable_operators;
   co_await (write_events(*queue, wanted.reader) || reader_leaves());
   queue->close();
@@ -90,7 +99,7 @@ net::awaitable<void> Connection::stream_events(const Request& request, const Res
     handle.reset();  // on a thread of the pool, since reset() waits for a callback that is in progress
     return true;
   };
-  co_await run_on(shared_.quick, shared_.io, std::move(unsubscribe));
+  co_await work_on(shared_.quick, std::move(unsubscribe));
 }
 
 net::awaitable<void> Connection::write_events(EventQueue& queue, const Caller& reader) {

@@ -6,6 +6,7 @@
 #include <boost/asio/detached.hpp>
 #include <boost/asio/executor_work_guard.hpp>
 #include <condition_variable>
+#include <map>
 #include <mutex>
 #include <thread>
 
@@ -44,7 +45,6 @@ Result<Address> parse_address(const std::string& text) {
 struct Server::State {
   // The order of these members matters: destroying `io` destroys the coroutines' frames, which may use the
   // members declared before `io`. Those are destroyed after `io`.
-  std::unique_ptr<net::thread_pool> quick, slow, bundles, remote;
   std::unique_ptr<Shared> shared;
   net::io_context io{1};
   net::executor_work_guard<net::io_context::executor_type> work{io.get_executor()};
@@ -63,21 +63,62 @@ struct Server::State {
 
 namespace {
 
-void refuse(Tcp::socket& socket) {
+// Tells the client that there is no room. On a port with TLS the connection is closed without a word, since
+// the client would take plain text for a broken handshake.
+void refuse(Tcp::socket& socket, bool tls) {
+  if (tls) return;
   error_code ignored;
   socket.non_blocking(true, ignored);
   // The whole answer fits into the send buffer, which is empty: write_some() sends all of it.
   socket.write_some(net::buffer(kFull.data(), kFull.size()), ignored);
 }
 
-// Closes an idle connection to make room for a new one.
+// How long a new connection may take to send its first request before it yields to others from its address.
+constexpr double kNewcomerSeconds = 1;
+
+// Closes the oldest of the connections that may yield, of the client that has most of these.
 bool make_room(Shared& shared) {
+  std::map<std::string, std::size_t> many;
+  for (const Connection* connection : shared.open)
+    if (connection->may_yield()) ++many[connection->client()];
+  Connection* oldest = nullptr;
   for (Connection* connection : shared.open) {
-    if (!connection->idle()) continue;
-    connection->cut();
-    return true;
+    if (!connection->may_yield()) continue;
+    const auto better = [&] {
+      const std::size_t a = many[connection->client()], b = many[oldest->client()];
+      return a != b ? a > b : connection->opened() < oldest->opened();
+    };
+    if (oldest == nullptr || better()) oldest = connection;
   }
-  return false;
+  if (oldest != nullptr) oldest->cut();
+  return oldest != nullptr;
+}
+
+// True if a connection from this address may come. One address may have connections_of_address connections on
+// which nobody has shown a token; the oldest of them yields to a new one, unless it is new itself.
+bool make_room_for(Shared& shared, const std::string& address) {
+  std::size_t strangers = 0;
+  Connection* oldest = nullptr;
+  for (Connection* connection : shared.open) {
+    if (connection->known() || connection->client() != address) continue;
+    ++strangers;
+    if (connection->may_yield() && (oldest == nullptr || connection->opened() < oldest->opened()))
+      oldest = connection;
+  }
+  if (strangers >= shared.api.limits().connections_of_address) {
+    if (oldest == nullptr) return false;
+    if (oldest->older_than(kNewcomerSeconds)) {
+      oldest->cut();
+      return true;
+    }
+  }
+  return shared.open.size() < shared.api.limits().connections || make_room(shared);
+}
+
+std::string address_of(const Tcp::socket& socket) {
+  error_code ec;
+  const auto remote = socket.remote_endpoint(ec);
+  return ec ? std::string() : Throttle::group_of(remote.address().to_string());
 }
 
 }  // namespace
@@ -94,8 +135,8 @@ net::awaitable<void> Server::State::accept_loop() {
       co_await pause.async_wait(awaiting(ec));
       continue;
     }
-    if (shared->open.size() >= shared->api.limits().connections && !make_room(*shared)) {
-      refuse(socket);
+    if (!make_room_for(*shared, address_of(socket))) {
+      refuse(socket, tls != nullptr);
       continue;
     }
     socket.set_option(Tcp::no_delay(true), ec);
@@ -156,12 +197,7 @@ int Server::port() const {
 void Server::start(Api& api, std::shared_ptr<const TlsIdentity> tls) {
   State& s = *state_;
   s.tls = std::move(tls);
-  s.quick = std::make_unique<net::thread_pool>(static_cast<std::size_t>(api.limits().quick_threads));
-  s.slow = std::make_unique<net::thread_pool>(static_cast<std::size_t>(api.limits().slow_threads));
-  s.bundles = std::make_unique<net::thread_pool>(static_cast<std::size_t>(api.limits().bundle_threads));
-  s.remote = std::make_unique<net::thread_pool>(static_cast<std::size_t>(api.limits().remote_threads));
-  s.shared = std::make_unique<Shared>(
-      Shared{s.io, *s.quick, *s.slow, *s.bundles, *s.remote, api, {}, 0, 0, 0, false});
+  s.shared = std::make_unique<Shared>(s.io, api);
   net::co_spawn(s.io, s.accept_loop(), net::detached);
   s.thread = std::thread([&s] { s.io.run(); });
 }
@@ -184,7 +220,10 @@ void Server::stop() {
   s.shared->api.ask_to_stop();
   s.io.stop();
   s.thread.join();
-  for (const auto* pool : {&s.quick, &s.slow, &s.bundles, &s.remote}) (*pool)->join();
+  for (Pool* pool : {&s.shared->quick, &s.shared->slow, &s.shared->bundles, &s.shared->remote}) {
+    pool->threads.join();
+    pool->turns.close();
+  }
   state_.reset();  // destroys the coroutine frames of closed connections, which use the Api
 }
 

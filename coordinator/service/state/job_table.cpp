@@ -3,17 +3,38 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <random>
 
 #include "coordinator/admission/admission.h"
 #include "coordinator/base/limits.h"
 
 namespace ls::coordinator {
+namespace {
+
+std::uint64_t film_bytes_of(const StoredJob& job) {
+  return film_bytes_per_pixel(aovs_of(job.settings)) * job.settings.size.pixels();
+}
+
+// Returns the sum of the largest kFilmsOfSequence values.
+std::uint64_t sum_of_largest(std::vector<std::uint64_t> values) {
+  const std::size_t count = std::min(values.size(), limits::kFilmsOfSequence);
+  std::partial_sort(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count), values.end(),
+                    std::greater<>());
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < count; ++i) sum += values[i];
+  return sum;
+}
+
+double gigabytes(std::uint64_t bytes) { return static_cast<double>(bytes) / (std::uint64_t{1} << 30); }
+
+}  // namespace
 
 JobEntry::JobEntry(StoredJob job, TimePoint now)
     : stored(std::move(job)),
       settings_digest(digest_of(stored.settings)),
       grid{stored.settings.size, stored.settings.tile},
+      film_bytes(film_bytes_of(stored)),
       last_snapshot(now),
       fold_seconds(stored.totals.render_seconds) {}
 
@@ -139,6 +160,42 @@ Result<void> JobTable::room_for(const std::string& owner, std::size_t jobs) cons
       fmt::format(
           "{} jobs of user {} are kept already, and {} more are more than {}: remove some that are done", own,
           owner, jobs, limits::kMaxJobsOfUser));
+}
+
+Result<void> JobTable::film_room_for(std::span<const StoredJob> more, std::uint64_t in_all) const {
+  const std::string& owner = more.front().owner;
+  std::uint64_t all = 0, own = 0;
+  for (const JobId& id : order_) {
+    const auto frames = sequences_.find(id);
+    std::vector<std::uint64_t> films;
+    const auto count = [&films](const EntryPtr& entry) {
+      if (entry->assembly) films.push_back(entry->film_bytes);
+    };
+    const EntryPtr first = frames == sequences_.end() ? find(id) : frames->second.frames.front();
+    if (frames == sequences_.end()) {
+      count(first);
+    } else {
+      std::ranges::for_each(frames->second.frames, count);
+    }
+    const std::uint64_t bytes = sum_of_largest(std::move(films));
+    all += bytes;
+    if (first->stored.owner == owner) own += bytes;
+  }
+  std::vector<std::uint64_t> films;
+  for (const StoredJob& job : more) films.push_back(film_bytes_of(job));
+  const std::uint64_t bytes = sum_of_largest(std::move(films));
+  const auto refuse = [&](std::string_view whose, std::uint64_t held, std::uint64_t most) {
+    return fail(
+        Errc::resource_exhausted,
+        fmt::format("the image takes {:.2f} GB of the coordinator's memory; {} that are not done hold "
+                    "{:.2f} of {:.2f} GB: wait until some are done or cancel them, or render a "
+                    "smaller image (operators: --film-memory)",
+                    gigabytes(bytes), whose, gigabytes(held), gigabytes(most)));
+  };
+  if (!owner.empty() && bytes > in_all / 2 - std::min(own, in_all / 2))
+    return refuse(fmt::format("the jobs of user {}", owner), own, in_all / 2);
+  if (bytes > in_all - std::min(all, in_all)) return refuse("all jobs", all, in_all);
+  return {};
 }
 
 void JobTable::add(const EntryPtr& entry) {

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,6 +35,7 @@ struct JobEntry {
   StoredJob stored;  // the job's record; its state stays `running` until the final image is written
   Digest settings_digest;
   TileGrid grid;
+  std::uint64_t film_bytes = 0;      // memory of the image's pixel sums when each tile has results
   std::shared_ptr<PartialLog> log;   // file of accepted results; null if all is in memory, or if `unloaded`
   std::optional<Assembly> assembly;  // the image in memory; nullopt if `unloaded`
   // Pictures for the comparison with the reference image; nullopt: the job has no reference image, or no
@@ -122,6 +124,10 @@ class JobTable {
   JobId unused_id() const;
   // Returns an error if there is no room for `jobs` more jobs.
   Result<void> room_for(const std::string& owner, std::size_t jobs) const;
+  // Returns an error if the images of the jobs `more` do not fit into the memory for images: `in_all` bytes
+  // for the jobs of all, and half of it for those of one user. A job counts until its image is in files. Of a
+  // sequence the largest kFilmsOfSequence frames count, since few are rendered at the same time.
+  Result<void> film_room_for(std::span<const StoredJob> more, std::uint64_t in_all) const;
   // Adds a job. If it is a frame, it joins its sequence, which is listed at the place of its first frame.
   void add(const EntryPtr& entry);
   // Removes the id of a job or a sequence from order(). The job, or the sequence's frames, stay in the table

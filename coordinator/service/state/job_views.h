@@ -97,8 +97,4 @@ class JobViews {
   const Clock& clock_;
 };
 
-// Selects and orders the jobs that a client's list shows. Makes views only of the jobs on the page, unless
-// the order needs the views of all.
-JobsPage list_jobs(JobTable& jobs, const JobViews& views, const JobsAsked& asked);
-
 }  // namespace ls::coordinator

@@ -96,8 +96,9 @@ void Records::log(const JobId& id, std::string text) {
 void Records::add_point(const EntryPtr& entry, const ConvergencePoint& point) {
   entry->points.push_back(point);
   writes_.push([this, id = entry->stored.id, point] {
-    if (const auto added = store_.add_point(id, point); !added)
-      log_error(fmt::format("job={}", id.value), added.error().message);
+    const auto added = store_.add_point(id, point);
+    note(added);
+    if (!added) log_error(fmt::format("job={}", id.value), added.error().message);
     failpoint("checkpoint-stored");
   });
 }

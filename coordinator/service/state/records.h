@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/guarded.h"
 #include "coordinator/base/work_queue.h"
 #include "coordinator/service/state/job_table.h"
 
@@ -40,7 +41,12 @@ class Records {
   Result<void> put_quarantined();
   // Why a record or a result could not be stored; empty: all records are stored, and no attempt has failed
   // since a result was last stored
-  const std::string& trouble() const { return trouble_; }
+  std::string trouble() const { return trouble_.empty() ? store_trouble() : trouble_; }
+  // Notes whether the job store took a record that is not stored by put(). store_trouble() is the reason why
+  // it did not take the latest one; empty: it did. Both are thread-safe, since some records are stored in the
+  // background.
+  void note(const Result<void>& stored) { *store_trouble_.lock() = stored ? "" : stored.error().message; }
+  std::string store_trouble() const { return *store_trouble_.lock(); }
   void set_trouble(std::string why) { trouble_ = std::move(why); }
 
   void log(const JobId& id, std::string text);
@@ -65,6 +71,7 @@ class Records {
   std::set<EntryPtr>* together_ = nullptr;  // jobs that put_together() will store; null: it is not running
   std::vector<QuarantinedWorker> quarantined_;
   std::string trouble_;
+  mutable Guarded<std::string> store_trouble_;
   std::uint64_t lines_left_out_ = 0;
 };
 

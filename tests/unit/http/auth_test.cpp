@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "tests/unit/http/fixture.h"
+#include "tests/unit/store/temp_folder.h"
 
 namespace ls::http::testing {
 namespace {
@@ -78,6 +79,54 @@ TEST_F(AuthTest, RefusesAChangedOrExpiredOrClosedSession) {
   auth.close_session(request(Method::del, "/api/v1/session", {{"cookie", other}}));
   EXPECT_EQ(status(Method::get, {{"cookie", other}}), 401);
   EXPECT_EQ(status(Method::get, {{"cookie", cookie()}}), 200);
+}
+
+TEST(ClosedSessions, StayClosedAfterARestartAndAtOtherCoordinators) {
+  const TempFolder folder;
+  const auto clock = [] { return now; };
+  const auto tokens = TokenRegistry::open(folder.path()).value();
+  const auto others_tokens = TokenRegistry::open(folder.path()).value();
+  Auth auth(*tokens, {}, clock), other(*others_tokens, {}, clock);
+  std::ifstream file(folder.path() / "token");
+  std::string token;
+  file >> token;
+  const auto cookie_of = [](const std::string& set) { return set.substr(0, set.find(';')); };
+  const std::string closed = cookie_of(std::get<std::string>(auth.open_session({}, token)));
+  const std::string open = cookie_of(std::get<std::string>(auth.open_session({}, token)));
+  const auto accepted = [](Auth& by, const std::string& cookie) {
+    return std::holds_alternative<Caller>(
+        by.identify(request(Method::get, "/api/v1/jobs", {{"cookie", cookie}})));
+  };
+  ASSERT_TRUE(accepted(other, closed));
+
+  auth.close_session(request(Method::del, "/api/v1/session", {{"cookie", closed}}));
+
+  EXPECT_FALSE(accepted(auth, closed));
+  EXPECT_FALSE(accepted(other, closed));
+  const auto tokens_again = TokenRegistry::open(folder.path()).value();
+  Auth again(*tokens_again, {}, clock);
+  EXPECT_FALSE(accepted(again, closed));
+  EXPECT_TRUE(accepted(again, open));
+  struct stat info {};
+  ASSERT_EQ(::stat((folder.path() / "closed-sessions").c_str(), &info), 0);
+  EXPECT_EQ(info.st_mode & 0777, 0600u);
+}
+
+TEST(ClosedSessions, OfManyTheFirstToExpireCloseAllBeforeThem) {
+  const TempFolder folder;
+  {
+    ClosedSessions sessions(folder.path());
+    for (std::size_t i = 0; i < 3 * kMaxClosedSessions; ++i)
+      sessions.close("t", now + 100 + static_cast<std::int64_t>(i), std::to_string(i), now);
+  }
+
+  const ClosedSessions again(folder.path());
+
+  for (const std::size_t i : {std::size_t{0}, kMaxClosedSessions, 3 * kMaxClosedSessions - 1})
+    EXPECT_TRUE(again.contains("t", now + 100 + static_cast<std::int64_t>(i), std::to_string(i))) << i;
+  EXPECT_FALSE(again.contains("t", now + 100'000, "open"));
+  EXPECT_FALSE(again.contains("u", now + 100, "0"));
+  EXPECT_LT(std::filesystem::file_size(folder.path() / "closed-sessions"), 4 * kMaxClosedSessions * 100);
 }
 
 // Someone with a read token could open and close many sessions so that an earlier closed one is forgotten and

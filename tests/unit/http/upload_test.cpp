@@ -45,6 +45,23 @@ TEST_F(Uploads, InPartsAreKeptUntilTheyAreWhole) {
   EXPECT_EQ(part("bytes 2-3/4", "id").status, 204);
 }
 
+TEST_F(Uploads, OfOneTokenBeyondItsShareDropItsOwnOldestOnly) {
+  const std::string mallory = tokens.add(Role::submit, "mallory")->token;
+  const auto begin = [&](const std::string& token, const Digest& digest) {
+    return ask(request(Method::put, "/api/v1/blobs/" + digest.hex(),
+                       {{"authorization", "Bearer " + token}, {"content-range", "bytes 0-0/4"}}, "x"))
+        .status;
+  };
+  constexpr std::size_t kShare = coordinator::limits::kMaxUnfinishedUploads / 4;
+  const auto part = [](std::size_t i) { return sha256(std::to_string(i)); };
+  EXPECT_EQ(begin(kToken, sha256("anna's")), 202);
+
+  for (std::size_t i = 0; i < kShare + 3; ++i) ASSERT_EQ(begin(mallory, part(i)), 202);
+
+  EXPECT_EQ(blobs->received(sha256("anna's")), 1u);
+  for (std::size_t i = 0; i < kShare + 3; ++i) EXPECT_EQ(blobs->received(part(i)), i < 3 ? 0u : 1u) << i;
+}
+
 TEST_F(Uploads, WhoSentAllOfABlobMayAskForItsEndWithoutABody) {
   const Digest digest = sha256("grid");
   ASSERT_TRUE(blobs->resume_upload(digest, 0).value()->append(std::as_bytes(std::span("grid", 4))));

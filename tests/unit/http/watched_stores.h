@@ -61,6 +61,11 @@ class WatchedBlobs final : public BlobStore {
     return std::make_unique<FakePart>(*this, digest);
   }
 
+  void remove_unfinished(const Digest& digest) override {
+    const std::lock_guard lock(mutex_);
+    parts_.erase(digest);
+  }
+
   Digest add(std::string_view text) {
     const Digest digest = sha256(text);
     EXPECT_TRUE(put(digest, std::as_bytes(std::span(text))));
@@ -114,7 +119,7 @@ class WatchedRecords final : public MovingStore {
   Result<void> put_jobs(std::span<const StoredJob> jobs) override {
     if (refuses) return fail(Errc::resource_exhausted, "the disk is full");
     const std::lock_guard lock(last_mutex_);
-    last_job_ = jobs.back();
+    if (!jobs.empty()) last_job_ = jobs.back();
     return MovingStore::put_jobs(jobs);
   }
   Result<std::vector<LogLine>> log(const JobId& job) const override {

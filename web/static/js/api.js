@@ -43,6 +43,8 @@ export const api = {
   signOut: () => call("DELETE", "/session"),
   /** {role, user} of the session. */
   me: async () => (await call("GET", "/session")).json(),
+  /** {role, user} of a token, whoever is signed in. */
+  whoIs: async (token) => (await call("GET", "/session", { headers: { Authorization: `Bearer ${token}` } })).json(),
   /** {jobs, total, states, owners} of a page, see job_list.js. */
   list: async (parameters) => (await call("GET", `/jobs?${parameters}`)).json(),
   job: async (id) => (await call("GET", jobPath(id))).json(),

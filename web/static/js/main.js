@@ -55,8 +55,27 @@ async function attempt(request) {
 async function start() {
   const token = takeToken(window.location, window.history);
   set({ ...state, route: routeOf(window.location.hash) });
-  if (token) await signIn(token);
+  if (token) await followLink(token);
   else await enter();
+}
+
+/**
+ * A link with a token signs in at once where nobody is signed in. Where somebody is, another user's link only
+ * asks: anybody can write such a link, and who follows it would go on as somebody else without noticing.
+ */
+async function followLink(token) {
+  let now;
+  try {
+    now = await api.me();
+  } catch (error) {
+    if (error.status === 401) await signIn(token);
+    else await enter();
+    return;
+  }
+  const then = await api.whoIs(token).catch(() => null);
+  await enter();
+  if (!then) set(withUi(state, { notice: "The token of this link is not known here. You are still signed in as before." }));
+  else if (then.role !== now.role || then.user !== now.user) set(withUi(state, { link: { token, ...then } }));
 }
 
 async function signIn(token) {
@@ -233,7 +252,7 @@ function showRoute() {
 }
 window.addEventListener("hashchange", () => {
   const token = takeToken(window.location, window.history);
-  if (token) signIn(token);
+  if (token) followLink(token);
   else showRoute();
 });
 
@@ -242,6 +261,14 @@ window.addEventListener("hashchange", () => {
 const seam = { get: () => state, set, attempt, api, snapshot, showRoute };
 const actions = {
   signIn,
+  takeLink: () => {
+    const { token } = state.ui.link;
+    closeEvents?.(); // it shows what the session before may see
+    closeEvents = null;
+    set({ ...initialState(), narrow: state.narrow, route: state.route });
+    return signIn(token);
+  },
+  leaveLink: () => set(withUi(state, { link: null })),
   signOut: async () => {
     await attempt(api.signOut);
     signedOut();

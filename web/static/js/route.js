@@ -1,9 +1,12 @@
 // The routes in the address bar: #/jobs, #/jobs/ID, #/jobs/ID/FRAME for a frame of a sequence,
 // #/view/ID?VIEW, #/workers, #/submit, and #token=..., which signs in and is then removed from the address.
 
+const kNoId = /^\.{1,2}$/; // in an address these lead elsewhere, however they are encoded
+
 export function routeOf(hash) {
   const [path, query = ""] = hash.replace(/^#\/?/, "").split("?");
-  const [view, id, frame] = path.split("/");
+  const [view, part, frame] = path.split("/");
+  const id = part && !kNoId.test(decoded(part)) ? part : null;
   if (view === "view" && id) return { view: "view", id: decoded(id), frame: null, query };
   if (view === "jobs" && id) return { view: "job", id: decoded(id), frame: /^\d{1,7}$/.test(frame) ? Number(frame) : null };
   return { view: ["workers", "submit"].includes(view) ? view : "jobs", id: null, frame: null, query };

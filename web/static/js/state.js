@@ -20,7 +20,7 @@ export function initialState() {
     viewer: null, // the state of the viewer, see viewer_actions.js
     submit: emptySubmission(),
     narrow: false, // true if the page is as narrow as a phone
-    ui: { confirming: null, busy: null, notice: null, again: null, signInError: null, signingIn: false },
+    ui: { confirming: null, busy: null, notice: null, again: null, signInError: null, signingIn: false, link: null },
   };
 }
 
