@@ -41,8 +41,8 @@ struct BlobRef {
   bool operator==(const BlobRef&) const = default;
 };
 
-// The data about a job that a worker needs. The coordinator sends them before the job's first lease on a
-// connection.
+// The data about a job that a worker needs. The coordinator sends them with a lease of the job if the worker
+// does not remember them (BriefMemory, common/protocol/briefs.h).
 struct JobBrief {
   JobId job;
   Digest scene;  // digest of the blob with the canonical scene (common/scene/json/serialize.h)
@@ -133,6 +133,8 @@ struct WorkerHello {
   WorkerId previous_id;
   bool fake = false;     // true if the worker generates fake pixels instead of rendering
   std::string platform;  // machine type and build that its numeric class stands for, as text; may be empty
+  // Size of the BriefMemory (common/protocol/briefs.h) that the worker keeps; 0: every lease needs its brief
+  std::uint64_t brief_bytes = 0;
   bool operator==(const WorkerHello&) const = default;
 };
 // This message renews the deadlines of the listed leases. The worker sends it about once a second while it
@@ -156,10 +158,12 @@ struct WorkerDraining {
   bool operator==(const WorkerDraining&) const = default;
 };
 // The worker returns units of a lease that it has not rendered and will not render, because it takes no more
-// work (WorkerDraining) or because they were cancelled.
+// work (WorkerDraining), does not know their job, or cannot load it on this machine.
 struct LeaseReturned {
   LeaseId lease;
   std::vector<UnitKey> unrendered;
+  std::string reason = {};   // why, for the user; empty: not told
+  bool unknown_job = false;  // true: the worker does not remember the job's brief
   bool operator==(const LeaseReturned&) const = default;
 };
 using FromWorker =
@@ -180,7 +184,7 @@ struct Refused {  // after this message the coordinator closes the connection
 };
 struct AssignLease {
   Lease lease;
-  std::optional<JobBrief> brief;  // sent with a job's first lease on this connection
+  std::optional<JobBrief> brief;  // nullopt: the worker remembers it
   // The span (traced period of time) of the lease in the job's trace. The worker's own spans become its
   // children. nullopt: the lease is not traced.
   std::optional<trace::SpanContext> trace = std::nullopt;

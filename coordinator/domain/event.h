@@ -155,6 +155,9 @@ struct WorkerJoined {
   // its class. It is false for workers of another version than the coordinator's.
   bool may_begin = true;
   std::string platform = {};  // the machine and build of its numeric class, in words
+  // Memory for briefs that it offers (BriefMemory in common/protocol/briefs.h), in bytes; 0: each lease needs
+  // its brief
+  std::uint64_t brief_bytes = 0;
 };
 // The worker rendered wrong pixels; this was found before a restart or by another coordinator. It gets no
 // work, and its results for jobs of this farm are void.

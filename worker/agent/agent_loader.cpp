@@ -6,15 +6,20 @@
 #include <new>
 
 #include "common/base/log.h"
+#include "common/protocol/limits.h"
 #include "worker/agent/agent_impl.h"
 
 namespace ls::worker {
 namespace {
-// Number of worlds kept in memory: the world of the job being rendered and that of the next job. So render
-// threads need not wait between two jobs, and memory stays bounded.
-constexpr std::size_t kWorldsKept = 2;
+// A job whose world does not fit beside those in memory waits this long for the end of their jobs' units.
+// Then units that came after its own wait for it. So no job waits for ever, and worlds are not exchanged all
+// the time.
+constexpr Duration kRoomWait = std::chrono::seconds(30);
 constexpr std::size_t kBlobsTraced = 64;  // at most this many blob transfers of a scene are traced
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
+// After this many transfers of a job's files that were cut, without one that was not, the worker gives the
+// job's units back: others may reach the coordinator better.
+constexpr int kTransfersCut = 20;
 // If this machine could not load a job, progress reports state the reason until this long after
 // Job::retry_at, the time at which loading may be tried again. A worker that still has units of the job tries
 // again by then, so an older reason concerns a job of which it has no units any more.
@@ -27,11 +32,19 @@ bool of_this_machine(const Error& error) {
 }
 }  // namespace
 
+std::string lost_file(const LocalJob& job) {
+  std::error_code error;
+  for (const auto& [digest, path] : job.assets)
+    if (!std::filesystem::exists(path, error))
+      return fmt::format("its file {} was removed from the cache while it was in use", path.string());
+  return {};
+}
+
 void Agent::Impl::load_loop(std::stop_token token) {
   std::unique_lock lock(mutex);
   while (!token.stop_requested()) {
     const std::optional<JobId> next = next_to_load();
-    if (next && make_room()) {
+    if (next && make_room(*next)) {
       Job& job = jobs.at(*next);
       job.state = Job::State::loading;
       const JobBrief brief = job.brief;
@@ -41,7 +54,7 @@ void Agent::Impl::load_loop(std::stop_token token) {
     } else {
       // The timeout is needed because a job becomes loadable again when its retry_at has passed, and nothing
       // notifies this thread of that. It is notified of all other changes.
-      work.wait_for(lock, token, kTransferRetry, [&] { return next_to_load().has_value() && make_room(); });
+      work.wait_for(lock, token, kTransferRetry, [&] { return can_load(); });
     }
   }
 }
@@ -55,21 +68,33 @@ std::optional<JobId> Agent::Impl::next_to_load() {
   return std::nullopt;
 }
 
-bool Agent::Impl::make_room() {
+bool Agent::Impl::can_load() {
+  const std::optional<JobId> next = next_to_load();
+  return next && make_room(*next);
+}
+
+bool Agent::Impl::room_overdue() const {
+  return room_wanted && clock.now() - room_wanted->since >= kRoomWait;
+}
+
+bool Agent::Impl::make_room(const JobId& job) {
+  if (!room_wanted || room_wanted->job != job) room_wanted = {job, clock.now()};
   std::size_t kept = 0;
   auto idlest = jobs.end();
   for (auto it = jobs.begin(); it != jobs.end(); ++it) {
     if (it->second.state != Job::State::ready) continue;
     ++kept;
-    if (!table.holds(it->first) && (idlest == jobs.end() || it->second.last_use < idlest->second.last_use))
-      idlest = it;
+    const bool needed = room_overdue() ? table.needs_before(it->first, job) : table.holds(it->first);
+    if (!needed && (idlest == jobs.end() || it->second.last_use < idlest->second.last_use)) idlest = it;
   }
-  if (kept < kWorldsKept) return true;
-  if (idlest == jobs.end()) return false;
-  idlest->second.state = Job::State::idle;
-  idlest->second.files.clear();
-  idlest->second.local.reset();
-  backend.forget(idlest->first);
+  if (kept >= limits::kWorldsKept) {
+    if (idlest == jobs.end()) return false;
+    idlest->second.state = Job::State::idle;
+    idlest->second.files.clear();
+    idlest->second.local.reset();
+    backend.forget(idlest->first);
+  }
+  room_wanted.reset();
   return true;
 }
 
@@ -139,6 +164,7 @@ void Agent::Impl::load(const JobBrief& brief) {
           id, UnitFailure{.reason = fmt::format("cannot get '{}': {}", blob.name, file.error().message)});
     if (blob.digest == brief.scene) local->scene = (*file)->path();
     local->assets[blob.digest] = (*file)->path();
+    got_file(id);
     pins.push_back(std::move(*file));
   }
   local->brief = brief;
@@ -150,6 +176,8 @@ void Agent::Impl::load(const JobBrief& brief) {
     if (prepared) span.loaded_at = end;
   }
   if (!prepared && backend.broken()) return hold_off(id, prepared.error().reason);
+  if (!prepared)
+    if (const std::string lost = lost_file(*local); !lost.empty()) return hold_off(id, lost);
   if (!prepared) return loading_failed(id, std::move(prepared.error()));
   const std::lock_guard lock(mutex);
   loading.clear();
@@ -175,22 +203,35 @@ void Agent::Impl::loading_failed(const JobId& id, UnitFailure failure) {
   loading.clear();
   if (const auto it = jobs.find(id); it != jobs.end()) it->second.state = Job::State::idle;
   backend.forget(id);
-  log_warn(fmt::format("job={}", id.value), "cannot be loaded: " + failure.reason);
+  const std::string reason = failure.reason;
+  log_warn(fmt::format("job={}", id.value), "cannot be loaded: " + reason);
   if (const auto first = table.take([&](const JobId& job) { return job == id; })) {
     failure.unit = first->key;
     failure.lease = first->lease;
     table.finish(first->key);
     outbox.add(std::move(failure));
   }
-  for (LeaseReturned& returned : table.return_waiting(&id)) outgoing.push_back(std::move(returned));
+  for (LeaseReturned& returned : table.return_waiting(&id, reason)) outgoing.push_back(std::move(returned));
   inbox->nudge();
 }
 
-void Agent::Impl::postpone(const JobId& id, const Error& why) {
+void Agent::Impl::got_file(const JobId& id) {
   const std::lock_guard lock(mutex);
+  if (const auto it = jobs.find(id); it != jobs.end()) it->second.transfers_cut = 0;
+}
+
+void Agent::Impl::postpone(const JobId& id, const Error& why) {
+  std::unique_lock lock(mutex);
   loading.clear();
   const auto it = jobs.find(id);
   if (it == jobs.end()) return;
+  // While the stream is down, no transfer can succeed, and the coordinator takes the units back anyway
+  if (connection == Connection::up && ++it->second.transfers_cut >= kTransfersCut) {
+    it->second.transfers_cut = 0;
+    lock.unlock();
+    return hold_off(
+        id, fmt::format("{} transfers of its files were cut; the last: {}", kTransfersCut, why.message));
+  }
   it->second.state = Job::State::idle;
   it->second.retry_at = clock.now() + kTransferRetry;
   log_warn(fmt::format("job={}", id.value), "a transfer was cut, trying again: " + why.message);
@@ -209,7 +250,7 @@ void Agent::Impl::hold_off(const JobId& id, const std::string& trouble) {
   }
   log_warn(fmt::format("job={}", id.value),
            fmt::format("{}; giving its units back, trying again in {:.1f} s", trouble, seconds(pause)));
-  for (LeaseReturned& returned : table.return_waiting(&id)) outgoing.push_back(std::move(returned));
+  for (LeaseReturned& returned : table.return_waiting(&id, trouble)) outgoing.push_back(std::move(returned));
   inbox->nudge();
 }
 

@@ -113,9 +113,10 @@ class Farm {
   Result<void> may_retarget(const JobId& id, double target_error) const;
   Result<void> may_extend(const JobId& id, std::uint64_t spp) const;
   std::optional<WorkerFigures> worker(const WorkerId& id) const;
-  // Explains to the user why no worker may take units of a job that is queued or running: each connected
-  // worker is of another class, lacks memory or a tag, is blocked or unhealthy, or the like. Empty if some
-  // worker may take units, or if the job is in another state.
+  // Explains to the user why a job that is queued or running stands still: each connected worker is of
+  // another class, lacks memory or a tag, is blocked or unhealthy, gives the job's units back, or the like;
+  // or one worker after the other was lost with them. Empty if some worker renders units of the job or may
+  // take some, or if the job is in another state.
   std::string why_waiting(const JobId& id) const;
   AuditFigures audits() const;
   // Returns the job's open audits (units that are rendered again for comparison). The service must store

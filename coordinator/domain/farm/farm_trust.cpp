@@ -30,7 +30,7 @@ Farm::State::Deciders Farm::State::deciders(const Job& job, const Audit& audit) 
     if (!worker->connected || worker->draining || worker->unhealthy_since || !audit.asks(index) ||
         !fits(job, *worker) || worker->blocked(job.seq, ticked))
       continue;
-    if (worker->available()) return Deciders::there;
+    if (worker->available() && !worker->unable(job.seq)) return Deciders::there;
     found = Deciders::away;
   }
   return found;

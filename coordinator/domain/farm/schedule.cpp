@@ -153,16 +153,20 @@ Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
 
 // A worker that is alone in its numeric class (machines that compute the same bits) cannot be audited: no
 // other worker can check its results. So, if another class has several workers that fit the job, the job may
-// not be pinned to this worker's class. Without audits the job may be pinned to any class.
+// not be pinned to this worker's class. Without audits the job may be pinned to any class. A worker that is
+// unable to render the job pins it only if no worker of another class can begin it.
 bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
-  if (job.numeric_class || options.audit_rate <= 0 || workers.of_class(worker.numeric_class).workers > 1)
-    return true;
+  const bool alone = options.audit_rate > 0 && workers.of_class(worker.numeric_class).workers <= 1;
+  const bool unable = worker.unable(job.seq);
+  if (job.numeric_class || (!alone && !unable)) return true;
+  const int enough = unable ? 1 : 2;
   std::map<Digest, int> others;
   for (const auto& [index, other] : workers.all()) {
     const bool there = other->connected && !other->draining && !other->unhealthy_since &&
                        other->pause != Pause::silent && other->pause != Pause::stuck &&
-                       other->numeric_class != worker.numeric_class;
-    if (there && fits(job, *other) && !other->blocked(job.seq, ticked) && ++others[other->numeric_class] > 1)
+                       !other->unable(job.seq) && other->numeric_class != worker.numeric_class;
+    if (there && fits(job, *other) && !other->blocked(job.seq, ticked) &&
+        ++others[other->numeric_class] >= enough)
       return false;
   }
   return true;
