@@ -118,7 +118,7 @@ struct Agent::Impl {
     TimePoint retry_at{};
     // The fault of this machine that made the last attempt to load fail; empty: there was none
     std::string trouble;
-    int transfers_cut = 0;  // transfers of its files that were cut since the last file that arrived
+    int transfers_cut = 0;  // transfers of its files that were cut since it was last loaded or given back
     UnitTimes unreported;   // time spent on loading the job, not yet reported to the coordinator
   };
   // The state of one render thread.
@@ -166,7 +166,6 @@ struct Agent::Impl {
   void load(const JobBrief& brief);
   void try_to_load(const JobBrief& brief);
   void loading_failed(const JobId& id, UnitFailure failure);
-  void got_file(const JobId& id);
   void postpone(const JobId& id, const Error& why);
   void hold_off(const JobId& id, const std::string& trouble);
   // Returns a recent fault of this machine that prevented loading a job; empty: there is none. Call with the

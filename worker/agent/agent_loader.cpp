@@ -17,8 +17,8 @@ namespace {
 constexpr Duration kRoomWait = std::chrono::seconds(30);
 constexpr std::size_t kBlobsTraced = 64;  // at most this many blob transfers of a scene are traced
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
-// After this many transfers of a job's files that were cut, without one that was not, the worker gives the
-// job's units back: others may reach the coordinator better.
+// After this many transfers of a job's files that were cut, the worker gives the job's units back: others may
+// reach the coordinator better. What has arrived stays in the cache.
 constexpr int kTransfersCut = 20;
 // If this machine could not load a job, progress reports state the reason until this long after
 // Job::retry_at, the time at which loading may be tried again. A worker that still has units of the job tries
@@ -164,7 +164,6 @@ void Agent::Impl::load(const JobBrief& brief) {
           id, UnitFailure{.reason = fmt::format("cannot get '{}': {}", blob.name, file.error().message)});
     if (blob.digest == brief.scene) local->scene = (*file)->path();
     local->assets[blob.digest] = (*file)->path();
-    got_file(id);
     pins.push_back(std::move(*file));
   }
   local->brief = brief;
@@ -190,6 +189,7 @@ void Agent::Impl::load(const JobBrief& brief) {
   it->second.files = std::move(pins);
   it->second.last_use = ++uses;
   it->second.trouble.clear();
+  it->second.transfers_cut = 0;
   it->second.unreported.load += seconds(start - begin);
   it->second.unreported.build += load_seconds;
   trouble_backoff.reset();
@@ -213,11 +213,6 @@ void Agent::Impl::loading_failed(const JobId& id, UnitFailure failure) {
   }
   for (LeaseReturned& returned : table.return_waiting(&id, reason)) outgoing.push_back(std::move(returned));
   inbox->nudge();
-}
-
-void Agent::Impl::got_file(const JobId& id) {
-  const std::lock_guard lock(mutex);
-  if (const auto it = jobs.find(id); it != jobs.end()) it->second.transfers_cut = 0;
 }
 
 void Agent::Impl::postpone(const JobId& id, const Error& why) {

@@ -122,11 +122,12 @@ TEST_F(AgentInTrouble, GivesUnitsBackWhoseFilesNeverArriveWholeAndSaysWhy) {
   coordinator_.fail_fetches_with(Error{Errc::unavailable, "the line was cut"});
   coordinator_.tell(assign("l-1", "j-1", {0, 1}));
 
-  coordinator_.wait_for([](auto& c) { return c.returned.size() == 1; },
-                        [&] {
-                          pass(std::chrono::milliseconds(500));
-                          coordinator_.tell(ResultAck{{JobId{"j-0"}, 0, 0}, {}});  // makes the loader look again
-                        });
+  coordinator_.wait_for(
+      [](auto& c) { return c.returned.size() == 1; },
+      [&] {
+        pass(std::chrono::milliseconds(500));
+        coordinator_.tell(ResultAck{{JobId{"j-0"}, 0, 0}, {}});  // makes the loader look again
+      });
 
   EXPECT_TRUE(drain());
   EXPECT_EQ(coordinator_.returned[0].unrendered.size(), 2U);

@@ -100,7 +100,8 @@ TEST(Fruitless, OthersGetTheUnitsAtOnce) {
 
 // A job of two units that "healthy" has rendered, both audited by "broken" alone.
 struct Audited {
-  explicit Audited(Farm::Options options = {.lease_prefix = "t", .limits = {}, .audit_rate = 1, .audit_seed = 7})
+  explicit Audited(
+      Farm::Options options = {.lease_prefix = "t", .limits = {}, .audit_rate = 1, .audit_seed = 7})
       : rig(std::move(options)) {
     rig.join("healthy", 1);
     rig.join("broken", 1);
@@ -159,7 +160,8 @@ TEST(Fruitless, AResultMakesAWorkerOneThatIsWaitedForAgain) {
 
 // Each process takes the audit and is gone; the next one has another name.
 TEST(Fruitless, AnAuditIsDroppedAfterManyWorkersWereLostWithIt) {
-  Rig rig(plan_of("j", 1, 2), {{"healthy", 1}}, {.lease_prefix = "t", .limits = {}, .audit_rate = 1, .audit_seed = 7});
+  Rig rig(plan_of("j", 1, 2), {{"healthy", 1}},
+          {.lease_prefix = "t", .limits = {}, .audit_rate = 1, .audit_seed = 7});
   rig.join("v0", 1);
   rig.render("healthy");
   ASSERT_EQ(rig.job().state, JobState::running);
