@@ -37,11 +37,11 @@ std::string Walk::run_into_foul_weather(int events) {
   limits_ = {};
   farm_ = Farm(options());
   for (int i = 0; i < events && wrong_.empty(); ++i) step();
-  std::map<std::string, Habit> habits;
+  std::vector<std::pair<std::string, Habit>> habits;
   for (int i = 0; i < 5; ++i) {
     const std::string name = "w" + std::to_string(i);
     workers_[name].crashes = workers_[name].stalled = workers_[name].gives_back = false;
-    habits[name] = static_cast<Habit>(pick(5));
+    habits.emplace_back(name, static_cast<Habit>(pick(5)));
     if (!workers_[name].connected) join(name);
   }
   for (const auto& [id, job] : jobs_) send(JobResumed{id});
@@ -49,22 +49,24 @@ std::string Walk::run_into_foul_weather(int events) {
   constexpr Duration kStep = 5s, kLong = 4 * kNoGrowthLimit, kWatched = 20 * kStep;
   for (Duration passed{}; passed < kLong && wrong_.empty(); passed += kStep) {
     now_ += kStep;
-    for (auto [name, habit] : habits) {
-      const std::string before = name;
-      keep_to(habit, name);
-      if (name == before) continue;
-      habits.erase(before);
-      habits.emplace(name, habit);
-      break;  // the loop's place is gone; the others act in the next step
-    }
+    for (auto& [name, habit] : habits) keep_to(habit, name);
     settle_results();
     send(Tick{});
     if (passed < kLong - kWatched) continue;
     for (const auto& [id, job] : jobs_) {
       const JobState state = farm_.job(id)->state;
       const bool waits = state == JobState::queued || state == JobState::running;
-      if (waits && farm_.why_waiting(id).empty())
-        blame("job " + id.value + " neither ends nor says why it waits");
+      if (!waits || !farm_.why_waiting(id).empty()) continue;
+      const JobFigures f = farm_.job(id).value();
+      std::string workers;
+      for (const auto& [name, habit] : habits)
+        workers += "; " + name + " " + std::to_string(static_cast<int>(habit)) + " holds " +
+                   std::to_string(workers_[name].held.size());
+      blame("job " + id.value + " neither ends nor says why it waits: done " + std::to_string(f.units_done) +
+            ", leased " + std::to_string(f.units_leased) + ", queued " + std::to_string(f.units_queued) +
+            ", folded " + std::to_string(f.units_folded) + ", audits " +
+            std::to_string(farm_.open_audits(id).size()) + ", after " + std::to_string(seconds(passed)) +
+            " s" + workers);
     }
   }
   return wrong_;
