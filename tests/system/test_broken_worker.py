@@ -34,7 +34,7 @@ def test_a_job_says_why_its_only_worker_renders_nothing_and_goes_on_when_it_can(
     job = farm.submit(SCENE, **JOB)
 
     error = wait_until(lambda: farm.job(job)["error"], "the job says why it waits")
-    assert "worker-1 was given its units" in error and "cannot write" in error, error
+    assert "worker-1 was given its units" in error and "cannot get 'the scene'" in error, error
     cache_of(farm, worker).unlink()
     assert farm.wait_for_job(job)["error"] == ""
 

@@ -24,7 +24,8 @@ class Walk {
   // problem; empty: there was none.
   std::string run(int events);
   // The same, but then each worker keeps to one habit for good: it renders, gives everything back, only
-  // reports, is silent, or vanishes and is replaced again and again. Every job must end, or say why it waits.
+  // reports, is silent, or vanishes and is replaced again and again. Every job must end, or say why it waits,
+  // or wait behind one that says so.
   std::string run_into_foul_weather(int events);
 
  private:
