@@ -55,7 +55,7 @@ TEST(Brief, ComesAgainOnceTheWorkersMemoryNeededItsRoomForOthers) {
   EXPECT_EQ(render_one("second"), std::pair(1, 0));
   EXPECT_EQ(render_one("third"), std::pair(1, 0));
 
-  EXPECT_EQ(briefs(rig.send(JobResumed{{"first"}})), std::pair(1, 0));
+  EXPECT_EQ(briefs(rig.send(JobResumed{{"first"}})).first, 1);
 }
 
 TEST(Fruitless, AJobWhoseOnlyWorkerGivesEverythingBackSaysSoWithTheReason) {
