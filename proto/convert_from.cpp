@@ -162,6 +162,7 @@ Result<FromWorker> hello_from(const pb::Hello& in) {
   hello.join_token = token;
   hello.fake = in.fake();
   hello.platform = platform;
+  hello.brief_bytes = in.brief_bytes();
   return hello;
 }
 
@@ -244,7 +245,8 @@ Result<FromWorker> failure_from(const pb::UnitFailure& in) {
 Result<FromWorker> returned_from(const pb::LeaseReturned& in) {
   LS_TRY(lease, id_from(in.lease(), "returned.lease"));
   LS_TRY(units, list_from(in.units(), limits::kUnitsPerLease, "returned.units", key_from));
-  return LeaseReturned{LeaseId{lease}, std::move(units)};
+  LS_TRY(reason, text_from(in.reason(), limits::kTextBytes, "returned.reason"));
+  return LeaseReturned{LeaseId{lease}, std::move(units), reason, in.unknown_job()};
 }
 
 Result<ToWorker> assign_from(const pb::AssignLease& in) {

@@ -85,6 +85,7 @@ void put(const WorkerHello& hello, pb::FromWorker& out) {
   h->set_fake(hello.fake);
   h->set_platform(sendable(hello.platform, limits::kNameBytes));
   if (hello.secret) h->set_secret(*hello.secret);
+  h->set_brief_bytes(hello.brief_bytes);
 }
 
 void put(const WorkerProgress& progress, pb::FromWorker& out) {
@@ -139,6 +140,8 @@ void put(const UnitFailure& failure, pb::FromWorker& out) {
 void put(const LeaseReturned& returned, pb::FromWorker& out) {
   out.mutable_returned()->set_lease(returned.lease.value);
   for (const UnitKey& key : returned.unrendered) put(key, out.mutable_returned()->add_units());
+  out.mutable_returned()->set_reason(sendable(returned.reason, limits::kTextBytes));
+  out.mutable_returned()->set_unknown_job(returned.unknown_job);
 }
 
 void put(const WorkerDraining&, pb::FromWorker& out) { out.mutable_draining(); }

@@ -36,6 +36,9 @@ inline constexpr std::size_t kAssetsPerJob = 4096;
 inline constexpr std::size_t kTags = 64;
 inline constexpr std::size_t kBlobsHeld = 8192;
 inline constexpr int kThreads = 4096;
+// A worker keeps the worlds (scenes made ready to render) of at most this many jobs in memory: that of the
+// job being rendered and that of the next one, so that its threads need not wait between two jobs.
+inline constexpr std::size_t kWorldsKept = 2;
 // Longest duration, in seconds, that a worker may report. The limit keeps sums of durations finite.
 inline constexpr double kSeconds = 1e12;
 

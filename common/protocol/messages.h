@@ -41,8 +41,8 @@ struct BlobRef {
   bool operator==(const BlobRef&) const = default;
 };
 
-// The data about a job that a worker needs. The coordinator sends them before the job's first lease on a
-// connection.
+// The data about a job that a worker needs. The coordinator sends them with a lease of the job if the worker
+// does not remember them (BriefMemory, common/protocol/briefs.h).
 struct JobBrief {
   JobId job;
   Digest scene;  // digest of the blob with the canonical scene (common/scene/json/serialize.h)
@@ -136,6 +136,8 @@ struct WorkerHello {
   // The secret that came with previous_id; empty for a new worker. nullopt: the worker is of a version that
   // keeps no secret.
   std::optional<std::string> secret = std::nullopt;
+  // Size of the BriefMemory (common/protocol/briefs.h) that the worker keeps; 0: every lease needs its brief
+  std::uint64_t brief_bytes = 0;
   bool operator==(const WorkerHello&) const = default;
 };
 // This message renews the deadlines of the listed leases. The worker sends it about once a second while it
@@ -159,10 +161,13 @@ struct WorkerDraining {
   bool operator==(const WorkerDraining&) const = default;
 };
 // The worker returns units of a lease that it has not rendered and will not render, because it takes no more
-// work (WorkerDraining), because it cannot load their job, or because the coordinator recalled the lease.
+  // work (WorkerDraining), does not know their job, cannot load it on this machine, or because the coordinator
+  // recalled the lease.
 struct LeaseReturned {
   LeaseId lease;
   std::vector<UnitKey> unrendered;
+  std::string reason = {};   // why, for the user; empty: not told
+  bool unknown_job = false;  // true: the worker does not remember the job's brief
   bool operator==(const LeaseReturned&) const = default;
 };
 using FromWorker =
@@ -185,7 +190,7 @@ struct Refused {  // after this message the coordinator closes the connection
 };
 struct AssignLease {
   Lease lease;
-  std::optional<JobBrief> brief;  // sent with a job's first lease on this connection
+  std::optional<JobBrief> brief;  // nullopt: the worker remembers it
   // The span (traced period of time) of the lease in the job's trace. The worker's own spans become its
   // children. nullopt: the lease is not traced.
   std::optional<trace::SpanContext> trace = std::nullopt;

@@ -142,6 +142,13 @@ struct WorkerBlocked {
   JobId job;
   std::string why;
 };
+// The worker has given back kFruitlessLeases leases of this job, or not finished them in time, without a
+// result in between. It is still offered units of the job, but nobody waits for it. `why`: of the latest.
+struct WorkerFruitless {
+  WorkerId worker;
+  JobId job;
+  std::string why;
+};
 // This worker rendered wrong pixels: two other workers agree on other pixels, or the worker delivered two
 // different results of one unit. It gets no more work of any job, and its messages are ignored. The service
 // must store this before it carries out the effects that follow; after a restart none of the worker's results
@@ -166,6 +173,7 @@ struct WorkerForgotten {
 using Effect =
     std::variant<Send, UnitsFreed, RecordUnit, Fold, DropDuplicate, DropUnwanted, DigestMismatch, JobPinned,
                  JobUnpinned, JobStateChanged, Checkpoint, CheckDenoised, ReopenRound, JobFinished, JobFailed,
-                 WorkerStateChanged, WorkerBlocked, WorkerFoundFaulty, TileDiscarded, WorkerForgotten>;
+                 WorkerStateChanged, WorkerBlocked, WorkerFruitless, WorkerFoundFaulty, TileDiscarded,
+                 WorkerForgotten>;
 
 }  // namespace ls::coordinator

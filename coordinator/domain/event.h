@@ -158,6 +158,9 @@ struct WorkerJoined {
   // Who answers for the worker: its certificate or its address, as far as the coordinator can tell. All
   // workers of one principal have one vote. Empty: the worker is a principal of its own.
   std::string principal = {};
+  // Memory for briefs that it offers (BriefMemory in common/protocol/briefs.h), in bytes; 0: each lease needs
+  // its brief
+  std::uint64_t brief_bytes = 0;
 };
 // The worker rendered wrong pixels; this was found before a restart or by another coordinator. It gets no
 // work, and its results for jobs of this farm are void.

@@ -176,14 +176,17 @@ struct Audit {
   // A differing result of a worker that held no lease on the unit. It is not a vote, but it causes an audit
   std::optional<std::pair<WorkerIndex, Digest>> claim;
   std::vector<WorkerIndex> tried;  // workers that failed to render the unit for the audit
-  TimePoint since{};               // when the second result arrived or the coordinator restarted
-  bool restored = false;           // true if the audit began before the coordinator restarted
-  LeaseSeq lease = 0;              // lease under which the unit is rendered; 0: it waits for a worker
+  // For each lease of the audit that ended without result or failure: its worker
+  std::vector<WorkerIndex> fruitless;
+  TimePoint since{};      // when the second result arrived or the coordinator restarted
+  bool restored = false;  // true if the audit began before the coordinator restarted
+  LeaseSeq lease = 0;     // lease under which the unit is rendered; 0: it waits for a worker
   // True if this worker may render the unit for the audit: it has neither delivered a result of this unit nor
-  // failed to render it.
+  // failed to render it, and neither it nor all workers together have had too many leases of it in vain.
   bool asks(WorkerIndex worker) const {
     return worker != first && (!second || worker != second->first) && (!claim || worker != claim->first) &&
-           std::find(tried.begin(), tried.end(), worker) == tried.end();
+           std::find(tried.begin(), tried.end(), worker) == tried.end() && fruitless.size() < kAuditLeases &&
+           std::count(fruitless.begin(), fruitless.end(), worker) < kFruitlessLeases;
   }
 };
 
@@ -231,6 +234,10 @@ struct Job {
   std::uint64_t audits_missed = 0;
   VoterTable voters;
   Load load;
+  // How many times a worker was lost that held units of the job, since the latest result; and the latest of
+  // these workers' name
+  std::uint32_t losses_in_a_row = 0;
+  std::string last_lost;
   std::uint32_t leased = 0;  // units under all leases, including audits
   bool has_units = false;    // true if it had units to lease when this was last checked
   bool offered = false;      // true if FairShare lists it as a job that has units to lease

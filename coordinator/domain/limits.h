@@ -124,6 +124,23 @@ inline constexpr std::size_t kLostNewcomersKept = 64;
 inline constexpr std::size_t kNamesKept = 256;
 inline constexpr std::uint32_t kMaxNamedWorkers = 8;  // one message names at most this many workers
 
+// Leases without results
+
+// A worker that has given back this many leases of a job, or not finished them in time, without a result in
+// between, is not waited for: an audit that only such workers could render is dropped. The same holds for
+// all jobs after this many such leases of any jobs without a result of any job in between
+inline constexpr std::uint32_t kFruitlessLeases = 3;
+// After the second such lease the worker gets no unit of the job for kFruitlessPause; each further one
+// doubles the pause, up to kFruitlessPauseMost. So a worker with a full disk costs others nothing, and works
+// again soon after there is room
+inline constexpr Duration kFruitlessPause = 2s, kFruitlessPauseMost = 60s;
+// An audit is dropped after this many leases without a result, of all workers together
+inline constexpr std::uint32_t kAuditLeases = 10;
+// After this many losses of workers that held units of a job, without a result in between, the job says so
+inline constexpr std::uint32_t kLossesInARow = 5;
+// Most memory for briefs that is counted on, whatever a worker offers; in bytes (BriefMemory)
+inline constexpr std::uint64_t kBriefBytesMost = 16 << 20;
+
 // Stopping
 
 // Samples per pixel that every tile gets before its error may stop it

@@ -133,7 +133,17 @@ bool fits(const Job& job, const Worker& worker) {
 }
 
 bool may_serve(const Job& job, const Worker& worker, TimePoint now) {
-  return worker.available() && fits(job, worker) && !worker.blocked(job.seq, now);
+  const FruitlessLeases* fruitless = worker.fruitless_in(job.seq);
+  return worker.available() && fits(job, worker) && !worker.blocked(job.seq, now) &&
+         !(fruitless && now < fruitless->until);
+}
+
+void FruitlessLeases::add(TimePoint now, std::string why) {
+  // The first time, the worker waits until the next tick (Pause::returned) only
+  if (count > 0)
+    until = now + std::min(kFruitlessPause * (1 << std::min(count - 1, 16u)), kFruitlessPauseMost);
+  ++count;
+  reason = std::move(why);
 }
 
 void LeaseTable::add(LeaseRecord record) {

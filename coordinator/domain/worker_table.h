@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/protocol/briefs.h"
+#include "common/protocol/limits.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/domain/job.h"
 #include "coordinator/domain/limits.h"
@@ -51,6 +53,35 @@ enum class Pause {
   returned  // the worker returned a lease; ends at the next tick
 };
 
+// The jobs whose worlds (scenes made ready to render) a worker has in memory: those of its latest results, as
+// many as a worker keeps.
+class LoadedWorlds {
+ public:
+  bool contains(JobSeq job) const { return std::find(jobs_.begin(), jobs_.end(), job) != jobs_.end(); }
+  void insert(JobSeq job) {
+    erase(job);
+    jobs_.insert(jobs_.begin(), job);
+    jobs_.resize(std::min(jobs_.size(), ls::limits::kWorldsKept));
+  }
+  void erase(JobSeq job) { std::erase(jobs_, job); }
+  void clear() { jobs_.clear(); }
+  std::size_t size() const { return jobs_.size(); }
+
+ private:
+  std::vector<JobSeq> jobs_;  // that of the latest result first
+};
+
+// Leases of one job that a worker has given back or has not finished in time, without a result in between.
+// All that end between two ticks count as one.
+struct FruitlessLeases {
+  std::uint32_t count = 0;
+  TimePoint tick{};    // the latest tick when the latest was counted
+  TimePoint until{};   // the worker gets no units of the job before this time
+  std::string reason;  // of the latest: why the worker gave it back, or that it did not finish it
+
+  void add(TimePoint now, std::string why);
+};
+
 struct Worker {
   WorkerIndex index = kNoWorker;
   WorkerId id;
@@ -82,10 +113,13 @@ struct Worker {
   double seconds_out = 0;       // predicted CPU seconds of its leased units
   std::uint64_t units_done = 0;
   CoreShare core_share;
-  std::set<JobSeq> briefed;  // jobs whose settings (JobBrief) were sent to it on its present connection
-  // Jobs whose scene it has loaded: it has finished a unit of them on its present connection
-  std::set<JobSeq> warmed_up;
+  BriefMemory<JobSeq> briefs;  // the jobs whose settings (JobBrief) it remembers
+  LoadedWorlds warmed_up;      // the jobs whose scenes it has loaded
   std::map<JobSeq, WorkerFailures> failures;
+  // By job. A job has no entry once the worker has delivered a result of it
+  std::map<JobSeq, FruitlessLeases> fruitless;
+  // Fruitless leases of all jobs since its latest result
+  std::uint32_t fruitless_in_a_row = 0;
 
   // Returns how many cores its threads get together: the CPU seconds that they use per second of wall-clock
   // time.
@@ -98,6 +132,17 @@ struct Worker {
   bool blocked(JobSeq job, TimePoint now) const {
     const auto it = failures.find(job);
     return it != failures.end() && it->second.blocked_at(now);
+  }
+  // Its fruitless leases of this job; null: there are none, or a result has come since
+  const FruitlessLeases* fruitless_in(JobSeq job) const {
+    const auto it = fruitless.find(job);
+    return it == fruitless.end() ? nullptr : &it->second;
+  }
+  // True if nobody should wait for results of this job from this worker: too many leases were fruitless. It
+  // is offered units of the job nevertheless, from time to time.
+  bool unable(JobSeq job) const {
+    const FruitlessLeases* of_job = fruitless_in(job);
+    return fruitless_in_a_row >= kFruitlessLeases || (of_job && of_job->count >= kFruitlessLeases);
   }
   // True if the worker should get another lease. This is so if it holds fewer than kUnitsAThread units per
   // thread. It is also so if it holds fewer than kQueuedLeases leases and its leased work takes less time
@@ -201,8 +246,8 @@ bool of_class_asked(const Job& job, const Worker& worker);
 // of the class that the user requests, has the job's tags and enough memory, and is not quarantined. The
 // worker may be busy or lost.
 bool fits(const Job& job, const Worker& worker);
-// True if the worker fits the job, can get work now (Worker::available()), and is not blocked from the job by
-// its failures.
+// True if the worker fits the job, can get work now (Worker::available()), is not blocked from the job by its
+// failures, and is not to be left alone after fruitless leases of the job.
 bool may_serve(const Job& job, const Worker& worker, TimePoint now);
 
 struct LeaseRecord {
@@ -229,6 +274,8 @@ struct LeaseRecord {
   // True while units are expected to come back: until then the worker gets no further units of the job, which
   // would be of later rounds
   bool comes_back = false;
+  // When its worker last finished a unit of this lease or of an earlier one; before that, `issued`
+  TimePoint progress_at{};
   // Predicted time from `issued` until the last unit of this lease is done, including the wait for the
   // worker's earlier leases
   Duration predicted{};

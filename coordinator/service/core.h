@@ -62,6 +62,7 @@ class FarmDriver {
   void on(const JobFailed& e);
   void on(const WorkerStateChanged& e);
   void on(const WorkerBlocked& e);
+  void on(const WorkerFruitless& e);
   void on(const WorkerFoundFaulty& e);
   void on(const TileDiscarded& e);
   void on(const WorkerForgotten& e);

@@ -386,6 +386,13 @@ void FarmDriver::on(const WorkerBlocked& e) {
   core_.records.log(e.job, fmt::format("worker {} gets no more of it: {}", e.worker.value, e.why));
 }
 
+void FarmDriver::on(const WorkerFruitless& e) {
+  log_warn(fmt::format("worker={} job={}", e.worker.value, e.job.value),
+           "renders nothing of this job and is not waited for: " + e.why);
+  core_.records.log(
+      e.job, fmt::format("worker {} renders nothing of it and is not waited for: {}", e.worker.value, e.why));
+}
+
 // The quarantine of a faulty worker is stored separately from the jobs and outlives them, so that none of its
 // results is accepted after a restart or in a job that is extended later. Until the quarantine is stored, all
 // jobs are paused: a restart reads the results of all workers from the jobs' files of partials, and without

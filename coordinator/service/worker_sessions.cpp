@@ -132,7 +132,7 @@ Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello
   core->driver.run(WorkerJoined{id, connection->epoch, hello.name, hello.numeric_class, hello.threads,
                                 hello.tags, hello.memory_bytes, hello.blobs_held,
                                 options_.version.empty() || hello.build == options_.version, hello.platform,
-                                principal});
+                                principal, hello.brief_bytes});
   return std::make_unique<Session>(*this, std::move(connection));
 }
 

@@ -84,6 +84,8 @@ def line(name, right, count, again, lost):
 
 PAGE = """# Storms
 
+> Shown with fake workers (the real worker program, whose renderer makes pixels up) and one job at a time, except the storms "with real pixels". Workers that render, and many jobs open at once: [open-jobs.md](open-jobs.md).
+
 `/usr/bin/python3 tests/chaos/chaos.py --seed {seed} --repetitions {repetitions} --write docs/measurements/chaos.md` wrote this page, in {minutes:.0f} minutes on {cores} cores, with other work on the machine. Each storm has a farm of its own (coordinator and workers as processes, real sockets, disks and databases) and ends with the
 same question: are the pixels those of one worker that nothing happened to? Workers are fake: their pixels are a pure function of the unit, so a unit that is lost, counted twice, swapped or folded out of order shows. In the storms "with real pixels" workers render fog, and the pixels must be those of `lightshaft render`. The job has {units} units of {delay} ms (1920 in the storm with audits of 1 %). What is random (who is killed, when, which bytes) follows from the seed.
 

@@ -261,6 +261,8 @@ def fault_table(run, ledger):
 
 PAGE = """# Hours of chaos
 
+> Shown with fake workers (the real worker program, whose renderer makes pixels up) beside two that render, and at most 8 open jobs of a user at a time. Workers that render alone, and thousands of jobs open at once: [open-jobs.md](open-jobs.md).
+
 `/usr/bin/python3 tests/chaos/hours.py --seed {seed} --minutes {minutes:g} --workers {workers} --write PAGE` made this page, commit {commit}, on {cores} cores, with other work on the machine (load average {load:.0f} in the mean, at most {most_load:.0f}).{broken} Faults of every kind came at once on one farm: three coordinators with TLS that share a real Redis and an S3 store (`tests/support/s3_server.py`), {workers} fake workers and two that render, {jobs} jobs of five users in waves of {waves:.0f} minutes, {audits} % of the results audited. {faults} faults began, {at_once:.1f} were under way on average, at most {most}. Jobs, what users do to them, and the faults with their order follow from the seed; when something happens does not.
 
 ## What must hold

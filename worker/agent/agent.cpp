@@ -23,7 +23,6 @@ constexpr Duration kGoodConnection = std::chrono::seconds(5);
 constexpr Duration kFirstPause = std::chrono::milliseconds(100), kFirstTroublePause = std::chrono::seconds(1);
 constexpr Duration kLongestWait = std::chrono::seconds(1);
 constexpr int kProgressWhenIdle = 5;  // an idle worker sends only every fifth progress report
-constexpr std::size_t kJobsRemembered = 64;
 // Number of cached files that the hello names. The coordinator remembers no more of them (kBlobsRemembered),
 // and takes a longer hello from few workers at a time.
 constexpr std::size_t kBlobsReported = 1024;
@@ -36,6 +35,7 @@ Agent::Impl::Impl(AgentOptions o, CoordinatorLink& l, RenderBackend& b, BlobFile
       files(f),
       clock(c),
       backoff(kFirstPause, options.backoff_most, options.backoff_seed),
+      briefs(options.brief_bytes),
       trouble_backoff(kFirstTroublePause, options.backoff_most, options.backoff_seed) {}
 
 Result<void> Agent::Impl::run() {
@@ -154,11 +154,13 @@ void Agent::Impl::open_connection() {
   hello.numeric_class = backend.numeric_class();
   hello.platform = backend.platform();
   hello.blobs_held = files.held(kBlobsReported);
+  hello.brief_bytes = options.brief_bytes;
   hello.previous_id = id;
   hello.secret = secret;
   {
     const std::lock_guard lock(mutex);
     connection = Connection::opening;
+    briefs.clear();
   }
   connection_timer = clock.now() + kWelcomeLimit;
   const auto connected = link.connect(hello, std::make_shared<InboxObserver>(inbox, ++connection_count));
@@ -180,8 +182,11 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
     }
     jobs.try_emplace(id, Job{.brief = *assign.brief}).first->second.last_use = ++uses;
   }
-  if (draining || !jobs.contains(id) || table.lease_count() >= limits::kLeasesPerWorker) {
-    LeaseReturned returned{assign.lease.id, {}};
+  briefs.leased(id, assign.brief ? std::optional(memory_of(*assign.brief)) : std::nullopt);
+  const bool unknown = !jobs.contains(id), too_many = table.lease_count() >= limits::kLeasesPerWorker;
+  if (draining || unknown || too_many) {
+    LeaseReturned returned{.lease = assign.lease.id, .unknown_job = unknown};
+    if (!draining && too_many) returned.reason = "it holds too many leases already";
     for (const LeaseUnit& unit : assign.lease.units)
       returned.unrendered.push_back({id, unit.tile, unit.round});
     outgoing.push_back(std::move(returned));
@@ -191,17 +196,10 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
   table.add(
       assign.lease, [this](const UnitKey& key) { return outbox.has_result(key); },
       traced ? assign.trace : std::nullopt, traced ? options.tracer->unix_ns(clock.now()) : 0);
-  // If the worker knows more than kJobsRemembered jobs, it forgets the least recently used ones. Each job
-  // takes little memory, but a worker may run for years.
-  while (jobs.size() > kJobsRemembered) {
-    auto oldest = jobs.end();
-    for (auto it = jobs.begin(); it != jobs.end(); ++it)
-      if (it->second.state == Job::State::idle && !table.holds(it->first) &&
-          (oldest == jobs.end() || it->second.last_use < oldest->second.last_use))
-        oldest = it;
-    if (oldest == jobs.end()) break;
-    jobs.erase(oldest);
-  }
+  if (jobs.size() <= briefs.size()) return;
+  std::erase_if(jobs, [this](const auto& known) {
+    return known.second.state == Job::State::idle && !briefs.has(known.first) && !table.holds(known.first);
+  });
 }
 
 void Agent::Impl::cancel(const JobId& job) {

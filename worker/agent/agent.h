@@ -18,6 +18,7 @@
 
 #include "common/base/clock.h"
 #include "common/base/error.h"
+#include "common/protocol/briefs.h"
 #include "common/protocol/messages.h"
 #include "common/trace/tracer.h"
 #include "worker/agent/backend.h"
@@ -26,8 +27,9 @@
 namespace ls::worker {
 
 struct AgentOptions {
-  WorkerHello hello;  // threads, numeric_class, platform and blobs_held are filled in by the agent
+  WorkerHello hello;  // the agent fills in threads, numeric_class, platform, blobs_held and brief_bytes
   int threads = 1;
+  std::size_t brief_bytes = kBriefBytes;  // size of its memory for the briefs of jobs (BriefMemory)
   // No further unit is begun while results that are not acknowledged occupy this many bytes or more
   std::size_t outbox_bytes = 64 << 20;
   Duration progress_period = std::chrono::seconds(1);

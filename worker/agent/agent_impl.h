@@ -99,6 +99,9 @@ class InboxObserver final : public LinkObserver {
   const std::uint64_t connection_;
 };
 
+// Returns which file of the job is gone: somebody has cleaned up the cache. Empty: all files are there.
+std::string lost_file(const LocalJob& job);
+
 struct Agent::Impl {
   Impl(AgentOptions o, CoordinatorLink& l, RenderBackend& b, BlobFiles& f, const Clock& c);
 
@@ -115,7 +118,8 @@ struct Agent::Impl {
     TimePoint retry_at{};
     // The fault of this machine that made the last attempt to load fail; empty: there was none
     std::string trouble;
-    UnitTimes unreported;  // time spent on loading the job, not yet reported to the coordinator
+    int transfers_cut = 0;  // transfers of its files that were cut since it was last loaded or given back
+    UnitTimes unreported;   // time spent on loading the job, not yet reported to the coordinator
   };
   // The state of one render thread.
   struct RenderSlot {
@@ -155,7 +159,12 @@ struct Agent::Impl {
   // Functions that the loader thread calls, except trouble(), which the control thread calls.
   void load_loop(std::stop_token token);
   std::optional<JobId> next_to_load();
-  bool make_room();  // frees an unused world if too many are kept; false: all are in use
+  // Frees a world that is not needed, if too many are kept, so that this job can be loaded; false: all are
+  // needed. A job that has waited for room longer than kRoomWait goes before units that came after its
+  // own: a world is not needed for these.
+  bool make_room(const JobId& job);
+  bool can_load();            // next_to_load() has a job, and there is room for it
+  bool room_overdue() const;  // true if a job has waited for room longer than kRoomWait
   void load(const JobBrief& brief);
   void try_to_load(const JobBrief& brief);
   // Each of these ends an attempt to load the job that has failed. If the loader was told to stop, or the job
@@ -163,6 +172,7 @@ struct Agent::Impl {
   void loading_failed(const JobBrief& brief, UnitFailure failure);
   void postpone(const JobBrief& brief, const Error& why);
   void hold_off(const JobBrief& brief, const std::string& trouble);
+  void give_back(const JobId& id, Job& job, const std::string& trouble);  // call with the mutex held
   // Ends an attempt to load the job, and returns the job, which is idle then; null: it was replaced. Call
   // with the mutex held.
   Job* end_loading(const JobBrief& brief);
@@ -204,7 +214,10 @@ struct Agent::Impl {
     const trace::SpanContext own;
     std::optional<TimePoint> loaded_at;  // when the world was built; nullopt: the scene could not be loaded
   };
-  void finished(RenderSlot& slot, const UnitKey& key, tl::expected<UnitResult, UnitFailure> outcome);
+  // `trouble`: why the unit could not be rendered though neither it nor the renderer is at fault; empty: no
+  // such reason is known
+  void finished(RenderSlot& slot, const UnitKey& key, tl::expected<UnitResult, UnitFailure> outcome,
+                const std::string& trouble);
 
   const AgentOptions options;
   CoordinatorLink& link;
@@ -236,6 +249,8 @@ struct Agent::Impl {
   // All members from here to `loading` are guarded by `mutex`.
   HeldLeases table;
   Outbox outbox;
+  BriefMemory<JobId> briefs;  // the jobs that the coordinator takes to be known here
+  // The jobs of `briefs`, and all jobs of which the worker holds units or a world
   std::map<JobId, Job> jobs;
   // A result of a traced lease that is not sent yet: the span of the lease, and when the result was packed.
   struct Unsent {
@@ -254,6 +269,12 @@ struct Agent::Impl {
   GapMeter gaps;
   Backoff trouble_backoff;
   std::optional<JobId> loaded_job;  // the job that the loader loads
+  // The job that the loader would load if there were room, and since when it has waited for that
+  struct RoomWanted {
+    JobId job;
+    TimePoint since{};
+  };
+  std::optional<RoomWanted> room_wanted;
   // While the loader loads a job: the name of the file that it fetched last or is fetching; otherwise empty
   std::string loading;
 

@@ -6,15 +6,20 @@
 #include <new>
 
 #include "common/base/log.h"
+#include "common/protocol/limits.h"
 #include "worker/agent/agent_impl.h"
 
 namespace ls::worker {
 namespace {
-// Number of worlds kept in memory: the world of the job being rendered and that of the next job. So render
-// threads need not wait between two jobs, and memory stays bounded.
-constexpr std::size_t kWorldsKept = 2;
+// A job whose world does not fit beside those in memory waits this long for the end of their jobs' units.
+// Then units that came after its own wait for it. So no job waits for ever, and worlds are not exchanged all
+// the time.
+constexpr Duration kRoomWait = std::chrono::seconds(30);
 constexpr std::size_t kBlobsTraced = 64;  // at most this many blob transfers of a scene are traced
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
+// After this many transfers of a job's files that were cut, the worker gives the job's units back: others may
+// reach the coordinator better. What has arrived stays in the cache.
+constexpr int kTransfersCut = 20;
 // If this machine could not load a job, progress reports state the reason until this long after
 // Job::retry_at, the time at which loading may be tried again. A worker that still has units of the job tries
 // again by then, so an older reason concerns a job of which it has no units any more.
@@ -27,11 +32,19 @@ bool of_this_machine(const Error& error) {
 }
 }  // namespace
 
+std::string lost_file(const LocalJob& job) {
+  std::error_code error;
+  for (const auto& [digest, path] : job.assets)
+    if (!std::filesystem::exists(path, error))
+      return fmt::format("its file {} was removed from the cache while it was in use", path.string());
+  return {};
+}
+
 void Agent::Impl::load_loop(std::stop_token token) {
   std::unique_lock lock(mutex);
   while (!token.stop_requested()) {
     const std::optional<JobId> next = next_to_load();
-    if (next && make_room()) {
+    if (next && make_room(*next)) {
       Job& job = jobs.at(*next);
       job.state = Job::State::loading;
       loaded_job = *next;
@@ -44,7 +57,7 @@ void Agent::Impl::load_loop(std::stop_token token) {
     } else {
       // The timeout is needed because a job becomes loadable again when its retry_at has passed, and nothing
       // notifies this thread of that. It is notified of all other changes.
-      work.wait_for(lock, token, kTransferRetry, [&] { return next_to_load().has_value() && make_room(); });
+      work.wait_for(lock, token, kTransferRetry, [&] { return can_load(); });
     }
   }
 }
@@ -58,21 +71,33 @@ std::optional<JobId> Agent::Impl::next_to_load() {
   return std::nullopt;
 }
 
-bool Agent::Impl::make_room() {
+bool Agent::Impl::can_load() {
+  const std::optional<JobId> next = next_to_load();
+  return next && make_room(*next);
+}
+
+bool Agent::Impl::room_overdue() const {
+  return room_wanted && clock.now() - room_wanted->since >= kRoomWait;
+}
+
+bool Agent::Impl::make_room(const JobId& job) {
+  if (!room_wanted || room_wanted->job != job) room_wanted = {job, clock.now()};
   std::size_t kept = 0;
   auto idlest = jobs.end();
   for (auto it = jobs.begin(); it != jobs.end(); ++it) {
     if (it->second.state != Job::State::ready) continue;
     ++kept;
-    if (!table.holds(it->first) && (idlest == jobs.end() || it->second.last_use < idlest->second.last_use))
-      idlest = it;
+    const bool needed = room_overdue() ? table.needs_before(it->first, job) : table.holds(it->first);
+    if (!needed && (idlest == jobs.end() || it->second.last_use < idlest->second.last_use)) idlest = it;
   }
-  if (kept < kWorldsKept) return true;
-  if (idlest == jobs.end()) return false;
-  idlest->second.state = Job::State::idle;
-  idlest->second.files.clear();
-  idlest->second.local.reset();
-  backend.forget(idlest->first);
+  if (kept >= limits::kWorldsKept) {
+    if (idlest == jobs.end()) return false;
+    idlest->second.state = Job::State::idle;
+    idlest->second.files.clear();
+    idlest->second.local.reset();
+    backend.forget(idlest->first);
+  }
+  room_wanted.reset();
   return true;
 }
 
@@ -154,6 +179,8 @@ void Agent::Impl::load(const JobBrief& brief) {
     if (prepared) span.loaded_at = end;
   }
   if (!prepared && backend.broken()) return hold_off(brief, prepared.error().reason);
+  if (!prepared)
+    if (const std::string lost = lost_file(*local); !lost.empty()) return hold_off(brief, lost);
   if (!prepared) return loading_failed(brief, std::move(prepared.error()));
   const std::lock_guard lock(mutex);
   load_seconds = seconds(clock.now() - start);
@@ -164,6 +191,7 @@ void Agent::Impl::load(const JobBrief& brief) {
   job->files = std::move(pins);
   job->last_use = ++uses;
   job->trouble.clear();
+  job->transfers_cut = 0;
   job->unreported.load += seconds(start - begin);
   job->unreported.build += load_seconds;
   trouble_backoff.reset();
@@ -190,14 +218,15 @@ void Agent::Impl::loading_failed(const JobBrief& brief, UnitFailure failure) {
   const std::lock_guard lock(mutex);
   if (!end_loading(brief) || stop_loading) return;
   backend.forget(id);
-  log_warn(fmt::format("job={}", id.value), "cannot be loaded: " + failure.reason);
+  const std::string reason = failure.reason;
+  log_warn(fmt::format("job={}", id.value), "cannot be loaded: " + reason);
   if (const auto first = table.take([&](const JobId& job) { return job == id; })) {
     failure.unit = first->key;
     failure.lease = first->lease;
     table.finish(first->key);
     outbox.add(std::move(failure));
   }
-  for (LeaseReturned& returned : table.return_waiting(id)) outgoing.push_back(std::move(returned));
+  for (LeaseReturned& returned : table.return_waiting(id, reason)) outgoing.push_back(std::move(returned));
   inbox->nudge();
 }
 
@@ -205,23 +234,31 @@ void Agent::Impl::postpone(const JobBrief& brief, const Error& why) {
   const std::lock_guard lock(mutex);
   Job* const job = end_loading(brief);
   if (!job || stop_loading) return;
+  // While the stream is down, no transfer can succeed, and the coordinator takes the units back anyway
+  if (connection == Connection::up && ++job->transfers_cut >= kTransfersCut) {
+    job->transfers_cut = 0;
+    return give_back(brief.job, *job,
+                     fmt::format("{} transfers of its files were cut; the last: {}", kTransfersCut, why.message));
+  }
   job->retry_at = clock.now() + kTransferRetry;
   log_warn(fmt::format("job={}", brief.job.value), "a transfer was cut, trying again: " + why.message);
 }
 
-// Returns the job's units to the coordinator, so that other workers can render them. If units of the job are
-// assigned to this worker again, they wait until the next attempt to load the job.
 void Agent::Impl::hold_off(const JobBrief& brief, const std::string& trouble) {
-  const JobId& id = brief.job;
   const std::lock_guard lock(mutex);
   Job* const job = end_loading(brief);
-  if (!job || stop_loading) return;
+  if (job && !stop_loading) give_back(brief.job, *job, trouble);
+}
+
+// Returns the job's units to the coordinator, so that other workers can render them. If units of the job are
+// assigned to this worker again, they wait until the next attempt to load the job.
+void Agent::Impl::give_back(const JobId& id, Job& job, const std::string& trouble) {
   const Duration pause = trouble_backoff.next();
-  job->retry_at = clock.now() + pause;
-  job->trouble = trouble;
+  job.retry_at = clock.now() + pause;
+  job.trouble = trouble;
   log_warn(fmt::format("job={}", id.value),
            fmt::format("{}; giving its units back, trying again in {:.1f} s", trouble, seconds(pause)));
-  for (LeaseReturned& returned : table.return_waiting(id)) outgoing.push_back(std::move(returned));
+  for (LeaseReturned& returned : table.return_waiting(id, trouble)) outgoing.push_back(std::move(returned));
   inbox->nudge();
 }
 

@@ -88,7 +88,9 @@ double Agent::Impl::note_gap(RenderSlot& slot, const JobId& job, double wall_sec
 void Agent::Impl::render_loop(RenderSlot& slot, std::stop_token token) {
   std::shared_ptr<const LocalJob> job;
   while (const auto held = next_unit(slot, token, job)) {
-    finished(slot, held->key, render(slot, *job, *held));
+    auto outcome = render(slot, *job, *held);
+    const std::string trouble = outcome ? "" : lost_file(*job);
+    finished(slot, held->key, std::move(outcome), trouble);
     job.reset();
   }
 }
@@ -104,7 +106,8 @@ std::optional<HeldLeases::Held> Agent::Impl::next_unit(RenderSlot& slot, std::st
     return it != jobs.end() && it->second.state == Job::State::ready;
   };
   const auto found = [&] {
-    if (!draining && outbox.bytes() < options.outbox_bytes) held = table.take(ready);
+    const JobId* before = room_overdue() ? &room_wanted->job : nullptr;
+    if (!draining && outbox.bytes() < options.outbox_bytes) held = table.take(ready, before);
     return held.has_value();
   };
   if (!work.wait(lock, token, found)) return std::nullopt;
@@ -140,9 +143,9 @@ void Agent::Impl::trace_unit(const RenderSlot& slot, const HeldLeases::Held& hel
 }
 
 void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key,
-                           tl::expected<UnitResult, UnitFailure> outcome) {
+                           tl::expected<UnitResult, UnitFailure> outcome, const std::string& trouble) {
   failpoint("unit-rendered");
-  const bool innocent = !outcome && backend.broken();
+  const bool innocent = !outcome && (backend.broken() || !trouble.empty());
   {
     const std::lock_guard lock(mutex);
     slot.unit.reset();
@@ -160,11 +163,17 @@ void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key,
       }
       outbox.add(std::move(*outcome));
     } else if (lease && innocent) {
-      outgoing.push_back(LeaseReturned{*lease, {key}});
+      outgoing.push_back(LeaseReturned{*lease, {key}, trouble});
     } else if (lease) {
       outcome.error().unit = key;
       outcome.error().lease = *lease;
       outbox.add(std::move(outcome.error()));
+    }
+    if (const auto job = jobs.find(key.job);
+        !trouble.empty() && job != jobs.end() && job->second.state == Job::State::ready) {
+      job->second.state = Job::State::idle;  // its files are fetched again
+      job->second.local.reset();
+      job->second.files.clear();
     }
     work.notify_all();
   }

@@ -27,8 +27,10 @@ void HeldLeases::add(const Lease& lease, const std::function<bool(const UnitKey&
   }
 }
 
-std::optional<HeldLeases::Held> HeldLeases::take(const std::function<bool(const JobId&)>& ready) {
+std::optional<HeldLeases::Held> HeldLeases::take(const std::function<bool(const JobId&)>& ready,
+                                                 const JobId* before) {
   for (auto it = queue_.begin(); it != queue_.end(); ++it) {
+    if (before && it->second.job == *before) return std::nullopt;
     if (!ready(it->second.job)) continue;
     Entry& entry = units_.at(it->second);
     queue_.erase(it);
@@ -71,18 +73,19 @@ void HeldLeases::drop_lease(const LeaseId& lease) {
 }
 
 std::vector<LeaseReturned> HeldLeases::return_waiting() {
-  return return_if([](const Held&) { return true; });
+  return return_if({}, [](const Held&) { return true; });
 }
 
-std::vector<LeaseReturned> HeldLeases::return_waiting(const JobId& job) {
-  return return_if([&](const Held& held) { return held.key.job == job; });
+std::vector<LeaseReturned> HeldLeases::return_waiting(const JobId& job, const std::string& reason) {
+  return return_if(reason, [&](const Held& held) { return held.key.job == job; });
 }
 
 std::vector<LeaseReturned> HeldLeases::return_waiting(const LeaseId& lease) {
-  return return_if([&](const Held& held) { return held.lease == lease; });
+  return return_if({}, [&](const Held& held) { return held.lease == lease; });
 }
 
-std::vector<LeaseReturned> HeldLeases::return_if(const std::function<bool(const Held&)>& goes) {
+std::vector<LeaseReturned> HeldLeases::return_if(const std::string& reason,
+                                                 const std::function<bool(const Held&)>& goes) {
   std::map<LeaseId, LeaseReturned> returned;
   for (auto it = queue_.begin(); it != queue_.end();) {
     const Held& held = units_.at(it->second).held;
@@ -92,6 +95,7 @@ std::vector<LeaseReturned> HeldLeases::return_if(const std::function<bool(const 
     }
     const LeaseId lease = held.lease;
     returned[lease].lease = lease;
+    returned[lease].reason = reason;
     returned[lease].unrendered.push_back(it->second);
     units_.erase(it->second);
     leave(lease, false);
@@ -121,6 +125,16 @@ bool HeldLeases::is_running(const UnitKey& key) const {
 bool HeldLeases::holds(const JobId& job) const {
   const auto it = units_.lower_bound(UnitKey{job, 0, 0});
   return it != units_.end() && it->first.job == job;
+}
+
+bool HeldLeases::needs_before(const JobId& job, const JobId& other) const {
+  for (auto it = units_.lower_bound(UnitKey{job, 0, 0}); it != units_.end() && it->first.job == job; ++it)
+    if (it->second.held.state == State::running) return true;
+  for (const auto& [order, key] : queue_) {
+    if (key.job == job) return true;
+    if (key.job == other) return false;
+  }
+  return false;
 }
 
 std::vector<JobId> HeldLeases::wanted() const {

@@ -40,8 +40,9 @@ class HeldLeases {
   void add(const Lease& lease, const std::function<bool(const UnitKey&)>& handed_in,
            const std::optional<trace::SpanContext>& trace = std::nullopt, std::int64_t unix_ns = 0);
   // Returns the first waiting unit for whose job `ready` returns true, and marks the unit as running;
-  // nullopt: there is none.
-  std::optional<Held> take(const std::function<bool(const JobId&)>& ready);
+  // nullopt: there is none. If `before` is given, only units that wait before the first one of that job
+  // count.
+  std::optional<Held> take(const std::function<bool(const JobId&)>& ready, const JobId* before = nullptr);
   // Removes a unit that was running and has been rendered. Returns its present lease; nullopt: the unit was
   // dropped meanwhile.
   std::optional<LeaseId> finish(const UnitKey& key);
@@ -53,15 +54,17 @@ class HeldLeases {
   void drop_job(const JobId& job);
   void drop_lease(const LeaseId& lease);
   // Remove the waiting units (without argument: all; else those of this job or lease). Return the messages
-  // that give these units back to the coordinator, one message per lease.
+  // that give these units back to the coordinator, for this reason, one message per lease.
   std::vector<LeaseReturned> return_waiting();
-  std::vector<LeaseReturned> return_waiting(const JobId& job);
+  std::vector<LeaseReturned> return_waiting(const JobId& job, const std::string& reason);
   std::vector<LeaseReturned> return_waiting(const LeaseId& lease);
 
   std::optional<Held> first_waiting(const JobId& job) const;
   const Held* find(const UnitKey& key) const;  // null: the unit is not held
   bool is_running(const UnitKey& key) const;
   bool holds(const JobId& job) const;
+  // True if a unit of `job` is running, or waits before the first waiting unit of `other`.
+  bool needs_before(const JobId& job, const JobId& other) const;
   std::size_t lease_count() const { return leases_.size(); }
   std::size_t running() const { return running_; }
   // Jobs with waiting units, in the order in which they will be rendered.
@@ -79,7 +82,7 @@ class HeldLeases {
   void enqueue(Entry& entry);
   void leave(const LeaseId& lease, bool done);
   void drop_if(const std::function<bool(const Held&)>& goes);
-  std::vector<LeaseReturned> return_if(const std::function<bool(const Held&)>& goes);
+  std::vector<LeaseReturned> return_if(const std::string& reason, const std::function<bool(const Held&)>& goes);
 
   std::map<UnitKey, Entry> units_;
   // The waiting units by Entry::order, that is, in the order in which they will be rendered.

@@ -106,6 +106,9 @@ Result<std::shared_ptr<const BlobFile>> BlobCache::open_verified(const Digest& d
 
 Result<void> BlobCache::download(const BlobRef& blob, bool arrived_wrong, const std::atomic<bool>& stop) {
   verified_.erase(blob.digest);
+  // The folder may have been removed since the start: caches are cleaned up
+  std::error_code error;
+  if (fs::create_directories(folder_ / kPartialFolder, error)) write_cache_tag(folder_);
   auto partial = PartialFile::open(folder_ / kPartialFolder / blob.digest.hex());
   if (!partial) return tl::unexpected<Error>(partial.error());
   const auto received = receive(blob, arrived_wrong, stop, *partial);

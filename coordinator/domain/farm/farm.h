@@ -119,9 +119,10 @@ class Farm {
   // results of a worker together cannot have taken more than all of its threads since it got work. A result
   // of a unit that is not leased to the worker is believed to have taken what such units take.
   double believable_seconds(const UnitKey& unit, const WorkerId& worker, double reported, TimePoint at) const;
-  // Explains to the user why no worker may take units of a job that is queued or running: each connected
-  // worker is of another class, lacks memory or a tag, is blocked or unhealthy, or the like. Empty if some
-  // worker may take units, or if the job is in another state.
+  // Explains to the user why a job that is queued or running stands still: each connected worker is of
+  // another class, lacks memory or a tag, is blocked or unhealthy, gives the job's units back, or the like;
+  // or one worker after the other was lost with them. Empty if some worker renders units of the job or may
+  // take some, or if the job is in another state.
   std::string why_waiting(const JobId& id) const;
   AuditFigures audits() const;
   // Returns the job's open audits (units that are rendered again for comparison). The service must store

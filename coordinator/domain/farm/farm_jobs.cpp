@@ -167,8 +167,8 @@ void Farm::State::on(const JobForgotten& event) {
   Job* job = find(event.job);
   if (job == nullptr || !job->ended()) return;
   for (const auto& [index, worker] : workers.all()) {
-    worker->briefed.erase(job->seq);
     worker->warmed_up.erase(job->seq);
+    worker->fruitless.erase(job->seq);
   }
   by_id.erase(event.job);
   jobs.erase(job->seq);
@@ -250,9 +250,9 @@ void Farm::State::end(Job& job) {
     free_lease(seq, FreedCause::job_ended, false);
     if (!worker.connected || !notified.insert(worker.index).second) continue;
     effects.emplace_back(Send{worker.id, CancelJob{job.plan.brief.job}});
-    worker.briefed.erase(job.seq);
     worker.warmed_up.erase(job.seq);
   }
+  for (const auto& [index, worker] : workers.all()) worker->fruitless.erase(job.seq);
   audited.dropped += job.audits.size();
   if (!job.audits.empty()) audits_changed.insert(job.plan.brief.job);
   job.audits.clear();

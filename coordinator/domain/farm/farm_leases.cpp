@@ -13,7 +13,7 @@ void Farm::State::grant(Job& job, Worker& worker, std::vector<UnitCode> units, b
   lease.seq = leases.next_seq();
   lease.job = &job;
   lease.worker = &worker;
-  lease.issued = now;
+  lease.issued = lease.progress_at = now;
   lease.audit = audit;
   lease.remaining = static_cast<std::uint32_t>(units.size());
   double sum = 0, longest = 0;
@@ -45,7 +45,12 @@ void Farm::State::grant(Job& job, Worker& worker, std::vector<UnitCode> units, b
   job.leased += lease.remaining;
   if (!audit) load(job, worker, lease.remaining);
   shares.charge(job, lease.remaining * lease.charge_per_unit);
-  if (worker.briefed.insert(job.seq).second) message.brief = job.plan.brief;
+  std::optional<std::size_t> brief_bytes;
+  if (!worker.briefs.has(job.seq)) {
+    message.brief = job.plan.brief;
+    brief_bytes = memory_of(job.plan.brief);
+  }
+  worker.briefs.leased(job.seq, brief_bytes);
   leases.add(std::move(lease));
   note_begun(worker);
   effects.emplace_back(Send{worker.id, std::move(message)});

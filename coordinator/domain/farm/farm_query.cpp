@@ -167,40 +167,72 @@ double Farm::believable_seconds(const UnitKey& unit, const WorkerId& worker, dou
                             at);
 }
 
+namespace {
+
+// Returns why this worker cannot take units of the job now; empty: it may.
+std::string why_not(const Job& job, const Worker& worker, TimePoint ticked) {
+  if (job.numeric_class && *job.numeric_class != worker.numeric_class)
+    return fmt::format("is of another numeric class, {}",
+                       class_in_words(worker.numeric_class, worker.platform));
+  if (!of_class_asked(job, worker))
+    return fmt::format("is of numeric class {} and the job asks for '{}'",
+                       class_in_words(worker.numeric_class, worker.platform), job.plan.class_asked);
+  if (!job.numeric_class && !worker.may_begin)
+    return "is of another version than the coordinator and begins no job";
+  if (worker.quarantined) return "is quarantined, since it rendered wrong pixels";
+  if (worker.memory_bytes != 0 && job.plan.memory_bytes > worker.memory_bytes)
+    return fmt::format("has {} of memory and the job needs at least {}", in_words(worker.memory_bytes),
+                       in_words(job.plan.memory_bytes));
+  if (!fits(job, worker)) return "lacks a tag that the job asks for";
+  if (worker.unhealthy_since) return "is unhealthy";
+  if (worker.blocked(job.seq, ticked)) return "failed too many of its units";
+  if (worker.draining) return "drains";
+  if (worker.pause == Pause::silent) return "does not answer";
+  if (worker.pause == Pause::stuck) return "has finished no unit for long";
+  if (const FruitlessLeases* fruitless = worker.fruitless_in(job.seq))
+    return fmt::format("was given its units {} and rendered none: {}",
+                       fruitless->count == 1 ? "once" : fmt::format("{} times", fruitless->count),
+                       fruitless->reason);
+  return "";
+}
+
+}  // namespace
+
+// True if some worker holds units of the job, audits included, and is expected to render them.
+bool Farm::State::in_good_hands(const Job& job) const {
+  const auto good = [&](const Worker& worker) {
+    return worker.pause != Pause::silent && worker.pause != Pause::stuck && !worker.fruitless_in(job.seq);
+  };
+  if (job.losses_in_a_row >= kLossesInARow) return false;
+  for (const auto& [index, held] : job.load.leases_at)
+    if (good(*workers.all().at(index))) return true;
+  for (const auto& [code, audit] : job.audits)
+    if (audit.lease != 0 && good(*leases.all().at(audit.lease).worker)) return true;
+  return false;
+}
+
 std::string Farm::why_waiting(const JobId& id) const {
   const Job* job = state_->find(id);
-  if (job == nullptr || !job->leasable()) return "";
+  if (job == nullptr || !job->leasable() || state_->in_good_hands(*job)) return "";
+  if (job->losses_in_a_row >= kLossesInARow)
+    return fmt::format(
+        "{} times in a row the worker that held its units was lost before it finished one; the "
+        "last: {}",
+        job->losses_in_a_row, job->last_lost);
+  // True if the job's units are rendered, and only units that are rendered again for comparison are missing
+  const bool checking = job->units.accepted_count() == job->queue.planned() && !job->audits.empty();
+  const auto rendered_it = [&](const Worker& worker) {
+    return checking && std::none_of(job->audits.begin(), job->audits.end(),
+                                    [&](const auto& audit) { return audit.second.asks(worker.index); });
+  };
   std::string reasons;
   std::uint32_t named = 0, connected = 0;
   for (const auto& [index, worker] : state_->workers.all()) {
     if (!worker->connected) continue;
     ++connected;
-    std::string why;
-    if (job->numeric_class && *job->numeric_class != worker->numeric_class)
-      why = fmt::format("is of another numeric class, {}",
-                        class_in_words(worker->numeric_class, worker->platform));
-    else if (!of_class_asked(*job, *worker))
-      why = fmt::format("is of numeric class {} and the job asks for '{}'",
-                        class_in_words(worker->numeric_class, worker->platform), job->plan.class_asked);
-    else if (!job->numeric_class && !worker->may_begin)
-      why = "is of another version than the coordinator and begins no job";
-    else if (worker->quarantined)
-      why = "is quarantined, since it rendered wrong pixels";
-    else if (worker->memory_bytes != 0 && job->plan.memory_bytes > worker->memory_bytes)
-      why = fmt::format("has {} of memory and the job needs at least {}", in_words(worker->memory_bytes),
-                        in_words(job->plan.memory_bytes));
-    else if (!fits(*job, *worker))
-      why = "lacks a tag that the job asks for";
-    else if (worker->unhealthy_since)
-      why = "is unhealthy";
-    else if (worker->blocked(job->seq, state_->ticked))
-      why = "failed too many of its units";
-    else if (worker->draining)
-      why = "drains";
-    else if (worker->pause != Pause::none)
-      why = "does not answer";
-    else
-      return "";
+    std::string why = why_not(*job, *worker, state_->ticked);
+    if (why.empty() && rendered_it(*worker)) why = "may not check the units that it has rendered itself";
+    if (why.empty()) return "";
     if (++named <= kMaxNamedWorkers)
       reasons += fmt::format("{}{} {}", named > 1 ? "; " : "", worker->name, why);
   }

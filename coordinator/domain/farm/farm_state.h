@@ -21,6 +21,13 @@
 
 namespace ls::coordinator {
 
+// True if a unit that left a lease for this reason tells against the worker: it was lost, or did not render
+// it.
+constexpr bool is_fruitless(FreedCause why) {
+  return why == FreedCause::worker_lost || why == FreedCause::newer_stream ||
+         why == FreedCause::deadline_passed || why == FreedCause::returned;
+}
+
 // Returns the smaller of two limits; a limit of 0 means no limit.
 std::uint32_t tighter(std::uint32_t a, std::uint32_t b);
 
@@ -76,6 +83,7 @@ struct Farm::State {
   void reopen(Job& job, RoundIndex last);  // queues round `last`, which was truncated, to be rendered in full
   void take_up_again(Job& job);            // lets a job go on after its samples or its target were changed
   Job* find(const JobId& id) const;
+  bool in_good_hands(const Job& job) const;  // defined in farm_query.cpp
   Job& add(JobPlan plan);
   void set_state(Job& job, JobState to);
   // Updates in FairShare whether the job has units to lease. Call it after any change of the job's queue,
@@ -100,7 +108,11 @@ struct Farm::State {
   void on(const Tick& event);
   void lose(Worker& worker, FreedCause why);
   void touch(Worker& worker);
-  void note_progress(Worker& worker);  // notes that the worker makes progress, so it is not stuck
+  // Notes that the worker makes progress, so it is not stuck: it has done something of its lease `from`. That
+  // counts for its later leases, too, as it renders them in order, but not for earlier ones. 0: for all
+  void note_progress(Worker& worker, LeaseSeq from = 0);
+  // Notes that a lease of the job ended without results because of this worker
+  void note_fruitless(Worker& worker, const Job& job, const std::string& why);
   void expire_leases();
   void forgive_and_forget();
   void forget(Worker& worker);
@@ -149,7 +161,7 @@ struct Farm::State {
   bool outvote(WorkerIndex one, WorkerIndex other, WorkerIndex alone) const;
   void ignore_vote(Job& job, UnitCode code, WorkerIndex by);
   // Which workers can render the unit for the audit. `none`: no connected worker; `away`: only workers that
-  // get no work at the moment; `there`: at least one that can render it now.
+  // get no work at the moment or whose leases were fruitless; `there`: at least one that can render it now.
   enum class Deciders { none, away, there };
   Deciders deciders(const Job& job, const Audit& audit) const;
   void settle_audits(Job& job);  // decides or drops the open audits that no worker can render
@@ -276,6 +288,7 @@ void Farm::State::free_units(LeaseRecord& lease, FreedCause why, bool send_worke
     if (!which(code)) continue;
     freed.units.push_back(job.key(code));
     if (!lease.audit) job.voters.note(code, lease.worker->index);
+    if (lease.audit && is_fruitless(why)) job.audits.at(code).fruitless.push_back(lease.worker->index);
     work_appeared |= lease.audit;
     if (!detach(lease, code)) continue;
     job.queue.put_back(code, may_be_begun);

@@ -61,7 +61,8 @@ Farm::State::Deciders Farm::State::deciders(const Job& job, const Audit& audit) 
   for (const auto& [index, worker] : workers.all()) {
     if (!may_decide(job, audit, *worker)) continue;
     Deciders& found = is_outsider(audit, *worker) ? outsiders : others;
-    if (found != Deciders::there) found = worker->available() ? Deciders::there : Deciders::away;
+    const bool able = worker->available() && !worker->unable(job.seq);
+    if (found != Deciders::there) found = able ? Deciders::there : Deciders::away;
     if (outsiders == Deciders::there) break;
   }
   return outsiders != Deciders::none ? outsiders : others;

@@ -70,11 +70,17 @@ void Farm::State::accept(const UnitAccepted& event) {
     effects.emplace_back(DropUnwanted{event.unit, event.worker, std::move(why)});
   };
   Worker* worker = workers.find(event.worker);
-  if (worker != nullptr && worker->connected) note_progress(*worker);
   Job* found = find(event.unit.job);
+  const UnitCode code = unit_code(event.unit.round, event.unit.tile);
+  if (worker != nullptr) {
+    const LeaseRecord* lease = found ? lease_of(*found, code, *worker) : nullptr;
+    if (worker->connected) note_progress(*worker, lease ? lease->seq : 0);
+    worker->fruitless_in_a_row = 0;
+  }
   if (found == nullptr) return unwanted("no such job");
   Job& job = *found;
-  const UnitCode code = unit_code(event.unit.round, event.unit.tile);
+  if (worker != nullptr) worker->fruitless.erase(job.seq);
+  job.losses_in_a_row = 0;
   if (is_closed(job.state)) return unwanted("the job has ended");
   if (quarantined.contains(event.worker)) return unwanted("the worker is quarantined");
   if (event.unit.tile >= job.units.tiles() || !job.queue.plans(code))
@@ -174,8 +180,9 @@ void Farm::State::on(const UnitFailed& event) {
   Worker* worker = workers.find(event.worker);
   Job* job = find(event.failure.unit.job);
   if (worker == nullptr || job == nullptr || job->ended()) return;
-  note_progress(*worker);
   const UnitCode code = unit_code(event.failure.unit.round, event.failure.unit.tile);
+  const LeaseRecord* failed_in = lease_of(*job, code, *worker);
+  note_progress(*worker, failed_in ? failed_in->seq : 0);
   if (event.failure.unit.tile >= job->units.tiles() || !job->queue.plans(code)) return;
   // Only the failure of a worker that holds the unit counts. If the unit was taken back, another worker
   // renders it, and this report is ignored.

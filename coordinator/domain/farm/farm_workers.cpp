@@ -41,7 +41,7 @@ void Farm::State::on(const WorkerJoined& event) {
   worker.quarantined = known != quarantined.end();
   worker.draining = false;
   worker.pause = Pause::none;
-  worker.briefed.clear();
+  worker.briefs = BriefMemory<JobSeq>(std::min(event.brief_bytes, kBriefBytesMost));
   worker.warmed_up.clear();
   workers.connected(worker, true);
   effects.emplace_back(WorkerStateChanged{worker.id, worker.state(),
@@ -80,6 +80,12 @@ void Farm::State::forget(Worker& worker) {
 void Farm::State::lose(Worker& worker, FreedCause why) {
   workers.connected(worker, false);
   worker.lost_at = now;
+  std::set<Job*> lost_by;
+  for (const LeaseSeq seq : worker.leases) lost_by.insert(leases.find(seq)->job);
+  for (Job* job : lost_by) {
+    ++job->losses_in_a_row;
+    job->last_lost = worker.name;
+  }
   // The newest lease goes first: which units may be begun is derived from the worker's earlier leases.
   while (!worker.leases.empty()) free_lease(*worker.leases.rbegin(), why, false);
   for (const auto& [seq, job] : jobs) cut_off_returned(*job);
@@ -97,8 +103,10 @@ void Farm::State::on(const WorkerDrains& event) {
   work_appeared = true;
 }
 
-void Farm::State::note_progress(Worker& worker) {
+void Farm::State::note_progress(Worker& worker, LeaseSeq from) {
   worker.progress_at = now;
+  for (auto seq = worker.leases.lower_bound(from); seq != worker.leases.end(); ++seq)
+    leases.find(*seq)->progress_at = now;
   if (worker.pause == Pause::silent || worker.pause == Pause::stuck) worker.pause = Pause::none;
   touch(worker);
 }
@@ -115,9 +123,9 @@ void Farm::State::on(const LeaseProgress& event) {
     if (lease == nullptr || lease->worker != worker) continue;
     if (entry.units_done > lease->reported) {
       lease->reported = entry.units_done;
-      note_progress(*worker);
+      note_progress(*worker, lease->seq);
     }
-    if (now - worker->progress_at < kNoGrowthLimit) renew(*lease);
+    if (now - lease->progress_at < kNoGrowthLimit) renew(*lease);
   }
 }
 
@@ -128,6 +136,16 @@ void Farm::State::on(const ResultsWait& event) {
   for (const LeaseSeq seq : worker->leases) renew(*leases.find(seq));
 }
 
+void Farm::State::note_fruitless(Worker& worker, const Job& job, const std::string& why) {
+  FruitlessLeases& leases_of_job = worker.fruitless[job.seq];
+  if (leases_of_job.count > 0 && leases_of_job.tick == ticked) return;
+  leases_of_job.tick = ticked;
+  leases_of_job.add(now, why);
+  ++worker.fruitless_in_a_row;
+  if (leases_of_job.count == kFruitlessLeases)
+    effects.emplace_back(WorkerFruitless{worker.id, job.plan.brief.job, why});
+}
+
 void Farm::State::on(const LeaseCameBack& event) {
   Worker* worker = workers.find(event.worker);
   LeaseRecord* lease = leases.find(event.returned.lease);
@@ -136,6 +154,10 @@ void Farm::State::on(const LeaseCameBack& event) {
   const bool recalled = lease->recalled.has_value();
   lease->comes_back = false;
   if (!worker->draining && !recalled) worker->pause = Pause::returned;
+  if (!recalled || event.returned.unknown_job) worker->briefs.doubt(lease->job->seq);
+  if (!worker->draining && !recalled && !event.returned.unknown_job)
+    note_fruitless(*worker, *lease->job,
+                   event.returned.reason.empty() ? "it does not say why" : event.returned.reason);
   std::set<UnitCode> back;
   for (const UnitKey& unit : event.returned.unrendered) back.insert(unit_code(unit.round, unit.tile));
   workers.settle(*worker);
@@ -177,6 +199,7 @@ void Farm::State::expire_leases() {
     Worker& worker = *lease->worker;
     worker.pause = now - worker.progress_at >= kNoGrowthLimit ? Pause::stuck : Pause::silent;
     workers.settle(worker);
+    note_fruitless(worker, *lease->job, "they were not finished in time");
     // The worker is not told to stop: if it recovers and delivers results before other workers do, they are
     // accepted.
     Job& job = *lease->job;

@@ -166,10 +166,11 @@ Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
 }
 
 // Decides whether the worker may take the first lease of a job, and so pin it to its numeric class (machines
-// that compute the same bits). Three preferences decide:
-// 1. Another class than one that had leases of this job and brought no result, if an idle worker has it.
-// 2. A class of which a result was accepted before, if an idle worker has it: anybody can announce a class.
-// 3. A class of several workers, so that they can check each other's results in audits. This one waits for
+// that compute the same bits). Four preferences decide:
+// 1. A worker that has not given back this job's units without a result, if one of another class is there.
+// 2. Another class than one that had leases of this job and brought no result, if an idle worker has it.
+// 3. A class of which a result was accepted before, if an idle worker has it: anybody can announce a class.
+// 4. A class of several workers, so that they can check each other's results in audits. This one waits for
 //    busy workers, too. A class without results so far does not count against one with results.
 bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
   if (job.numeric_class) return *job.numeric_class == worker.numeric_class;
@@ -177,14 +178,16 @@ bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
   const bool known = proven.contains(worker.numeric_class);
   const bool passed = job.passed_over.contains(worker.numeric_class);
   const bool alone = options.audit_rate > 0 && workers.of_class(worker.numeric_class).workers <= 1;
-  if (!passed && !alone && (known || proven.empty())) return true;
+  const bool unable = worker.unable(job.seq);
+  if (!passed && !alone && !unable && (known || proven.empty())) return true;
   std::map<Digest, int> others;
   for (const auto& [index, other] : workers.all()) {
     const Digest& another = other->numeric_class;
     const bool there = other->connected && !other->draining && !other->unhealthy_since &&
                        other->pause != Pause::silent && other->pause != Pause::stuck &&
-                       another != worker.numeric_class;
+                       !other->unable(job.seq) && another != worker.numeric_class;
     if (!there || !fits(job, *other) || other->blocked(job.seq, ticked)) continue;
+    if (unable) return false;
     const bool idle =
         other->available() && other->wants_more() && !other->saturated() && room(job, *other) > 0;
     const bool other_passed = job.passed_over.contains(another), other_known = proven.contains(another);

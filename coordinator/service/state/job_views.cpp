@@ -188,7 +188,7 @@ JobView JobViews::job(const JobEntry& entry) const {
     if (!is_terminal(v.state)) v.class_share = figures->class_share;
     const Eta out = eta(entry, *figures, v);
     v.progress = out.progress;
-    const std::string waits = !entry.finishing && figures->units_leased == 0 ? farm_.why_waiting(job.id) : "";
+    const std::string waits = entry.finishing ? "" : farm_.why_waiting(job.id);
     if (v.error.empty()) v.error = waits;
     if (waits.empty() && (v.state == JobState::running || v.state == JobState::queued)) {
       v.eta_seconds = out.seconds;

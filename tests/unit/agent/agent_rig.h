@@ -23,7 +23,7 @@ class FetchedFiles final : public BlobFiles {
   Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob, const std::atomic<bool>&) override {
     struct File final : BlobFile {
       const std::filesystem::path& path() const override { return file; }
-      std::filesystem::path file = "blob";
+      std::filesystem::path file = "/dev/null";
     };
     const auto ok =
         link_.fetch_blob({blob.digest}, [](std::span<const std::byte>) { return Result<void>{}; });

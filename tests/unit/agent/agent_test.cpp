@@ -1,6 +1,7 @@
 // The agent with real threads, the fake renderer and a scripted coordinator.
 #include "worker/agent/agent.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -259,6 +260,54 @@ TEST_F(AgentTest, ReturnsALeaseOfAJobThatItWasNotToldAbout) {
   coordinator_.wait_for(
       [](auto& c) { return c.returned.size() == 1 && c.returned[0].unrendered.size() == 2; });
   EXPECT_TRUE(drain());
+}
+
+std::size_t briefs_size() { return memory_of(*assign("l", "j-000", {0}).brief); }
+
+// The coordinator's side: leases of many jobs in turn, with a brief only if the worker does not remember it.
+TEST_F(AgentTest, RemembersTheJobsThatTheCoordinatorTakesToBeKnown) {
+  constexpr int kJobs = 200, kLeases = 600;
+  start();
+  coordinator_.wait_for([](auto& c) { return c.hellos.size() == 1; });
+  BriefMemory<std::string> known(coordinator_.hellos[0].brief_bytes);
+  int briefs = 0;
+
+  for (int i = 0; i < kLeases; ++i) {
+    const std::string job = fmt::format("j-{}", i % kJobs);
+    AssignLease a = assign(fmt::format("l-{}", i).c_str(), job.c_str(), {static_cast<TileIndex>(i / kJobs)});
+    const auto bytes = known.has(job) ? std::nullopt : std::optional(memory_of(*a.brief));
+    if (!bytes) a.brief.reset();
+    briefs += bytes.has_value();
+    known.leased(job, bytes);
+    coordinator_.tell(a);
+  }
+
+  coordinator_.wait_for([](auto& c) { return c.results.size() + c.returned.size() == kLeases; });
+  EXPECT_TRUE(drain());
+  EXPECT_EQ(briefs, kJobs) << "the memory is large enough for all of them";
+  EXPECT_EQ(coordinator_.results.size(), kLeases);
+}
+
+TEST_F(AgentTest, ForgetsTheJobsWhoseBriefsDoNotFitIntoItsMemoryAndSaysSo) {
+  AgentOptions options;
+  options.brief_bytes = 2 * briefs_size();
+  start(options);
+  for (const char* job : {"j-001", "j-002", "j-003"}) {
+    coordinator_.tell(assign(job, job, {0}));
+    coordinator_.wait_for(
+        [&](auto& c) { return !c.results.empty() && c.results.back().unit.job.value == job; });
+  }
+
+  for (const char* job : {"j-003", "j-002", "j-001"}) {
+    AssignLease again = assign(job, job, {1});
+    again.brief.reset();
+    coordinator_.tell(again);
+  }
+
+  coordinator_.wait_for([](auto& c) { return c.results.size() == 5 && c.returned.size() == 1; });
+  EXPECT_TRUE(drain());
+  EXPECT_EQ(coordinator_.returned[0].lease, LeaseId{"j-001"});
+  EXPECT_TRUE(coordinator_.returned[0].unknown_job);
 }
 
 TEST_F(AgentTest, NamesItsLeasesOnceASecondWhileItWorks) {

@@ -2,7 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
 #include <new>
+#include <semaphore>
 #include <thread>
 
 #include "tests/unit/agent/agent_rig.h"
@@ -210,6 +215,136 @@ TEST_F(AgentInTrouble, EndsWithABrokenBackendsErrorAfterGivingUnitsBackUnharmed)
   std::size_t returned = 0;
   for (const LeaseReturned& r : coordinator_.returned) returned += r.unrendered.size();
   EXPECT_EQ(returned, 9U);
+}
+
+TEST_F(AgentInTrouble, GivesUnitsBackWhoseFilesNeverArriveWholeAndSaysWhy) {
+  start();
+  coordinator_.fail_fetches_with(Error{Errc::unavailable, "the line was cut"});
+  coordinator_.tell(assign("l-1", "j-1", {0, 1}));
+
+  coordinator_.wait_for(
+      [](auto& c) { return c.returned.size() == 1; },
+      [&] {
+        pass(std::chrono::milliseconds(500));
+        coordinator_.tell(ResultAck{{JobId{"j-0"}, 0, 0}, {}});  // makes the loader look again
+      });
+
+  EXPECT_TRUE(drain());
+  EXPECT_EQ(coordinator_.returned[0].unrendered.size(), 2U);
+  EXPECT_THAT(coordinator_.returned[0].reason, HasSubstr("the line was cut"));
+}
+
+// Hands out files that can be removed, as somebody who cleans up a cache does.
+class RemovableFiles final : public BlobFiles {
+ public:
+  explicit RemovableFiles(std::filesystem::path path) : path_(std::move(path)) {}
+  Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef&) override {
+    std::ofstream(path_) << "scene";
+    ++acquired;
+    struct File final : BlobFile {
+      const std::filesystem::path& path() const override { return file; }
+      std::filesystem::path file;
+    };
+    auto file = std::make_shared<File>();
+    file->file = path_;
+    return std::shared_ptr<const BlobFile>(std::move(file));
+  }
+  std::vector<Digest> held(std::size_t) const override { return {}; }
+
+  std::atomic<int> acquired = 0;
+
+ private:
+  const std::filesystem::path path_;
+};
+
+// A backend that needs the scene's file for each unit, as a new render child does.
+class NeedsItsFile final : public RenderBackend {
+ public:
+  Digest numeric_class() const override { return fake_->numeric_class(); }
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override { return fake_->prepare(job); }
+  tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
+                                                 const std::atomic<bool>& stop) override {
+    if (!std::filesystem::exists(job.scene)) return unit_failure("cannot open the scene");
+    return fake_->render(job, unit, stop);
+  }
+  void forget(const JobId& job) override { fake_->forget(job); }
+  std::uint64_t rss_bytes() const override { return 0; }
+
+ private:
+  std::unique_ptr<LocalBackend> fake_ = make_fake_backend({});
+};
+
+TEST_F(AgentInTrouble, FetchesFilesAgainThatWereRemovedUnderARendererAndBlamesNobody) {
+  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "removed-scene";
+  RemovableFiles files(path);
+  NeedsItsFile backend;
+  Agent agent({}, coordinator_, backend, files, clock_);
+  std::jthread runner([&] { ended_ = agent.run(); });
+  coordinator_.wait_for([](auto& c) { return c.hellos.size() == 1; });
+  coordinator_.tell(assign("l-1", "j-1", {0}));
+  coordinator_.wait_for([](auto& c) { return c.results.size() == 1; });
+
+  std::filesystem::remove(path);
+  coordinator_.tell(assign("l-2", "j-1", {1}));
+  coordinator_.wait_for([](auto& c) { return c.returned.size() == 1; });
+  coordinator_.tell(assign("l-3", "j-1", {1}));
+  coordinator_.wait_for([](auto& c) { return c.results.size() == 2; });
+
+  agent.drain();
+  runner.join();
+  std::filesystem::remove(path);
+  EXPECT_TRUE(coordinator_.failures.empty());
+  EXPECT_THAT(coordinator_.returned[0].reason, HasSubstr("removed from the cache"));
+  EXPECT_EQ(files.acquired, 2);
+}
+
+// Renders a unit only when the test lets it.
+class StepByStep final : public RenderBackend {
+ public:
+  Digest numeric_class() const override { return fake_->numeric_class(); }
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override { return fake_->prepare(job); }
+  tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
+                                                 const std::atomic<bool>& stop) override {
+    allowed_.acquire();
+    return fake_->render(job, unit, stop);
+  }
+  void forget(const JobId& job) override { fake_->forget(job); }
+  std::uint64_t rss_bytes() const override { return 0; }
+  void shutdown() override { allow(1000); }
+  void allow(int units) { allowed_.release(units); }
+
+ private:
+  std::unique_ptr<LocalBackend> fake_ = make_fake_backend({});
+  std::counting_semaphore<> allowed_{0};
+};
+
+// Two jobs keep the worker busy without end, and two worlds are all that it keeps in memory.
+TEST_F(AgentInTrouble, AJobWhoseWorldHasNoRoomGetsItsTurnThoughOtherJobsNeverRunOut) {
+  auto backend = std::make_unique<StepByStep>();
+  StepByStep& steps = *backend;
+  start_with(std::move(backend));
+  TileIndex next = 0;
+  const auto feed = [&] {
+    for (const char* job : {"j-a", "j-b"})
+      coordinator_.tell(assign(fmt::format("l-{}-{}", job, next).c_str(), job, {next % 64}));
+    ++next;
+  };
+  feed();
+  coordinator_.tell(assign("l-c", "j-c", {0}));
+  for (int i = 0; i < 3; ++i) feed();
+
+  coordinator_.wait_for(
+      [](auto& c) {
+        return std::any_of(c.results.begin(), c.results.end(),
+                           [](const UnitResult& r) { return r.unit.job == JobId{"j-c"}; });
+      },
+      [&] {
+        pass(std::chrono::seconds(1));
+        const std::size_t before = coordinator_.results_so_far();
+        feed();
+        steps.allow(2);
+        coordinator_.wait_for([&](auto& c) { return c.results.size() >= before + 2; }, [&] { pass({}); });
+      });
 }
 
 TEST(Backoff, DoublesUpToItsLimitWithinItsJitterAndStartsAgain) {

@@ -64,6 +64,10 @@ class ScriptedCoordinator final : public CoordinatorLink {
       changed_.wait_for(lock, std::chrono::milliseconds(2), [&] { return condition(*this); });
     }
   }
+  std::size_t results_so_far() {
+    const std::lock_guard lock(mutex_);
+    return results.size();
+  }
   std::vector<WorkerHello> hellos;  // guarded by the mutex: read them in wait_for or after the agent's end
   std::vector<UnitResult> results;
   std::vector<UnitFailure> failures;

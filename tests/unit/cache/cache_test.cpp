@@ -182,6 +182,30 @@ TEST_F(Cache, RemovesNothingButItsOwnFiles) {
   EXPECT_EQ(cache->held(10).size(), 1U);
 }
 
+TEST_F(Cache, MakesItsFolderAgainAfterSomebodyHasRemovedOrEmptiedIt) {
+  const BlobRef first = source_.add("the first"), second = source_.add("the second");
+  const auto cache = open();
+  EXPECT_TRUE(cache->acquire(first));
+
+  fs::remove_all(folder_);
+
+  EXPECT_EQ(content(cache->acquire(first).value()->path()), "the first");
+  EXPECT_EQ(content(cache->acquire(second).value()->path()), "the second");
+  EXPECT_TRUE(fs::exists(folder_ / "CACHEDIR.TAG"));
+}
+
+TEST_F(Cache, WorksAgainOnceItsFolderCanBeWrittenAgain) {
+  const BlobRef blob = source_.add("the steam");
+  const auto cache = open();
+  fs::remove_all(folder_);
+  std::ofstream(folder_) << "a file is in the way";
+  EXPECT_EQ(cache->acquire(blob).error().code, Errc::internal);
+
+  fs::remove(folder_);
+
+  EXPECT_EQ(content(cache->acquire(blob).value()->path()), "the steam");
+}
+
 TEST_F(Cache, MarksItsFolderForBackups) {
   open();
 

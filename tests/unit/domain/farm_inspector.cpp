@@ -133,8 +133,8 @@ std::vector<std::pair<std::string, std::size_t>> sizes(const Farm& farm) {
   const State& s = FarmInspector::state(farm);
   std::size_t of_workers = 0, of_jobs = 0, units = 0;
   for (const auto& [index, w] : s.workers.all())
-    of_workers += w->tags.size() + w->blobs.size() + w->leases.size() + w->briefed.size() +
-                  w->warmed_up.size() + w->failures.size();
+    of_workers += w->tags.size() + w->blobs.size() + w->leases.size() + w->briefs.size() +
+                  w->warmed_up.size() + w->failures.size() + w->fruitless.size();
   for (const auto& [seq, job] : s.jobs) {
     of_jobs += job->out.size() + job->audits.size() + job->marks.size() + job->queue.returned_count() +
                job->load.leases_at.size();

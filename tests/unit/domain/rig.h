@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "common/protocol/briefs.h"
 #include "coordinator/domain/farm/farm.h"
 #include "coordinator/domain/limits.h"
 #include "tests/unit/domain/farm_inspector.h"
@@ -84,7 +85,8 @@ class Rig {
   // The upper end of the interval that each check of the denoised layers' error finds, immediately. Empty:
   // the test sends the results of checks itself
   std::function<double(const CheckDenoised&)> denoised;
-  double cpu_seconds = 0.01;  // reported for each unit
+  double cpu_seconds = 0.01;                // reported for each unit
+  std::uint64_t brief_bytes = kBriefBytes;  // memory for briefs of the workers that join
   // Seconds that the thread waited, reported for each unit
   double wait_seconds = 0;
   // Who answers for a worker, by its name (WorkerJoined::principal)
@@ -128,7 +130,8 @@ class Rig {
                              std::move(blobs),
                              true,
                              {},
-                             principals[name]});
+                             principals[name],
+                             brief_bytes});
   }
   std::vector<Effect> join_another_version(const std::string& name, int threads,
                                            std::uint64_t numeric_class) {
@@ -161,6 +164,17 @@ class Rig {
   std::vector<Effect> fail(const std::string& name, bool scene_at_fault = false) {
     const Held unit = take(name);
     return send(UnitFailed{{name}, {unit.key(), unit.lease, scene_at_fault, "crashed", 11, {{3, 4}}, 5}});
+  }
+  // The worker gives all units back that it holds.
+  std::vector<Effect> give_back(const std::string& name, const std::string& why) {
+    std::map<LeaseId, std::vector<UnitKey>> back;
+    for (const Held& unit : held[{name}]) back[unit.lease].push_back(unit.key());
+    held[{name}].clear();
+    std::vector<Effect> all;
+    for (const auto& [lease, units] : back)
+      for (Effect& effect : send(LeaseCameBack{{name}, {lease, units, why}}))
+        all.push_back(std::move(effect));
+    return all;
   }
   Held take(const std::string& name) {
     auto& units = held[{name}];

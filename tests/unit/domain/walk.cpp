@@ -1,5 +1,6 @@
 #include "tests/unit/domain/walk.h"
 
+#include <algorithm>
 #include <array>
 
 namespace ls::coordinator {
@@ -30,6 +31,92 @@ std::string Walk::run(int events) {
   for (int i = 0; i < events && wrong_.empty(); ++i) step();
   calm_down();
   return wrong_;
+}
+
+std::string Walk::run_into_foul_weather(int events) {
+  unlimited_ = true;
+  limits_ = {};
+  farm_ = Farm(options());
+  for (int i = 0; i < events && wrong_.empty(); ++i) step();
+  std::vector<std::pair<std::string, Habit>> habits;
+  for (int i = 0; i < 5; ++i) {
+    const std::string name = "w" + std::to_string(i);
+    workers_[name].crashes = workers_[name].stalled = workers_[name].gives_back = false;
+    habits.emplace_back(name, static_cast<Habit>(pick(5)));
+    if (!workers_[name].connected) join(name);
+  }
+  for (const auto& [id, job] : jobs_) send(JobResumed{id});
+  // Long enough for workers to be found stuck, and for audits without a third worker to be given up
+  constexpr Duration kStep = 5s, kLong = 4 * kNoGrowthLimit, kWatched = 20 * kStep;
+  for (Duration passed{}; passed < kLong && wrong_.empty(); passed += kStep) {
+    now_ += kStep;
+    for (auto& [name, habit] : habits) keep_to(habit, name);
+    settle_results();
+    send(Tick{});
+    if (passed < kLong - kWatched) continue;
+    // A job that waits for its turn behind one that says why it stands still need not say so.
+    if (std::any_of(jobs_.begin(), jobs_.end(),
+                    [&](const auto& job) { return !farm_.why_waiting(job.first).empty(); }))
+      continue;
+    for (const auto& [id, job] : jobs_) {
+      const JobState state = farm_.job(id)->state;
+      const bool waits = state == JobState::queued || state == JobState::running;
+      if (!waits) continue;
+      const JobFigures f = farm_.job(id).value();
+      std::string workers;
+      for (const auto& [name, habit] : habits)
+        workers += "; " + name + " " + std::to_string(static_cast<int>(habit)) + " holds " +
+                   std::to_string(workers_[name].held.size());
+      blame("job " + id.value + " neither ends nor says why it waits: done " + std::to_string(f.units_done) +
+            ", leased " + std::to_string(f.units_leased) + ", queued " + std::to_string(f.units_queued) +
+            ", folded " + std::to_string(f.units_folded) + ", audits " +
+            std::to_string(farm_.open_audits(id).size()) + ", after " + std::to_string(seconds(passed)) +
+            " s" + workers);
+    }
+  }
+  return wrong_;
+}
+
+void Walk::keep_to(Habit habit, std::string& name) {
+  switch (habit) {
+    case Habit::renders:
+      for (int i = 0; i < 200 && !workers_[name].held.empty(); ++i) render(name);
+      return;
+    case Habit::gives_back:
+      return give_back(name);
+    case Habit::only_reports: {
+      LeaseProgress progress{{name}, {}};
+      for (const auto& h : workers_[name].held) progress.leases.push_back({h.lease, 0});
+      return send(progress);
+    }
+    case Habit::silent:
+      return;
+    case Habit::vanishes:
+      send(WorkerLost{{name}, workers_[name].epoch});
+      workers_.erase(name);
+      name = "r" + std::to_string(++replaced_) + name.substr(name.size() - 2);
+      return join(name);
+  }
+}
+
+void Walk::give_back(const std::string& name) {
+  std::map<LeaseId, std::vector<UnitKey>> back;
+  for (const auto& h : workers_[name].held) back[h.lease].push_back(h.key());
+  workers_[name].held.clear();
+  for (const auto& [lease, units] : back) send(LeaseCameBack{{name}, {lease, units, "its disk is full"}});
+}
+
+void Walk::settle_results() {
+  while (!on_the_way_.empty() && wrong_.empty()) {
+    const UnitAccepted result = on_the_way_.front();
+    on_the_way_.pop_front();
+    send(result);
+  }
+  while (!unfolded_.empty() && wrong_.empty()) {
+    const UnitFolded folded = unfolded_.front();
+    unfolded_.pop_front();
+    fold(folded);
+  }
 }
 
 void Walk::send(const Event& event) {
@@ -128,13 +215,13 @@ void Walk::submit() {
   if (chance(10)) job.plan.tags = {"even"};
   job.plan.priority = static_cast<int>(pick(3));
   job.plan.owner = std::array{"", "ann", "bob"}[pick(3)];
-  if (chance(20)) job.plan.max_workers = 1 + static_cast<std::uint32_t>(pick(3));
-  if (chance(20)) job.plan.max_units = 1 + static_cast<std::uint32_t>(pick(6));
+  if (chance(20) && !unlimited_) job.plan.max_workers = 1 + static_cast<std::uint32_t>(pick(3));
+  if (chance(20) && !unlimited_) job.plan.max_units = 1 + static_cast<std::uint32_t>(pick(6));
   if (chance(30)) {  // frames have the owner and the limits of their sequence
     job.plan.group = "film";
     job.plan.owner = "ann";
-    job.plan.max_workers = 2;
-    job.plan.max_units = 5;
+    if (!unlimited_) job.plan.max_workers = 2;
+    if (!unlimited_) job.plan.max_units = 5;
   }
   if (chance(20)) job.plan.memory_bytes = 8;
   job.film.resize(job.plan.grid.count());
@@ -173,18 +260,16 @@ void Walk::worker_acts() {
   if (what < 10) worker.crashes = chance(20);
   if (what < 12) {
     send(WorkerDrains{{name}});
-    std::map<LeaseId, std::vector<UnitKey>> back;
-    for (const auto& h : worker.held) back[h.lease].push_back(h.key());
-    worker.held.clear();
-    for (const auto& [lease, units] : back) send(LeaseCameBack{{name}, {lease, units}});
-    return;
+    return give_back(name);
   }
+  if (what < 13) worker.gives_back = !worker.gives_back;
   if (what < 25) {
     LeaseProgress progress{{name}, {}};
     for (const auto& h : worker.held)
       progress.leases.push_back({h.lease, static_cast<std::uint32_t>(pick(3))});
     return send(progress);
   }
+  if (worker.gives_back) return give_back(name);
   if (!worker.stalled) render(name);
 }
 
@@ -266,7 +351,7 @@ bool Walk::all_ended() const {
 }
 
 void Walk::calm_down() {
-  for (auto& [name, worker] : workers_) worker.crashes = worker.stalled = false;
+  for (auto& [name, worker] : workers_) worker.crashes = worker.stalled = worker.gives_back = false;
   for (const auto& [id, job] : jobs_) send(JobResumed{id});
   now_ += kForgiveAfter;
   for (int i = 0; i < 5; ++i) join("w" + std::to_string(i));
@@ -285,6 +370,7 @@ void Walk::calm_down() {
       unfolded_.pop_front();
       fold(folded);
     }
+    settle_results();
     if (turn % 50 == 0) send(Tick{});
   }
   for (const auto& [id, job] : jobs_) {

@@ -1,8 +1,9 @@
-// A simulated farm for random walks: workers that crash, stall, fail, duplicate, reorder, drain, reconnect
-// and bring results late, in some histories one that renders wrong pixels; an assembler that folds later;
-// users with limits who pause, extend, stop, cancel and change priorities; a coordinator that restarts. After
-// every event the farm checks its invariants (farm_inspector.h), and the walk compares its own records with
-// those of the farm. At its end a job's film must be the one that honest workers alone would have made.
+// A simulated farm for random walks: workers that crash, stall, fail, duplicate, reorder, drain, reconnect,
+// give all units back, vanish, and bring results late, in some histories one that renders wrong pixels; an
+// assembler that folds later; users with limits who pause, extend, stop, cancel and change priorities; a
+// coordinator that restarts. After every event the farm checks its invariants (farm_inspector.h), and the
+// walk compares its own records with those of the farm. At its end a job's film must be the one that honest
+// workers alone would have made.
 #pragma once
 
 #include <deque>
@@ -22,11 +23,16 @@ class Walk {
   // Makes this many random events, then only helpful ones until every job has ended. Returns the first
   // problem; empty: there was none.
   std::string run(int events);
+  // The same, but then each worker keeps to one habit for good: it renders, gives everything back, only
+  // reports, is silent, or vanishes and is replaced again and again. Every job must end, or say why it waits,
+  // or wait behind one that says so.
+  std::string run_into_foul_weather(int events);
 
  private:
+  enum class Habit { renders, gives_back, only_reports, silent, vanishes };
   struct FakeWorker {
     std::uint64_t epoch = 0;
-    bool connected = false, stalled = false, crashes = false;
+    bool connected = false, stalled = false, crashes = false, gives_back = false;
     int threads = 1;
     std::uint64_t numeric_class = 1;
     std::deque<Rig::Held> held;
@@ -75,6 +81,9 @@ class Walk {
   void answer_recall();  // a worker gives back what it has not begun of a lease that was recalled
   void restart();
   void calm_down();
+  void give_back(const std::string& name);
+  void keep_to(Habit habit, std::string& name);
+  void settle_results();  // all results and folds that are on their way arrive
   bool all_ended() const;
   static double error_sum(const StoredJob& job, TileIndex tile, RoundIndex round);
 
@@ -85,7 +94,10 @@ class Walk {
   std::set<JobId> ended_before_;
   ShareLimits limits_;
   double audit_rate_ = 0;
-  int restarts_ = 0, submitted_ = 0;
+  int restarts_ = 0, submitted_ = 0, replaced_ = 0;
+  // True in histories that end in foul weather: no limits, since a job that waits for another one of its user
+  // need not say so
+  bool unlimited_ = false;
   Farm farm_;
   TimePoint now_{};
   std::map<std::string, FakeWorker> workers_;

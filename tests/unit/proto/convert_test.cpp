@@ -52,7 +52,8 @@ const std::vector<FromWorker> kFromWorker = {
                 "token",
                 WorkerId{"w-9"},
                 true,
-                "armv8-a:gcc-14.2.0"},
+                "armv8-a:gcc-14.2.0",
+                4 << 20},
     WorkerProgress{{{LeaseId{"l-1"}, 3}}, "rendering", 1.5, 77, 0.25},
     UnitResult{{JobId{"j"}, 1, 2},
                LeaseId{"l"},
@@ -69,7 +70,8 @@ const std::vector<FromWorker> kFromWorker = {
                {.5, 1.5, .25, .125, .0625}},
     UnitFailure{{JobId{"j"}, 1, 2}, LeaseId{"l"}, true, "why", 11, std::pair{3, 4}, 99},
     UnitFailure{{JobId{"j"}, 1, 2}, LeaseId{"l"}, false, "why", {}, {}, {}},
-    LeaseReturned{LeaseId{"l"}, {{JobId{"j"}, 5, 6}}},
+    LeaseReturned{LeaseId{"l"}, {{JobId{"j"}, 5, 6}}, "its disk is full"},
+    LeaseReturned{LeaseId{"l"}, {{JobId{"j"}, 5, 6}}, "", true},
     WorkerDraining{},
 };
 
