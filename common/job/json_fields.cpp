@@ -6,7 +6,7 @@
 #include <set>
 
 #include "common/base/parse_number.h"
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/job/limits.h"
 
 namespace ls::job {

@@ -161,8 +161,8 @@ struct WorkerDraining {
   bool operator==(const WorkerDraining&) const = default;
 };
 // The worker returns units of a lease that it has not rendered and will not render, because it takes no more
-  // work (WorkerDraining), does not know their job, cannot load it on this machine, or because the coordinator
-  // recalled the lease.
+// work (WorkerDraining), does not know their job, cannot load it on this machine, or because the coordinator
+// recalled the lease.
 struct LeaseReturned {
   LeaseId lease;
   std::vector<UnitKey> unrendered;

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "common/base/file_form.h"
-#include "common/base/name_forms.h"
-#include "common/base/suggest.h"
+#include "common/base/text/name_forms.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/limits.h"
 
 namespace ls {

@@ -12,7 +12,7 @@
 #include <set>
 
 #include "common/base/file_form.h"
-#include "common/base/name_forms.h"
+#include "common/base/text/name_forms.h"
 #include "common/job/health_notes.h"
 #include "common/job/limits.h"
 #include "common/protocol/limits.h"

@@ -45,7 +45,7 @@ Result<void> run(const std::filesystem::path& program, const ExrLimits& limits, 
     return broken(Errc::invalid_argument, fmt::format("it takes more than {} s", kSeconds));
   return broken(Errc::invalid_argument,
                 WIFSIGNALED(status) ? fmt::format("its decoder crashed ({})", ::strsignal(WTERMSIG(status)))
-                                     : fmt::format("its decoder ended with {}", WEXITSTATUS(status)));
+                                    : fmt::format("its decoder ended with {}", WEXITSTATUS(status)));
 }
 
 // Takes the result out of the shared memory. The program may have been taken over by the file, so nothing

@@ -170,10 +170,9 @@ struct WorkerForgotten {
   WorkerId worker;
 };
 
-using Effect =
-    std::variant<Send, UnitsFreed, RecordUnit, Fold, DropDuplicate, DropUnwanted, DigestMismatch, JobPinned,
-                 JobUnpinned, JobStateChanged, Checkpoint, CheckDenoised, ReopenRound, JobFinished, JobFailed,
-                 WorkerStateChanged, WorkerBlocked, WorkerFruitless, WorkerFoundFaulty, TileDiscarded,
-                 WorkerForgotten>;
+using Effect = std::variant<Send, UnitsFreed, RecordUnit, Fold, DropDuplicate, DropUnwanted, DigestMismatch,
+                            JobPinned, JobUnpinned, JobStateChanged, Checkpoint, CheckDenoised, ReopenRound,
+                            JobFinished, JobFailed, WorkerStateChanged, WorkerBlocked, WorkerFruitless,
+                            WorkerFoundFaulty, TileDiscarded, WorkerForgotten>;
 
 }  // namespace ls::coordinator

@@ -170,9 +170,7 @@ struct Agent::Impl {
   // Each of these ends an attempt to load the job that has failed. If the loader was told to stop, or the job
   // was replaced by another one with its id, they do nothing besides.
   void loading_failed(const JobBrief& brief, UnitFailure failure);
-  void postpone(const JobBrief& brief, const Error& why);
-  void hold_off(const JobBrief& brief, const std::string& trouble);
-  void give_back(const JobId& id, Job& job, const std::string& trouble);  // call with the mutex held
+  void hold_off(const JobBrief& brief, std::string trouble, bool transfer_cut = false);
   // Ends an attempt to load the job, and returns the job, which is idle then; null: it was replaced. Call
   // with the mutex held.
   Job* end_loading(const JobBrief& brief);

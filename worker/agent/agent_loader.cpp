@@ -159,7 +159,7 @@ void Agent::Impl::load(const JobBrief& brief) {
              {{"lightshaft.blob", blob.digest.hex()},
               {"lightshaft.bytes", static_cast<std::int64_t>(blob.bytes)}},
              !file);
-    if (!file && file.error().code == Errc::unavailable) return postpone(brief, file.error());
+    if (!file && file.error().code == Errc::unavailable) return hold_off(brief, file.error().message, true);
     if (!file && of_this_machine(file.error()))
       return hold_off(brief, fmt::format("cannot get '{}': {}", blob.name, file.error().message));
     if (!file || stop_loading)
@@ -230,32 +230,26 @@ void Agent::Impl::loading_failed(const JobBrief& brief, UnitFailure failure) {
   inbox->nudge();
 }
 
-void Agent::Impl::postpone(const JobBrief& brief, const Error& why) {
+// Returns the job's units to the coordinator, so that other workers can render them. If units of the job are
+// assigned to this worker again, they wait until the next attempt to load the job. If only a transfer was
+// cut, the worker keeps the units and soon tries again, unless too many were cut in a row.
+void Agent::Impl::hold_off(const JobBrief& brief, std::string trouble, bool transfer_cut) {
+  const JobId& id = brief.job;
   const std::lock_guard lock(mutex);
   Job* const job = end_loading(brief);
   if (!job || stop_loading) return;
-  // While the stream is down, no transfer can succeed, and the coordinator takes the units back anyway
-  if (connection == Connection::up && ++job->transfers_cut >= kTransfersCut) {
+  if (transfer_cut) {
+    // While the stream is down, no transfer can succeed, and the coordinator takes the units back anyway
+    if (connection != Connection::up || ++job->transfers_cut < kTransfersCut) {
+      job->retry_at = clock.now() + kTransferRetry;
+      return log_warn(fmt::format("job={}", id.value), "a transfer was cut, trying again: " + trouble);
+    }
     job->transfers_cut = 0;
-    return give_back(brief.job, *job,
-                     fmt::format("{} transfers of its files were cut; the last: {}", kTransfersCut, why.message));
+    trouble = fmt::format("{} transfers of its files were cut; the last: {}", kTransfersCut, trouble);
   }
-  job->retry_at = clock.now() + kTransferRetry;
-  log_warn(fmt::format("job={}", brief.job.value), "a transfer was cut, trying again: " + why.message);
-}
-
-void Agent::Impl::hold_off(const JobBrief& brief, const std::string& trouble) {
-  const std::lock_guard lock(mutex);
-  Job* const job = end_loading(brief);
-  if (job && !stop_loading) give_back(brief.job, *job, trouble);
-}
-
-// Returns the job's units to the coordinator, so that other workers can render them. If units of the job are
-// assigned to this worker again, they wait until the next attempt to load the job.
-void Agent::Impl::give_back(const JobId& id, Job& job, const std::string& trouble) {
   const Duration pause = trouble_backoff.next();
-  job.retry_at = clock.now() + pause;
-  job.trouble = trouble;
+  job->retry_at = clock.now() + pause;
+  job->trouble = trouble;
   log_warn(fmt::format("job={}", id.value),
            fmt::format("{}; giving its units back, trying again in {:.1f} s", trouble, seconds(pause)));
   for (LeaseReturned& returned : table.return_waiting(id, trouble)) outgoing.push_back(std::move(returned));

@@ -82,7 +82,8 @@ class HeldLeases {
   void enqueue(Entry& entry);
   void leave(const LeaseId& lease, bool done);
   void drop_if(const std::function<bool(const Held&)>& goes);
-  std::vector<LeaseReturned> return_if(const std::string& reason, const std::function<bool(const Held&)>& goes);
+  std::vector<LeaseReturned> return_if(const std::string& reason,
+                                       const std::function<bool(const Held&)>& goes);
 
   std::map<UnitKey, Entry> units_;
   // The waiting units by Entry::order, that is, in the order in which they will be rendered.

@@ -8,7 +8,7 @@
 
 #include "common/base/parse_number.h"
 #include "common/base/safe_text.h"
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/file_names.h"
 #include "common/scene/gltf/support_table.h"
 #include "common/scene/gltf/translation.h"

@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "common/base/safe_text.h"
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/gltf/support_table.h"
 #include "common/scene/gltf/translation.h"
 

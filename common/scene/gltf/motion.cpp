@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/gltf/translation.h"
 #include "common/scene/limits.h"
 #include "common/scene/xml/transform_element.h"

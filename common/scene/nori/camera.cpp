@@ -1,7 +1,7 @@
 // Translates Nori's camera with its filter and sampler, and Nori's integrators.
 #include <fmt/format.h>
 
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/image/frame/render_limits.h"
 #include "common/scene/nori/object.h"
 #include "common/scene/schema/integrators.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/limits.h"
 #include "common/scene/xml/transform_element.h"
 #include "common/scene/xml/values.h"

@@ -11,7 +11,7 @@
 #include "common/base/file_form.h"
 #include "common/base/frame_range.h"
 #include "common/base/parse_number.h"
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/file_names.h"
 #include "common/scene/limits.h"
 #include "common/scene/pbrt/object_translation.h"

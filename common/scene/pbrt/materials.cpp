@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/pbrt/object_translation.h"
 
 namespace ls::scene::pbrt {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/limits.h"
 #include "common/scene/pbrt/media_parts.h"
 #include "common/scene/xml/transform_element.h"

@@ -9,7 +9,7 @@
 
 #include "common/base/check.h"
 #include "common/base/parse_number.h"
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/limits.h"
 
 namespace ls::scene::pbrt {

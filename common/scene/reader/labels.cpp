@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/reader/reader.h"
 #include "common/scene/schema/integrators.h"
 #include "common/scene/xml/transform_element.h"

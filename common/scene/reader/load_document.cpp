@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "common/base/frame_range.h"
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/limits.h"
 #include "common/scene/nori/translate.h"
 #include "common/scene/reader/upgrade.h"

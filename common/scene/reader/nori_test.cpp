@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/nori/object.h"
 #include "common/scene/nori/translate.h"
 #include "common/scene/reader/reader.h"

@@ -5,7 +5,7 @@
 #include <map>
 #include <utility>
 
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/reader/reader.h"
 #include "common/scene/reader/unsupported.h"
 #include "common/scene/schema/materials.h"

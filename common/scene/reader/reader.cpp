@@ -6,7 +6,7 @@
 
 #include "common/base/file_form.h"
 #include "common/base/frame_range.h"
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/analysis/shape_place.h"
 #include "common/scene/file_names.h"
 #include "common/scene/gltf/asset.h"

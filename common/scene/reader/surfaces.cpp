@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 #include "common/scene/limits.h"
 #include "common/scene/reader/reader.h"
 #include "common/scene/reader/unsupported.h"

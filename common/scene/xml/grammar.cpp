@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 
 namespace ls::scene {
 namespace {

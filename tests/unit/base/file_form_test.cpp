@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
-#include "common/base/name_forms.h"
+#include "common/base/text/name_forms.h"
 
 namespace ls {
 namespace {

@@ -1,4 +1,4 @@
-#include "common/base/name_forms.h"
+#include "common/base/text/name_forms.h"
 
 #include <algorithm>
 #include <system_error>

@@ -1,4 +1,4 @@
-#include "common/base/suggest.h"
+#include "common/base/text/suggest.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
