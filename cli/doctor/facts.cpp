@@ -12,6 +12,7 @@
 #include "cli/farm/farm_api.h"
 #include "cli/output/reply_fields.h"
 #include "common/base/clock.h"
+#include "common/base/machine_memory.h"
 #include "common/base/spawn.h"
 #include "common/denoise/denoiser.h"
 #include "worker/machine.h"

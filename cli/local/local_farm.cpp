@@ -10,6 +10,7 @@
 #include <cstring>
 #include <utility>
 
+#include "common/base/machine_memory.h"
 #include "common/base/parse_number.h"
 #include "common/protocol/limits.h"
 #include "common/sandbox/call_filter.h"
