@@ -238,7 +238,7 @@ TEST_F(AgentInTrouble, GivesUnitsBackWhoseFilesNeverArriveWholeAndSaysWhy) {
 class RemovableFiles final : public BlobFiles {
  public:
   explicit RemovableFiles(std::filesystem::path path) : path_(std::move(path)) {}
-  Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef&) override {
+  Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef&, const std::atomic<bool>&) override {
     std::ofstream(path_) << "scene";
     ++acquired;
     struct File final : BlobFile {
@@ -261,7 +261,9 @@ class RemovableFiles final : public BlobFiles {
 class NeedsItsFile final : public RenderBackend {
  public:
   Digest numeric_class() const override { return fake_->numeric_class(); }
-  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override { return fake_->prepare(job); }
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job, const std::atomic<bool>& stop) override {
+    return fake_->prepare(job, stop);
+  }
   tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
                                                  const std::atomic<bool>& stop) override {
     if (!std::filesystem::exists(job.scene)) return unit_failure("cannot open the scene");
@@ -302,7 +304,9 @@ TEST_F(AgentInTrouble, FetchesFilesAgainThatWereRemovedUnderARendererAndBlamesNo
 class StepByStep final : public RenderBackend {
  public:
   Digest numeric_class() const override { return fake_->numeric_class(); }
-  tl::expected<void, UnitFailure> prepare(const LocalJob& job) override { return fake_->prepare(job); }
+  tl::expected<void, UnitFailure> prepare(const LocalJob& job, const std::atomic<bool>& stop) override {
+    return fake_->prepare(job, stop);
+  }
   tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
                                                  const std::atomic<bool>& stop) override {
     allowed_.acquire();

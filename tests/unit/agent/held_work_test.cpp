@@ -99,7 +99,8 @@ TEST(HeldLeases, ReturnsWhatWaitsAndKeepsWhatRuns) {
   table.add(lease("b", kOther, {2}), nothing_handed_in);
   table.take(any);
 
-  EXPECT_THAT(table.return_waiting(kJob), testing::ElementsAre(LeaseReturned{LeaseId{"a"}, {key(1)}}));
+  EXPECT_THAT(table.return_waiting(kJob, "its disk is full"),
+              testing::ElementsAre(LeaseReturned{LeaseId{"a"}, {key(1)}, "its disk is full"}));
   EXPECT_THAT(table.return_waiting(), testing::ElementsAre(LeaseReturned{LeaseId{"b"}, {{kOther, 2, 0}}}));
   EXPECT_EQ(table.finish(key(0)), LeaseId{"a"});
   EXPECT_EQ(table.lease_count(), 0U);
