@@ -235,7 +235,7 @@ Result<void> JobCommands::become(Core& core, const Entries& jobs, JobState asked
     job.state = begins ? JobState::queued : asked;
     job.missing_blobs.clear();  // a pause by the user does not end when the job's files are there
   };
-  if (auto put = edit_all(changed, edit); !put) return put;
+  if (auto put = edit_all(core, changed, edit); !put) return put;
   core.records.put_together([&] {
     for (const EntryPtr& job : changed) {
       const JobId& id = job->stored.id;
@@ -256,16 +256,19 @@ Result<void> JobCommands::become(Core& core, const Entries& jobs, JobState asked
 // Applies edit() to the records of all these jobs, and stores them in one transaction. If that fails, no
 // record is changed, neither in the store nor in memory.
 template <class Edit>
-Result<void> JobCommands::edit_all(const Entries& jobs, Edit edit) const {
+Result<void> JobCommands::edit_all(Core& core, const Entries& jobs, Edit edit) const {
   std::vector<StoredJob> edited;
   for (const EntryPtr& job : jobs) edit(edited.emplace_back(job->stored));
-  if (auto put = store_.put_jobs(edited); !put) return put;
+  const auto put = store_.put_jobs(edited);
+  core.records.note(put);
+  if (!put) return put;
   for (const EntryPtr& job : jobs) edit(job->stored);
   return {};
 }
 
 Result<void> JobCommands::set_priority(Core& core, const Entries& jobs, int priority) const {
-  if (auto put = edit_all(jobs, [&](StoredJob& job) { job.spec.priority = priority; }); !put) return put;
+  if (auto put = edit_all(core, jobs, [&](StoredJob& job) { job.spec.priority = priority; }); !put)
+    return put;
   for (const EntryPtr& job : jobs)
     if (!job->unloaded) core.driver.run(JobPriority{job->stored.id, priority});
   return {};
@@ -273,7 +276,7 @@ Result<void> JobCommands::set_priority(Core& core, const Entries& jobs, int prio
 
 Result<void> JobCommands::set_focus(Core& core, const Entries& jobs,
                                     const std::optional<PixelRect>& focus) const {
-  if (auto put = edit_all(jobs, [&](StoredJob& job) { job.focus = focus; }); !put) return put;
+  if (auto put = edit_all(core, jobs, [&](StoredJob& job) { job.focus = focus; }); !put) return put;
   for (const EntryPtr& job : jobs) {
     if (!job->unloaded) core.driver.run(JobFocused{job->stored.id, focus});
     core.publisher.job(*job);
@@ -327,7 +330,9 @@ Result<void> JobCommands::go_on(Core& core, JobEntry& entry, const Result<JobPla
     next.state = JobState::running;
     next.stopped.reset();
   }
-  if (const auto put = store_.put_job(next); !put) return refuse(put.error());
+  const auto put = store_.put_job(next);
+  core.records.note(put);
+  if (!put) return refuse(put.error());
   entry.stored = std::move(next);
   if (entry.finishing != 0 || state == JobState::done)
     entry.clock_zero = clock_.now() - from_seconds(entry.stored.totals.render_seconds);

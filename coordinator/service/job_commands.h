@@ -43,7 +43,7 @@ class JobCommands {
   Result<void> remove_job(Core& core, const JobId& id) const;
   Result<void> change_job(Core& core, const EntryPtr& entry, const JobChange& change) const;
   template <class Edit>
-  Result<void> edit_all(const Entries& jobs, Edit edit) const;
+  Result<void> edit_all(Core& core, const Entries& jobs, Edit edit) const;
   Result<void> set_priority(Core& core, const Entries& jobs, int priority) const;
   Result<void> set_focus(Core& core, const Entries& jobs, const std::optional<PixelRect>& focus) const;
   Result<void> extend(Core& core, JobEntry& entry, std::uint64_t spp) const;

@@ -308,7 +308,7 @@ TEST_F(Routes, SayWhetherTheCoordinatorLivesAndIsReady) {
   EXPECT_EQ(ask(request(Method::get, "/readyz")).status, 200);
   const std::string url = "/api/v1/jobs/" + submit();
   records->refuses = true;
-  ASSERT_EQ(ask(Method::patch, url, R"({"state":"paused"})").status, 200);
+  ASSERT_EQ(ask(Method::patch, url, R"({"state":"paused"})").status, 507);
   EXPECT_EQ(ask(request(Method::get, "/healthz")).status, 200);
   const Response r = ask(request(Method::get, "/readyz"));
   EXPECT_EQ(r.status, 503);
