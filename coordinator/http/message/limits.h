@@ -72,7 +72,8 @@ struct Limits {
   std::uint64_t unpacked_bytes = std::uint64_t{64} << 30;  // size of all files of a bundle together, unpacked
   std::size_t header_bytes = 16u << 10;
   std::size_t connections = 512;
-  std::size_t connections_each = 128;  // of these, at most so many of one token
+  // Of these, at most so many of one token; one that is silent between requests is closed for a new one
+  std::size_t connections_each = 128;
   // Connections of one address (an IPv6 /64 counts as one) on which nobody has shown a token yet. For a new
   // one the oldest is closed.
   std::size_t connections_of_address = 32;

@@ -197,6 +197,21 @@ TEST_F(SharesTest, ConnectionsOfOneTokenLeaveRoomForOthers) {
   EXPECT_EQ(ask(with_token("GET /api/v1/jobs", bob)), 200);
 }
 
+TEST_F(SharesTest, ASilentConnectionOfATokenYieldsToANewOne) {
+  Limits limits = patient_limits();
+  limits.connections_each = 2;
+  limits.idle_seconds = 600;
+  start(limits);
+  const std::string user_token = user("mallory");
+  const std::string look = with_token("GET /api/v1/jobs", user_token);
+  Clients kept;
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(RawClient::status(open(kept, look).response()), 200) << i;
+
+  EXPECT_TRUE(eventually([&] { return api->counters().connections == 2; }));
+  kept.back()->send(look);
+  EXPECT_EQ(RawClient::status(kept.back()->response()), 200);
+}
+
 TEST_F(SharesTest, EventStreamsOfOneTokenLeaveRoomForOthers) {
   Limits limits = patient_limits();
   limits.event_streams_each = 2;
