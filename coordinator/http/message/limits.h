@@ -79,9 +79,10 @@ struct Limits {
   std::size_t connections_of_address = 32;
   // How many of `connections` may be event streams; the rest is for requests.
   std::size_t event_streams = 128;
-  std::size_t event_streams_each = 32;  // of these, at most so many of one token
+  // Of these, at most so many of one token once half of all are open
+  std::size_t event_streams_each = 32;
   // Bytes of request bodies, and of answers that are not in files, that all connections together may hold in
-  // memory; of each a quarter for one token (net/shares.h)
+  // memory; of each a quarter for one token once half is used (net/shares.h)
   std::uint64_t body_memory = 256u << 20;
   std::uint64_t answer_memory = 256u << 20;
   // Memory in which answers about images are made, half of it for one token. The largest image takes 2 GB.
