@@ -8,7 +8,9 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <system_error>
 
 #include "common/base/spawn.h"
@@ -79,14 +81,20 @@ bool bound_files(const std::vector<std::filesystem::path>& readable) {
 }
 
 // Gives up all capabilities, also those that a program would get when it is started by root. Without
-// capabilities this fails only if there is nothing to give up.
+// capabilities this fails only if there is nothing to give up. A filter that the process was started with, such
+// as that of a systemd unit, may deny capset(): then it is enough that there are none.
 bool drop_capabilities() {
   for (unsigned long one = 0; ::prctl(PR_CAPBSET_READ, one, 0, 0, 0) >= 0; ++one)
     ::prctl(PR_CAPBSET_DROP, one, 0, 0, 0);
   ::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL, 0, 0, 0);
   __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
   const __user_cap_data_struct none[_LINUX_CAPABILITY_U32S_3]{};
-  return ::syscall(SYS_capset, &header, none) == 0;
+  if (::syscall(SYS_capset, &header, none) == 0) return true;
+  __user_cap_data_struct held[_LINUX_CAPABILITY_U32S_3]{};
+  return ::syscall(SYS_capget, &header, held) == 0 &&
+         std::all_of(std::begin(held), std::end(held), [](const __user_cap_data_struct& one) {
+           return (one.effective | one.permitted | one.inheritable) == 0;
+         });
 }
 
 }  // namespace

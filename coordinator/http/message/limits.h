@@ -72,15 +72,17 @@ struct Limits {
   std::uint64_t unpacked_bytes = std::uint64_t{64} << 30;  // size of all files of a bundle together, unpacked
   std::size_t header_bytes = 16u << 10;
   std::size_t connections = 512;
-  std::size_t connections_each = 128;  // of these, at most so many of one token
+  // Of these, at most so many of one token; one that is silent between requests is closed for a new one
+  std::size_t connections_each = 128;
   // Connections of one address (an IPv6 /64 counts as one) on which nobody has shown a token yet. For a new
   // one the oldest is closed.
   std::size_t connections_of_address = 32;
   // How many of `connections` may be event streams; the rest is for requests.
   std::size_t event_streams = 128;
-  std::size_t event_streams_each = 32;  // of these, at most so many of one token
+  // Of these, at most so many of one token once half of all are open
+  std::size_t event_streams_each = 32;
   // Bytes of request bodies, and of answers that are not in files, that all connections together may hold in
-  // memory; of each a quarter for one token (net/shares.h)
+  // memory; of each a quarter for one token once half is used (net/shares.h)
   std::uint64_t body_memory = 256u << 20;
   std::uint64_t answer_memory = 256u << 20;
   // Memory in which answers about images are made, half of it for one token. The largest image takes 2 GB.

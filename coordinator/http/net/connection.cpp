@@ -148,9 +148,18 @@ bool Connection::note_caller(const Request& request) {
   const std::string& token = request.caller.token_id;
   caller_ = token.empty() ? Throttle::group_of(stream_.peer()) : "token " + token;
   if (token.empty() || client_ == caller_) return true;
-  const auto same = [this](const Connection* other) { return other != this && other->client_ == caller_; };
-  const auto there = std::count_if(shared_.open.begin(), shared_.open.end(), same);
-  if (static_cast<std::size_t>(there) >= limits_.connections_each) return false;
+  // Connections kept open between requests, by a reverse proxy say, must not keep new ones out.
+  std::size_t there = 0;
+  Connection* oldest = nullptr;
+  for (Connection* other : shared_.open) {
+    if (other == this || other->leaving_ || other->client_ != caller_) continue;
+    ++there;
+    if (other->idle_ && (oldest == nullptr || other->opened_ < oldest->opened_)) oldest = other;
+  }
+  if (there >= limits_.connections_each) {
+    if (oldest == nullptr) return false;
+    oldest->cut();
+  }
   client_ = caller_;
   known_ = true;
   return true;

@@ -43,8 +43,9 @@ net::awaitable<void> Connection::stream_events(const Request& request, const Res
     return other->streams_events() && other->client() == client_;
   };
   const auto own = std::count_if(shared_.open.begin(), shared_.open.end(), same);
+  const bool crowded = 2 * shared_.event_streams >= limits_.event_streams;
   if (shared_.event_streams >= limits_.event_streams ||
-      static_cast<std::size_t>(own) >= limits_.event_streams_each) {
+      (crowded && static_cast<std::size_t>(own) >= limits_.event_streams_each)) {
     co_await answer(request, problem(503, "too many event streams are open; close one or try again later"),
                     false);
     co_return;

@@ -1,4 +1,5 @@
-// Memory that callers share: each may hold a part of it, so that no caller takes the part of another.
+// Memory that callers share: once half of it is used, each may hold a part of it, so that no caller takes the
+// part of another.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +14,8 @@ namespace ls::http {
 // Not thread-safe.
 class Shares {
  public:
-  // One caller may hold a quarter of `bytes`, or one larger piece, which counts as a quarter.
+  // Up to half of `bytes` is for whoever asks. Beyond that one caller may hold a quarter, or one larger piece;
+  // a piece counts as a quarter at most.
   explicit Shares(std::uint64_t bytes) : bytes_(bytes), each_(bytes / kParts) {}
 
   // Bytes of at most this many are not counted and always allowed: small requests and answers, such as a
@@ -36,7 +38,8 @@ class Shares {
       const std::uint64_t counted = std::min(bytes, shares.each_);
       const auto found = shares.held_.find(caller);
       const std::uint64_t held = found == shares.held_.end() ? 0 : found->second;
-      if (held > shares.each_ - counted || shares.used_ > shares.bytes_ - counted) return false;
+      const bool crowded = shares.used_ + counted > shares.bytes_ / 2;
+      if ((crowded && held > shares.each_ - counted) || shares.used_ > shares.bytes_ - counted) return false;
       shares_ = &shares;
       caller_ = caller;
       counted_ = counted;

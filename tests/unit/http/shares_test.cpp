@@ -2,6 +2,7 @@
 #include <atomic>
 #include <future>
 
+#include "coordinator/http/net/shares.h"
 #include "tests/unit/http/server_fixture.h"
 
 namespace ls::http::testing {
@@ -53,10 +54,13 @@ TEST_F(SharesTest, UnfinishedBodiesOfOneTokenKeepNobodyOut) {
   const JobId job = coordinator::submit(*coordinator);
   Clients held;
   const std::uint64_t before = api->counters().body_bytes;
-  // One byte before the end of each; those beyond the token's share are refused.
-  open(held, post_scene(mallory, 1'000'000) + std::string(999'999, ' '));
-  ASSERT_TRUE(eventually([&] { return api->counters().body_bytes - before >= 999'999; }));
-  for (int i = 1; i < 8; ++i)
+  // One byte before the end of each; once half of the memory is used, those beyond the token's share are
+  // refused.
+  for (std::uint64_t i = 1; i <= 2; ++i) {
+    open(held, post_scene(mallory, 1'000'000) + std::string(999'999, ' '));
+    ASSERT_TRUE(eventually([&] { return api->counters().body_bytes - before >= i * 999'999; }));
+  }
+  for (int i = 2; i < 8; ++i)
     EXPECT_EQ(
         RawClient::status(open(held, post_scene(mallory, 1'000'000) + std::string(999'999, ' ')).response()),
         503)
@@ -195,6 +199,49 @@ TEST_F(SharesTest, ConnectionsOfOneTokenLeaveRoomForOthers) {
 
   for (std::size_t i = 8; i < 16; ++i) EXPECT_EQ(RawClient::status(held[i]->response()), 503);
   EXPECT_EQ(ask(with_token("GET /api/v1/jobs", bob)), 200);
+}
+
+TEST_F(SharesTest, ASilentConnectionOfATokenYieldsToANewOne) {
+  Limits limits = patient_limits();
+  limits.connections_each = 2;
+  limits.idle_seconds = 600;
+  start(limits);
+  const std::string user_token = user("mallory");
+  const std::string look = with_token("GET /api/v1/jobs", user_token);
+  Clients kept;
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(RawClient::status(open(kept, look).response()), 200) << i;
+
+  EXPECT_TRUE(eventually([&] { return api->counters().connections == 2; }));
+  kept.back()->send(look);
+  EXPECT_EQ(RawClient::status(kept.back()->response()), 200);
+}
+
+TEST(Shares, OneCallerMayHoldMoreThanItsPartWhileHalfIsFree) {
+  constexpr std::uint64_t kMegabyte = 1u << 20;
+  Shares shares(8 * kMegabyte);
+  Shares::Held a, b, c, d, other;
+
+  EXPECT_TRUE(a.take(shares, "mallory", 2 * kMegabyte));
+  EXPECT_TRUE(b.take(shares, "mallory", 2 * kMegabyte));
+  EXPECT_FALSE(c.take(shares, "mallory", kMegabyte));
+  EXPECT_TRUE(other.take(shares, "bob", 2 * kMegabyte));
+  b.give_back();
+  EXPECT_FALSE(d.take(shares, "mallory", kMegabyte));
+  other.give_back();
+  EXPECT_TRUE(d.take(shares, "mallory", kMegabyte));
+}
+
+TEST_F(SharesTest, OneTokenMayHaveMoreEventStreamsWhileHalfAreFree) {
+  Limits limits = patient_limits();
+  limits.event_streams = 6;
+  limits.event_streams_each = 1;
+  start(limits);
+  const std::string mallory = user("mallory");
+  Clients readers;
+  for (int i = 0; i < 3; ++i)
+    ASSERT_TRUE(open(readers, with_token("GET /api/v1/events", mallory)).read_until("\n\n"));
+
+  EXPECT_EQ(ask(with_token("GET /api/v1/events", mallory)), 503);
 }
 
 TEST_F(SharesTest, EventStreamsOfOneTokenLeaveRoomForOthers) {

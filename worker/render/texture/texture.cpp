@@ -72,11 +72,10 @@ class TexelsLoader {
  public:
   TexelsLoader(const Scene& scene, const ImageLoader& load, TextureTable::Data& data)
       : scene_(scene), load_(load), data_(data), uses_(scene::texture_uses(scene)) {
-    std::set<Way> ways;
     for (std::size_t i = 0; i < scene.textures.size(); ++i)
       if (const auto* b = std::get_if<BitmapTexture>(&scene.textures[i]))
         for (const Content content : contents_of(i))
-          if (ways.insert(way_of(*b, content)).second) ++left_[b->file.value];
+          if (ways_.insert(way_of(*b, content)).second) ++left_[b->file.value];
   }
 
   // Returns the indices of the texels of texture i, the bitmap b: those that lookups read, and those that
@@ -130,7 +129,9 @@ class TexelsLoader {
     // Bytes are neither negative nor of other colours, so that they are the same as whatever they are read.
     if (is_bytes)
       for (const Content other : {Content::colours, Content::numbers, Content::heights})
-        made_.try_emplace(way_of(b, other), index);
+        if (made_.try_emplace(way_of(b, other), index).second && ways_.contains(way_of(b, other)) &&
+            --left_[b.file.value] == 0)
+          decoded_.erase(b.file.value);
     return index;
   }
 
@@ -145,6 +146,7 @@ class TexelsLoader {
   const Scene& scene_;
   const ImageLoader& load_;
   TextureTable::Data& data_;
+  std::set<Way> ways_;                 // in which bitmaps read files
   std::map<std::uint32_t, int> left_;  // by file: number of ways in which it is still to be read
   std::map<std::uint32_t, ImageData> decoded_;
   std::map<Way, std::uint32_t> made_;
