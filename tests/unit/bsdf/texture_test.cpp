@@ -325,6 +325,17 @@ TEST(Product, MultipliesAndCuts) {
   EXPECT_EQ(t.number({4}, {0, 0}), 0);  // and below .3
 }
 
+// The mean decides how often a light is sampled, and whether it is one at all.
+TEST(Product, ThatIsMostlyCutIsNotBlackOnAverage) {
+  Scene s;
+  s.textures = {ConstantTexture{{1, 1, 1}}, ConstantTexture{{0, 0, 0}}, CheckerboardTexture{{0}, {1}, {}},
+                CheckerboardTexture{{2}, {1}, {}}, ProductTexture{{3}, {0}, .5}};
+
+  const TextureTable t = table(s, ramp());
+
+  EXPECT_EQ(t.mean({4}), C3(.25f));
+}
+
 TEST(Product, RefusesCirclesAndWhatIsMissing) {
   Scene s;
   s.textures = {ProductTexture{{1}, {1}}, ProductTexture{{0}, {0}}};

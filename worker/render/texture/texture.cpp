@@ -174,6 +174,12 @@ Result<Entry> attribute_entry(const MeshAttributeTexture& t, const SurfaceAttrib
 C3 cut(const C3& product, float threshold) {
   return threshold > 0 ? C3(luminance(product) >= threshold ? 1.f : 0.f) : product;
 }
+// The mean of a product that is cut. What is cut at the mean would be 0 if less than the threshold passes on
+// average, and lights of this texture would be left out although parts of them shine: so the share that
+// passes is taken to be the mean of the product.
+C3 mean_of_cut(const C3& mean, float threshold) {
+  return threshold > 0 ? C3(std::min(luminance(mean), 1.f)) : mean;
+}
 C3 peak_of(const C3& c) {
   const float peak = std::max({c.x, c.y, c.z});
   return {peak, peak, peak};
@@ -201,7 +207,7 @@ Result<void> resolve_nested(TextureTable::Data& data) {
         e.value = e.kind == Kind::peak ? peak_of(inner) : hue_of(inner);
         d += depth[e.first];
       } else if (e.kind == Kind::product) {
-        e.value = cut(data.entries[e.first].value * data.entries[e.second].value, e.scale);
+        e.value = mean_of_cut(data.entries[e.first].value * data.entries[e.second].value, e.scale);
         d += std::max(depth[e.first], depth[e.second]);
       } else {
         continue;

@@ -57,6 +57,13 @@ void note_left(const World& w, V3 o, const V3& d, Left& left) {
     o = offset_point(hit, d);
   }
 }
+// The directions avoid axes and diagonals, along which hits are often grazing.
+Left left_from(const World& w, const V3& o) {
+  Left left;
+  for (const V3d& d : {V3d(.31, .82, .48), V3d(-.72, .24, .65), V3d(.17, -.44, -.88)})
+    note_left(w, o, V3(d.normalized()), left);
+  return left;
+}
 
 }  // namespace
 
@@ -77,14 +84,17 @@ MediaState camera_media(const World& w) {
   const CameraRay ray =
       w.camera.ray(w.origin_x + w.size.width / 2., w.origin_y + w.size.height / 2., {.5f, .5f});
   const V3 eye = w.hidden_boundaries ? hidden_part(w, ray).start : ray.o;
-  Left left;
-  // The directions avoid axes and diagonals, along which hits are often grazing.
-  for (const V3d& d : {V3d(.31, .82, .48), V3d(-.72, .24, .65), V3d(.17, -.44, -.88)})
-    note_left(w, eye, V3(d.normalized()), left);
   const auto around = [&](const auto& entry) { return entry.second >= 2; };
-  const bool inside_of_it = std::any_of(left.begin(), left.end(), [&](const auto& e) {
-    return around(e) && w.geometry.surfaces[e.first.first].interior == w.camera_medium;
-  });
+  const auto holds_medium = [&](const Left& left) {
+    return std::any_of(left.begin(), left.end(), [&](const auto& e) {
+      return around(e) && w.geometry.surfaces[e.first.first].interior == w.camera_medium;
+    });
+  };
+  const Left left = left_from(w, eye);
+  // A camera on the face of a body, or just before it, names the medium in it too: rays enter the body before
+  // the near plane, and this crossing adds the medium (for_hidden_boundaries).
+  const bool inside_of_it =
+      holds_medium(left) || (w.hidden_boundaries && holds_medium(left_from(w, ray.o)));
   state.start(inside_of_it ? kNone : w.camera_medium, w.media);
   for (const auto& e : left)
     if (around(e)) state.stand(w.geometry.surfaces[e.first.first], false, true, w.media);

@@ -136,6 +136,30 @@ TEST(Lights, ACheckeredSphereGivesTheMeanOfItsColours) {
   expect_close(inside.irradiance({0, 0, 0}, {0, 1, 0}, 256), kMean * M_PI);
 }
 
+// As of a glTF material with emission and alphaMode MASK: of the card passes less than its alphaCutoff.
+TEST(Lights, ACardOfWhichAQuarterPassesTheCutShines) {
+  SceneBuilder builder = area(RectangleShape{}, translate({0, 0, 100}) * test::rotate_x(180));
+  std::vector<Texture>& textures = builder.scene.textures;
+  const auto add = [&](const Texture& t) {
+    textures.push_back(t);
+    return TextureIndex{static_cast<std::uint32_t>(textures.size() - 1)};
+  };
+  const TextureIndex one = add(ConstantTexture{{1, 1, 1}}), none = add(ConstantTexture{{0, 0, 0}}),
+                     emission = add(ConstantTexture{{2, 2, 2}});
+  UvTransform twice;
+  twice.m[0] = twice.m[4] = 2;
+  const TextureIndex half = add(CheckerboardTexture{one, none, twice}),
+                     quarter = add(CheckerboardTexture{half, none, {}});
+  const TextureIndex passed = add(ProductTexture{quarter, one, .5});
+  builder.scene.shapes[0].emitter->radiance = add(ProductTexture{emission, passed});
+
+  const LightBench bench(builder);
+
+  EXPECT_EQ(bench.world->lights.left_out(), 0u);
+  const auto e = bench.irradiance({0, 0, 0}, {0, 0, 1});
+  EXPECT_NEAR(e.mean, .25 * 2 * 4 / 1e4, 5 * e.se + 1e-7);
+}
+
 TEST(Lights, ASampleOfATexturedLightHasTheColourThatIsSeenThere) {
   for (const bool flip : {false, true}) {
     const LightBench b(checkered_sphere(flip));

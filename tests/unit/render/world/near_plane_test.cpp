@@ -58,6 +58,26 @@ TEST(NearPlane, IsBehindAMediumThatEndsBeforeIt) {
   expect_transmitted(builder, 1);
 }
 
+// The camera stands on the face of the fog that it names, or just before it. Another body in this medium makes
+// the media overlap.
+TEST(NearPlane, IsOnceInTheMediumThatTheSensorNames) {
+  for (const bool overlaps : {false, true})
+    for (const auto& [eye, near] : {std::pair{-1., 1e-4}, {-1.05, .1}}) {
+      SceneBuilder builder = before_sky(eye, near);
+      const MediumIndex fog = builder.homogeneous({1, 1, 1}, {0, 0, 0});
+      builder.container(CubeShape{}, {}, builder.null(), fog);
+      builder.scene.sensor.medium = fog;
+      if (overlaps)
+        builder.container(CubeShape{}, translate({0, -9, 0}), builder.null(),
+                          builder.homogeneous({2, 2, 2}, {0, 0, 0}));
+
+      const double hidden = eye + near + 1;
+
+      EXPECT_EQ(test::world_of(builder)->overlaps, overlaps);
+      expect_transmitted(builder, std::exp(-(2 - hidden)), fmt::format("{} {} {}", overlaps, eye, near));
+    }
+}
+
 // Both faces of a thin slab of fog, and the face of a ball in it, lie before the near plane.
 TEST(NearPlane, IsInTheInnermostOfSeveralBodies) {
   SceneBuilder builder = before_sky(-1.15, .3);
