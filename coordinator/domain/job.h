@@ -215,8 +215,11 @@ struct Job {
   // True once a result of the numeric class was accepted. Before that the class is that of the first lease,
   // and is given up if the leases bring no result
   bool class_kept = false;
-  TimePoint pinned_at{};              // when the class of the first lease was taken
+  // When the class of the first lease was taken, or the job was resumed since
+  TimePoint pinned_at{};
   std::set<Digest> passed_over = {};  // classes that were given up so
+  // How often the class was given up because it had brought no result for too long (kPinLimit)
+  std::uint32_t pins_released = 0;
   // When the first ray was traced, plus the total time in which the job's clock was stopped; nullopt: no ray
   // was traced yet
   std::optional<TimePoint> first_ray;

@@ -107,7 +107,7 @@ inline constexpr std::uint32_t kUnitFailureWorkers = 3;
 inline constexpr std::uint32_t kUnitFailureAttempts = 2;
 // A job is pinned to the numeric class of its first lease; until a result of that class is accepted, the pin
 // may move. If none was accepted for this long, and an idle worker of another class could render the job, the
-// pin is released. The time doubles with each release.
+// pin is released. The time doubles with each such release.
 inline constexpr Duration kPinLimit = 60s;
 // After this many failures a worker gets no more units of the job
 inline constexpr std::uint32_t kWorkerFailuresPerJob = 3;

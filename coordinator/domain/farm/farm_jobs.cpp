@@ -128,6 +128,7 @@ void Farm::State::on(const JobResumed& event) {
   Job* job = find(event.job);
   if (job == nullptr || job->state != JobState::paused) return;
   set_state(*job, job->numeric_class ? JobState::running : JobState::queued);
+  job->pinned_at = now;  // workers were given nothing while it was paused
   // The job may have been paused because a check of its denoised layers failed. judge() then requests this
   // check again
   job->checking_spp = 0;
@@ -140,8 +141,10 @@ void Farm::State::on(const JobStopped& event) {
   Job* job = find(event.job);
   if (job == nullptr || job->ended()) return;
   freeze(*job, StopReason::user);
-  if (job->state == JobState::paused)
+  if (job->state == JobState::paused) {
     set_state(*job, job->numeric_class ? JobState::running : JobState::queued);
+    job->pinned_at = now;
+  }
   refresh(*job);
 }
 

@@ -36,7 +36,8 @@ void Farm::State::unpin(Job& job) {
 
 void Farm::State::doubt_pin(Job& job) {
   if (!job.numeric_class || job.class_kept || !job.leasable()) return;
-  const int doublings = static_cast<int>(std::min<std::size_t>(job.passed_over.size(), 10));
+  // Counted by releases, not by classes: there may be two classes only, and the job may take long to load
+  const std::uint32_t doublings = std::min(job.pins_released, 10u);
   if (now - job.pinned_at < kPinLimit * (1 << doublings)) return;
   const Digest pinned = *std::exchange(job.numeric_class, std::nullopt);
   const bool wanted = std::any_of(workers.all().begin(), workers.all().end(), [&](const auto& entry) {
@@ -45,6 +46,7 @@ void Farm::State::doubt_pin(Job& job) {
   });
   job.numeric_class = pinned;
   if (!wanted) return;
+  ++job.pins_released;
   for (const LeaseSeq seq : leases_of(job)) free_lease(seq, FreedCause::deadline_passed, true);
   unpin(job);
   refresh(job);

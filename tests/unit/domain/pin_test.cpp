@@ -138,6 +138,43 @@ TEST(Pin, AClassThatBringsNoResultForLongGivesWayToAnIdleWorkerOfAnother) {
   }
 }
 
+// The worker reports that it still has all units that it holds.
+void report(Rig& rig, const char* name) {
+  LeaseProgress progress{{name}, {}};
+  for (const auto& held : rig.held[{name}]) progress.leases.push_back({held.lease, 0});
+  rig.send(progress);
+}
+
+TEST(Pin, AJobThatTakesLongToLoadIsNotTakenFromOneOfTwoClassesAfterTheOtherForEver) {
+  Rig rig;
+  rig.join("a", 1, 1);
+  rig.join("b", 1, 9);
+  rig.submit(plan_of("j", 4, 2));
+
+  Duration loading{};
+  for (Duration waited{}; loading < 500s && waited < 1h; waited += 10s) {
+    for (const char* name : {"a", "b"}) report(rig, name);
+    loading = of<JobUnpinned>(rig.pass(10s)).empty() ? loading + 10s : Duration{};
+  }
+
+  EXPECT_EQ(loading, 500s);
+  EXPECT_EQ(audit(rig.farm), "");
+}
+
+TEST(Pin, TheTimeInWhichAJobIsPausedDoesNotTellAgainstItsClass) {
+  Rig rig;
+  rig.join("a", 1, 1);
+  rig.submit(plan_of("j", 4, 2));
+  rig.join("b", 1, 9);
+
+  rig.send(JobPaused{{"j"}});
+  for (Duration waited{}; waited < 2 * kPinLimit; waited += 10s) report(rig, "a"), rig.pass(10s);
+  rig.send(JobResumed{{"j"}});
+  rig.pass(1s);
+
+  EXPECT_EQ(rig.job().numeric_class, digest_number(1));
+}
+
 TEST(Pin, AClassOfWhichAResultWasAcceptedStays) {
   Rig rig;
   rig.join("a", 1, 1);
