@@ -32,8 +32,8 @@ void on_error(png_structp png, png_const_charp text) {
   std::longjmp(png_jmpbuf(png), 1);
 }
 // libpng leaves out a damaged chunk that an image can do without, with a warning that begins with its name.
-// The opacities of a palette or of a colour are such a chunk to it, but not to us. Nothing is lost if the image
-// has an alpha channel, or if the chunk was read before.
+// The opacities of a palette or of a colour are such a chunk to it, but not to us. Nothing is lost if the
+// image has an alpha channel, or if the chunk was read before.
 void on_warning(png_structp png, png_const_charp text) {
   if (std::strstr(text, "tRNS") && !std::strstr(text, "invalid with alpha channel") &&
       !std::strstr(text, "duplicate"))

@@ -81,8 +81,8 @@ bool bound_files(const std::vector<std::filesystem::path>& readable) {
 }
 
 // Gives up all capabilities, also those that a program would get when it is started by root. Without
-// capabilities this fails only if there is nothing to give up. A filter that the process was started with, such
-// as that of a systemd unit, may deny capset(): then it is enough that there are none.
+// capabilities this fails only if there is nothing to give up. A filter that the process was started with,
+// such as that of a systemd unit, may deny capset(): then it is enough that there are none.
 bool drop_capabilities() {
   for (unsigned long one = 0; ::prctl(PR_CAPBSET_READ, one, 0, 0, 0) >= 0; ++one)
     ::prctl(PR_CAPBSET_DROP, one, 0, 0, 0);

@@ -117,8 +117,8 @@ class Connection {
   net::awaitable<bool> serve_match(Parser& parser, const Match& match, Request& request);
   // nullopt: the client has left while its request waited for its turn, so that nobody needs the answer
   net::awaitable<std::optional<Response>> handle_on_executor(const Match& match, const Request& request);
-  // Notes whose connection this is from now on. If this caller has too many, the oldest that is silent between
-  // requests is closed. False: there is none.
+  // Notes whose connection this is from now on. If this caller has too many, the oldest that is silent
+  // between requests is closed. False: there is none.
   bool note_caller(const Request& request);
 
   // A request's turn on a pool: waits with the network thread free, and gives the turn back when destroyed.

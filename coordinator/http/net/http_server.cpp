@@ -123,8 +123,9 @@ std::string address_of(const Tcp::socket& socket) {
   return ec ? std::string() : Throttle::group_of(remote.address().to_string());
 }
 
-// Without this limit the send buffer of a loopback connection (ssh -L, a reverse proxy) takes bytes in steps of
-// nearly 1 MB, between which a client of less than 60 KB/s shows no progress for longer than the grace time.
+// Without this limit the send buffer of a loopback connection (ssh -L, a reverse proxy) takes bytes in steps
+// of nearly 1 MB, between which a client of less than 60 KB/s shows no progress for longer than the grace
+// time.
 void show_progress_in_small_steps(Tcp::socket& socket) {
   const int unsent_bytes = 128 << 10;
   ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent_bytes, sizeof unsent_bytes);

@@ -14,8 +14,8 @@ namespace ls::http {
 // Not thread-safe.
 class Shares {
  public:
-  // Up to half of `bytes` is for whoever asks. Beyond that one caller may hold a quarter, or one larger piece;
-  // a piece counts as a quarter at most.
+  // Up to half of `bytes` is for whoever asks. Beyond that one caller may hold a quarter, or one larger
+  // piece; a piece counts as a quarter at most.
   explicit Shares(std::uint64_t bytes) : bytes_(bytes), each_(bytes / kParts) {}
 
   // Bytes of at most this many are not counted and always allowed: small requests and answers, such as a

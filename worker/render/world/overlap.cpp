@@ -93,8 +93,7 @@ MediaState camera_media(const World& w) {
   const Left left = left_from(w, eye);
   // A camera on the face of a body, or just before it, names the medium in it too: rays enter the body before
   // the near plane, and this crossing adds the medium (for_hidden_boundaries).
-  const bool inside_of_it =
-      holds_medium(left) || (w.hidden_boundaries && holds_medium(left_from(w, ray.o)));
+  const bool inside_of_it = holds_medium(left) || (w.hidden_boundaries && holds_medium(left_from(w, ray.o)));
   state.start(inside_of_it ? kNone : w.camera_medium, w.media);
   for (const auto& e : left)
     if (around(e)) state.stand(w.geometry.surfaces[e.first.first], false, true, w.media);

@@ -58,8 +58,8 @@ TEST(NearPlane, IsBehindAMediumThatEndsBeforeIt) {
   expect_transmitted(builder, 1);
 }
 
-// The camera stands on the face of the fog that it names, or just before it. Another body in this medium makes
-// the media overlap.
+// The camera stands on the face of the fog that it names, or just before it. Another body in this medium
+// makes the media overlap.
 TEST(NearPlane, IsOnceInTheMediumThatTheSensorNames) {
   for (const bool overlaps : {false, true})
     for (const auto& [eye, near] : {std::pair{-1., 1e-4}, {-1.05, .1}}) {
