@@ -63,6 +63,7 @@ class Task:
     resume_at: float = 0.0
     checked: int = 0
     priority: int = 0
+    leaving: dict = None  # what is recorded of it once it is removed: its removal was asked for
     notes: dict = dataclasses.field(default_factory=dict)
 
     @property
@@ -387,14 +388,16 @@ class User(threading.Thread):
             self.record.wrong("a job was cancelled by nobody", number=task.number, job=task.id)
         elif state == "done" and task.kind == "crash":
             self.record.wrong("a job whose unit is a crash is done", number=task.number, job=task.id)
-        status = self.caller.try_ask(at, "DELETE", f"/api/v1/jobs/{task.id}")[0]
-        if status == 204:
-            self.record.write("ended", number=task.number, job=task.id, state=state, seconds=self.record.now() - task.submitted,
-                              core_seconds=view["core_seconds"], units=view["units_total"])
-            task.ended = state
-            self.gone.add(task.id)
-            self.removed[task.id] = self.tasks.pop(task.id)
-            self.finished.append(task)
+        task.leaving = {"state": state, "core_seconds": view["core_seconds"], "units": view["units_total"]}
+        if self.caller.try_ask(at, "DELETE", f"/api/v1/jobs/{task.id}")[0] == 204:
+            self.removed[task.id] = task
+            self.is_gone(task)
+
+    def is_gone(self, task):
+        self.record.write("ended", number=task.number, job=task.id, seconds=self.record.now() - task.submitted, **task.leaving)
+        task.ended = task.leaving["state"]
+        self.gone.add(task.id)
+        self.finished.append(self.tasks.pop(task.id))
 
     def turn(self):
         if self.todo and self.record.now() > self.until:
@@ -417,7 +420,10 @@ class User(threading.Thread):
             if job not in found:
                 self.kept(task, "a removal", True)
         for task in list(self.tasks.values()):
-            if task.id not in found and time.monotonic() - task.seen > LOST_AFTER and self.note(task, "nobody has it", every=60):
+            # A coordinator that is cut off from Redis removes a job and answers 503: another one could bring it back.
+            if task.leaving and task.id not in found and time.monotonic() - task.seen > 20:
+                self.is_gone(task)
+            elif task.id not in found and time.monotonic() - task.seen > LOST_AFTER and self.note(task, "nobody has it", every=60):
                 self.record.wrong("a job is lost", number=task.number, job=task.id)
 
     def run(self):

@@ -32,11 +32,20 @@ class AskedProcess:
         self.pid = pid
 
     def __enter__(self):
-        _ptrace(ATTACH, self.pid)
-        os.waitpid(self.pid, ANY_THREAD)
-        self.before = (ctypes.c_ulong * 27)()
-        _ptrace(GETREGS, self.pid, None, ctypes.addressof(self.before))
-        return self
+        # A process that has just started may still be on its way to the call in which it waits.
+        for _ in range(100_000):
+            _ptrace(ATTACH, self.pid)
+            os.waitpid(self.pid, ANY_THREAD)
+            self.before = (ctypes.c_ulong * 27)()
+            _ptrace(GETREGS, self.pid, None, ctypes.addressof(self.before))
+            if self._instruction()[:2] == SYSCALL:
+                return self
+            _ptrace(DETACH, self.pid)
+            os.sched_yield()
+        raise AssertionError("it waits in no system call")
+
+    def _instruction(self):
+        return struct.pack("<q", _ptrace(PEEK, self.pid, self.before[RIP] - len(SYSCALL)))
 
     def __exit__(self, *error):
         _ptrace(SETREGS, self.pid, None, ctypes.addressof(self.before))
@@ -45,7 +54,6 @@ class AskedProcess:
     def call(self, number, *arguments):
         """0, or the errno. A text is passed by its address."""
         instruction = self.before[RIP] - len(SYSCALL)
-        assert struct.pack("<q", _ptrace(PEEK, self.pid, instruction))[:2] == SYSCALL, "it waits in no system call"
         place = (self.before[RSP] - 4096) & ~15  # on its stack, below all that is in use
         regs = (ctypes.c_ulong * 27)(*self.before)
         regs[ORIG_RAX], regs[RIP], regs[RAX] = 2 ** 64 - 1, instruction, number

@@ -127,6 +127,7 @@ void Agent::Impl::handle_message(ToWorker& message) {
                    const std::lock_guard lock(mutex);
                    for (LeaseReturned& returned : table.return_waiting(r.lease))
                      outgoing.push_back(std::move(returned));
+                   stop_dropped_work();
                  },
                  [this](DrainNow&) { drain_requested = true; },
              },

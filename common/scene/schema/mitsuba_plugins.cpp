@@ -294,6 +294,7 @@ bool is_our_parameter(std::string_view tag, std::string_view plugin, std::string
       {"shape", "obj", {"shape_index"}},
       {"shape", "ply", {"shape_index"}},
       {"bsdf", "", {"multiple_scattering"}},
+      {"bsdf", "normalmap", {"follow_mirroring"}},
       {"texture", "bitmap", {"channel"}},
       {"emitter", "area", {"cutoff_angle", "beam_width", "falloff", "two_sided"}},
       {"emitter", "directional", {"angular_radius"}},

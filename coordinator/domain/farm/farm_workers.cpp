@@ -165,6 +165,7 @@ void Farm::State::on(const LeaseCameBack& event) {
   Job& job = *lease->job;
   free_units(*lease, recalled ? FreedCause::recalled : FreedCause::returned, false,
              [&](UnitCode code) { return back.contains(code); });
+  workers.settle(*worker);  // with fewer units it may want more
   cut_off_returned(job);
 }
 
