@@ -364,15 +364,22 @@ class PlyReader {
     return true;
   }
 
-  // Gives the corners of face i their texture coordinates; no uvs mean (0, 0). Replaces each corner by the
+  // Gives the corners of face i their texture coordinates; no uvs mean those of the vertices, or (0, 0) if
+  // these have none. Replaces each corner by the
   // vertex that has its position and its coordinates: the vertex of the file where it comes up first, a copy
   // of it for each further pair of coordinates.
   bool split_by_uv(std::uint64_t i, std::span<std::uint32_t> corners, std::vector<float>& uvs) {
-    if (uvs.empty()) uvs.resize(2 * corners.size());
+    if (split_.empty()) {
+      vertex_uvs_ = std::move(mesh_.uvs);
+      mesh_.uvs.assign(2 * mesh_.vertex_count(), 0);
+    }
+    if (uvs.empty())
+      for (const std::uint32_t corner : corners)
+        for (const std::size_t k : {0, 1})
+          uvs.push_back(vertex_uvs_.empty() ? 0 : vertex_uvs_[2 * corner + k]);
     if (uvs.size() != 2 * corners.size())
       return complain(fmt::format("face {} of {} corners has {} numbers of texture coordinates", i,
                                   corners.size(), uvs.size()));
-    if (split_.empty()) mesh_.uvs.assign(2 * mesh_.vertex_count(), 0);
     for (std::size_t k = 0; k < corners.size(); ++k) {
       const std::array<float, 2> uv{uvs[2 * k], uvs[2 * k + 1]};
       const auto bits = [](float x) { return static_cast<std::int64_t>(std::bit_cast<std::uint32_t>(x)); };
@@ -506,6 +513,7 @@ class PlyReader {
   Coding coding_ = Coding::ascii;
   std::vector<Element> elements_;
   std::uint64_t vertex_count_ = 0;  // of the file; split_by_uv() adds copies to the mesh
+  std::vector<float> vertex_uvs_;   // texture coordinates of the file's vertices; empty: they have none
   // The vertices of the mesh by vertex of the file and texture coordinates, as numbers of their bits
   std::unordered_map<Corner, std::uint32_t, CornerHash> split_{0, CornerHash{secret_of_this_process()}};
   std::string problem_;

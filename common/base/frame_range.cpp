@@ -80,32 +80,44 @@ std::string to_string(const FrameRange& range) {
 
 namespace {
 
-// Where the last component of a path begins: only there # stands for the frame's number.
+// Where the last component of a path begins.
 std::size_t file_begins(std::string_view name) {
   const std::size_t end = name.find_last_not_of('/');
   const std::size_t slash = end == std::string_view::npos ? end : name.rfind('/', end);
   return slash == std::string_view::npos ? 0 : slash + 1;
 }
 
+// Where and as what # stands for the frame's number: in the last component of the path; if that has none, as
+// two or more in the names of folders. One # in the name of a folder ("shot#3") is only a #.
+struct Hashes {
+  explicit Hashes(std::string_view name) {
+    first = file_begins(name);
+    if (name.find('#', first) == std::string_view::npos) first = 0, shortest = 2;
+  }
+  std::size_t first = 0, shortest = 1;
+};
+
 }  // namespace
 
 std::string numbered(std::string_view name, std::uint32_t frame) {
-  const std::size_t file = file_begins(name);
-  std::string out(name.substr(0, file));
-  for (std::size_t at = file; at < name.size();) {
+  const Hashes hashes(name);
+  std::string out(name.substr(0, hashes.first));
+  for (std::size_t at = hashes.first; at < name.size();) {
     if (name[at] != '#') {
       out += name[at++];
       continue;
     }
     const std::size_t end = std::min(name.find_first_not_of('#', at), name.size());
-    out += fmt::format("{:0{}}", frame, end - at);
+    const bool stands = end - at >= hashes.shortest;
+    out += stands ? fmt::format("{:0{}}", frame, end - at) : std::string(name.substr(at, end - at));
     at = end;
   }
   return out;
 }
 
 bool has_frame_number(std::string_view name) {
-  return name.find('#', file_begins(name)) != std::string_view::npos;
+  const Hashes hashes(name);
+  return name.find(std::string(hashes.shortest, '#'), hashes.first) != std::string_view::npos;
 }
 
 }  // namespace ls

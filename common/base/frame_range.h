@@ -32,9 +32,10 @@ Result<FrameRange> parse_frames(std::string_view text);
 std::string to_string(const FrameRange& range);
 
 // Returns the path `name` with every run of # in its last component replaced by the frame number:
-// "shot#3/fog.####.vdb" of frame 7 is "shot#3/fog.0007.vdb". A number with more digits than its run is
+// "shot#3/fog.####.vdb" of frame 7 is "shot#3/fog.0007.vdb". If the last component has none, runs of two and
+// more in the names of folders are replaced: "frame_####/fog.vdb". A number with more digits than its run is
 // written in full.
 std::string numbered(std::string_view name, std::uint32_t frame);
-bool has_frame_number(std::string_view name);  // true if the last component of the path contains a #
+bool has_frame_number(std::string_view name);  // true if numbered() replaces anything
 
 }  // namespace ls

@@ -61,7 +61,9 @@ Result<Source> find_colour(const Imf::MultiPartInputFile& file, const std::strin
       source.channels = {"X", "Y", "Z"};
     else
       source.channels = {"Y"}, source.layout = {0, 0, 0};
-    if (wanted == Wanted::texture && list.findChannel("A")) {
+    const Imf::Channel* alpha = list.findChannel("A");
+    const bool readable = alpha && alpha->type != Imf::UINT && alpha->xSampling == 1 && alpha->ySampling == 1;
+    if (wanted == Wanted::texture && readable) {
       source.layout.push_back(source.channels.size());
       source.channels.push_back("A");
     }

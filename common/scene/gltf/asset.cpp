@@ -165,7 +165,8 @@ void Translation::add(Element e) {
 }
 
 void Translation::warn_once(const Item& at, std::string text) {
-  if (warned.insert(text).second) at.warning(std::move(text));
+  // A file may give millions of reasons for warnings: none is kept once no more are shown.
+  if (report.takes_warnings() && warned.insert(text).second) at.warning(std::move(text));
 }
 
 bool is_gltf(std::string_view file_name) { return has_ending(file_name, {".gltf", ".glb"}); }

@@ -164,6 +164,7 @@ class IgnoredParts {
   }
 
   void unknown(const Member& m, const Kind& kind) {
+    if (!t_.report.takes_warnings()) return;
     std::vector<std::string> names;
     for (const MemberRule& r : kind.members) names.emplace_back(r.name);
     warn(m.value, fmt::format("{} has no member {}, which has no effect{}", kind.title, plain_text(m.name),

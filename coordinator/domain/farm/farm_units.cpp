@@ -99,7 +99,13 @@ void Farm::State::accept(const UnitAccepted& event) {
   }
   if (job.state == JobState::queued) set_state(job, JobState::running);
   const double cpu_seconds = believable(job, code, worker, event.cpu_seconds, now);
-  if (!job.first_ray) job.first_ray = now - from_seconds(cpu_seconds);
+  if (!job.first_ray) {
+    // No ray of a leased unit is dated before its lease, whatever its worker says: the time limit counts from
+    // the first ray
+    const LeaseRecord* lease = worker == nullptr ? nullptr : lease_of(job, code, *worker);
+    job.first_ray = now - from_seconds(cpu_seconds);
+    if (lease != nullptr) job.first_ray = std::max(*job.first_ray, lease->issued);
+  }
   effects.emplace_back(RecordUnit{event.unit, event.samples, event.digest, event.worker});
   settle_unit(job, code, worker);
   job.units.accept(code, {event.digest, workers.index_of(event.worker)});
@@ -122,9 +128,13 @@ double Farm::State::believable(const Job& job, UnitCode code, const Worker* work
                                TimePoint at) {
   if (!(reported > 0)) return 0;
   const LeaseRecord* lease = worker == nullptr ? nullptr : lease_of(job, code, *worker);
-  if (lease == nullptr) return std::min(reported, job.cost.known() ? job.predict(code) : kAssumedUnitSeconds);
+  // What such units take is believed in any case. After a reconnect a worker may be given the very units that
+  // it has rendered already, and their results arrive at once. If they counted as free, all predictions of
+  // the job would fall to nothing.
+  const double usual = job.cost.known() ? job.predict(code) : kAssumedUnitSeconds;
+  if (lease == nullptr) return std::min(reported, usual);
   const double of_all_threads = worker->threads * seconds(at - worker->busy_since) - worker->claimed;
-  return std::clamp(std::min(seconds(at - lease->issued), of_all_threads), 0.0, reported);
+  return std::min(reported, std::max(usual, std::min(seconds(at - lease->issued), of_all_threads)));
 }
 
 void Farm::State::issue_folds(Job& job, TileIndex tile) {

@@ -105,12 +105,12 @@ def written_otherwise(folder: pathlib.Path, name: str) -> pathlib.Path | None:
     otherwise than on this disk (macOS stores them apart). None: there is no such file, or there are several.
     """
     place = folder / name
-    if place.exists():
+    if os.path.exists(place):  # Path.exists() raises for names that are too long
         return place
     place = folder
     for part in pathlib.PurePosixPath(name.replace("\\", "/")).parts:
         there = place / part
-        if not there.exists():
+        if not os.path.exists(there):
             alike = [entry for entry in _names_in(place) if _composed(entry) == _composed(part)]
             if len(alike) != 1:
                 return None
@@ -298,8 +298,11 @@ class _Finder:
     def _numbered(self, name: str) -> str:
         if self._frame is None:
             return name
-        folder, slash, file = name.rpartition("/")  # in the name of a folder # is only a #
-        return folder + slash + re.sub("#+", lambda run: str(self._frame).zfill(len(run[0])), file)
+        # A single # in the name of a folder ("shot#3") is only a #.
+        folder, slash, file = name.rpartition("/")
+        one_by_one = "#" in file
+        ahead, rest = (folder + slash, file) if one_by_one else ("", name)
+        return ahead + re.sub("#+" if one_by_one else "##+", lambda run: str(self._frame).zfill(len(run[0])), rest)
 
     def _filled(self, value: str) -> str:
         """With its parameters put in: after a $ stands the longest name that is defined."""

@@ -460,6 +460,18 @@ TEST(Ply, TextureCoordinatesOfCornersSplitVertices) {
   EXPECT_THAT(odd.error().message, HasSubstr("face 0 of 3 corners has 5 numbers"));
 }
 
+// MeshLab writes empty lists for faces without a texture of their own.
+TEST(Ply, AnEmptyListOfTextureCoordinatesLeavesThoseOfTheVertices) {
+  const auto m = ply_of(
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nproperty float s\nproperty float t\nelement face 1\n"
+      "property list uchar int vertex_indices\nproperty list uchar float texcoord\n"
+      "end_header\n0 0 0 .1 .2\n1 0 0 .3 .4\n0 1 0 .5 .6\n3 0 1 2 0\n");
+
+  ASSERT_TRUE(m) << m.error().message;
+  EXPECT_THAT(m->uvs, ElementsAre(.1f, .2f, .3f, .4f, .5f, .6f));
+}
+
 TEST(Ply, SplitVerticesKeepTheirNormalsAndAttributes) {
   const std::string text =
       "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"

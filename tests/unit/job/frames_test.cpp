@@ -53,6 +53,9 @@ TEST(FrameRange, PutsTheNumberWhereTheHashesAre) {
       << "a # in the name of a folder is only a #";
   EXPECT_EQ(numbered("#/parts_##/", 7), "#/parts_07/");
   EXPECT_EQ(numbered("/", 7), "/");
+  EXPECT_EQ(numbered("C#/frame_####/a.vdb", 7), "C#/frame_0007/a.vdb")
+      << "two and more in a folder's name, if the file's name has none";
+  EXPECT_TRUE(has_frame_number("C#/frame_####/a.vdb"));
   EXPECT_FALSE(has_frame_number("C#/a.vdb"));
   EXPECT_TRUE(has_frame_number("C#/a#.vdb"));
 }

@@ -29,6 +29,7 @@ Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const 
   aperture_ = static_cast<float>(s.aperture_radius);
   focus_ = static_cast<float>(s.focus_distance);
   near_ = static_cast<float>(s.near_clip * scale);
+  spread_ = 1 + s.near_clip / s.focus_distance;
   far_ = static_cast<float>(s.far_clip * scale);
   lens_x_ = V3(axis_x_ * scale);
   lens_y_ = V3(axis_y_ * scale);
@@ -102,7 +103,7 @@ std::pair<V3d, V3d> Camera::before_near_plane(double pixels) const {
       }
     }
   // The lens is a disk, and what rays pass up to the near plane is at most (1 + near / focus) times as wide.
-  const double wide = has_lens() ? double{aperture_} * (1 + double{near_} / double{focus_}) : 0;
+  const double wide = has_lens() ? double{aperture_} * spread_ : 0;
   for (int k = 0; k < 3; ++k) {
     const double margin = 1e-6 * std::max(std::abs(low[k]), std::abs(high[k])) +
                           wide * double{std::abs(lens_x_[k]) + std::abs(lens_y_[k])};

@@ -77,8 +77,9 @@ class Camera {
   // The film position (fx, fy), in pixels, has the direction (x, y, 1) in camera space, where x = x0_ + dx_ *
   // fx and y = y0_ + dy_ * fy.
   double x0_ = 0, dx_ = 0, y0_ = 0, dy_ = 0;
-  float aperture_ = 0, focus_ = 1;            // radius of the lens and focus distance, in scene units
-  float near_ = 0, far_ = 0;                  // clip distances: those of the scene times the scale
+  float aperture_ = 0, focus_ = 1;  // radius of the lens and focus distance, in scene units
+  float near_ = 0, far_ = 0;        // clip distances: those of the scene times the scale
+  double spread_ = 1;  // how many times as wide as the lens its rays are at most, up to the near plane
   double per_pixel_x_ = 1, per_pixel_y_ = 1;  // width and height of a pixel over those of the frame
   const TextureTable* textures_ = nullptr;    // set only if the sensor has an aperture_scale
   TextureIndex aperture_scale_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "worker/render/geometry/surface_boxes.h"
 
@@ -20,9 +21,10 @@ bool touches(const Sphere& s, const SurfaceBox& box) {
   return nearest <= s.radius * s.radius && farthest >= s.radius * s.radius;
 }
 
-bool touches_own(const Geometry& g, std::uint32_t surface, const SurfaceBox& region) {
+// True if a primitive of one of these surfaces, which are not instances, may be in the region.
+bool any_touches(const Geometry& g, const std::vector<bool>& surfaces, const SurfaceBox& region) {
   for (std::uint32_t i = g.own.triangles.first; i < g.own.triangles.last; ++i) {
-    if (g.triangle_surface[i] != surface) continue;
+    if (!surfaces[g.triangle_surface[i]]) continue;
     const V3 a = g.vertex(i, 0), b = g.vertex(i, 1), c = g.vertex(i, 2);
     SurfaceBox box;
     for (int k = 0; k < 3; ++k) {
@@ -32,8 +34,8 @@ bool touches_own(const Geometry& g, std::uint32_t surface, const SurfaceBox& reg
     if (box.touches(region)) return true;
   }
   for (const Sphere& s : g.spheres)
-    if (s.surface == surface && touches(s, region)) return true;
-  const auto of = [&](const auto& one) { return one.surface == surface; };
+    if (surfaces[s.surface] && touches(s, region)) return true;
+  const auto of = [&](const auto& one) { return surfaces[one.surface]; };
   return std::any_of(g.disks.begin(), g.disks.end(), of) ||
          std::any_of(g.cylinders.begin(), g.cylinders.end(), of);
 }
@@ -48,9 +50,13 @@ bool near_plane_hides_boundaries(const World& w) {
   const auto [low, high] = w.camera.before_near_plane(w.filter.reach());
   SurfaceBox region;
   region.lo = V3(low), region.hi = V3(high);
-  return std::any_of(boxes->begin(), boxes->end(), [&](const SurfaceBox& box) {
-    return box.touches(region) && (box.instance != kNone || touches_own(w.geometry, box.surface, region));
-  });
+  std::vector<bool> near(w.geometry.surfaces.size());
+  for (const SurfaceBox& box : *boxes) {
+    if (!box.touches(region)) continue;
+    if (box.instance != kNone) return true;
+    near[box.surface] = true;
+  }
+  return any_touches(w.geometry, near, region);
 }
 
 }  // namespace ls::render

@@ -129,7 +129,7 @@ def _clipping(problems: Problems, prim: Usd.Prim, time: Usd.TimeCode) -> tuple[f
     if not near < far or far <= NEAR:
         problems.warn(prim, f"clippingRange ({near:g}, {far:g}) shows nothing: nothing is clipped")
         return NEAR, FAR
-    return max(near, NEAR), far
+    return max(near, NEAR), far if math.isfinite(far) else FAR
 
 
 def add_framing_camera(
