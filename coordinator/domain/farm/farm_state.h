@@ -244,7 +244,8 @@ struct Farm::State {
 
   // Defined in schedule.cpp
   void dispatch();
-  void serve(const std::vector<Worker*>& candidates, bool only_uncovered, bool only_holders);
+  // Leases units to these workers in turn; true if any was leased.
+  bool serve(const std::vector<Worker*>& candidates, bool only_uncovered, bool only_holders);
   bool assign(Worker& worker, bool only_held);
   Job* choose(const Worker& worker);  // the job whose units this worker gets next; null: none
   // True if units of the job that the worker was asked for will come back in a moment

@@ -81,7 +81,7 @@ void Farm::State::accept(const UnitAccepted& event) {
   }
   if (found == nullptr) return unwanted("no such job");
   Job& job = *found;
-  if (worker != nullptr) worker->fruitless.erase(job.seq);
+  if (worker != nullptr) work_appeared |= worker->fruitless.erase(job.seq) > 0;
   job.losses_in_a_row = 0;
   if (is_closed(job.state)) return unwanted("the job has ended");
   if (quarantined.contains(event.worker)) return unwanted("the worker is quarantined");
@@ -95,17 +95,13 @@ void Farm::State::accept(const UnitAccepted& event) {
 
   if (worker != nullptr) {
     keep_class(job, worker->numeric_class);
-    proven.insert(worker->numeric_class);
+    // A class, or a worker, is preferred from its first result on: units that were kept for others are for it
+    // now
+    work_appeared |= proven.insert(worker->numeric_class).second || worker->units_done == 0;
   }
   if (job.state == JobState::queued) set_state(job, JobState::running);
   const double cpu_seconds = believable(job, code, worker, event.cpu_seconds, now);
-  if (!job.first_ray) {
-    // No ray of a leased unit is dated before its lease, whatever its worker says: the time limit counts from
-    // the first ray
-    const LeaseRecord* lease = worker == nullptr ? nullptr : lease_of(job, code, *worker);
-    job.first_ray = now - from_seconds(cpu_seconds);
-    if (lease != nullptr) job.first_ray = std::max(*job.first_ray, lease->issued);
-  }
+  if (!job.first_ray) job.first_ray = now - from_seconds(cpu_seconds);
   effects.emplace_back(RecordUnit{event.unit, event.samples, event.digest, event.worker});
   settle_unit(job, code, worker);
   job.units.accept(code, {event.digest, workers.index_of(event.worker)});
@@ -128,13 +124,9 @@ double Farm::State::believable(const Job& job, UnitCode code, const Worker* work
                                TimePoint at) {
   if (!(reported > 0)) return 0;
   const LeaseRecord* lease = worker == nullptr ? nullptr : lease_of(job, code, *worker);
-  // What such units take is believed in any case. After a reconnect a worker may be given the very units that
-  // it has rendered already, and their results arrive at once. If they counted as free, all predictions of
-  // the job would fall to nothing.
-  const double usual = job.cost.known() ? job.predict(code) : kAssumedUnitSeconds;
-  if (lease == nullptr) return std::min(reported, usual);
+  if (lease == nullptr) return std::min(reported, job.cost.known() ? job.predict(code) : kAssumedUnitSeconds);
   const double of_all_threads = worker->threads * seconds(at - worker->busy_since) - worker->claimed;
-  return std::min(reported, std::max(usual, std::min(seconds(at - lease->issued), of_all_threads)));
+  return std::clamp(std::min(seconds(at - lease->issued), of_all_threads), 0.0, reported);
 }
 
 void Farm::State::issue_folds(Job& job, TileIndex tile) {

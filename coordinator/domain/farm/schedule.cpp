@@ -58,6 +58,7 @@ bool out_of_time(const Job& job, const Worker& worker, UnitCode code, TimePoint 
 }  // namespace
 
 void Farm::State::dispatch() {
+  bool again = false;
   do {
     pinned_for_others = false;
     std::vector<Worker*> candidates;
@@ -65,11 +66,16 @@ void Farm::State::dispatch() {
       if (workers.wanting_work().contains(index)) candidates.push_back(&workers.at(index));
     }
     const bool choice = candidates.size() > 1;
+    bool served = false;
     for (const bool only_uncovered : {true, false}) {
-      if (choice) serve(candidates, only_uncovered, true);
-      serve(candidates, only_uncovered, false);
+      if (choice) served |= serve(candidates, only_uncovered, true);
+      served |= serve(candidates, only_uncovered, false);
     }
-  } while (pinned_for_others || take_back_for_idle());
+    // A worker that is no longer idle may have been the one for which a job of no class yet was kept
+    // (may_pin)
+    again = served && !work_appeared && workers.classes() > 1;
+    work_appeared |= again;
+  } while (again || pinned_for_others || take_back_for_idle());
   for (const WorkerIndex index : dirty) {
     if (workers.wanting_work().contains(index)) copy_overdue(workers.at(index));
   }
@@ -130,16 +136,18 @@ LeaseRecord* Farm::State::longest_waiting_for(const Worker& idle) {
   return found;
 }
 
-void Farm::State::serve(const std::vector<Worker*>& candidates, bool only_uncovered, bool only_holders) {
-  bool served = true;
+bool Farm::State::serve(const std::vector<Worker*>& candidates, bool only_uncovered, bool only_holders) {
+  bool any = false, served = true;
   while (served && !shares.empty()) {
     served = false;
     for (Worker* worker : candidates) {
-      if (shares.empty()) return;
+      if (shares.empty()) break;
       if (!worker->wants_more() || (only_uncovered && worker->saturated())) continue;
       served |= assign(*worker, only_holders);
     }
+    any |= served;
   }
+  return any;
 }
 
 // What other workers give back matters if the job is frozen: a unit that came back may be cut off as soon as

@@ -53,6 +53,7 @@ const std::vector<FromWorker> kFromWorker = {
                 WorkerId{"w-9"},
                 true,
                 "armv8-a:gcc-14.2.0",
+                "secret",
                 4 << 20},
     WorkerProgress{{{LeaseId{"l-1"}, 3}}, "rendering", 1.5, 77, 0.25},
     UnitResult{{JobId{"j"}, 1, 2},

@@ -125,8 +125,9 @@ TEST(Turns, AThreadWaitsForItsTurn) {
 
 TEST(Shares, OneCallerHasAQuarterAndSmallPiecesAreFree) {
   Shares shares(1 << 20);
-  Shares::Held a, b, c, small;
+  Shares::Held a, b, c, d, small;
 
+  EXPECT_TRUE(d.take(shares, "eve", 200'000));
   EXPECT_TRUE(a.take(shares, "mallory", 200'000));
   EXPECT_FALSE(b.take(shares, "mallory", 200'000));
   EXPECT_TRUE(c.take(shares, "bob", 200'000));

@@ -274,7 +274,9 @@ TEST_F(Vdb, GzipIsUnpackedAndTellsItsDamage) {
     std::string changed = packed;
     changed[at] = static_cast<char>(changed[at] ^ 0x10);
     store(file_.path(), changed);
-    EXPECT_NE(read(file_.path()).error, "") << at;
+    // The bits that fill up the last byte of the packed data mean nothing: then it is the whole grid.
+    if (const auto changed_grid = read(file_.path()); changed_grid.error.empty())
+      expect_them(changed_grid, 1);
   }
 }
 
