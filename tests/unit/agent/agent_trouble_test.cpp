@@ -151,6 +151,11 @@ TEST_F(AgentThatBuilds, GoesOnWithTheWorldOfAJobThatAnotherLeaseNeeds) {
   coordinator_.tell(assign("l-2", "j-1", {2}, 1));
 
   coordinator_.tell(CancelLease{LeaseId{"l-1"}});
+  // Messages are handled in order: once the lease of an unknown job came back, the other one is cancelled.
+  AssignLease unknown = assign("l-3", "j-3", {0}, 1);
+  unknown.brief.reset();
+  coordinator_.tell(std::move(unknown));
+  coordinator_.wait_for([](auto& c) { return c.returned.size() == 1; });
   backend.fail = true;
 
   coordinator_.wait_for([](auto& c) { return c.failures.size() == 1; });
