@@ -73,6 +73,7 @@ void BlobWatch::missing(const Digest& digest, const Error& why) {
       waiting.push_back(entry);
   }
   if (waiting.empty()) return;
+  log_error("blob=" + digest.hex(), why.message);
   core->records.put_together([&] {
     for (const EntryPtr& entry : waiting) {
       core->records.log(entry->stored.id, why.message);
