@@ -19,6 +19,7 @@ std::string user_called(const std::string& owner) { return owner.empty() ? "admi
 void Ledger::observe(std::span<const EngineWorker> workers, double elapsed) {
   std::map<std::string, Line> now;
   for (const auto& w : workers) {
+    unlisted_.erase(w.id);
     if (w.state != EngineWorker::State::running) continue;
     const auto before = running_.find(w.id);
     // If the worker has run for a shorter time than at the previous call, its earlier run has ended and the
@@ -32,6 +33,13 @@ void Ledger::observe(std::span<const EngineWorker> workers, double elapsed) {
   }
   for (const auto& [id, line] : running_) ended_ += (line.seconds + elapsed) * line.cores;
   running_ = std::move(now);
+  for (const auto& [id, cores] : unlisted_) ended_ += elapsed * cores;
+  started_ += static_cast<int>(unlisted_.size());
+  unlisted_.clear();
+}
+
+void Ledger::started(std::span<const std::string> ids, int cores) {
+  for (const std::string& id : ids) unlisted_.emplace(id, cores);
 }
 
 double Ledger::core_seconds() const {

@@ -20,6 +20,9 @@ class Ledger {
   // Adds the cost since the previous call, `elapsed` seconds ago. `workers` is the engine's present list. A
   // worker that is no longer in it is charged for all of `elapsed`, since the time of its end is unknown.
   void observe(std::span<const EngineWorker> workers, double elapsed);
+  // Adds workers that the engine has just started, each with `cores` cores. One that the next list lacks has
+  // run and ended in between, and is charged for all of that time.
+  void started(std::span<const std::string> ids, int cores);
   double core_seconds() const;
   // Returns how many workers have started to run. A worker that the engine requeued and ran again counts
   // again.
@@ -34,6 +37,7 @@ class Ledger {
     int cores = 1;
   };
   std::map<std::string, Line> running_;
+  std::map<std::string, int> unlisted_;  // cores of workers that were started since the last list
   double ended_ = 0;  // core seconds of workers that have ended
   int started_ = 0;
 };

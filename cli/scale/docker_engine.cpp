@@ -41,9 +41,11 @@ class Docker final : public Engine {
     return std::move(found->workers);
   }
 
-  Result<void> start(int count) override {
+  Result<std::vector<std::string>> start(int count) override {
+    std::vector<std::string> ids;
     for (; count > 0; --count) {
       const std::string id = new_worker_id();
+      ids.push_back(id);
       auto started = run(run_command_of(id), "", kDockerRunLimit);
       if (started)
         started = run({"docker", "exec", "--interactive", container(id), "sh", "-c", kGiveToken},
@@ -52,7 +54,7 @@ class Docker final : public Engine {
       remove(id);
       return tl::unexpected(started.error());
     }
-    return {};
+    return ids;
   }
 
   Result<void> drain(std::span<const EngineWorker> workers) override {

@@ -187,9 +187,12 @@ class FarmUp {
     }
     if (actions.start == 0) return;
     print_note(fmt::format("lightshaft: starts {} workers", actions.start));
-    if (const auto done = engine_.start(actions.start); !done) {
+    if (const auto ids = engine_.start(actions.start)) {
+      scaler_.started(*ids);
+      ledger_.started(*ids, options_.limits.threads);
+    } else {
       scaler_.start_failed(clock_.now());
-      notes_.print(done.error().message);
+      notes_.print(ids.error().message);
     }
   }
 

@@ -91,16 +91,19 @@ class Kubernetes final : public Engine {
     return std::move(found->workers);
   }
 
-  Result<void> start(int count) override {
+  Result<std::vector<std::string>> start(int count) override {
+    std::vector<std::string> ids;
     json pods = json::array();
     for (; count > 0; --count) {
-      auto pod = pod_like(deployment_, options_, new_worker_id());
+      ids.push_back(new_worker_id());
+      auto pod = pod_like(deployment_, options_, ids.back());
       if (!pod) return tl::unexpected(pod.error());
       pods.push_back(std::move(*pod));
     }
-    return without_text(
-        kubectl({"create", "--filename=-"},
-                json{{"apiVersion", "v1"}, {"kind", "List"}, {"items", std::move(pods)}}.dump()));
+    const auto made = kubectl({"create", "--filename=-"},
+                              json{{"apiVersion", "v1"}, {"kind", "List"}, {"items", std::move(pods)}}.dump());
+    if (!made) return tl::unexpected(made.error());
+    return ids;
   }
 
   Result<void> drain(std::span<const EngineWorker> workers) override { return remove(workers, {}); }

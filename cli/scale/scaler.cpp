@@ -62,6 +62,10 @@ ScaleActions Scaler::end(std::span<const EngineWorker> workers, TimePoint now) {
   return out;
 }
 
+void Scaler::started(std::span<const std::string> ids) {
+  for (const std::string& id : ids) seen_.try_emplace(id);
+}
+
 void Scaler::start_failed(TimePoint now) {
   ++failures_;
   const double pause = std::min(kLongestPause, kFirstPause * std::exp2(std::min(failures_ - 1, 10)));

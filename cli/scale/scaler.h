@@ -55,6 +55,8 @@ class Scaler {
   // Returns the actions while the command is ending: start no worker, drain all, and kill those that have not
   // ended after drain_seconds.
   ScaleActions end(std::span<const EngineWorker> workers, TimePoint now);
+  // Must be called with the workers that the engine has started: one that the next list lacks has ended.
+  void started(std::span<const std::string> ids);
   // Must be called if the engine could not start workers. The next attempt is delayed, longer after each
   // failure.
   void start_failed(TimePoint now);

@@ -62,7 +62,7 @@ class Slurm final : public Engine {
     return lines ? parse_squeue(*lines) : tl::unexpected(lines.error());
   }
 
-  Result<void> start(int count) override {
+  Result<std::vector<std::string>> start(int count) override {
     const WorkerCommand& w = options_.worker;
     Words words{"sbatch",
                 "--parsable",
@@ -82,7 +82,12 @@ class Slurm final : public Engine {
     words.insert(words.end(), w.options.begin(), w.options.end());
     words.insert(words.end(), {"--name", w.farm});  // the script appends the job's id to this name
     const auto started = run(words, kScript);
-    return started ? Result<void>{} : tl::unexpected(started.error());
+    if (!started) return tl::unexpected(started.error());
+    // With --parsable, sbatch prints JOB or JOB;CLUSTER.
+    const std::string job = started->substr(0, started->find_first_of(";\n"));
+    std::vector<std::string> ids;
+    for (int task = 1; task <= count; ++task) ids.push_back(fmt::format("{}_{}", job, task));
+    return ids;
   }
 
   Result<void> drain(std::span<const EngineWorker> workers) override {

@@ -47,14 +47,16 @@ class Ssh final : public Engine {
   }
 
   // Tries the machines in turn, so that one that is down does not get every attempt.
-  Result<void> start(int count) override {
+  Result<std::vector<std::string>> start(int count) override {
+    std::vector<std::string> ids;
     for (std::size_t tried = 0; count > 0 && tried < options_.machines.size(); ++tried) {
       const std::string& machine = options_.machines[next_++ % options_.machines.size()];
       if (running_.contains(machine)) continue;
-      if (const auto started = start_on(machine); !started) return started;
+      if (const auto started = start_on(machine); !started) return tl::unexpected(started.error());
+      ids.push_back(running_.at(machine).id);
       --count;
     }
-    return {};
+    return ids;
   }
 
   Result<void> drain(std::span<const EngineWorker> workers) override {

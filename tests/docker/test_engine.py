@@ -48,6 +48,7 @@ def test_one_picture_while_containers_are_killed_and_stopped(farm, start):
     up = start("--workers", 2, "--finish-in", .001, delay=300)
     wait_until(lambda: len(connected(farm)) == 2, "two workers have joined")
     farm.wait_for_progress(job, 2)
+    wait_until(lambda: up.report()["workers_started"] == 2, "farm-up has listed both")
 
     docker("kill", containers()[0])
     wait_until(lambda: len(connected(farm)) == 2 and up.report()["workers_started"] >= 3, "another has joined")

@@ -207,6 +207,20 @@ TEST(Scaler, WaitsLongerAfterEachWorkerThatEndedWithoutJoining) {
   EXPECT_EQ(w.look_after(5).start, 1);
 }
 
+TEST(Scaler, WaitsAfterWorkersThatEndedBeforeTheyWereListed) {
+  World w;
+  w.work(100);
+  w.look();
+  const std::vector<std::string> ids{"1", "2"};
+  w.scaler.started(ids);
+
+  const auto actions = w.look();
+
+  EXPECT_EQ(actions.start, 0);
+  EXPECT_THAT(actions.why, HasSubstr("1 starts of workers in a row failed"));
+  EXPECT_EQ(w.look_after(5).start, 1);
+}
+
 TEST(Scaler, ReplacesAWorkerThatHadJoinedAtOnce) {
   World w;
   w.work(100);
@@ -351,6 +365,18 @@ TEST(Ledger, AWorkerThatIsGoneIsChargedUpToTheLookThatMissedIt) {
   ledger.observe({}, 5);
 
   EXPECT_DOUBLE_EQ(ledger.core_seconds(), 60);
+}
+
+TEST(Ledger, AWorkerThatEndedBeforeItWasListedIsChargedToo) {
+  Ledger ledger;
+  ledger.observe({}, 0);
+  const std::vector<std::string> ids{"1", "2"};
+  ledger.started(ids, 4);
+
+  ledger.observe(std::vector{running("2", 3, 4)}, 5);
+
+  EXPECT_DOUBLE_EQ(ledger.core_seconds(), 5 * 4 + 3 * 4);
+  EXPECT_EQ(ledger.started(), 2);
 }
 
 TEST(Ledger, ARequeuedWorkerBeginsASecondRun) {
