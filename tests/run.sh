@@ -168,8 +168,10 @@ run_packages() {
 }
 
 waiting_lane() {
-  step "system tests" run_pytest system tests/system
-  step "browser tests" run_pytest web tests/web
+  # Most of their time is waiting, so several files run side by side. A file runs in one process: its tests share what is slow
+  # to make.
+  step "system tests" run_pytest system -n 3 --dist loadfile tests/system
+  step "browser tests" run_pytest web -n 2 --dist loadfile tests/web
   step "Python package" run_in_venv python tests/python tests/packages
   step "Open Job Description" run_in_venv openjd tests/openjd
   step "Blender" run_blender
@@ -199,7 +201,7 @@ export LIGHTSHAFT_BIN="$PWD/build/release/bin"
 step "release build: programs" build release lightshaft lightshaft-coordinator lightshaft-worker fake_oidn_blurs race_pages
 
 if [ "$quick" -eq 1 ]; then
-  step "system tests, the fast ones" run_pytest system tests/system -m "not slow" &
+  step "system tests, the fast ones" run_pytest system -n 3 --dist loadfile tests/system -m "not slow" &
   waiting=$!
   (step "release build: tests" build release tests-unit
    step "unit and architecture tests" run_ctest release unit unit)
