@@ -241,10 +241,11 @@ struct Job {
   // these workers' name
   std::uint32_t losses_in_a_row = 0;
   std::string last_lost;
-  std::uint32_t leased = 0;  // units under all leases, including audits
-  bool has_units = false;    // true if it had units to lease when this was last checked
-  bool offered = false;      // true if FairShare lists it as a job that has units to lease
-  double charge_out = 0;     // core seconds charged for units that are leased now (fair_share.h)
+  std::uint32_t leased = 0;   // units under all leases, including audits
+  std::set<LeaseSeq> leases;  // all leases of its units, including audits
+  bool has_units = false;     // true if it had units to lease when this was last checked
+  bool offered = false;       // true if FairShare lists it as a job that has units to lease
+  double charge_out = 0;      // core seconds charged for units that are leased now (fair_share.h)
   // Samples per pixel of the latest checkpoint at which all tiles had the same number of rounds; 0: none
   double checkpoint_spp = 0;
 

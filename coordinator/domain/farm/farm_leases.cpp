@@ -41,6 +41,7 @@ void Farm::State::grant(Job& job, Worker& worker, std::vector<UnitCode> units, b
   worker.units_out += lease.remaining;
   worker.seconds_out += sum;
   worker.leases.insert(lease.seq);
+  job.leases.insert(lease.seq);
   workers.settle(worker);
   job.leased += lease.remaining;
   if (!audit) load(job, worker, lease.remaining);
@@ -165,6 +166,7 @@ void Farm::State::close(LeaseRecord& lease, bool send_worker) {
   Worker& worker = *lease.worker;
   worker.leases.erase(lease.seq);
   if (!lease.audit) leave_load(*lease.job, worker);
+  lease.job->leases.erase(lease.seq);
   if (send_worker && worker.connected)
     effects.emplace_back(Send{worker.id, CancelLease{leases.id_of(lease.seq)}});
   touch(worker);
@@ -183,14 +185,6 @@ std::uint32_t Farm::State::units_before(const LeaseRecord& lease) const {
   return units;
 }
 
-std::vector<LeaseSeq> Farm::State::leases_of(const Job& job) const {
-  std::vector<LeaseSeq> found;
-  for (const auto& [seq, lease] : leases.all()) {
-    if (lease.job == &job) found.push_back(seq);
-  }
-  return found;
-}
-
 void Farm::State::recall(LeaseRecord& lease) {
   if (lease.recalled || lease.audit) return;
   lease.recalled = now;
@@ -201,8 +195,7 @@ void Farm::State::recall(LeaseRecord& lease) {
 
 // The newest goes first, so that later rounds come back before earlier ones.
 void Farm::State::recall_all(const Job& job) {
-  const std::vector<LeaseSeq> all = leases_of(job);
-  for (auto seq = all.rbegin(); seq != all.rend(); ++seq) recall(*leases.find(*seq));
+  for (auto seq = job.leases.rbegin(); seq != job.leases.rend(); ++seq) recall(*leases.find(*seq));
 }
 
 void Farm::State::note_begun(Worker& worker) {

@@ -227,7 +227,8 @@ struct Farm::State {
   void free_units(LeaseRecord& lease, FreedCause why, bool send_worker, Which&& which);
   void free_lease(LeaseSeq seq, FreedCause why, bool send_worker);
   void close(LeaseRecord& lease, bool send_worker);
-  std::vector<LeaseSeq> leases_of(const Job& job) const;
+  // The leases of the job, oldest first: a copy, since they may end while the caller goes through them
+  static std::vector<LeaseSeq> leases_of(const Job& job) { return {job.leases.begin(), job.leases.end()}; }
   std::uint32_t units_before(const LeaseRecord& lease) const;  // units of earlier leases of the same worker
   void renew(LeaseRecord& lease);
   // Asks the worker to give back the units of the lease that it has not begun (RecallLease), once.

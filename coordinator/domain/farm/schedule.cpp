@@ -157,10 +157,8 @@ bool Farm::State::awaits_return(const Job& job, const Worker& worker) const {
   const auto expected = [&](const LeaseRecord& lease) {
     return lease.job == &job && lease.comes_back && ticked < *lease.recalled + kSpeculateSlack;
   };
-  if (job.frozen)
-    return std::any_of(leases.all().begin(), leases.all().end(),
-                       [&](const auto& one) { return expected(one.second); });
-  return std::any_of(worker.leases.begin(), worker.leases.end(),
+  const std::set<LeaseSeq>& those = job.frozen ? job.leases : worker.leases;
+  return std::any_of(those.begin(), those.end(),
                      [&](LeaseSeq seq) { return expected(leases.all().at(seq)); });
 }
 
