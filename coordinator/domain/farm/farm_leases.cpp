@@ -35,8 +35,8 @@ void Farm::State::grant(Job& job, Worker& worker, std::vector<UnitCode> units, b
                    (worker.warmed_up.contains(job.seq) ? Duration{} : Duration{kLoadSlack});
 
   if (worker.units_out == 0) {
-    worker.progress_at = worker.busy_since = now;
-    worker.claimed = 0;
+    worker.progress_at = now;
+    worker.begin_work(now);
   }
   worker.units_out += lease.remaining;
   worker.seconds_out += sum;
@@ -50,6 +50,7 @@ void Farm::State::grant(Job& job, Worker& worker, std::vector<UnitCode> units, b
   if (!worker.briefs.has(job.seq)) {
     message.brief = job.plan.brief;
     brief_bytes = memory_of(job.plan.brief);
+    lease.with_brief = true;
   }
   worker.briefs.leased(job.seq, brief_bytes);
   leases.add(std::move(lease));
@@ -165,8 +166,8 @@ void Farm::State::free_lease(LeaseSeq seq, FreedCause why, bool send_worker) {
 void Farm::State::close(LeaseRecord& lease, bool send_worker) {
   Worker& worker = *lease.worker;
   worker.leases.erase(lease.seq);
-  if (!lease.audit) leave_load(*lease.job, worker);
   lease.job->leases.erase(lease.seq);
+  if (!lease.audit) leave_load(*lease.job, worker);
   if (send_worker && worker.connected)
     effects.emplace_back(Send{worker.id, CancelLease{leases.id_of(lease.seq)}});
   touch(worker);
