@@ -6,8 +6,10 @@
 
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <new>
 #include <semaphore>
+#include <set>
 #include <thread>
 
 #include "tests/unit/agent/agent_rig.h"
@@ -267,18 +269,34 @@ class NeedsItsFile final : public RenderBackend {
  public:
   Digest numeric_class() const override { return fake_->numeric_class(); }
   tl::expected<void, UnitFailure> prepare(const LocalJob& job, const std::atomic<bool>& stop) override {
+    const std::lock_guard lock(mutex_);
+    built += worlds_.insert(key_of(job.brief)).second;
     return fake_->prepare(job, stop);
   }
+  // Tile 9 finds no file, too, but says so only when the test lets it.
   tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
                                                  const std::atomic<bool>& stop) override {
+    if (unit.tile == 9) {
+      begun.release();
+      fail.acquire();
+      return unit_failure("cannot open the scene");
+    }
     if (!std::filesystem::exists(job.scene)) return unit_failure("cannot open the scene");
     return fake_->render(job, unit, stop);
   }
-  void forget(const JobId& job) override { fake_->forget(job); }
+  void forget(const JobId& job) override {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(worlds_, [&](const WorldKey& key) { return key.job == job; });
+  }
   std::uint64_t rss_bytes() const override { return 0; }
+
+  std::atomic<int> built = 0;
+  std::counting_semaphore<> begun{0}, fail{0};
 
  private:
   std::unique_ptr<LocalBackend> fake_ = make_fake_backend({});
+  std::mutex mutex_;
+  std::set<WorldKey> worlds_;
 };
 
 TEST_F(AgentInTrouble, FetchesFilesAgainThatWereRemovedUnderARendererAndBlamesNobody) {
@@ -303,6 +321,34 @@ TEST_F(AgentInTrouble, FetchesFilesAgainThatWereRemovedUnderARendererAndBlamesNo
   EXPECT_TRUE(coordinator_.failures.empty());
   EXPECT_THAT(coordinator_.returned[0].reason, HasSubstr("removed from the cache"));
   EXPECT_EQ(files.acquired, 2);
+  EXPECT_EQ(backend.built, 2) << "the world whose file was lost is freed";
+}
+
+// Two threads miss the file. Until the second one has said so, somebody has put the file back.
+TEST_F(AgentInTrouble, BlamesNobodyForAFileThatIsThereAgainWhenTheLastUnitThatMissedItEnds) {
+  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "removed-and-back";
+  RemovableFiles files(path);
+  NeedsItsFile backend;
+  AgentOptions options;
+  options.threads = 2;
+  Agent agent(options, coordinator_, backend, files, clock_);
+  std::jthread runner([&] { ended_ = agent.run(); });
+  coordinator_.wait_for([](auto& c) { return c.hellos.size() == 1; });
+  coordinator_.tell(assign("l-1", "j-1", {9}));
+  backend.begun.acquire();
+
+  std::filesystem::remove(path);
+  coordinator_.tell(assign("l-2", "j-1", {1}));
+  coordinator_.wait_for([](auto& c) { return c.returned.size() == 1; });
+  std::ofstream(path) << "scene";
+  backend.fail.release();
+  coordinator_.wait_for([](auto& c) { return c.returned.size() + c.failures.size() == 2; });
+
+  agent.drain();
+  runner.join();
+  std::filesystem::remove(path);
+  EXPECT_TRUE(coordinator_.failures.empty());
+  EXPECT_EQ(files.acquired, 1) << "no file is fetched for a job without units";
 }
 
 // Renders a unit only when the test lets it.
