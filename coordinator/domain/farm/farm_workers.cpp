@@ -155,12 +155,13 @@ void Farm::State::on(const LeaseCameBack& event) {
   Worker* worker = workers.find(event.worker);
   LeaseRecord* lease = leases.find(event.returned.lease);
   if (worker == nullptr || lease == nullptr || lease->worker != worker) return;
-  // A worker that answers a recall can take other units at once
   const bool recalled = lease->recalled.has_value();
   lease->comes_back = false;
-  if (!worker->draining && !recalled) worker->pause = Pause::returned;
-  if (!recalled || event.returned.unknown_job) worker->briefs.doubt(lease->job->seq);
-  if (!worker->draining && !recalled && (!event.returned.unknown_job || lease->with_brief))
+  // A worker that answers a recall can take other units at once, and so can one whose result was not kept
+  const bool gave_up = !recalled && !event.not_kept;
+  if (gave_up && !worker->draining) worker->pause = Pause::returned;
+  if (gave_up || event.returned.unknown_job) worker->briefs.doubt(lease->job->seq);
+  if (gave_up && !worker->draining && (!event.returned.unknown_job || lease->with_brief))
     note_fruitless(*worker, *lease->job,
                    event.returned.unknown_job      ? kUnknownInSpiteOfBrief
                    : event.returned.reason.empty() ? "it does not say why"

@@ -146,6 +146,18 @@ TEST(Fruitless, ADuplicateDoesNotHideThatWorkersAreLostWithTheJob) {
   EXPECT_THAT(rig.farm.why_waiting({"j"}), HasSubstr("5 times in a row"));
 }
 
+TEST(Fruitless, AResultThatTheCoordinatorCouldNotKeepDoesNotTellAgainstItsWorker) {
+  Rig rig(plan_of("j", 1, 2), {{"w", 1}});
+
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_FALSE(rig.held[{"w"}].empty()) << "it is offered the unit again at once";
+    const Rig::Held unit = rig.take("w");
+    rig.send(LeaseCameBack{{"w"}, {unit.lease, {unit.key()}}, true});
+  }
+
+  EXPECT_EQ(rig.farm.why_waiting({"j"}), "");
+}
+
 TEST(Fruitless, OthersGetTheUnitsAtOnce) {
   Rig rig(plan_of("j", 4, 2), {{"broken", 1}});
   rig.join("healthy", 1);
