@@ -86,15 +86,16 @@ TEST_F(AgentInTrouble, ReportsAUnitWhoseBackendRanOutOfMemoryAndLivesOn) {
 }
 
 // A backend whose world of the job with seed 1 is never ready: building it ends when told to stop or, if the
-// backend is `deaf`, fails when the test says so.
+// backend is `deaf`, fails or is done when the test says so.
 class Building final : public RenderBackend {
  public:
   explicit Building(bool deaf) : deaf_(deaf) {}
   Digest numeric_class() const override { return fake_->numeric_class(); }
   tl::expected<void, UnitFailure> prepare(const LocalJob& job, const std::atomic<bool>& stop) override {
-    if (job.brief.settings.seed != 1) return fake_->prepare(job, stop);
+    if (job.brief.settings.seed != 1) return ++others_built, fake_->prepare(job, stop);
     building = true;
-    while (deaf_ ? !fail.load() : !stop.load()) std::this_thread::yield();
+    while (deaf_ ? !fail && !done : !stop) std::this_thread::yield();
+    if (done) return {};
     return unit_failure(deaf_ ? "the world cannot be built" : "told to stop");
   }
   tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
@@ -104,7 +105,8 @@ class Building final : public RenderBackend {
   void forget(const JobId& job) override { fake_->forget(job); }
   std::uint64_t rss_bytes() const override { return 0; }
 
-  std::atomic<bool> building{false}, fail{false};
+  std::atomic<bool> building{false}, fail{false}, done{false};
+  std::atomic<int> others_built = 0;
 
  private:
   const bool deaf_;
@@ -177,6 +179,20 @@ TEST_F(AgentThatBuilds, ReportsNoUnitOfAJobThatReplacedTheOneThatCannotBeBuilt) 
   backend.fail = true;
 
   expect_that_only_tile_7_was_rendered();
+}
+
+TEST_F(AgentThatBuilds, BuildsTheWorldOfAJobThatReplacedTheOneThatWasBuiltMeanwhile) {
+  Building& backend = start_building(true);
+
+  coordinator_.tell(assign("l-2", "j-1", {7}, 2));
+  AssignLease unknown = assign("l-3", "j-3", {3});
+  unknown.brief.reset();
+  coordinator_.tell(unknown);
+  coordinator_.wait_for([](auto& c) { return c.returned.size() == 1; });
+  backend.done = true;
+
+  expect_that_only_tile_7_was_rendered();
+  EXPECT_EQ(backend.others_built, 1);
 }
 
 TEST_F(AgentThatBuilds, EndsWithoutWaitingForTheWorld) {
