@@ -246,7 +246,8 @@ Result<FromWorker> returned_from(const pb::LeaseReturned& in) {
   LS_TRY(lease, id_from(in.lease(), "returned.lease"));
   LS_TRY(units, list_from(in.units(), limits::kUnitsPerLease, "returned.units", key_from));
   LS_TRY(reason, text_from(in.reason(), limits::kTextBytes, "returned.reason"));
-  return LeaseReturned{LeaseId{lease}, std::move(units), reason, in.unknown_job()};
+  return LeaseReturned{LeaseId{lease}, std::move(units), sendable(reason, limits::kReasonBytes),
+                       in.unknown_job()};
 }
 
 Result<ToWorker> assign_from(const pb::AssignLease& in) {

@@ -140,7 +140,7 @@ void put(const UnitFailure& failure, pb::FromWorker& out) {
 void put(const LeaseReturned& returned, pb::FromWorker& out) {
   out.mutable_returned()->set_lease(returned.lease.value);
   for (const UnitKey& key : returned.unrendered) put(key, out.mutable_returned()->add_units());
-  out.mutable_returned()->set_reason(sendable(returned.reason, limits::kTextBytes));
+  out.mutable_returned()->set_reason(sendable(returned.reason, limits::kReasonBytes));
   out.mutable_returned()->set_unknown_job(returned.unknown_job);
 }
 

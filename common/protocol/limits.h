@@ -22,6 +22,9 @@ inline constexpr std::size_t kIdBytes = 64;  // length of an id of a job, lease 
 inline constexpr std::size_t kNameBytes = 128;
 // Length of a text that gives the reason of a failure or describes a problem.
 inline constexpr std::size_t kTextBytes = 4096;
+// Length of the reason of a returned lease, which the coordinator keeps for each worker and job. A longer one
+// is cut.
+inline constexpr std::size_t kReasonBytes = 256;
 inline constexpr std::size_t kTokenBytes = 512;
 inline constexpr std::size_t kSettingsBytes = 64 << 10;
 inline constexpr std::size_t kNeedsBytes = 16 << 10;

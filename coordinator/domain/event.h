@@ -192,6 +192,9 @@ struct ResultsWait {
 struct LeaseCameBack {
   WorkerId worker;
   LeaseReturned returned;
+  // True: the worker has rendered these units, but the coordinator could not keep the results. That does not
+  // tell against the worker
+  bool not_kept = false;
 };
 
 // Units

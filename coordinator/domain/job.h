@@ -12,6 +12,7 @@
 #include <deque>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <unordered_map>
@@ -129,19 +130,36 @@ std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
 // claims, not votes.
 class VoterTable {
  public:
-  void note(UnitCode unit, WorkerIndex worker) {
-    held_.emplace(unit, worker);
+  // `since`: when the unit was leased to the worker, if the worker may still be rendering it
+  void note(UnitCode unit, WorkerIndex worker, std::optional<TimePoint> since = std::nullopt) {
+    auto& kept = held_.try_emplace({unit, worker}).first->second;
+    if (!kept || (since && *since < *kept)) kept = since;
     if (held_.size() > kMaxVoters) held_.erase(held_.begin());
   }
   bool has(UnitCode unit, WorkerIndex worker) const { return held_.contains({unit, worker}); }
+  // Returns the earliest `since` that was noted for this unit and worker; nullopt: there is none.
+  std::optional<TimePoint> since(UnitCode unit, WorkerIndex worker) const {
+    const auto found = held_.find({unit, worker});
+    return found == held_.end() ? std::nullopt : found->second;
+  }
   void clear() { held_.clear(); }
   std::size_t size() const { return held_.size(); }
   void mark_workers(std::vector<bool>& used) const {
-    for (const auto& [unit, worker] : held_) used[worker] = true;
+    for (const auto& [held, since] : held_) used[held.second] = true;
   }
 
  private:
-  std::set<std::pair<UnitCode, WorkerIndex>> held_;
+  std::map<std::pair<UnitCode, WorkerIndex>, std::optional<TimePoint>> held_;
+};
+
+// The workers of one numeric class whose leases of a job ended without a result while the job was pinned to
+// the class and no result of the class was accepted. A process can connect as any number of workers, so the
+// rest of the class is taken to be no better than kFruitlessLeases of them.
+struct PassedOver {
+  std::set<WorkerIndex> workers;  // kFruitlessLeases at most
+  bool has(WorkerIndex worker) const {
+    return workers.size() >= kFruitlessLeases || workers.contains(worker);
+  }
 };
 
 using JobSeq = std::uint64_t;    // number of a job, in the order of submission
@@ -217,7 +235,7 @@ struct Job {
   bool class_kept = false;
   // When the class of the first lease was taken, or the job was resumed since
   TimePoint pinned_at{};
-  std::set<Digest> passed_over = {};  // classes that were given up so
+  std::map<Digest, PassedOver> passed_over = {};
   // How often the class was given up because it had brought no result for too long (kPinLimit)
   std::uint32_t pins_released = 0;
   // When the first ray was traced, plus the total time in which the job's clock was stopped; nullopt: no ray
@@ -241,10 +259,11 @@ struct Job {
   // these workers' name
   std::uint32_t losses_in_a_row = 0;
   std::string last_lost;
-  std::uint32_t leased = 0;  // units under all leases, including audits
-  bool has_units = false;    // true if it had units to lease when this was last checked
-  bool offered = false;      // true if FairShare lists it as a job that has units to lease
-  double charge_out = 0;     // core seconds charged for units that are leased now (fair_share.h)
+  std::uint32_t leased = 0;   // units under all leases, including audits
+  std::set<LeaseSeq> leases;  // all leases of its units, including audits
+  bool has_units = false;     // true if it had units to lease when this was last checked
+  bool offered = false;       // true if FairShare lists it as a job that has units to lease
+  double charge_out = 0;      // core seconds charged for units that are leased now (fair_share.h)
   // Samples per pixel of the latest checkpoint at which all tiles had the same number of rounds; 0: none
   double checkpoint_spp = 0;
 

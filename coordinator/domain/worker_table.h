@@ -82,6 +82,12 @@ struct FruitlessLeases {
   void add(TimePoint now, std::string why);
 };
 
+// How long a worker has had work, and what it says that it did with this time
+struct WorkedTime {
+  TimePoint since{};
+  double claimed = 0;  // CPU seconds that were believed of its results (Farm::believable_seconds)
+};
+
 struct Worker {
   WorkerIndex index = kNoWorker;
   WorkerId id;
@@ -104,9 +110,10 @@ struct Worker {
   std::optional<TimePoint> unhealthy_since;
   TimePoint lost_at{};
   TimePoint progress_at{};  // when it last finished a unit, or when it got its first unit after being idle
-  TimePoint busy_since{};   // when it last got a unit after being idle
-  // CPU seconds that were believed of its results since `busy_since` (Farm::believable_seconds)
-  double claimed = 0;
+  WorkedTime worked;        // since it last got a unit after being idle
+  // What `worked` was before, if leases were taken from the worker then that it may still be rendering
+  std::optional<WorkedTime> worked_before;
+  bool interrupted = false;  // true if such leases were taken from it since worked.since
 
   std::set<LeaseSeq> leases;
   std::uint32_t units_out = 0;  // units leased to it
@@ -137,6 +144,31 @@ struct Worker {
   const FruitlessLeases* fruitless_in(JobSeq job) const {
     const auto it = fruitless.find(job);
     return it == fruitless.end() ? nullptr : &it->second;
+  }
+  // Begins a new `worked`: the worker was idle, or all its leases were taken from it, and it gets work now.
+  void begin_work(TimePoint now) {
+    if (!interrupted)
+      worked_before.reset();
+    else if (worked_before)
+      worked_before->claimed += worked.claimed;
+    else
+      worked_before = worked;
+    interrupted = false;
+    worked = {now, 0};
+  }
+  // Returns the time in which the worker may have rendered a unit that it has held since then.
+  const WorkedTime& worked_on(TimePoint unit_since) const {
+    return worked_before && unit_since < worked.since ? *worked_before : worked;
+  }
+  // Notes that this cost of a unit was believed, which the worker has held since `unit_since`.
+  void claim(TimePoint unit_since, double cpu_seconds, TimePoint now) {
+    if (!worked_before || unit_since >= worked.since) {
+      worked.claimed += cpu_seconds;
+      return;
+    }
+    worked_before->claimed += cpu_seconds;
+    // Only this part can lie in the present time
+    worked.claimed += std::min(cpu_seconds, seconds(now - worked.since));
   }
   // True if nobody should wait for results of this job from this worker: too many leases were fruitless. It
   // is offered units of the job nevertheless, from time to time.
@@ -265,6 +297,7 @@ struct LeaseRecord {
   double charge_per_unit = 0;
   // True for an audit: a lease of one unit that has an accepted result and is rendered again for comparison
   bool audit = false;
+  bool with_brief = false;  // true if the job's brief was sent with it
   TimePoint issued{};
   // When the worker began to render the lease, as far as the coordinator can tell: its scene is loaded, and
   // the units of earlier leases no longer occupy all threads. nullopt: not yet

@@ -211,7 +211,7 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
   // may have joined again with the job's class meanwhile; then the farm would take the result for one of the
   // job's class.
   if ((accepted && lost) || wanted.verdict == Verdict::other_class)
-    core.driver.run(LeaseCameBack{a.from->worker, {r.lease, {r.unit}}});
+    core.driver.run(LeaseCameBack{a.from->worker, {r.lease, {r.unit}}, true});
   else
     core.driver.run(
         UnitAccepted{r.unit, a.expected.samples, r.digest, a.from->worker, r.cpu_seconds, r.times.wait});
@@ -250,7 +250,7 @@ void ResultPipeline::cannot_store(Core& core, const Arrived& a, const Error& err
     a.job->trouble = error.message + "; then resume the job";
     core.driver.run(JobPaused{unit.job});
   }
-  core.driver.run(LeaseCameBack{a.from->worker, {a.result.lease, {unit}}});
+  core.driver.run(LeaseCameBack{a.from->worker, {a.result.lease, {unit}}, true});
   acknowledge(core, *a.from, unit, error);
 }
 

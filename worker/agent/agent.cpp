@@ -199,7 +199,8 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
       traced ? assign.trace : std::nullopt, traced ? options.tracer->unix_ns(clock.now()) : 0);
   if (jobs.size() <= briefs.size()) return;
   std::erase_if(jobs, [this](const auto& known) {
-    return known.second.state == Job::State::idle && !briefs.has(known.first) && !table.holds(known.first);
+    return known.second.state == Job::State::idle && known.second.lost.empty() && !briefs.has(known.first) &&
+           !table.holds(known.first);
   });
 }
 

@@ -118,6 +118,10 @@ struct Agent::Impl {
     TimePoint retry_at{};
     // The fault of this machine that made the last attempt to load fail; empty: there was none
     std::string trouble;
+    // Which file of the world in memory is gone; empty: none. The job is idle then. The world is freed when
+    // the last of its units that are being rendered ends, and is not loaded again before: a unit that began
+    // with it might find it gone.
+    std::string lost;
     int transfers_cut = 0;  // transfers of its files that were cut since it was last loaded or given back
     UnitTimes unreported;   // time spent on loading the job, not yet reported to the coordinator
   };
@@ -212,10 +216,12 @@ struct Agent::Impl {
     const trace::SpanContext own;
     std::optional<TimePoint> loaded_at;  // when the world was built; nullopt: the scene could not be loaded
   };
-  // `trouble`: why the unit could not be rendered though neither it nor the renderer is at fault; empty: no
-  // such reason is known
+  // `missing`: the lost_file() of `from`, the job as the unit was rendered with it; empty if it was rendered
   void finished(RenderSlot& slot, const UnitKey& key, tl::expected<UnitResult, UnitFailure> outcome,
-                const std::string& trouble);
+                const LocalJob& from, std::string missing);
+  // Frees the world of the job if one of its files was lost and no unit of it is being rendered. Call with
+  // the mutex held.
+  void free_lost_world(const JobId& id);
 
   const AgentOptions options;
   CoordinatorLink& link;

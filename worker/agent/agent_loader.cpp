@@ -65,7 +65,8 @@ void Agent::Impl::load_loop(std::stop_token token) {
 std::optional<JobId> Agent::Impl::next_to_load() {
   for (const JobId& id : table.wanted()) {
     const auto it = jobs.find(id);
-    if (it != jobs.end() && it->second.state == Job::State::idle && clock.now() >= it->second.retry_at)
+    if (it != jobs.end() && it->second.state == Job::State::idle && it->second.lost.empty() &&
+        clock.now() >= it->second.retry_at)
       return id;
   }
   return std::nullopt;

@@ -89,8 +89,8 @@ void Agent::Impl::render_loop(RenderSlot& slot, std::stop_token token) {
   std::shared_ptr<const LocalJob> job;
   while (const auto held = next_unit(slot, token, job)) {
     auto outcome = render(slot, *job, *held);
-    const std::string trouble = outcome ? "" : lost_file(*job);
-    finished(slot, held->key, std::move(outcome), trouble);
+    std::string missing = outcome ? "" : lost_file(*job);
+    finished(slot, held->key, std::move(outcome), *job, std::move(missing));
     job.reset();
   }
 }
@@ -143,12 +143,24 @@ void Agent::Impl::trace_unit(const RenderSlot& slot, const HeldLeases::Held& hel
 }
 
 void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key,
-                           tl::expected<UnitResult, UnitFailure> outcome, const std::string& trouble) {
+                           tl::expected<UnitResult, UnitFailure> outcome, const LocalJob& from,
+                           std::string missing) {
   failpoint("unit-rendered");
-  const bool innocent = !outcome && (backend.broken() || !trouble.empty());
+  const bool broken_backend = !outcome && backend.broken();
   {
     const std::lock_guard lock(mutex);
     slot.unit.reset();
+    if (const auto job = jobs.find(key.job);
+        !outcome && job != jobs.end() && job->second.local.get() == &from) {
+      std::string& lost = job->second.lost;
+      if (lost.empty() && !missing.empty()) {
+        lost = missing;
+        job->second.state = Job::State::idle;  // its files are fetched again
+      }
+      // If another unit has found that a file is missing, this one may have missed it, too, even if the file
+      // is there again
+      missing = lost;
+    }
     if (outcome) cpu_seconds += outcome->cpu_seconds;
     if (options.tracer && !slot.stop)
       if (const auto* held = table.find(key); held && held->trace) trace_unit(slot, *held, outcome);
@@ -162,22 +174,28 @@ void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key,
         outcome->times.build = load_times.build;
       }
       outbox.add(std::move(*outcome));
-    } else if (lease && innocent) {
-      outgoing.push_back(LeaseReturned{*lease, {key}, trouble});
+    } else if (lease && (broken_backend || !missing.empty())) {
+      outgoing.push_back(LeaseReturned{*lease, {key}, missing});
     } else if (lease) {
       outcome.error().unit = key;
       outcome.error().lease = *lease;
       outbox.add(std::move(outcome.error()));
     }
-    if (const auto job = jobs.find(key.job);
-        !trouble.empty() && job != jobs.end() && job->second.state == Job::State::ready) {
-      job->second.state = Job::State::idle;  // its files are fetched again
-      job->second.local.reset();
-      job->second.files.clear();
-    }
+    free_lost_world(key.job);
     work.notify_all();
   }
   inbox->nudge();
+}
+
+void Agent::Impl::free_lost_world(const JobId& id) {
+  const auto job = jobs.find(id);
+  if (job == jobs.end() || job->second.lost.empty()) return;
+  for (const auto& slot : slots)
+    if (slot->unit && slot->unit->job == id) return;
+  backend.forget(id);
+  job->second.local.reset();
+  job->second.files.clear();
+  job->second.lost.clear();
 }
 
 }  // namespace ls::worker

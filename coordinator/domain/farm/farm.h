@@ -116,8 +116,10 @@ class Farm {
   std::optional<WorkerFigures> worker(const WorkerId& id) const;
   // Returns how many of the CPU seconds that a worker reports for its result of this unit, which arrived at
   // `at`, are credible: one thread renders a unit, and not before the unit was leased to the worker; and the
-  // results of a worker together cannot have taken more than all of its threads since it got work. A result
-  // of a unit that is not leased to the worker is believed to have taken what such units take.
+  // results of a worker together cannot have taken more than all of its threads since it got work. A worker
+  // whose stream broke, or which was silent, may have rendered its units all the time: for these, both count
+  // from the first lease on. A result of a unit that was not leased to the worker is believed to have taken
+  // what such units take.
   double believable_seconds(const UnitKey& unit, const WorkerId& worker, double reported, TimePoint at) const;
   // Explains to the user why a job that is queued or running stands still: each connected worker is of
   // another class, lacks memory or a tag, is blocked or unhealthy, gives the job's units back, or the like;

@@ -35,12 +35,13 @@ void Farm::State::grant(Job& job, Worker& worker, std::vector<UnitCode> units, b
                    (worker.warmed_up.contains(job.seq) ? Duration{} : Duration{kLoadSlack});
 
   if (worker.units_out == 0) {
-    worker.progress_at = worker.busy_since = now;
-    worker.claimed = 0;
+    worker.progress_at = now;
+    worker.begin_work(now);
   }
   worker.units_out += lease.remaining;
   worker.seconds_out += sum;
   worker.leases.insert(lease.seq);
+  job.leases.insert(lease.seq);
   workers.settle(worker);
   job.leased += lease.remaining;
   if (!audit) load(job, worker, lease.remaining);
@@ -49,6 +50,7 @@ void Farm::State::grant(Job& job, Worker& worker, std::vector<UnitCode> units, b
   if (!worker.briefs.has(job.seq)) {
     message.brief = job.plan.brief;
     brief_bytes = memory_of(job.plan.brief);
+    lease.with_brief = true;
   }
   worker.briefs.leased(job.seq, brief_bytes);
   leases.add(std::move(lease));
@@ -164,6 +166,7 @@ void Farm::State::free_lease(LeaseSeq seq, FreedCause why, bool send_worker) {
 void Farm::State::close(LeaseRecord& lease, bool send_worker) {
   Worker& worker = *lease.worker;
   worker.leases.erase(lease.seq);
+  lease.job->leases.erase(lease.seq);
   if (!lease.audit) leave_load(*lease.job, worker);
   if (send_worker && worker.connected)
     effects.emplace_back(Send{worker.id, CancelLease{leases.id_of(lease.seq)}});
@@ -183,14 +186,6 @@ std::uint32_t Farm::State::units_before(const LeaseRecord& lease) const {
   return units;
 }
 
-std::vector<LeaseSeq> Farm::State::leases_of(const Job& job) const {
-  std::vector<LeaseSeq> found;
-  for (const auto& [seq, lease] : leases.all()) {
-    if (lease.job == &job) found.push_back(seq);
-  }
-  return found;
-}
-
 void Farm::State::recall(LeaseRecord& lease) {
   if (lease.recalled || lease.audit) return;
   lease.recalled = now;
@@ -201,8 +196,7 @@ void Farm::State::recall(LeaseRecord& lease) {
 
 // The newest goes first, so that later rounds come back before earlier ones.
 void Farm::State::recall_all(const Job& job) {
-  const std::vector<LeaseSeq> all = leases_of(job);
-  for (auto seq = all.rbegin(); seq != all.rend(); ++seq) recall(*leases.find(*seq));
+  for (auto seq = job.leases.rbegin(); seq != job.leases.rend(); ++seq) recall(*leases.find(*seq));
 }
 
 void Farm::State::note_begun(Worker& worker) {

@@ -163,8 +163,10 @@ double Farm::believable_seconds(const UnitKey& unit, const WorkerId& worker, dou
                                 TimePoint at) const {
   const Job* job = state_->find(unit.job);
   if (job == nullptr || unit.tile >= job->units.tiles()) return std::min(reported, kAssumedUnitSeconds);
-  return state_->believable(*job, unit_code(unit.round, unit.tile), state_->workers.find(worker), reported,
-                            at);
+  const UnitCode code = unit_code(unit.round, unit.tile);
+  const Worker* known = std::as_const(state_->workers).find(worker);
+  const auto since = known ? state_->held_since(*job, code, *known) : std::nullopt;
+  return State::believable(*job, code, known, since, reported, at);
 }
 
 namespace {

@@ -28,6 +28,12 @@ constexpr bool is_fruitless(FreedCause why) {
          why == FreedCause::deadline_passed || why == FreedCause::returned;
 }
 
+// True if the worker may go on rendering units that were taken from it for this reason.
+constexpr bool may_go_on(FreedCause why) {
+  return why == FreedCause::worker_lost || why == FreedCause::newer_stream ||
+         why == FreedCause::deadline_passed;
+}
+
 // Returns the smaller of two limits; a limit of 0 means no limit.
 std::uint32_t tighter(std::uint32_t a, std::uint32_t b);
 
@@ -125,8 +131,14 @@ struct Farm::State {
   void on(const DenoisedChecked& event);
   void on(const UnitFailed& event);
   void accept(const UnitAccepted& event);
-  // See Farm::believable_seconds; null: the worker is unknown
-  double believable(const Job& job, UnitCode code, const Worker* worker, double reported, TimePoint at);
+  // See Farm::believable_seconds. `since`: held_since(), or nullopt if the worker is unknown, too
+  static double believable(const Job& job, UnitCode code, const Worker* worker,
+                           std::optional<TimePoint> since, double reported, TimePoint at);
+  // Returns since when the worker may have been rendering this unit: since its first lease, if it may have
+  // kept on rendering when that one was taken from it, else since its present one. nullopt: never.
+  std::optional<TimePoint> held_since(const Job& job, UnitCode code, const Worker& worker) const;
+  // Notes that the worker has rendered a unit of the job, so that its leases are not fruitless (is_fruitless)
+  void note_fruitful(Worker* worker, Job& job);
   void issue_folds(Job& job, TileIndex tile);
   void issue_folds(Job& job) {
     for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
@@ -227,7 +239,8 @@ struct Farm::State {
   void free_units(LeaseRecord& lease, FreedCause why, bool send_worker, Which&& which);
   void free_lease(LeaseSeq seq, FreedCause why, bool send_worker);
   void close(LeaseRecord& lease, bool send_worker);
-  std::vector<LeaseSeq> leases_of(const Job& job) const;
+  // The leases of the job, oldest first: a copy, since they may end while the caller goes through them
+  static std::vector<LeaseSeq> leases_of(const Job& job) { return {job.leases.begin(), job.leases.end()}; }
   std::uint32_t units_before(const LeaseRecord& lease) const;  // units of earlier leases of the same worker
   void renew(LeaseRecord& lease);
   // Asks the worker to give back the units of the lease that it has not begun (RecallLease), once.
@@ -257,6 +270,8 @@ struct Farm::State {
   void keep_class(Job& job, const Digest& numeric_class);  // pins the job for good
   // Releases the pin of a job of whose class no result was accepted: its leases are gone
   void unpin(Job& job);
+  // Notes that a lease of the job ended without a result because of this worker
+  static void pass_over(Job& job, const Worker& worker);
   // Takes the leases of the job back, and so releases its pin, if they bring no result for too long although
   // an idle worker of another class could render the job
   void doubt_pin(Job& job);
@@ -282,13 +297,18 @@ void Farm::State::free_units(LeaseRecord& lease, FreedCause why, bool send_worke
   Job& job = *lease.job;
   UnitsFreed freed{job.plan.brief.job, leases.id_of(lease.seq), lease.worker->id, {}, why, lease.audit};
   const std::uint32_t begun = may_be_begun(lease, why);
+  lease.worker->interrupted |= may_go_on(why);
+  if (!lease.audit && (is_fruitless(why) || why == FreedCause::failed)) pass_over(job, *lease.worker);
   std::uint32_t held = 0;
   for (const UnitCode code : lease.units) {
     if (!has(lease, code)) continue;
     const bool may_be_begun = held++ < begun;
     if (!which(code)) continue;
     freed.units.push_back(job.key(code));
-    if (!lease.audit) job.voters.note(code, lease.worker->index);
+    if (!lease.audit && may_go_on(why))
+      job.voters.note(code, lease.worker->index, lease.issued);
+    else if (!lease.audit)
+      job.voters.note(code, lease.worker->index);
     if (lease.audit && is_fruitless(why)) job.audits.at(code).fruitless.push_back(lease.worker->index);
     work_appeared |= lease.audit;
     if (!detach(lease, code)) continue;

@@ -170,9 +170,11 @@ void Farm::State::compare(Job& job, UnitCode code, const UnitAccepted& event) {
     LeaseRecord* lease = leases.find(audit->second.lease);
     if (lease->worker->id == event.worker) {
       Worker& worker = *lease->worker;
-      const double cpu_seconds = believable(job, code, &worker, event.cpu_seconds, now);
-      worker.claimed += cpu_seconds;
+      const auto since = held_since(job, code, worker);
+      const double cpu_seconds = believable(job, code, &worker, since, event.cpu_seconds, now);
+      worker.claim(since.value_or(now), cpu_seconds, now);
       shares.spend(job, cpu_seconds);
+      if (first.digest == event.digest) note_fruitful(&worker, job);
       detach(*lease, code);
       close(*lease, false);
     }

@@ -28,10 +28,15 @@ void Farm::State::keep_class(Job& job, const Digest& numeric_class) {
 
 void Farm::State::unpin(Job& job) {
   if (!job.numeric_class || job.class_kept || job.leased > 0 || job.ended()) return;
-  job.passed_over.insert(*job.numeric_class);
   job.numeric_class.reset();
   effects.emplace_back(JobUnpinned{job.plan.brief.job});
   work_appeared = true;
+}
+
+void Farm::State::pass_over(Job& job, const Worker& worker) {
+  if (job.class_kept) return;
+  std::set<WorkerIndex>& fruitless = job.passed_over[worker.numeric_class].workers;
+  if (fruitless.size() < kFruitlessLeases) fruitless.insert(worker.index);
 }
 
 void Farm::State::doubt_pin(Job& job) {
@@ -77,12 +82,9 @@ void Farm::State::accept(const UnitAccepted& event) {
   if (worker != nullptr) {
     const LeaseRecord* lease = found ? lease_of(*found, code, *worker) : nullptr;
     if (worker->connected) note_progress(*worker, lease ? lease->seq : 0);
-    worker->fruitless_in_a_row = 0;
   }
   if (found == nullptr) return unwanted("no such job");
   Job& job = *found;
-  if (worker != nullptr) work_appeared |= worker->fruitless.erase(job.seq) > 0;
-  job.losses_in_a_row = 0;
   if (is_closed(job.state)) return unwanted("the job has ended");
   if (quarantined.contains(event.worker)) return unwanted("the worker is quarantined");
   if (event.unit.tile >= job.units.tiles() || !job.queue.plans(code))
@@ -93,6 +95,7 @@ void Farm::State::accept(const UnitAccepted& event) {
   }
   if (job.units.accepted(code)) return compare(job, code, event);
 
+  note_fruitful(worker, job);
   if (worker != nullptr) {
     keep_class(job, worker->numeric_class);
     // A class, or a worker, is preferred from its first result on: units that were kept for others are for it
@@ -100,7 +103,8 @@ void Farm::State::accept(const UnitAccepted& event) {
     work_appeared |= proven.insert(worker->numeric_class).second || worker->units_done == 0;
   }
   if (job.state == JobState::queued) set_state(job, JobState::running);
-  const double cpu_seconds = believable(job, code, worker, event.cpu_seconds, now);
+  const auto since = worker ? held_since(job, code, *worker) : std::nullopt;
+  const double cpu_seconds = believable(job, code, worker, since, event.cpu_seconds, now);
   if (!job.first_ray) job.first_ray = now - from_seconds(cpu_seconds);
   effects.emplace_back(RecordUnit{event.unit, event.samples, event.digest, event.worker});
   settle_unit(job, code, worker);
@@ -110,7 +114,7 @@ void Farm::State::accept(const UnitAccepted& event) {
   shares.spend(job, cpu_seconds);
   if (worker != nullptr) {
     ++worker->units_done;
-    worker->claimed += cpu_seconds;
+    worker->claim(since.value_or(now), cpu_seconds, now);
     workers.measured(*worker, cpu_seconds, event.wait_seconds);
     if (worker->connected) worker->warmed_up.insert(job.seq);
   }
@@ -120,13 +124,27 @@ void Farm::State::accept(const UnitAccepted& event) {
   refresh(job);
 }
 
-double Farm::State::believable(const Job& job, UnitCode code, const Worker* worker, double reported,
-                               TimePoint at) {
+void Farm::State::note_fruitful(Worker* worker, Job& job) {
+  job.losses_in_a_row = 0;
+  if (worker == nullptr) return;
+  worker->fruitless_in_a_row = 0;
+  work_appeared |= worker->fruitless.erase(job.seq) > 0;
+}
+
+std::optional<TimePoint> Farm::State::held_since(const Job& job, UnitCode code, const Worker& worker) const {
+  const auto before = job.voters.since(code, worker.index);
+  const LeaseRecord* lease = lease_of(job, code, worker);
+  if (lease == nullptr) return before;
+  return before ? std::min(*before, lease->issued) : lease->issued;
+}
+
+double Farm::State::believable(const Job& job, UnitCode code, const Worker* worker,
+                               std::optional<TimePoint> since, double reported, TimePoint at) {
   if (!(reported > 0)) return 0;
-  const LeaseRecord* lease = worker == nullptr ? nullptr : lease_of(job, code, *worker);
-  if (lease == nullptr) return std::min(reported, job.cost.known() ? job.predict(code) : kAssumedUnitSeconds);
-  const double of_all_threads = worker->threads * seconds(at - worker->busy_since) - worker->claimed;
-  return std::clamp(std::min(seconds(at - lease->issued), of_all_threads), 0.0, reported);
+  if (!since) return std::min(reported, job.cost.known() ? job.predict(code) : kAssumedUnitSeconds);
+  const WorkedTime& worked = worker->worked_on(*since);
+  const double of_all_threads = worker->threads * seconds(at - worked.since) - worked.claimed;
+  return std::clamp(std::min(seconds(at - *since), of_all_threads), 0.0, reported);
 }
 
 void Farm::State::issue_folds(Job& job, TileIndex tile) {

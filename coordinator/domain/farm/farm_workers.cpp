@@ -9,6 +9,8 @@ namespace {
 constexpr int kMaxThreads = 4096;
 // More classes are remembered only while workers of them are connected
 constexpr std::size_t kProvenKept = 64;
+constexpr const char* kUnknownInSpiteOfBrief =
+    "it says that it does not know the job, though the job's brief came with the units";
 }  // namespace
 
 void Farm::State::touch(Worker& worker) {
@@ -17,7 +19,10 @@ void Farm::State::touch(Worker& worker) {
 }
 
 void Farm::State::on(const WorkerJoined& event) {
+  const bool is_new = workers.find(event.worker) == nullptr;
   Worker& worker = workers.get(event.worker);
+  // A job may know units that the worker had before it was forgotten
+  if (is_new) worker.worked.since = now;
   if (worker.connected) {
     if (event.epoch <= worker.epoch) return;  // late event of an older connection
     lose(worker, FreedCause::newer_stream);
@@ -150,14 +155,17 @@ void Farm::State::on(const LeaseCameBack& event) {
   Worker* worker = workers.find(event.worker);
   LeaseRecord* lease = leases.find(event.returned.lease);
   if (worker == nullptr || lease == nullptr || lease->worker != worker) return;
-  // A worker that answers a recall can take other units at once
   const bool recalled = lease->recalled.has_value();
   lease->comes_back = false;
-  if (!worker->draining && !recalled) worker->pause = Pause::returned;
-  if (!recalled || event.returned.unknown_job) worker->briefs.doubt(lease->job->seq);
-  if (!worker->draining && !recalled && !event.returned.unknown_job)
+  // A worker that answers a recall can take other units at once, and so can one whose result was not kept
+  const bool gave_up = !recalled && !event.not_kept;
+  if (gave_up && !worker->draining) worker->pause = Pause::returned;
+  if (gave_up || event.returned.unknown_job) worker->briefs.doubt(lease->job->seq);
+  if (gave_up && !worker->draining && (!event.returned.unknown_job || lease->with_brief))
     note_fruitless(*worker, *lease->job,
-                   event.returned.reason.empty() ? "it does not say why" : event.returned.reason);
+                   event.returned.unknown_job      ? kUnknownInSpiteOfBrief
+                   : event.returned.reason.empty() ? "it does not say why"
+                                                   : event.returned.reason);
   std::set<UnitCode> back;
   for (const UnitKey& unit : event.returned.unrendered) back.insert(unit_code(unit.round, unit.tile));
   workers.settle(*worker);
@@ -237,6 +245,8 @@ void Farm::State::forget_names() {
     job->units.mark_workers(used);
     job->failures.mark_workers(used);
     job->voters.mark_workers(used);
+    for (const auto& [numeric_class, passed] : job->passed_over)
+      for (const WorkerIndex worker : passed.workers) used[worker] = true;
     for (const auto& [code, audit] : job->audits) {
       used[audit.first] = true;
       if (audit.second) used[audit.second->first] = true;

@@ -157,10 +157,8 @@ bool Farm::State::awaits_return(const Job& job, const Worker& worker) const {
   const auto expected = [&](const LeaseRecord& lease) {
     return lease.job == &job && lease.comes_back && ticked < *lease.recalled + kSpeculateSlack;
   };
-  if (job.frozen)
-    return std::any_of(leases.all().begin(), leases.all().end(),
-                       [&](const auto& one) { return expected(one.second); });
-  return std::any_of(worker.leases.begin(), worker.leases.end(),
+  const std::set<LeaseSeq>& those = job.frozen ? job.leases : worker.leases;
+  return std::any_of(those.begin(), those.end(),
                      [&](LeaseSeq seq) { return expected(leases.all().at(seq)); });
 }
 
@@ -176,7 +174,7 @@ Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
 // Decides whether the worker may take the first lease of a job, and so pin it to its numeric class (machines
 // that compute the same bits). Four preferences decide:
 // 1. A worker that has not given back this job's units without a result, if one of another class is there.
-// 2. Another class than one that had leases of this job and brought no result, if an idle worker has it.
+// 2. A worker that had no leases of this job in vain (PassedOver), if an idle worker of another class is one.
 // 3. A class of which a result was accepted before, if an idle worker has it: anybody can announce a class.
 // 4. A class of several workers, so that they can check each other's results in audits. This one waits for
 //    busy workers, too. A class without results so far does not count against one with results.
@@ -184,7 +182,11 @@ bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
   if (job.numeric_class) return *job.numeric_class == worker.numeric_class;
   if (workers.classes() < 2) return true;
   const bool known = proven.contains(worker.numeric_class);
-  const bool passed = job.passed_over.contains(worker.numeric_class);
+  const auto passed_over = [&](const Worker& one) {
+    const auto found = job.passed_over.find(one.numeric_class);
+    return found != job.passed_over.end() && found->second.has(one.index);
+  };
+  const bool passed = passed_over(worker);
   const bool alone = options.audit_rate > 0 && workers.of_class(worker.numeric_class).workers <= 1;
   const bool unable = worker.unable(job.seq);
   if (!passed && !alone && !unable && (known || proven.empty())) return true;
@@ -198,7 +200,7 @@ bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
     if (unable) return false;
     const bool idle =
         other->available() && other->wants_more() && !other->saturated() && room(job, *other) > 0;
-    const bool other_passed = job.passed_over.contains(another), other_known = proven.contains(another);
+    const bool other_passed = passed_over(*other), other_known = proven.contains(another);
     if ((passed && !other_passed && idle) || (!known && other_known && !other_passed && idle)) return false;
     if ((other_passed && !passed) || (known && !other_known)) continue;
     if (alone && ++others[another] > 1) return false;

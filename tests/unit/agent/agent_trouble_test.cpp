@@ -6,8 +6,10 @@
 
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <new>
 #include <semaphore>
+#include <set>
 #include <thread>
 
 #include "tests/unit/agent/agent_rig.h"
@@ -84,15 +86,16 @@ TEST_F(AgentInTrouble, ReportsAUnitWhoseBackendRanOutOfMemoryAndLivesOn) {
 }
 
 // A backend whose world of the job with seed 1 is never ready: building it ends when told to stop or, if the
-// backend is `deaf`, fails when the test says so.
+// backend is `deaf`, fails or is done when the test says so.
 class Building final : public RenderBackend {
  public:
   explicit Building(bool deaf) : deaf_(deaf) {}
   Digest numeric_class() const override { return fake_->numeric_class(); }
   tl::expected<void, UnitFailure> prepare(const LocalJob& job, const std::atomic<bool>& stop) override {
-    if (job.brief.settings.seed != 1) return fake_->prepare(job, stop);
+    if (job.brief.settings.seed != 1) return ++others_built, fake_->prepare(job, stop);
     building = true;
-    while (deaf_ ? !fail.load() : !stop.load()) std::this_thread::yield();
+    while (deaf_ ? !fail && !done : !stop) std::this_thread::yield();
+    if (done) return {};
     return unit_failure(deaf_ ? "the world cannot be built" : "told to stop");
   }
   tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
@@ -102,7 +105,8 @@ class Building final : public RenderBackend {
   void forget(const JobId& job) override { fake_->forget(job); }
   std::uint64_t rss_bytes() const override { return 0; }
 
-  std::atomic<bool> building{false}, fail{false};
+  std::atomic<bool> building{false}, fail{false}, done{false};
+  std::atomic<int> others_built = 0;
 
  private:
   const bool deaf_;
@@ -175,6 +179,20 @@ TEST_F(AgentThatBuilds, ReportsNoUnitOfAJobThatReplacedTheOneThatCannotBeBuilt) 
   backend.fail = true;
 
   expect_that_only_tile_7_was_rendered();
+}
+
+TEST_F(AgentThatBuilds, BuildsTheWorldOfAJobThatReplacedTheOneThatWasBuiltMeanwhile) {
+  Building& backend = start_building(true);
+
+  coordinator_.tell(assign("l-2", "j-1", {7}, 2));
+  AssignLease unknown = assign("l-3", "j-3", {3});
+  unknown.brief.reset();
+  coordinator_.tell(unknown);
+  coordinator_.wait_for([](auto& c) { return c.returned.size() == 1; });
+  backend.done = true;
+
+  expect_that_only_tile_7_was_rendered();
+  EXPECT_EQ(backend.others_built, 1);
 }
 
 TEST_F(AgentThatBuilds, EndsWithoutWaitingForTheWorld) {
@@ -267,18 +285,34 @@ class NeedsItsFile final : public RenderBackend {
  public:
   Digest numeric_class() const override { return fake_->numeric_class(); }
   tl::expected<void, UnitFailure> prepare(const LocalJob& job, const std::atomic<bool>& stop) override {
+    const std::lock_guard lock(mutex_);
+    built += worlds_.insert(key_of(job.brief)).second;
     return fake_->prepare(job, stop);
   }
+  // Tile 9 finds no file, too, but says so only when the test lets it.
   tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
                                                  const std::atomic<bool>& stop) override {
+    if (unit.tile == 9) {
+      begun.release();
+      fail.acquire();
+      return unit_failure("cannot open the scene");
+    }
     if (!std::filesystem::exists(job.scene)) return unit_failure("cannot open the scene");
     return fake_->render(job, unit, stop);
   }
-  void forget(const JobId& job) override { fake_->forget(job); }
+  void forget(const JobId& job) override {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(worlds_, [&](const WorldKey& key) { return key.job == job; });
+  }
   std::uint64_t rss_bytes() const override { return 0; }
+
+  std::atomic<int> built = 0;
+  std::counting_semaphore<> begun{0}, fail{0};
 
  private:
   std::unique_ptr<LocalBackend> fake_ = make_fake_backend({});
+  std::mutex mutex_;
+  std::set<WorldKey> worlds_;
 };
 
 TEST_F(AgentInTrouble, FetchesFilesAgainThatWereRemovedUnderARendererAndBlamesNobody) {
@@ -303,6 +337,34 @@ TEST_F(AgentInTrouble, FetchesFilesAgainThatWereRemovedUnderARendererAndBlamesNo
   EXPECT_TRUE(coordinator_.failures.empty());
   EXPECT_THAT(coordinator_.returned[0].reason, HasSubstr("removed from the cache"));
   EXPECT_EQ(files.acquired, 2);
+  EXPECT_EQ(backend.built, 2) << "the world whose file was lost is freed";
+}
+
+// Two threads miss the file. Until the second one has said so, somebody has put the file back.
+TEST_F(AgentInTrouble, BlamesNobodyForAFileThatIsThereAgainWhenTheLastUnitThatMissedItEnds) {
+  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "removed-and-back";
+  RemovableFiles files(path);
+  NeedsItsFile backend;
+  AgentOptions options;
+  options.threads = 2;
+  Agent agent(options, coordinator_, backend, files, clock_);
+  std::jthread runner([&] { ended_ = agent.run(); });
+  coordinator_.wait_for([](auto& c) { return c.hellos.size() == 1; });
+  coordinator_.tell(assign("l-1", "j-1", {9}));
+  backend.begun.acquire();
+
+  std::filesystem::remove(path);
+  coordinator_.tell(assign("l-2", "j-1", {1}));
+  coordinator_.wait_for([](auto& c) { return c.returned.size() == 1; });
+  std::ofstream(path) << "scene";
+  backend.fail.release();
+  coordinator_.wait_for([](auto& c) { return c.returned.size() + c.failures.size() == 2; });
+
+  agent.drain();
+  runner.join();
+  std::filesystem::remove(path);
+  EXPECT_TRUE(coordinator_.failures.empty());
+  EXPECT_EQ(files.acquired, 1) << "no file is fetched for a job without units";
 }
 
 // Renders a unit only when the test lets it.

@@ -62,6 +62,8 @@ std::string audit_lease(const LeaseRecord& lease,
     return fmt::format("lease {}: {} units out, {} counted", lease.seq, out, lease.remaining);
   if (!lease.worker->leases.contains(lease.seq))
     return fmt::format("lease {}: its worker does not know it", lease.seq);
+  if (!lease.job->leases.contains(lease.seq))
+    return fmt::format("lease {}: its job does not know it", lease.seq);
   if (!lease.worker->connected) return fmt::format("lease {}: its worker is gone", lease.seq);
   return "";
 }
@@ -182,6 +184,9 @@ std::string audit(const Farm& farm) {
   }
   for (const auto& [seq, job] : state.jobs) {
     if (std::string wrong = audit_job(*job, state.leases); !wrong.empty()) return wrong;
+    for (const LeaseSeq seq : job->leases)
+      if (!state.leases.all().contains(seq))
+        return fmt::format("lease {}: it is gone, but not of its job", seq);
   }
   for (const auto& [index, worker] : state.workers.all()) {
     threads += worker->connected ? worker->threads : 0;

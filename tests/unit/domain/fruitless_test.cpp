@@ -19,13 +19,34 @@ std::pair<int, int> briefs(const std::vector<Effect>& effects) {
 }
 
 TEST(Brief, ComesAgainWithTheNextLeaseAfterAWorkerHasGivenOneBack) {
-  Rig rig(plan_of("j", 1, 2), {{"w", 1}});
+  Rig rig(plan_of("j", 3, 2), {{"w", 1}});
+  const LeaseId with_brief = rig.held[{"w"}].front().lease;
+  while (rig.held[{"w"}].front().lease == with_brief) rig.render("w");
   const Rig::Held unit = rig.take("w");
+  while (!rig.held[{"w"}].empty()) rig.render("w");
 
   rig.send(LeaseCameBack{{"w"}, {unit.lease, {unit.key()}, "", true}});
 
-  EXPECT_EQ(briefs(rig.pass(1s)), std::pair(1, 0));
   EXPECT_EQ(rig.farm.why_waiting({"j"}), "") << "that it did not know the job does not tell against a worker";
+  EXPECT_EQ(briefs(rig.pass(1s)), std::pair(1, 0));
+}
+
+TEST(Brief, AWorkerThatSaysItDoesNotKnowAJobWhoseBriefCameWithTheLeaseIsLeftAloneForLonger) {
+  Rig rig(plan_of("j", 1, 2), {{"w", 1}});
+  std::vector<int> waited;
+
+  for (int i = 0; i < 4; ++i) {
+    const Rig::Held unit = rig.take("w");
+    rig.send(LeaseCameBack{{"w"}, {unit.lease, {unit.key()}, "", true}});
+    int ticks = 0;
+    while (rig.held[{"w"}].empty() && ticks < 1000) rig.pass(1s), ++ticks;
+    waited.push_back(ticks);
+  }
+
+  EXPECT_EQ(waited, (std::vector{1, 2, 4, 8}));
+  EXPECT_EQ(rig.farm.why_waiting({"j"}),
+            "w was given its units 4 times and rendered none: it says that it does not know the job, though "
+            "the job's brief came with the units");
 }
 
 TEST(Brief, ComesWithEachLeaseOfAWorkerThatRemembersNone) {
@@ -85,6 +106,56 @@ TEST(Fruitless, EachTimeAWorkerGivesUnitsBackItIsLeftAloneForLonger) {
   }
 
   EXPECT_EQ(waited, (std::vector{1, 2, 4, 8, 16, 32, 60, 60, 60}));
+}
+
+// Results that bring the farm nothing: one that it has already, one of a unit that the job does not have, and
+// one of other samples than it needs.
+TEST(Fruitless, ResultsThatBringNothingDoNotMakeAWorkerLookAbleAgain) {
+  Rig rig(plan_of("j", 5, 2), {{"w", 1}});
+  const Rig::Held old = rig.take("w");
+  rig.result("w", old);
+  std::vector<Rig::Held> useless(3, old);
+  useless[1].unit.tile = 99;
+  useless[2].unit.tile = 4;
+  useless[2].unit.samples = {0, 64};
+
+  for (const Rig::Held& result : useless) {
+    std::vector<int> waited;
+    for (int i = 0; i < 4; ++i) {
+      rig.give_back("w", kFull);
+      rig.result("w", result);
+      int ticks = 0;
+      while (rig.held[{"w"}].empty() && ticks < 1000) rig.pass(1s), ++ticks;
+      waited.push_back(ticks);
+    }
+    EXPECT_EQ(waited, (std::vector{1, 2, 4, 8})) << result.unit.tile << " " << result.unit.samples.s1;
+    rig.render("w");  // a result that counts
+  }
+}
+
+TEST(Fruitless, ADuplicateDoesNotHideThatWorkersAreLostWithTheJob) {
+  Rig rig(plan_of("j", 3, 2), {{"v0", 1}});
+  const Rig::Held old = rig.take("v0");
+  rig.result("v0", old);
+  for (std::uint32_t i = 0; i < kLossesInARow; ++i) {
+    rig.lose(fmt::format("v{}", i));
+    rig.join(fmt::format("v{}", i + 1), 1);
+    rig.result(fmt::format("v{}", i + 1), old);
+  }
+
+  EXPECT_THAT(rig.farm.why_waiting({"j"}), HasSubstr("5 times in a row"));
+}
+
+TEST(Fruitless, AResultThatTheCoordinatorCouldNotKeepDoesNotTellAgainstItsWorker) {
+  Rig rig(plan_of("j", 1, 2), {{"w", 1}});
+
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_FALSE(rig.held[{"w"}].empty()) << "it is offered the unit again at once";
+    const Rig::Held unit = rig.take("w");
+    rig.send(LeaseCameBack{{"w"}, {unit.lease, {unit.key()}}, true});
+  }
+
+  EXPECT_EQ(rig.farm.why_waiting({"j"}), "");
 }
 
 TEST(Fruitless, OthersGetTheUnitsAtOnce) {

@@ -118,6 +118,42 @@ TEST(Pin, AClassWhoseLeasesAreGoneWithoutAResultIsGivenUp) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
+TEST(Pin, AClassIsNotPassedOverForOneOfItsWorkersThatBringsNoResult) {
+  Rig rig;
+  rig.join("broken", 1, 1);
+  rig.submit(plan_of("j", 1, 2));
+  rig.join("sound", 1, 1);
+  rig.join("x", 1, 9);
+
+  rig.give_back("broken", "its disk is full");
+
+  EXPECT_EQ(rig.job().numeric_class, digest_number(1));
+  EXPECT_EQ(rig.held[{"sound"}].size(), 1u);
+  EXPECT_EQ(audit(rig.farm), "");
+}
+
+// One process takes the job's only unit again and again, each time as a new worker, and leaves with it.
+TEST(Pin, AClassIsPassedOverAfterSeveralOfItsWorkersHaveBroughtNoResult) {
+  Rig rig;
+  rig.join("x0", 1, 9);
+  rig.submit(plan_of("j", 1, 2));
+  rig.join("honest", 1, 1);
+
+  int lost = 0;
+  for (; rig.held[{"honest"}].empty() && lost < 10; ++lost) {
+    for (const char* more : {"a", "b"}) rig.join("x" + std::to_string(lost + 1) + more, 1, 9);
+    for (auto& [name, units] : rig.held)
+      if (!units.empty()) {
+        rig.lose(std::string(name.value));
+        break;
+      }
+  }
+
+  EXPECT_EQ(rig.job().numeric_class, digest_number(1));
+  EXPECT_LE(lost, 3) << "kFruitlessLeases";
+  EXPECT_EQ(audit(rig.farm), "");
+}
+
 TEST(Pin, AClassThatBringsNoResultForLongGivesWayToAnIdleWorkerOfAnother) {
   for (const bool others : {true, false}) {
     Rig rig;

@@ -208,6 +208,109 @@ TEST(Lies, OfCostEndNoJobByTime) {
   EXPECT_GE(work.finished["j"], 10 - .1 - 1e-6);
 }
 
+// Its stream breaks every half second. What it says of the units that it held then has the same bound.
+TEST(Lies, OfCostOfUnitsThatWereLeasedBeforeAReconnectEndNoJobByTime) {
+  Clockwork work;
+  work.join("liar", 1);
+  work.lies["liar"] = 3600;
+  work.cost = [](const UnitKey&) { return .1; };
+  JobPlan plan = plan_of("j", 4, std::nullopt);
+  plan.time = 10;
+  work.rig.submit(plan);
+
+  for (int i = 0; i < 40; ++i) {
+    work.run(.5);
+    work.lose("liar");
+    work.join("liar", 1);
+  }
+
+  EXPECT_EQ(work.rig.job().stopped, StopReason::time);
+  EXPECT_GE(work.finished["j"], 10 - .1 - 1e-6);
+}
+
+// A worker with two threads that has held units for three seconds when its stream breaks, or when their
+// deadline passes while it is silent. It is there again one second later.
+struct Interrupted {
+  explicit Interrupted(bool lost, bool others) {
+    rig.own_time = true;
+    rig.join("w", 2);
+    rig.submit(plan_of("j", 100, 2));
+    units.assign(rig.held[{"w"}].begin(), rig.held[{"w"}].end());
+    begin = rig.now;
+    rig.now += lost ? Duration{3s} : Duration{kLoadSlack + kDeadlineSlack};
+    if (others) rig.join("other", 64);
+    if (lost) {
+      rig.lose("w");
+      rig.now += 1s;
+      rig.join("w", 2);
+    } else {
+      rig.pass(1s);
+      rig.send(LeaseProgress{{"w"}, {}});
+    }
+    elapsed = seconds(rig.now - begin);
+  }
+  double credible(const Rig::Held& unit, double reported) {
+    return rig.farm.believable_seconds(unit.key(), {"w"}, reported, rig.now);
+  }
+  Rig rig;
+  std::vector<Rig::Held> units;
+  TimePoint begin{};
+  double elapsed = 0;
+};
+
+TEST(Cost, OfUnitsThatWereLeasedBeforeAnInterruptionIsBelievedFromTheirFirstLeaseOn) {
+  for (const bool lost : {true, false})
+    for (const bool others : {true, false}) {
+      SCOPED_TRACE(testing::Message() << (lost ? "lost" : "silent") << (others ? ", others took them" : ""));
+      Interrupted now(lost, others);
+      ASSERT_GE(now.units.size(), 3u);
+
+      EXPECT_DOUBLE_EQ(now.credible(now.units[0], 2.5), 2.5);
+      EXPECT_DOUBLE_EQ(now.credible(now.units[0], 1e6), now.elapsed) << "one thread renders a unit";
+      now.rig.cpu_seconds = now.elapsed;
+      now.rig.result("w", now.units[0]);
+      now.rig.cpu_seconds = now.elapsed - 1;
+      now.rig.result("w", now.units[1]);
+      EXPECT_DOUBLE_EQ(now.credible(now.units[2], 1e6), 1) << "two threads had no more time together";
+    }
+}
+
+TEST(Cost, OfUnitsOfAForgottenWorkerIsBelievedFromItsReturnOn) {
+  Rig rig;
+  rig.own_time = true;
+  rig.now += 1h;
+  rig.join("w", 1);
+  rig.submit(plan_of("j", 2, 2));
+  const std::vector<Rig::Held> units(rig.held[{"w"}].begin(), rig.held[{"w"}].end());
+  ASSERT_EQ(units.size(), 2u);
+  rig.join("other", 64);
+  rig.lose("w");
+  rig.pass(kForgetWorkerAfter);
+  ASSERT_FALSE(rig.farm.worker({"w"}));
+  rig.send(JobPaused{{"j"}});
+  rig.join("w", 1);
+  rig.now += 2s;
+
+  EXPECT_DOUBLE_EQ(rig.farm.believable_seconds(units[0].key(), {"w"}, 1e6, rig.now), 2);
+}
+
+TEST(Cost, OfNewUnitsIsBelievedAlthoughThoseFromBeforeAnInterruptionTookLong) {
+  Interrupted now(true, true);
+  now.rig.lose("other");  // so that the units of the job are there for the worker
+  ASSERT_FALSE(now.rig.held[{"w"}].empty());
+  now.rig.cpu_seconds = now.elapsed;
+  for (int i : {0, 1}) now.rig.result("w", now.units[static_cast<std::size_t>(i)]);
+  const auto fresh = std::find_if(now.rig.held[{"w"}].begin(), now.rig.held[{"w"}].end(), [&](const auto& u) {
+    return std::none_of(now.units.begin(), now.units.end(),
+                        [&](const auto& o) { return o.key() == u.key(); });
+  });
+  ASSERT_NE(fresh, now.rig.held[{"w"}].end());
+
+  now.rig.now += 2s;
+
+  EXPECT_DOUBLE_EQ(now.credible(*fresh, 1e6), 2);
+}
+
 TEST(Lies, NothingIsCreditedBeyondTheTimeOfAWorkersThreads) {
   Rig rig;
   rig.own_time = true;

@@ -244,5 +244,50 @@ TEST(UnitQueue, WhatIsOutdatedIsNotKept) {
   EXPECT_EQ(all_of(queue, units).size(), 400u);
 }
 
+// A long random history, with and without speculative units and a focus. Each heap has at most two entries
+// for each tile and the one that was just added.
+TEST(UnitQueue, EntriesStayBoundedByTheNumberOfTilesWhateverHappens) {
+  constexpr TileIndex kTiles = 5;
+  constexpr RoundIndex kRounds = 40;
+  for (const bool speculative : {false, true}) {
+    const UnitTable units(kTiles);
+    UnitQueue queue(kTiles, kRounds);
+    std::mt19937 random(1);
+    const auto below = [&](std::uint32_t n) { return static_cast<std::uint32_t>(random() % n); };
+    std::vector<UnitCode> out;
+    std::size_t most = 0;
+    for (int i = 0; i < 200'000; ++i) {
+      const TileIndex tile = below(kTiles);
+      switch (below(7)) {
+        case 0:
+          queue.set_window(tile, below(kRounds + 1));
+          break;
+        case 1:
+          if (speculative) queue.set_wanted(tile, below(kRounds), below(1000));
+          break;
+        case 2:
+          queue.set_end(tile, queue.next(tile) + below(kRounds + 1 - std::min(kRounds, queue.next(tile))));
+          break;
+        case 3:
+          std::erase_if(out, [&](UnitCode code) { return tile_of(code) == tile; });
+          queue.rewind(tile, 0);
+          break;
+        case 4:
+          if (below(100) == 0) queue.set_focus(below(2) == 0 ? std::vector<TileIndex>() : std::vector{tile});
+          break;
+        case 5:
+          if (out.empty()) break;
+          queue.put_back(out.back(), below(2) == 0);
+          out.pop_back();
+          break;
+        default:
+          if (const auto next = queue.front(units, nobody)) queue.pop(*next), out.push_back(*next);
+      }
+      most = std::max(most, queue.entries());
+    }
+    EXPECT_LE(most, 3 * (2 * kTiles + 1)) << (speculative ? "with" : "without") << " speculative units";
+  }
+}
+
 }  // namespace
 }  // namespace ls::coordinator

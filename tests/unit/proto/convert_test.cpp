@@ -280,6 +280,17 @@ TEST(Convert, SendsOnlyValidUtf8) {
   EXPECT_TRUE(over_the_wire(FromWorker{failure}, pb::FromWorker{}));
 }
 
+// The coordinator keeps this reason for each worker and job. An older worker may send a longer one.
+TEST(FromWire, CutsTheReasonOfAReturnedLease) {
+  pb::FromWorker wire = to_wire(FromWorker{LeaseReturned{LeaseId{"l"}, {}, std::string(4000, 'x')}});
+  EXPECT_EQ(wire.returned().reason().size(), limits::kReasonBytes);
+  wire.mutable_returned()->set_reason(std::string(limits::kReasonBytes - 1, 'x') + "\xc3\xa9 and more");
+
+  const auto received = std::get<LeaseReturned>(from_wire(wire).value());
+
+  EXPECT_EQ(received.reason, std::string(limits::kReasonBytes - 1, 'x')) << "between two characters";
+}
+
 TEST(FromWire, AKindOfMessageThatThisVersionLacksIsKnownAsSuch) {
   pb::FromWorker from;
   pb::ToWorker to;
