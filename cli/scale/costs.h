@@ -38,7 +38,7 @@ class Ledger {
   };
   std::map<std::string, Line> running_;
   std::map<std::string, int> unlisted_;  // cores of workers that were started since the last list
-  double ended_ = 0;  // core seconds of workers that have ended
+  double ended_ = 0;                     // core seconds of workers that have ended
   int started_ = 0;
 };
 

@@ -38,8 +38,8 @@ class Engine {
   // Returns the workers that this farm-up started, now or in an earlier run under the same name. An error
   // means that they are unknown, not that there are none.
   virtual Result<std::vector<EngineWorker>> list() = 0;
-  // Starts up to `count` workers. Returns their ids, since a worker may end before it is ever listed. After an
-  // error, some may have been started.
+  // Starts up to `count` workers. Returns their ids, since a worker may end before it is ever listed. After
+  // an error, some may have been started.
   virtual Result<std::vector<std::string>> start(int count) = 0;
   // Asks workers to deliver their results and end. Workers that have not started yet are withdrawn.
   virtual Result<void> drain(std::span<const EngineWorker> workers) = 0;

@@ -100,8 +100,9 @@ class Kubernetes final : public Engine {
       if (!pod) return tl::unexpected(pod.error());
       pods.push_back(std::move(*pod));
     }
-    const auto made = kubectl({"create", "--filename=-"},
-                              json{{"apiVersion", "v1"}, {"kind", "List"}, {"items", std::move(pods)}}.dump());
+    const auto made =
+        kubectl({"create", "--filename=-"},
+                json{{"apiVersion", "v1"}, {"kind", "List"}, {"items", std::move(pods)}}.dump());
     if (!made) return tl::unexpected(made.error());
     return ids;
   }
