@@ -81,6 +81,13 @@ std::string slit() {
          R"(<emitter type="directional"><vector name="direction" x="-1" y="-0.6" z="-0.2"/><rgb name="irradiance" value="40, 36, 30"/></emitter>)";
 }
 
+// Nearly all noise is light that was scattered several times.
+std::string lit_from_within() {
+  return room(
+             R"(<shape type="rectangle"><transform name="to_world"><scale x="0.25" y="0.25"/><rotate x="1" angle="90"/><translate y="0.985"/></transform><emitter type="area"><rgb name="radiance" value="18, 15, 11"/></emitter></shape>
+)") + fog(.6, .9, .995);
+}
+
 }  // namespace
 
 const std::vector<CoverageScene>& coverage_scenes() {
@@ -97,6 +104,7 @@ const std::vector<CoverageScene>& coverage_scenes() {
       {"media, connected", scene(slit() + fog(.3, .9, .99))},
       {"surfaces, shared", scene(room(lamp(400, .1)), "0, 0, 3.9", 8, 16)},
       {"media, shared", scene(room(lamp(60)) + fog(.6, .9, .995), "0, 0, 3.9", 8, 16)},
+      {"fog, lit from within", scene(lit_from_within(), "0, 0, 3.9", 16, 16)},
       {"surfaces, to a target", scene(room(lamp(400, .1))), 4096, false, 1.5e-3},
       {"media, to a target", scene(fog(1, .9, .9) + lamp(60, .1)), 4096, false, 1e-4},
       {"surfaces, shared, to a target", scene(room(lamp(400, .1)), "0, 0, 3.9", 8, 16), 4096, false, 1e-3},

@@ -73,6 +73,7 @@ inline constexpr std::array kShares = {Share{Family::chi_square, "bsdf/sampling"
                                        Share{Family::chi_square, "render/trackers", 1},
                                        Share{Family::chi_square, "render/cylinder", 1},
                                        Share{Family::coverage, "coverage/short", 4 * 7},
+                                       Share{Family::coverage, "coverage/rendered", 2},
                                        Share{Family::coverage, "coverage/target", 3},
                                        Share{Family::coverage, "coverage/fireflies", 1},
                                        Share{Family::coverage, "coverage/denominators", 24},

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 
 #include "common/base/check.h"
 #include "common/image/error/relative_weights.h"
@@ -35,6 +36,12 @@ constexpr double kOneSided = 19;
 // samples per pixel and all earlier rounds together have, too. With fewer, such as 8 in each half, a single
 // sample that finds rare light would dominate.
 constexpr std::uint64_t kTellingSamples = 16;
+// Side in pixels of the squares over whose pixels errors may be correlated: those that share paths
+// (worker/render/integrator/path_reuse.h)
+constexpr std::size_t kSquare = 16;
+// What correlated errors add to the variance counts in full in an image of many squares. With this many, it
+// counts by half: their sum is then known to a third.
+constexpr double kTellingSquares = 16;
 
 // Returns the expected amount by which skewed noise lowers the sum of squared relative errors, as a negative
 // number. error_estimate.h derives it. The sum is accumulated per column, so that the compiler vectorises the
@@ -69,6 +76,27 @@ double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earl
   return std::accumulate(columns.begin(), columns.end(), 0.0);
 }
 
+// Returns the sum of squared relative errors in which no noise has a part in its own weight, or nullopt if
+// the last round and the samples before it are not equally many. error_estimate.h derives it. `roots` are
+// those of the weights of all samples.
+std::optional<double> cross_weighted(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earlier,
+                                     const std::vector<double>& roots) {
+  if (2 * earlier.spp != spp) return std::nullopt;
+  const std::size_t n = now.a.size();
+  std::vector<double> a(n), b(n);
+  for (std::size_t i = 0; i < n; ++i)
+    a[i] = 2 * now.a[i] - earlier.halves.a[i], b[i] = 2 * now.b[i] - earlier.halves.b[i];
+  const std::vector<double> before = relative_weights(earlier.halves).roots,
+                            last = relative_weights({now.width, now.height, a, b}).roots;
+  double sum = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double d_before = 0.5 * (earlier.halves.a[i] - earlier.halves.b[i]), d_last = 0.5 * (a[i] - b[i]);
+    sum += before[i] * before[i] * d_last * d_last + last[i] * last[i] * d_before * d_before +
+           2 * roots[i] * roots[i] * d_last * d_before;
+  }
+  return sum / 4;
+}
+
 // Returns the sum over pixels of tr(V^2), estimated from fourth powers and, for a trusted image, also from
 // pairs of neighbours. error_estimate.h derives both and defines V.
 double trace_of_moments(const NoiseSums& s, bool trusted) {
@@ -80,26 +108,40 @@ double trace_of_moments(const NoiseSums& s, bool trusted) {
 }
 
 // Returns the standard deviation of the difference between the estimated and the realised sum of squares,
-// divided by the estimated sum.
-double relative_spread(const NoiseSums& s, bool trusted) {
+// divided by the estimated sum. error_estimate.h derives it.
+double relative_spread(const NoiseSums& s, double pixels, bool trusted) {
   if (!(s.squares > 0)) return 0;
-  return trusted ? 2 * std::sqrt(s.changes.products) / s.changes.squares
-                 : 2 * std::sqrt(trace_of_moments(s, false)) / s.squares;
+  if (!trusted) return 2 * std::sqrt(trace_of_moments(s, false)) / s.squares;
+  if (s.changes.square_products == 0)
+    return 2 * std::pow(trace_of_moments(s, true) * trace_of_moments(s, false), 0.25) / s.squares;
+  const double squares = pixels / (kSquare * kSquare), telling = squares / (squares + kTellingSquares);
+  const double correlated = std::max(0.0, s.changes.square_products - s.changes.products);
+  return 2 * std::sqrt(s.changes.products + telling * correlated) / s.changes.squares;
 }
 
 // Returns the sums from which the interval is computed. `a` and `b` are the changes of the means of half A
-// and half B since the earlier rounds, three planes each; `scale` is a factor on their squares.
-ChangeSums change_sums(const std::vector<double>& a, const std::vector<double>& b, double scale) {
-  const std::size_t n = a.size() / 3;
+// and half B since the earlier rounds, three planes each, of a tile that is `width` pixels wide; `scale` is a
+// factor on their squares.
+ChangeSums change_sums(const std::vector<double>& a, const std::vector<double>& b, std::size_t width,
+                       double scale) {
+  const std::size_t n = a.size() / 3, across = (width + kSquare - 1) / kSquare;
   ChangeSums out;
+  std::vector<double> squares(across);  // sums of dot over the pixels of each square of the current row
   for (std::size_t i = 0; i < n; ++i) {
     const double ar = a[i], ag = a[n + i], ab = a[2 * n + i], br = b[i], bg = b[n + i], bb = b[2 * n + i];
     const double dot = ar * br + ag * bg + ab * bb;
     out.squares += ar * ar + ag * ag + ab * ab + br * br + bg * bg + bb * bb;
     out.products += dot * dot;
+    squares[i % width / kSquare] += dot;
+    if ((i + 1) % (kSquare * width) != 0 && i + 1 != n) continue;
+    for (double& sum : squares) {
+      out.square_products += sum * sum;
+      sum = 0;
+    }
   }
   out.squares *= scale / 2;
   out.products *= scale * scale;
+  out.square_products *= scale * scale;
   return out;
 }
 
@@ -177,6 +219,7 @@ void NoiseSums::add(const NoiseSums& o) {
   largest = std::max(largest, o.largest);
   changes.squares += o.changes.squares;
   changes.products += o.changes.products;
+  changes.square_products += o.changes.square_products;
 }
 
 void TileError::add(const TileError& o) {
@@ -185,6 +228,7 @@ void TileError::add(const TileError& o) {
   few_hits += o.few_hits;
   lit += o.lit;
   skew += o.skew;
+  other_weights += o.other_weights;
   plain.add(o.plain);
   relative.add(o.relative);
 }
@@ -224,14 +268,14 @@ namespace {
 void send_changes(const HalfMeans& h, std::uint64_t spp, const EarlierMeans& earlier,
                   const std::vector<double>& roots, TileError& out) {
   if (std::min(earlier.spp, spp - earlier.spp) < kTellingSamples) return;
-  const std::size_t n = h.a.size();
+  const std::size_t n = h.a.size(), width = static_cast<std::size_t>(h.width);
   const double scale = static_cast<double>(earlier.spp) / static_cast<double>(2 * (spp - earlier.spp));
   std::vector<double> a(n), b(n);
   for (std::size_t i = 0; i < n; ++i)
     a[i] = h.a[i] - earlier.halves.a[i], b[i] = h.b[i] - earlier.halves.b[i];
-  const ChangeSums plain = change_sums(a, b, scale);
+  const ChangeSums plain = change_sums(a, b, width, scale);
   for (std::size_t i = 0; i < n; ++i) a[i] *= roots[i], b[i] *= roots[i];
-  const ChangeSums relative = change_sums(a, b, scale);
+  const ChangeSums relative = change_sums(a, b, width, scale);
   if (plain.squares > 0) out.plain.changes = plain;
   if (relative.squares > 0) out.relative.changes = relative;
 }
@@ -251,7 +295,7 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMea
   for (std::size_t i = 0; i < 3 * n; ++i) d[i] *= w.roots[i];
   out.relative = noise_sums(d, w.edges, h.width, h.height);
   for (NoiseSums* sums : {&out.plain, &out.relative})
-    sums->changes = {sums->squares, trace_of_moments(*sums, true)};
+    sums->changes = {sums->squares, trace_of_moments(*sums, true), 0};
   if (!earlier) return out;
   CHECK(earlier->halves.a.size() == 3 * n && earlier->halves.b.size() == 3 * n && earlier->spp >= 2 &&
             earlier->spp < spp,
@@ -262,6 +306,8 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMea
   // smaller than these two suggest, so the correction might be too large.
   const double all = out.relative.squares;
   out.subtract_skew(std::clamp(skew_of(h, spp, *earlier, w), -all / 2, all / 2));
+  if (const auto other = cross_weighted(h, spp, *earlier, w.roots))
+    out.other_weights = *other - out.relative.squares;
   send_changes(h, spp, *earlier, w.roots, out);
   return out;
 }
@@ -280,10 +326,10 @@ namespace {
 //   products, the squares and their covariance), hence 3 e / 2 degrees. Uneven noise has fewer, but at least
 //   e / 2 in the scenes of tests/coverage.
 // So e / 2 is used for both.
-double half_width(const NoiseSums& s, bool trusted) {
+double half_width(const NoiseSums& s, double pixels, bool trusted) {
   if (!(s.pixel_fourth > 0)) return 0;
   const double freedom = s.squares * s.squares / s.pixel_fourth / 2;
-  return k95 * (1 + (k95 * k95 + 1) / (4 * freedom)) * relative_spread(s, trusted);
+  return k95 * (1 + (k95 * k95 + 1) / (4 * freedom)) * relative_spread(s, pixels, trusted);
 }
 
 }  // namespace
@@ -301,11 +347,13 @@ ImageError image_error(const TileError& sums) {
     out.top_share = sums.relative.largest / sums.relative.squares;
   }
   judge(out, sums.relative, pixels, sums.lit > 0);
-  const double plain = half_width(sums.plain, out.trusted), relative = half_width(sums.relative, out.trusted);
+  const double plain = half_width(sums.plain, pixels, out.trusted),
+               relative = half_width(sums.relative, pixels, out.trusted);
   out.rmse_lo = out.rmse * std::exp(-plain / 2);
   out.rmse_hi = out.rmse * std::exp(plain / 2);
-  out.relmse_lo = out.relmse * std::exp(-relative);
-  out.relmse_hi = out.relmse * std::exp(relative);
+  const double other = out.relmse + sums.other_weights / (3 * pixels);
+  out.relmse_lo = std::max(0.0, std::min(out.relmse, other)) * std::exp(-relative);
+  out.relmse_hi = std::max(out.relmse, other) * std::exp(relative);
   return out;
 }
 

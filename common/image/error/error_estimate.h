@@ -39,6 +39,14 @@
 // earlier samples, and D_o^2 that of the last round.) The correction is limited to half of each pixel's
 // weight. The first round has no earlier one and is not corrected.
 //
+// Weights: they are known from the image alone, and with few samples this is the largest source of doubt. So
+// where both parts have equally many samples (the second to seventh round), the sum is computed a second
+// time, with weights that do not know the noise that they weigh:
+//   (n/N)^2 w_o D_n^2 + (o/N)^2 w_n D_o^2 + 2 (n o / N^2) w D_n D_o,
+// with w_n and w_o the weights from one part alone. Such weights are noisier, so the two sums err in
+// different ways. The interval reaches from the lower end that belongs to the smaller of the two sums to the
+// upper end that belongs to the larger.
+//
 // Interval of the realised error: d - e^2 = -ab, so Var(sum of d - sum of e^2) = sum of 4 v^2 exactly,
 // whatever the distribution of a and b. Over channels it is 4 tr(V^2), with V the covariance of the channels
 // of D. Divided by the square of the sum of tr V, it depends only on how unevenly noise is spread over pixels
@@ -55,6 +63,13 @@
 // smaller than V as estimated from the two parts, by some factor. If this factor is the same for all pixels,
 // it cancels in the relative variance.
 //
+// Pixels that share paths (docs/decisions/0036-path-reuse.md) have correlated errors. With C_pq the
+// covariance of D in pixels p and q, the variance is 4 times the sum over all pairs of tr(C_pq C_qp), not
+// over pixels alone. Pairs within squares of 16 x 16 pixels are included by
+//   E[(sum over the pixels p of a square of alpha_p . beta_p)^2] = sum over p, q of tr(C_pq C_qp).
+// Of S squares, this sum has a relative standard deviation of about sqrt(2 / S). What it exceeds the sum over
+// pixels by counts with the weight S / (S + 16).
+//
 // If the last round, or the rounds before it, have too few samples for this, tr(V^2) is a weighted mean of
 // those two other estimates, with the weights g^2 and 1 - g^2 in each pixel:
 //   From the pixel's own fourth powers. Let D_c be the D of channel c. For Gaussian D, E[D_c^4] = 3 V_cc^2
@@ -67,6 +82,9 @@
 //   From pairs of neighbours p, q, for any distribution: E[(D(p) . D(q))^2] = tr V(p) V(q), since their D are
 //   independent. This equals tr(V^2) where V varies slowly from pixel to pixel, as it does in smooth parts of
 //   the image, where g is small.
+//
+// Where pixels next to each other differ in their noise, as with few samples of rare light, this is too low,
+// and fourth powers alone (g = 1) are too high: of a trusted image their geometric mean is used.
 // If the image's figures are not trusted (ImageError::trusted), the interval is from fourth powers alone, and
 // wider.
 #pragma once
@@ -87,6 +105,8 @@ namespace ls {
 struct ChangeSums {
   double squares = 0;   // sum over pixels of (alpha . alpha + beta . beta) / 2
   double products = 0;  // sum over pixels of (alpha . beta)^2
+  // sum over squares of 16 x 16 pixels of (sum of alpha . beta)^2; 0 if the last round has too few samples
+  double square_products = 0;
   bool operator==(const ChangeSums&) const = default;
 };
 
@@ -126,6 +146,9 @@ struct TileError {
   // amount that was subtracted from relative.squares because the noise is skewed; it is negative if skewed
   // noise made the sum too low
   double skew = 0;
+  // The sum of squared relative errors with weights from independent samples, minus relative.squares; 0 if
+  // the rounds do not have equally many samples
+  double other_weights = 0;
   void add(const TileError& other);
   void subtract_skew(double part);
   bool operator==(const TileError&) const = default;
@@ -156,6 +179,7 @@ bool has_few_hits(const HalfMeans& halves, int x, int y);
 struct ImageError {
   // root mean squared error, and the 95 % interval of this image's realised error
   double rmse = 0, rmse_lo = 0, rmse_hi = 0;
+  // the interval contains what is unknown of the weights, too
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;
   double spp = 0;  // samples per pixel, averaged over all pixels
   // The number of pixels that carry the error: (sum of x)^2 / (sum of x^2), where x is the squared relative

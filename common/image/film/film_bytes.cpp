@@ -1,11 +1,11 @@
 // Writes and reads a tile of the film as bytes, from which the coordinator restores the film after a restart.
 // A round is a range of samples; the tail is a last round with fewer samples than its full range (film.h).
 // The bytes are, little-endian:
-// - "LSTILE03"; u32 index of the tile; u32 number of full rounds; 32 bytes: digest chain of the full rounds;
+// - "LSTILE04"; u32 index of the tile; u32 number of full rounds; 32 bytes: digest chain of the full rounds;
 // - u64 s0, u64 s1: range of the tail's samples (0, 0: no tail); 32 bytes: digest of the tail;
-// - f64 skew; 2 f64 plain.changes; 2 f64 relative.changes: members of TileError. Only these members are
-// stored, since they depend on the tile as it was before its last round. The others are computed again from
-// the sums;
+// - f64 skew; f64 other_weights; 3 f64 plain.changes; 3 f64 relative.changes: members of TileError. Only
+// these members are stored, since they depend on the tile as it was before its last round. The others are
+// computed again from the sums;
 // - the full rounds: 6 colour planes and the planes of AOV sums as doubles, then the planes of identifiers as
 // floats;
 // - the tail, if there is one: the same planes, all as floats;
@@ -23,7 +23,7 @@
 namespace ls {
 namespace {
 
-constexpr std::string_view kTileMagic = "LSTILE03";
+constexpr std::string_view kTileMagic = "LSTILE04";
 
 class Writer {
  public:
@@ -69,7 +69,7 @@ bool read_finite(ByteReader& in, std::vector<T>& out, std::size_t count) {
 
 bool sound(const ChangeSums& sums) {
   return sums.squares >= 0 && std::isfinite(sums.squares) && sums.products >= 0 &&
-         std::isfinite(sums.products);
+         std::isfinite(sums.products) && sums.square_products >= 0 && std::isfinite(sums.square_products);
 }
 
 }  // namespace
@@ -81,7 +81,8 @@ std::vector<std::byte> Film::tile_bytes(const Tile* tile, TileIndex index) {
               (tile->tail ? tile->tail->sums.size() * sizeof(float) : 0));
   const Tail tail = tile->tail.value_or(Tail{});
   out.values(index, tile->full_rounds, tile->chain.bytes, tail.samples.s0, tail.samples.s1, tail.digest.bytes,
-             tile->error.skew, tile->error.plain.changes, tile->error.relative.changes);
+             tile->error.skew, tile->error.other_weights, tile->error.plain.changes,
+             tile->error.relative.changes);
   out.put(std::as_bytes(std::span(tile->sums)));
   out.put(std::as_bytes(std::span(tile->ids)));
   out.put(std::as_bytes(std::span(tail.sums)));
@@ -99,18 +100,18 @@ Result<std::shared_ptr<const Film::Tile>> Film::parse_tile(TileIndex index,
   TileIndex stored = 0;
   auto tile = std::make_shared<Tile>();
   Tail tail;
-  double skew = 0;
+  double skew = 0, other_weights = 0;
   ChangeSums plain, relative;
   read(stored, tile->full_rounds, tile->chain.bytes, tail.samples.s0, tail.samples.s1, tail.digest.bytes,
-       skew, plain, relative);
+       skew, other_weights, plain, relative);
   if (stored != index) return damaged(fmt::format("it is not tile {}", index));
   const bool has_tail = tail.samples.s1 != 0;
   const PixelRect rect = grid_.rect(index);
   const auto pixels = static_cast<std::size_t>(rect.pixels()), sums = pixels * planes_.sums,
              ids = pixels * planes_.ids;
-  if (!std::isfinite(skew) || !sound(plain) || !sound(relative) || !read_finite(in, tile->sums, sums) ||
-      !read_finite(in, tile->ids, ids) || (has_tail && !read_finite(in, tail.sums, sums + ids)) ||
-      in.left() != 0)
+  if (!std::isfinite(skew) || !std::isfinite(other_weights) || !sound(plain) || !sound(relative) ||
+      !read_finite(in, tile->sums, sums) || !read_finite(in, tile->ids, ids) ||
+      (has_tail && !read_finite(in, tail.sums, sums + ids)) || in.left() != 0)
     return damaged(fmt::format("tile {} has the wrong size or a value that is not finite", index));
   const SampleRange full = round_range(tile->full_rounds);
   if (has_tail && (tail.samples.s0 != full.s0 || tail.samples.s1 <= full.s0 || tail.samples.s1 >= full.s1))
@@ -119,6 +120,7 @@ Result<std::shared_ptr<const Film::Tile>> Film::parse_tile(TileIndex index,
   if (has_tail) tile->tail = std::move(tail);
   tile->error = estimate(*tile, nullptr, rect);
   tile->error.subtract_skew(skew);
+  tile->error.other_weights = other_weights;
   tile->error.plain.changes = plain;
   tile->error.relative.changes = relative;
   return tile;

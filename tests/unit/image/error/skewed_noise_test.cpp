@@ -92,6 +92,63 @@ TEST(SkewedNoise, ThereIsNothingToCorrectWhereItIsDark) {
   EXPECT_LT(std::abs(told.skew), 1e-3 * told.relative.squares);
 }
 
+// With few samples, more is unknown of the weights than the first order of the noise tells.
+TEST(SkewedNoise, AnIntervalOfFewSamplesContainsBothWaysToWeigh) {
+  std::mt19937_64 random(13);
+  Halves before = skewed(2, random), now = skewed(2, random);
+  for (std::size_t h = 0; h < 2; ++h)
+    for (std::size_t k = 0; k < 3 * kNoisyPixels; ++k) {
+      now[h][k] = (now[h][k] + before[h][k]) / 4;
+      before[h][k] /= 2;
+    }
+  const EarlierMeans earlier{{kSkewedSide, kSkewedSide, before[0], before[1]}, 4};
+  const TileError told = estimate_error({kSkewedSide, kSkewedSide, now[0], now[1]}, 8, &earlier);
+  TileError alone = told;
+  alone.other_weights = 0;
+  for (const double other : {.3, -.3}) {
+    TileError both = alone;
+    both.other_weights = other * both.relative.squares;
+    const ImageError image = image_error(both), without = image_error(alone);
+    EXPECT_DOUBLE_EQ(image.relmse, without.relmse);
+    EXPECT_DOUBLE_EQ(image.relmse_lo, without.relmse_lo * (other < 0 ? 1 + other : 1));
+    EXPECT_DOUBLE_EQ(image.relmse_hi, without.relmse_hi * (other > 0 ? 1 + other : 1));
+  }
+  EXPECT_NE(told.other_weights, 0);
+  EXPECT_EQ(estimate_error({kSkewedSide, kSkewedSide, now[0], now[1]}, 8).other_weights, 0);
+}
+
+// A tenth of each value's variance is common to all pixels of a square of 16 x 16.
+TEST(CorrelatedNoise, IsCountedWithinSquares) {
+  std::mt19937_64 random(14);
+  std::normal_distribution<double> normal(0, 1e-3);
+  constexpr double kCorrelation = .1;
+  double squares = 0, pixels = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const auto draw = [&] {
+      std::vector<double> out(3 * kNoisyPixels);
+      std::array<double, 4> common;
+      for (double& v : common) v = normal(random);
+      for (std::size_t p = 0; p < kNoisyPixels; ++p) {
+        const std::size_t square = p / (16 * kSkewedSide) * 2 + p % kSkewedSide / 16;
+        const double v =
+            std::sqrt(kCorrelation) * common[square] + std::sqrt(1 - kCorrelation) * normal(random);
+        for (std::size_t c = 0; c < 3; ++c) out[c * kNoisyPixels + p] = v;
+      }
+      return out;
+    };
+    const auto a0 = draw(), b0 = draw(), a = draw(), b = draw();
+    const EarlierMeans earlier{{kSkewedSide, kSkewedSide, a0, b0}, 32};
+    const TileError told = estimate_error({kSkewedSide, kSkewedSide, a, b}, 64, &earlier);
+    squares += told.plain.changes.square_products;
+    pixels += told.plain.changes.products;
+  }
+  // Each pixel has 255 others in its square. 400 squares tell the ratio to sqrt(2 / 400) = 7 %, doubled for
+  // products of normal values with a common part.
+  const double right = 1 + 255 * kCorrelation * kCorrelation;
+  EXPECT_NEAR(squares / pixels, right, 5 * .14 * right);
+  EXPECT_GT(squares / pixels, 1.05) << "or the common part is not seen";
+}
+
 Partial partial_of(const TileGrid& grid, const SampleRange& range, std::uint64_t seed) {
   Partial p;
   p.header.tile = grid.rect(0);
@@ -110,6 +167,7 @@ TEST(SkewedNoise, AFilmRemembersTheCorrectionOverARestart) {
   Film film(grid);
   for (const RoundIndex k : {0, 1, 2, 3}) ASSERT_TRUE(film.fold(0, k, partial_of(grid, round_range(k), k)));
   ASSERT_NE(film.error(0).skew, 0);
+  ASSERT_NE(film.error(0).other_weights, 0) << "the last round has as many samples as all before it";
 
   Film one(grid);
   ASSERT_TRUE(one.load_tile(0, film.save_tile(0)));
