@@ -60,7 +60,8 @@ constexpr std::array kRows{
         "triangles of the scene without area were left out"},
     Row{HealthCause::wrong_texture_coordinates, "wrong_texture_coordinates", kInput,
         "face of a mesh has a wrong number of texture coordinates, and its mesh those of its vertices alone",
-        "faces of meshes have a wrong number of texture coordinates, and their meshes those of their vertices "
+        "faces of meshes have a wrong number of texture coordinates, and their meshes those of their "
+        "vertices "
         "alone"},
 };
 constexpr bool rows_in_order() {

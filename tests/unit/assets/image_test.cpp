@@ -125,7 +125,8 @@ std::string chunk(const std::string& name, const std::string& data) {
 }
 
 TEST(Png, OpacitiesBeforeThePaletteAreTold) {
-  const std::string start = "\x89PNG\r\n\x1a\n" + chunk("IHDR", std::string("\0\0\0\1\0\0\0\1\10\3\0\0\0", 13)),
+  const std::string start =
+                        "\x89PNG\r\n\x1a\n" + chunk("IHDR", std::string("\0\0\0\1\0\0\0\1\10\3\0\0\0", 13)),
                     palette = chunk("PLTE", "abc"), opacities = chunk("tRNS", "\x7f"),
                     pixel = chunk("IDAT", std::string("\x78\x01\x01\2\0\xfd\xff\0\0\0\2\0\1", 13)),
                     end = chunk("IEND", "");

@@ -45,7 +45,8 @@ void expect_same_objects(const std::string& nori, const std::string& mitsuba) {
 TEST(NoriScene, IsTheSceneThatMitsubaHasWithItsDefaults) { expect_same_objects("", ""); }
 
 TEST(NoriScene, MayCallItsMeshesShapes) {
-  const std::string inside = R"(type="sphere"><emitter type="area"><color name="radiance" value="1 1 1"/></emitter>)";
+  const std::string inside =
+      R"(type="sphere"><emitter type="area"><color name="radiance" value="1 1 1"/></emitter>)";
   const Scene meshes = must_read_quietly(nori_scene("<mesh " + inside + "</mesh>"));
 
   const Scene shapes = must_read_quietly(nori_scene("<shape " + inside + "</shape>"));

@@ -395,9 +395,8 @@ TEST(Pbrt, OptionsAreANameAndAValue) {
     return read_pbrt(
         fmt::format(R"({}Camera "perspective" Option {} WorldBegin Shape "sphere")", kPbrtFilm, option));
   };
-  for (const std::string_view option :
-       {R"("seed" 42)", R"("wavefront" true)", R"("msereferenceout" "a.exr")", R"("integer seed" 3)",
-        R"("integer seed" [3])"}) {
+  for (const std::string_view option : {R"("seed" 42)", R"("wavefront" true)", R"("msereferenceout" "a.exr")",
+                                        R"("integer seed" 3)", R"("integer seed" [3])"}) {
     const ReadResult r = with(option);
     EXPECT_TRUE(r.scene) << messages(r);
     EXPECT_THAT(messages(r), HasSubstr("has no effect here"));
