@@ -12,12 +12,15 @@ def luminance(colour):
     return sum(weight * c for weight, c in zip(LUMINANCE, colour))
 
 
-def as_type(value, kind):
-    """A value as what a socket of type VALUE, RGBA or VECTOR takes."""
+def as_type(value, kind, source):
+    """A value of a socket of type `source` as what one of type VALUE, RGBA or VECTOR takes: a number is the
+    luminance of a colour, and the mean of a vector."""
     if value is None or kind not in ("VALUE", "RGBA", "VECTOR"):
         return value
     if kind == "VALUE":
-        return luminance(value) if isinstance(value, list) else value
+        if not isinstance(value, list):
+            return value
+        return sum(value) / len(value) if source == "VECTOR" else luminance(value)
     return value if isinstance(value, list) else [value] * 3
 
 

@@ -69,4 +69,4 @@ def constant(place, socket):
         value = plain(output)
     else:
         value = computed(source.node, output, lambda name: constant(source, source.input(name)))
-    return as_type(value, getattr(socket, "type", None))
+    return as_type(value, getattr(socket, "type", None), getattr(output, "type", None))

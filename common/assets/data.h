@@ -42,6 +42,9 @@ struct MeshData {
   bool face_normals = false;  // true if the file requests flat shading
   // Number of triangles without area or with a non-finite vertex; `indices` does not contain them.
   std::uint64_t dropped_triangles = 0;
+  // Number of faces whose corners have another number of texture coordinates than two each. If there is one,
+  // `uvs` are those of the file's vertices alone.
+  std::uint64_t wrong_uv_faces = 0;
   std::vector<MeshAttribute> attributes;     // the requested attributes
   std::vector<std::string> attribute_names;  // names of all attributes in the file
 

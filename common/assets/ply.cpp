@@ -85,8 +85,10 @@ int vertex_slot(std::string_view name) {
 
 class PlyReader {
  public:
-  PlyReader(std::string_view name, std::span<const std::byte> file, std::span<const std::string> wanted)
-      : name_(name), file_(file), wanted_(wanted), body_({}) {
+  // Without `corner_uvs` the texture coordinates of faces are passed over.
+  PlyReader(std::string_view name, std::span<const std::byte> file, std::span<const std::string> wanted,
+            bool corner_uvs)
+      : name_(name), file_(file), wanted_(wanted), corner_uvs_(corner_uvs), body_({}) {
     file_ = file_.subspan(as_text(file_).size() - without_mark(as_text(file_)).size());
     body_ = ByteReader(file_);
   }
@@ -312,7 +314,7 @@ class PlyReader {
   bool faces(const Element& e) {
     if (!wants_corner_list(e)) return false;
     const auto is_uv_list = [](const Property& p) { return p.count && p.name == "texcoord"; };
-    const bool has_uvs = std::ranges::any_of(e.properties, is_uv_list);
+    const bool has_uvs = corner_uvs_ && std::ranges::any_of(e.properties, is_uv_list);
     std::vector<std::uint32_t> corners;
     std::vector<float> uvs;
     const auto places = attribute_places(e, "face_");
@@ -330,7 +332,7 @@ class PlyReader {
         }
       }
       if (adds_too_many(corners.size())) return false;
-      if (has_uvs && !split_by_uv(i, corners, uvs)) return false;
+      if (has_uvs && !split_by_uv(corners, uvs)) return false;
       add_polygon(mesh_, corners);
       share_among_triangles(places, mesh_.triangle_count() - before);
     }
@@ -368,7 +370,7 @@ class PlyReader {
   // these have none. Replaces each corner by the
   // vertex that has its position and its coordinates: the vertex of the file where it comes up first, a copy
   // of it for each further pair of coordinates.
-  bool split_by_uv(std::uint64_t i, std::span<std::uint32_t> corners, std::vector<float>& uvs) {
+  bool split_by_uv(std::span<std::uint32_t> corners, std::vector<float>& uvs) {
     if (split_.empty()) {
       vertex_uvs_ = std::move(mesh_.uvs);
       mesh_.uvs.assign(2 * mesh_.vertex_count(), 0);
@@ -377,9 +379,7 @@ class PlyReader {
       for (const std::uint32_t corner : corners)
         for (const std::size_t k : {0, 1})
           uvs.push_back(vertex_uvs_.empty() ? 0 : vertex_uvs_[2 * corner + k]);
-    if (uvs.size() != 2 * corners.size())
-      return complain(fmt::format("face {} of {} corners has {} numbers of texture coordinates", i,
-                                  corners.size(), uvs.size()));
+    if (uvs.size() != 2 * corners.size()) return ++mesh_.wrong_uv_faces, true;
     for (std::size_t k = 0; k < corners.size(); ++k) {
       const std::array<float, 2> uv{uvs[2 * k], uvs[2 * k + 1]};
       const auto bits = [](float x) { return static_cast<std::int64_t>(std::bit_cast<std::uint32_t>(x)); };
@@ -508,6 +508,7 @@ class PlyReader {
   std::string_view name_;
   std::span<const std::byte> file_;
   std::span<const std::string> wanted_;
+  bool corner_uvs_;
   ByteReader body_;        // rest of a binary file after the header
   std::string_view rest_;  // rest of an ascii file after the header
   Coding coding_ = Coding::ascii;
@@ -524,7 +525,12 @@ class PlyReader {
 
 Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file,
                             std::span<const std::string> attributes) {
-  return PlyReader(name, file, attributes).read();
+  auto mesh = PlyReader(name, file, attributes, true).read();
+  if (!mesh || mesh->wrong_uv_faces == 0) return mesh;
+  // Vertices may have been split by then, so the file is read once more.
+  auto plain = PlyReader(name, file, attributes, false).read();
+  if (plain) plain->wrong_uv_faces = mesh->wrong_uv_faces;
+  return plain;
 }
 
 }  // namespace ls

@@ -17,6 +17,7 @@ struct Source {
   const std::byte* data;
   std::size_t left;
   char message[200];
+  png_infop info;
 };
 
 void read_bytes(png_structp png, png_bytep out, png_size_t n) {
@@ -35,9 +36,14 @@ void on_error(png_structp png, png_const_charp text) {
 // The opacities of a palette or of a colour are such a chunk to it, but not to us. Nothing is lost if the
 // image has an alpha channel, or if the chunk was read before.
 void on_warning(png_structp png, png_const_charp text) {
-  if (std::strstr(text, "tRNS") && !std::strstr(text, "invalid with alpha channel") &&
-      !std::strstr(text, "duplicate"))
-    on_error(png, text);
+  if (!std::strstr(text, "tRNS")) return;
+  const png_infop info = static_cast<Source*>(png_get_error_ptr(png))->info;
+  if ((png_get_color_type(png, info) & PNG_COLOR_MASK_ALPHA) || png_get_valid(png, info, PNG_INFO_tRNS))
+    return;
+  on_error(png, std::strstr(text, "out of place")
+                    ? "its opacities (tRNS) do not stand between its palette and its pixels, where programs "
+                      "look for them: save it again"
+                    : text);
 }
 
 struct Png {
@@ -78,11 +84,12 @@ bool read_rows(Png& p, png_bytepp rows) {
 
 Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels) {
-  Source source{file.data(), file.size(), {}};
+  Source source{file.data(), file.size(), {}, nullptr};
   Png p;
   const BrokenImage broken{name, "PNG"};
   p.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source, on_error, on_warning);
   if (p.png) p.info = png_create_info_struct(p.png);
+  source.info = p.info;
   if (!p.info) return fail(Errc::resource_exhausted, fmt::format("'{}': no memory to read a PNG", name));
   png_set_read_fn(p.png, &source, read_bytes);
   PngShape shape;

@@ -8,11 +8,15 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
 #include <fstream>
+#include <future>
+#include <semaphore>
 #include <sstream>
+#include <thread>
 #include <utility>
 
 #include "common/base/program_output.h"
@@ -154,12 +158,21 @@ Result<HelperEnd> run_helper(const std::filesystem::path& program, std::vector<s
   if (!output) return tl::unexpected<Error>(output.error());
   const int out = (*output)->write_end();
   arguments.insert(arguments.begin(), program.string());
-  // The helper of a render child stays in the child's process group, and so is killed with the child.
-  const auto pid = spawn({program.string(),
-                          std::move(arguments),
-                          {kDevNull, out, out, shared},
-                          inherits,
-                          !leads_session_without_terminal()});
+  // The helper of a render child stays in the child's process group, and so is killed with the child. A child
+  // in a sandbox may not signal it: but the kernel ends helpers that ask for it (PR_SET_PDEATHSIG) with the
+  // thread that has started them, so a thread of its own does that, and ends when the helper shall.
+  std::promise<Result<pid_t>> started;
+  std::jthread parent([&](std::stop_token asked) {
+    started.set_value(spawn({program.string(),
+                             std::move(arguments),
+                             {kDevNull, out, out, shared},
+                             inherits,
+                             !leads_session_without_terminal()}));
+    std::binary_semaphore end{0};
+    const std::stop_callback on_stop(asked, [&] { end.release(); });
+    end.acquire();
+  });
+  const auto pid = started.get_future().get();
   if (!pid) return fail(Errc::internal, pid.error().message);
   (*output)->close_write_end();
   // The output ends with the program, unless the program has closed it before or has left processes behind
@@ -167,7 +180,7 @@ Result<HelperEnd> run_helper(const std::filesystem::path& program, std::vector<s
   std::optional<int> status;
   bool open = true;
   for (int pause = 1; !status; status = poll_end(*pid)) {
-    if (stop && *stop) ::kill(*pid, SIGKILL);
+    if (stop && *stop) ::kill(*pid, SIGKILL), parent.request_stop();
     if (open) {
       open = (*output)->read(kLookMs);
     } else {

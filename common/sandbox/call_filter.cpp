@@ -264,11 +264,25 @@ Filter filter_of_calls() {
   return filter;
 }
 
-}  // namespace
+Filter filter_of_starts() {
+  constexpr std::uint32_t kStarts[] = {
+      SYS_clone, SYS_clone3, SYS_execve, SYS_execveat,
+#ifdef __x86_64__
+      SYS_fork,  SYS_vfork,
+#endif
+  };
+  Filter filter;
+  load(offsetof(seccomp_data, nr), filter);
+  for (std::size_t i = 0; i < std::size(kStarts); ++i)
+    compare(BPF_JEQ, kStarts[i], std::size(kStarts) - i, 0, filter);
+  answer(kAllow, filter);
+  answer(kDeny, filter);
+  return filter;
+}
 
-bool limit_calls() {
-  Filter filter = filter_of_calls();
+bool install(Filter filter) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  (void)filter;
   return false;  // sanitizers use ptrace, and write files anywhere
 #else
   const sock_fprog whole{static_cast<unsigned short>(filter.size()), filter.data()};
@@ -276,5 +290,11 @@ bool limit_calls() {
          ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &whole, 0, 0) == 0;
 #endif
 }
+
+}  // namespace
+
+bool limit_calls() { return install(filter_of_calls()); }
+
+bool forbid_processes() { return install(filter_of_starts()); }
 
 }  // namespace ls

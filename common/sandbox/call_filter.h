@@ -13,4 +13,8 @@ namespace ls {
 // thread would stay unrestricted.
 bool limit_calls();
 
+// Denies this process starting threads, processes and programs from now on, besides limit_calls(). Returns
+// false if the kernel has no filters.
+bool forbid_processes();
+
 }  // namespace ls

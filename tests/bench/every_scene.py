@@ -3,7 +3,8 @@
 
 usage: every_scene.py DIR [--size WxH] [--spp N] [--threads N] [--only TEXT] [--markdown] [--inspect]
 Each XML, .pbrt, .gltf and .glb is rendered small; with --inspect it is only read, and a table of the reasons for which scenes are
-refused follows: a scene counts once for each kind of error that it has, without its names and numbers. Healthy is a picture that is finite, not black, and whose report counts no non-finite sample and no
+refused follows: a scene counts once for each kind of error that it has, without its names and numbers. Incomplete is a scene all of
+whose errors are of what is not there. A scene that takes more than LIMIT seconds has failed. Healthy is a picture that is finite, not black, and whose report counts no non-finite sample and no
 majorant violation. Scenes whose root is a test (Nori's `ttest`, `chi2test`) are run by `lightshaft validate`. Files that others
 include, and those without a sensor, are fragments: listed as such. What is refused is printed with the first error.
 Exit status: 0 unless a render failed or was not healthy. Needs numpy and the OpenEXR package of PyPI. A bench, not a test.
@@ -21,6 +22,10 @@ import tempfile
 import numpy as np
 
 from agreement import BIN, load
+
+
+LIMIT = 60
+ABSENT = re.compile("there is no file|Git LFS|no object has the id|is not defined: give it")
 
 
 def run(*command):
@@ -64,13 +69,15 @@ def rendered(scene, options, folder, spp):
 
 
 def inspected(scene, reasons):
-    done = run(BIN / "lightshaft", "inspect", scene, "--json")
+    done = run("timeout", LIMIT, BIN / "lightshaft", "inspect", scene, "--json")
     if done.returncode == 0:
         return "loads", f"{sum('warning:' in line for line in done.stderr.splitlines())} warnings"
     errors = [line.split("error:", 1)[1] for line in done.stderr.splitlines() if "error:" in line] or [first_error(done.stderr, scene)]
     for kind in {re.sub(r'"[^"]*\.\w+"', '"FILE"', re.sub(r"(?<![\w.])-?\d[\d.e+-]*", "N", error)).strip() for error in errors}:
         reasons[kind] += 1
-    return ("refused" if done.returncode == 2 else "FAILED"), first_error(done.stderr, scene)
+    incomplete = all(ABSENT.search(error) for error in errors)
+    outcome = "FAILED" if done.returncode != 2 else "incomplete" if incomplete else "refused"
+    return outcome, first_error(done.stderr, scene)
 
 
 def main():

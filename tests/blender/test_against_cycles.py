@@ -432,6 +432,7 @@ NODES = {
     "contrast": ("ShaderNodeBrightContrast", {"Color": (0.2, 0.5, 0.9, 1), "Bright": 0.1, "Contrast": 0.5}, {}),
     "invert": ("ShaderNodeInvert", {"Fac": 0.8, "Color": (0.2, 0.5, 0.9, 1)}, {}),
     "power": ("ShaderNodeMath", {"Value": 0.5, "Value_001": 3.0}, {"operation": "POWER"}),
+    "divide": ("ShaderNodeMath", {"Value": 0.5, "Value_001": 0.0}, {"operation": "DIVIDE"}),
     "screen": ("ShaderNodeMix", {"Factor_Float": 0.7, "A_Color": (0.2, 0.5, 0.9, 1)}, {"data_type": "RGBA", "blend_type": "SCREEN"}),
 }  # fmt: skip
 
@@ -462,6 +463,28 @@ def test_nodes_of_constant_inputs_are_colours(stage, name):
 
     # Nothing has noise. Colour matching functions every 20 nm are within 0.006 of Blender's for a black body.
     assert ours == pytest.approx(theirs, rel=2e-3, abs=6e-3 if name == "blackbody" else 1e-3)
+
+
+@pytest.mark.parametrize(
+    "kind, strength", [("ShaderNodeCombineXYZ", 0.6), ("ShaderNodeCombineColor", 0.36497)]
+)
+def test_a_vector_as_a_number_is_its_mean_and_a_colour_its_luminance(stage, kind, strength):
+    from stage import material
+
+    made = material("Glow", "ShaderNodeEmission", Color=(1, 1, 1))
+    tree = made.node_tree
+    node = tree.nodes.new(kind)
+    for socket, value in zip(node.inputs, (0.3, 0.3, 1.2)):
+        socket.default_value = value
+    glow = next(n for n in tree.nodes if n.type == "EMISSION")
+    tree.links.new(node.outputs[0], glow.inputs["Strength"])
+    stage.plane(made, 60)
+
+    ours, theirs = (stage.render(e, 2)[:, :, :3].mean(axis=(0, 1)) for e in ("LIGHTSHAFT", "CYCLES"))
+
+    # Nothing has noise. Blue has the weight 0.0721923 in a luminance.
+    assert ours == pytest.approx(theirs, rel=2e-3)
+    assert ours == pytest.approx([strength] * 3, rel=2e-3)
 
 
 def test_an_image_of_light_is_multiplied_by_its_strength(stage):

@@ -19,6 +19,7 @@
 #include "common/base/spawn.h"
 #include "common/image/reference/exchange.h"
 #include "common/image/reference/reference.h"
+#include "common/sandbox/call_filter.h"
 #include "common/sandbox/sandbox.h"
 
 namespace {
@@ -39,6 +40,7 @@ void confine(unsigned seconds, std::uint64_t bytes) {
 #endif
   ::alarm(seconds);
   ls::enter_sandbox({});
+  ls::forbid_processes();
 }
 
 template <std::size_t N>

@@ -46,7 +46,8 @@ struct ExrImage {
   std::uint32_t channels = 3;  // 3: R, G, B; 4: also A, if the file has it
   std::vector<float> values;   // row by row from the top, as stored; the channels of a pixel are adjacent
   // If the stored colours are not linear sRGB, the matrix M (row by row) by which they become that:
-  // (R, G, B) of sRGB = M (R, G, B) as stored. Whites are not adapted, as in Mitsuba 3.9.
+  // (R, G, B) of sRGB = M (R, G, B) as stored. Whites are not adapted, as in Mitsuba 3.9. M is not finite if
+  // the `chromaticities` are those of no colour space: such an image serves as data only.
   std::optional<std::array<float, 9>> to_srgb = std::nullopt;
 };
 // As read_exr_rgb(), but with the alpha channel, and with the meaning of the colours: the header's

@@ -131,8 +131,7 @@ bool is_rec709(const Imf::Chromaticities& c) {
          kSame;
 }
 
-Result<std::optional<std::array<float, 9>>> srgb_matrix(const Imf::Header& header, const Source& source,
-                                                        const std::string& name) {
+std::optional<std::array<float, 9>> srgb_matrix(const Imf::Header& header, const Source& source) {
   ColourMatrix m = matrix_inverse(to_xyz(Imf::Chromaticities()));
   if (source.channels[0] != std::string_view("X")) {
     if (source.channels[0] != std::string_view("R") || !Imf::hasChromaticities(header) ||
@@ -142,9 +141,6 @@ Result<std::optional<std::array<float, 9>>> srgb_matrix(const Imf::Header& heade
   }
   std::array<float, 9> out{};
   for (std::size_t i = 0; i < 9; ++i) out[i] = static_cast<float>(m[i]);
-  if (!std::ranges::all_of(out, [](float x) { return std::isfinite(x); }))
-    return bad_argument(fmt::format(
-        "{}: the `chromaticities` in its header are those of no colour space; write them anew", name));
   return out;
 }
 
@@ -253,10 +249,8 @@ Result<ExrImage> read_exr_image(std::span<const std::byte> bytes, const std::str
     const auto source = find_colour(file, name, Wanted::texture);
     if (!source) return tl::unexpected(source.error());
     const Imf::Header& header = file.header(source->part);
-    const auto to_srgb = srgb_matrix(header, *source, name);
-    if (!to_srgb) return tl::unexpected(to_srgb.error());
     return ExrImage{size_of(header.dataWindow()), static_cast<std::uint32_t>(source->layout.size()),
-                    read_part(file, *source), *to_srgb};
+                    read_part(file, *source), srgb_matrix(header, *source)};
   });
 }
 

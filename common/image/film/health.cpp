@@ -58,6 +58,11 @@ constexpr std::array kRows{
     Row{HealthCause::degenerate_triangle, "degenerate_triangle", kInput,
         "triangle of the scene without area was left out",
         "triangles of the scene without area were left out"},
+    Row{HealthCause::wrong_texture_coordinates, "wrong_texture_coordinates", kInput,
+        "face of a mesh has a wrong number of texture coordinates, and its mesh those of its vertices alone",
+        "faces of meshes have a wrong number of texture coordinates, and their meshes those of their "
+        "vertices "
+        "alone"},
 };
 constexpr bool rows_in_order() {
   for (std::size_t i = 0; i < kRows.size(); ++i)

@@ -43,6 +43,7 @@ enum class HealthCause : std::uint8_t {
   negative_texel,
   reflectance,
   degenerate_triangle,
+  wrong_texture_coordinates,
   end_,
 };
 enum class HealthEffect : std::uint8_t { rejected, kept, input };

@@ -41,7 +41,6 @@ const TagRow* row_of(const Element& e) {
 // Returns a suggestion for an element that exists only in Mitsuba's format.
 std::string_view instead(std::string_view tag) {
   static constexpr std::pair<std::string_view, std::string_view> kOthers[] = {
-      {"shape", "in Nori it is called <mesh>"},
       {"sensor", "in Nori it is called <camera>"},
       {"film", "in Nori width and height stand in the <camera>"},
       {"rgb", "in Nori it is called <color>"},

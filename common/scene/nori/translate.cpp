@@ -190,12 +190,20 @@ bool is_nori(const Element& root) {
   return root.tag == "scene" && has("camera", "mesh") && (!root.find("version") || !has("shape", "sensor"));
 }
 
+void rename_shapes(Element& root) {
+  for (Element& child : root.children) {
+    if (root.tag == "scene" && child.tag == "shape") child.tag = "mesh";
+    if (child.tag == "scene") rename_shapes(child);
+  }
+}
+
 bool translate(Document& document, Report& report) {
   if (!is_nori(document.root)) return true;
   if (document.root.tag == "test")
     return report.error(document.root.at, "this is a test, not a scene: run it by lightshaft validate FILE"),
            false;
   std::erase_if(document.root.attributes, [](const Attribute& a) { return a.name == "version"; });
+  rename_shapes(document.root);
   if (!check_objects(document.root, report)) return false;
   auto scene = translate_scene(document.root, report);
   if (!scene) return false;

@@ -13,6 +13,9 @@ namespace ls::scene::nori {
 // If it has a version, it must not have a <shape> or a <sensor> besides: these are Mitsuba's.
 bool is_nori(const Element& root);
 
+// Some descendants of Nori call a <mesh> a <shape>. Gives those in the <scene>s of this root the name <mesh>.
+void rename_shapes(Element& root);
+
 // Translates the document in place if it is a Nori file. Returns false if the file has errors, which were
 // reported.
 bool translate(Document& document, Report& report);

@@ -251,19 +251,36 @@ class Loader {
     const std::vector<std::string> known{"srgb", "dci-p3", "rec2020", "aces2065-1"};
     report_.error(last_, fmt::format("there is no ColorSpace \"{}\"{}", *name, suggestion(*name, known)));
   }
+  bool next_is(Token::Kind kind) {
+    const Token* next = tokens_->peek();
+    return next && next->kind == kind;
+  }
+  // Takes one value, which may stand in brackets.
+  std::optional<std::string> option_value() {
+    const bool brackets = next_is(Token::Kind::open);
+    if (brackets) tokens_->take();
+    if (!tokens_->peek() || next_is(Token::Kind::open) || next_is(Token::Kind::close)) return std::nullopt;
+    std::string value = tokens_->take().text;
+    if (!brackets) return value;
+    if (!next_is(Token::Kind::close)) return std::nullopt;
+    tokens_->take();
+    return value;
+  }
   void option(const Token& d) {
     // pbrt-v4 reads a name and one value, and files may also have the type before the name.
     auto name = quoted(d);
     if (!name) return;
     const Span at = last_;
     name->erase(0, name->find_last_of(" \t") + 1);
-    const Token* next = tokens_->peek();
-    if (!next || next->kind == Token::Kind::open || next->kind == Token::Kind::close) {
+    const std::optional<std::string> given = option_value();
+    if (!given) {
       lost_ = true;
-      if (!tokens_->broken()) report_.error(at, fmt::format("the Option '{}' has no value", *name));
+      if (!tokens_->broken())
+        report_.error(at, fmt::format("the Option '{}' {}", *name,
+                                      tokens_->peek() ? "wants one value" : "has no value"));
       return;
     }
-    const std::string value = tokens_->take().text;
+    const std::string& value = *given;
     std::string lower;
     for (const char c : *name)
       if (c != '-') lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));

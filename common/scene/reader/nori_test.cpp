@@ -42,7 +42,8 @@ class TestReader {
       : document_(document), assets_(assets), report_(report) {}
 
   std::optional<NoriTest> read() {
-    const Element root = document_.root;
+    Element root = document_.root;
+    nori::rename_shapes(root);
     if (!nori::check_objects(root, report_)) return std::nullopt;
     const bool chi2 = root.get("type") == "chi2test";
     if (!chi2 && root.get("type") != "ttest") {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <jpeglib.h>
 #include <png.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -109,6 +110,36 @@ TEST(Png, ReadsColourGreyAndAlpha) {
   ASSERT_TRUE(grey) << grey.error().message;
   EXPECT_EQ(grey->channels, 1u);
   EXPECT_THAT(grey->u8, ElementsAre(0, 128, 255));
+}
+
+// Returns a chunk of a PNG.
+std::string chunk(const std::string& name, const std::string& data) {
+  const auto word = [](std::size_t x) {
+    std::string out;
+    for (const int shift : {24, 16, 8, 0}) out += static_cast<char>(x >> shift);
+    return out;
+  };
+  const std::string whole = name + data;
+  const auto sum = ::crc32(0, reinterpret_cast<const Bytef*>(whole.data()), static_cast<uInt>(whole.size()));
+  return word(data.size()) + whole + word(sum);
+}
+
+TEST(Png, OpacitiesBeforeThePaletteAreTold) {
+  const std::string start =
+                        "\x89PNG\r\n\x1a\n" + chunk("IHDR", std::string("\0\0\0\1\0\0\0\1\10\3\0\0\0", 13)),
+                    palette = chunk("PLTE", "abc"), opacities = chunk("tRNS", "\x7f"),
+                    pixel = chunk("IDAT", std::string("\x78\x01\x01\2\0\xfd\xff\0\0\0\2\0\1", 13)),
+                    end = chunk("IEND", "");
+
+  const auto right = decode_png("a.png", bytes_of(start + palette + opacities + pixel + end));
+  const auto wrong = decode_png("a.png", bytes_of(start + opacities + palette + pixel + end));
+
+  ASSERT_TRUE(right) << right.error().message;
+  EXPECT_THAT(right->u8, ElementsAre('a', 'b', 'c', 0x7f));
+  ASSERT_FALSE(wrong);
+  EXPECT_THAT(wrong.error().message,
+              HasSubstr("'a.png': broken PNG: its opacities (tRNS) do not stand between its palette and its "
+                        "pixels"));
 }
 
 // Returns a PNG with 16 bits per channel. It is written with libpng's full interface, since the simple one

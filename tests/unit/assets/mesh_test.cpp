@@ -453,11 +453,28 @@ TEST(Ply, TextureCoordinatesOfCornersSplitVertices) {
   EXPECT_THAT(m->indices, ElementsAre(0, 1, 2, 4, 2, 3));
   EXPECT_THAT(m->uvs, ElementsAre(0, 0, .5f, 0, .5f, 1, 0, 1, .25f, 0));
   EXPECT_THAT(std::vector(m->positions.begin() + 12, m->positions.end()), ElementsAre(0, 0, 0));
-  const auto odd = ply_of(header_of("element face 1\nproperty list uchar int vertex_indices\n"
-                                    "property list uchar float texcoord\n") +
-                          kPlyVertices + "3 0 1 2 5 0 0 .5 0 .5\n");
-  ASSERT_FALSE(odd);
-  EXPECT_THAT(odd.error().message, HasSubstr("face 0 of 3 corners has 5 numbers"));
+  EXPECT_EQ(m->wrong_uv_faces, 0u);
+}
+
+TEST(Ply, TextureCoordinatesOfAWrongNumberAreCountedAndThoseOfAllCornersLeftOut) {
+  const std::string faces = "3 0 1 2 6 0 0 .5 0 .5 1\n3 0 2 3 5 .25 0 .5 1 0\n3 0 1 3 8 0 0 0 0 0 0 0 0\n";
+  const std::string lists =
+      "element face 3\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\n";
+
+  const auto bare = ply_of(header_of(lists) + kPlyVertices + faces);
+  const auto laid_out = ply_of(
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+      "property float s\nproperty float t\n" +
+      lists + "end_header\n0 0 0 .1 .2\n1 0 0 .3 .4\n1 1 0 .5 .6\n0 1 0 .7 .8\n" + faces);
+
+  for (const auto* m : {&bare, &laid_out}) {
+    ASSERT_TRUE(*m) << m->error().message;
+    EXPECT_EQ((*m)->wrong_uv_faces, 2u);
+    EXPECT_EQ((*m)->vertex_count(), 4u);
+    EXPECT_THAT((*m)->indices, ElementsAre(0, 1, 2, 0, 2, 3, 0, 1, 3));
+  }
+  EXPECT_TRUE(bare->uvs.empty());
+  EXPECT_THAT(laid_out->uvs, ElementsAre(.1f, .2f, .3f, .4f, .5f, .6f, .7f, .8f));
 }
 
 // MeshLab writes empty lists for faces without a texture of their own.

@@ -290,6 +290,21 @@ TEST(Bitmap, NumbersAndNormalsAreNoColoursToConvert) {
   EXPECT_EQ(table(opacity, wide_colour()).eval({0}, {.5f, .5f}), C3(.5f));
 }
 
+TEST(Bitmap, PrimariesOfNoColourSpaceMatterToColoursAlone) {
+  ImageData image = wide_colour();
+  image.to_srgb->fill(std::numeric_limits<float>::quiet_NaN());
+  Scene colours = with(BitmapTexture{.file = {0}});
+  colours.bsdfs.emplace_back(DiffuseBsdf{{0}});
+  Scene normals = with(BitmapTexture{.file = {0}});
+  normals.textures.push_back(ConstantTexture{{.5, .5, .5}});
+  normals.bsdfs.emplace_back(DiffuseBsdf{{1}});
+  normals.bsdfs.emplace_back(NormalMapBsdf{{0}, {0}});
+
+  EXPECT_EQ(table(normals, image).eval({0}, {.5f, .5f}), C3(.25f, .5f, .25f));
+  EXPECT_THAT(build_error(colours, image),
+              HasSubstr("'wood.png': the `chromaticities` in its header are those of no colour space"));
+}
+
 TEST(Bitmap, GivesOneChannelAsANumber) {
   const ImageData codes{1, 1, 4, {51, 102, 153, 204}, {}, true};
   const std::pair<Channel, float> channels[] = {

@@ -40,6 +40,8 @@
 #include <thread>
 #include <vector>
 
+#include "common/sandbox/call_filter.h"
+
 namespace ls {
 namespace {
 
@@ -321,6 +323,29 @@ TEST_P(Cage, MakesNoNamespaces) {
       ENOSYS);
   EXPECT_EQ(try_sandboxed([] { return ::unshare(CLONE_NEWUSER); }, &Sandboxed::calls), EPERM);
   EXPECT_EQ(try_sandboxed([] { return std::thread([] {}).join(), 0; }, &Sandboxed::calls), 0);
+}
+
+TEST_P(Cage, StartsNothingOnceThatIsForbidden) {
+  const auto tried = [&](const std::function<long()>& start) {
+    return try_sandboxed([&] { return forbid_processes() && start() < 0 ? 1 : 0; }, &Sandboxed::calls);
+  };
+  const auto clone_with = [](unsigned long flags) {
+    return [flags] {
+      const long made = ::syscall(SYS_clone, flags, 0, 0, 0, 0);
+      if (made == 0) ::_exit(0);
+      return made;
+    };
+  };
+  char name[] = "/bin/true";
+  char* arguments[] = {name, nullptr};
+
+  const int process = tried(clone_with(SIGCHLD));
+  SKIP_UNCAGED(process, &Sandboxed::calls);
+
+  EXPECT_EQ(process, EPERM);
+  EXPECT_EQ(tried(clone_with(CLONE_VM | CLONE_VFORK | SIGCHLD)), EPERM) << "as posix_spawn does";
+  EXPECT_EQ(tried([&] { return ::execve(name, arguments, nullptr); }), EPERM);
+  EXPECT_EQ(tried([] { return 0; }), 0);
 }
 
 TEST_P(Cage, SignalsNobodyButItself) {

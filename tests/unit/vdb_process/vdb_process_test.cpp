@@ -1,18 +1,24 @@
 // lightshaft-vdb's reply, and replies of programs that stand in for one that a file made to harm has taken
 // over.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <thread>
 
+#include "common/base/spawn.h"
+#include "common/sandbox/call_filter.h"
 #include "tests/unit/nvdb/nvdb_builder.h"
 #include "worker/render/media/vdb_process.h"
 #include "worker/render/media/vdb_reply.h"
@@ -215,6 +221,35 @@ TEST_F(VdbProcess, AProgramThatIsMissingIsNoFaultOfTheFile) {
   EXPECT_EQ(missing.error().code, Errc::internal);
   EXPECT_THAT(missing.error().message, HasSubstr("/nowhere/lightshaft-vdb"));
 }
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // they have no sandbox
+// Renderers in their sandbox may not signal their helpers. The stand-in asks to be ended as lightshaft-vdb
+// does.
+TEST_F(VdbProcess, EndsWhenItsLoadIsStoppedInASandbox) {
+  const auto runs = fifo("runs");
+  const auto helper =
+      program("exec setpriv --pdeathsig KILL sh -c ': >> " + runs.string() + "; exec sleep 60'");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::alarm(20);  // ends a wait that would have no end
+    ::setsid();   // as the agent has renderers do
+    if (!limit_calls()) ::_exit(2);
+    std::atomic<bool> stop{false};
+    const std::jthread once_it_runs([&] {
+      if (::open(runs.c_str(), O_RDONLY) >= 0) stop = true;
+    });
+    const Descriptor reply(::memfd_create("reply", MFD_CLOEXEC));
+    const auto end = run_helper(helper, {}, reply.fd, &stop);
+    ::_exit(end && WIFSIGNALED(end->status) && WTERMSIG(end->status) == SIGKILL ? 0 : 1);
+  }
+
+  int status = 0;
+  ::waitpid(child, &status, 0);
+
+  ASSERT_TRUE(WIFEXITED(status)) << "ended by signal " << WTERMSIG(status);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+#endif
 
 }  // namespace
 }  // namespace ls::render

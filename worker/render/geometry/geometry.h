@@ -172,6 +172,7 @@ class Geometry {
   // Radius of a sphere about the world's origin that encloses every shape
   float radius = 1;
   std::uint64_t dropped_triangles = 0;  // number of triangles without area, which are left out
+  std::uint64_t wrong_uv_faces = 0;     // see MeshData
 
   std::uint32_t triangle_count() const { return static_cast<std::uint32_t>(triangle_surface.size()); }
   std::uint64_t primitive_count() const {

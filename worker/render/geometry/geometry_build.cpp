@@ -128,6 +128,7 @@ void follow_normals(const LocalMesh& mesh, SurfaceInfo& info, std::vector<std::u
 void append_mesh(Geometry& g, LocalMesh mesh, bool normals_given, std::uint32_t surface, const Space& space) {
   const auto base = static_cast<std::uint32_t>(g.positions.size());
   g.dropped_triangles += mesh.dropped_triangles;
+  g.wrong_uv_faces += mesh.wrong_uv_faces;
   SurfaceInfo& info = g.surfaces[surface];
   if (info.transition && !mesh.indices.empty()) info.sheet = is_sheet(mesh);
   for (const V3d& v : mesh.positions) g.positions.push_back(V3(space(v)));

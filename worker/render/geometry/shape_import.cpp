@@ -126,6 +126,7 @@ Result<LocalMesh> load(const MeshShape& shape, const AssetLoader& files,
   m.indices = std::move(data->indices);
   m.face_normals = data->face_normals;
   m.dropped_triangles = data->dropped_triangles;
+  m.wrong_uv_faces = data->wrong_uv_faces;
   const std::size_t n = data->vertex_count();
   m.positions.reserve(n);
   for (std::size_t i = 0; i < n; ++i)

@@ -19,6 +19,7 @@ struct LocalMesh {
   std::vector<std::uint32_t> indices;
   bool face_normals = false;            // true if the mesh file itself requests flat shading
   std::uint64_t dropped_triangles = 0;  // triangles without area, left out when the file was read
+  std::uint64_t wrong_uv_faces = 0;     // see MeshData
   std::vector<MeshAttribute> attributes;
 };
 struct Placed {

@@ -109,11 +109,17 @@ bool has_alpha(const ImageData& image) {
 }
 
 // Replaces the colours of t, which has three channels of floats, by those of linear sRGB.
-void convert(Texels& t, const std::array<float, 9>& m) {
+Result<void> convert(std::string_view name, Texels& t, const std::array<float, 9>& m) {
+  if (!std::ranges::all_of(m, [](float x) { return std::isfinite(x); }))
+    return fail(Errc::invalid_argument,
+                fmt::format("texture '{}': the `chromaticities` in its header are those of no colour space; "
+                            "write them anew",
+                            name));
   for (std::size_t i = 0; i + 2 < t.f32.size(); i += 3) {
     const float r = t.f32[i], g = t.f32[i + 1], b = t.f32[i + 2];
     for (std::size_t k = 0; k < 3; ++k) t.f32[i + k] = m[3 * k] * r + m[3 * k + 1] * g + m[3 * k + 2] * b;
   }
+  return {};
 }
 
 // Fails if a texel is not finite. Unless `signed_values`, negative values become 0 and are counted.
@@ -180,7 +186,8 @@ Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, boo
   t.f32 = std::move(image.f32);
   drop_channels(t.u8, image.channels, first, keep);
   drop_channels(t.f32, image.channels, first, keep);
-  if (image.to_srgb && t.channels == 3 && content == Content::colours) convert(t, *image.to_srgb);
+  if (image.to_srgb && t.channels == 3 && content == Content::colours)
+    if (auto ok = convert(name, t, *image.to_srgb); !ok) return tl::unexpected(ok.error());
   if (auto ok = check_texels(name, t, content == Content::heights); !ok) return tl::unexpected(ok.error());
   if (decode)
     for (float& v : t.f32) v = static_cast<float>(srgb_to_linear(v));

@@ -196,6 +196,7 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
   if (!geometry) return tl::unexpected(geometry.error());
   w.geometry = std::move(*geometry);
   w.inputs.add(HealthCause::degenerate_triangle, w.geometry.dropped_triangles);
+  w.inputs.add(HealthCause::wrong_texture_coordinates, w.geometry.wrong_uv_faces);
   w.inputs.add(HealthCause::negative_texel, w.geometry.attributes.clamped);
   const auto load = [&](const Asset& a, auto... most_pixels) -> Result<ImageData> {
     if (auto ok = BuildStop::go_on(); !ok) return tl::unexpected(ok.error());

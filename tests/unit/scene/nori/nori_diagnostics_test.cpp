@@ -33,7 +33,7 @@ TEST(NoriDiagnostics, TellWhatIsUnknown) {
               HasSubstr("2:13 Nori has no mesh \"spheer\"; did you mean 'sphere'?"));
   EXPECT_THAT(first("<mush type=\"obj\"/>"),
               HasSubstr("2:2 Nori has no element <mush>; did you mean <mesh>?"));
-  EXPECT_THAT(first("<shape type=\"obj\"/>"), HasSubstr("in Nori it is called <mesh>"));
+  EXPECT_THAT(first("<sensor type=\"perspective\"/>"), HasSubstr("in Nori it is called <camera>"));
   EXPECT_THAT(first("<mesh typ=\"obj\"/>"), HasSubstr("<mesh> has no attribute 'typ'; did you mean 'type'?"));
   EXPECT_THAT(first("<rfilter type=\"box\"/>"), HasSubstr("a <rfilter> can't stand in <scene>"));
   EXPECT_THAT(first(R"(<mesh type="sphere"><camera type="perspective"/></mesh>)"),

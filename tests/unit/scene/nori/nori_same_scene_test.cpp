@@ -44,6 +44,16 @@ void expect_same_objects(const std::string& nori, const std::string& mitsuba) {
 
 TEST(NoriScene, IsTheSceneThatMitsubaHasWithItsDefaults) { expect_same_objects("", ""); }
 
+TEST(NoriScene, MayCallItsMeshesShapes) {
+  const std::string inside =
+      R"(type="sphere"><emitter type="area"><color name="radiance" value="1 1 1"/></emitter>)";
+  const Scene meshes = must_read_quietly(nori_scene("<mesh " + inside + "</mesh>"));
+
+  const Scene shapes = must_read_quietly(nori_scene("<shape " + inside + "</shape>"));
+
+  EXPECT_EQ(digest_of(shapes), digest_of(meshes));
+}
+
 TEST(NoriScene, OfOneOfEverythingIsTheSameInMitsuba) {
   const double quarter = 1 / (4 * std::numbers::pi);
   expect_same(kNoriExample, fmt::format(R"(<scene version="3.0.0">

@@ -240,6 +240,7 @@ A `<scene>` that has a `<camera>` or a `<mesh>`, and if it has a version neither
 as Kombu). It becomes the same scene as one of Mitsuba that means the same, with the same digest; `lightshaft convert` shows which.
 What Nori means otherwise than Mitsuba:
 
+- A `<mesh>` may be called `<shape>`, as some descendants of Nori do.
 - Every object stands where it is used; numbers are separated by commas or blanks; names are in camelCase.
 - The camera's +x is on the right of the picture, so that a bare `<lookat>` shows the world mirrored. `fov` is over the width. The
   filter, if none is given, is `gaussian` with stddev 0.5; one sample a pixel is taken if there is no sampler.

@@ -395,15 +395,19 @@ TEST(Pbrt, OptionsAreANameAndAValue) {
     return read_pbrt(
         fmt::format(R"({}Camera "perspective" Option {} WorldBegin Shape "sphere")", kPbrtFilm, option));
   };
-  for (const std::string_view option :
-       {R"("seed" 42)", R"("wavefront" true)", R"("msereferenceout" "a.exr")", R"("integer seed" 3)"}) {
+  for (const std::string_view option : {R"("seed" 42)", R"("wavefront" true)", R"("msereferenceout" "a.exr")",
+                                        R"("integer seed" 3)", R"("integer seed" [3])"}) {
     const ReadResult r = with(option);
     EXPECT_TRUE(r.scene) << messages(r);
     EXPECT_THAT(messages(r), HasSubstr("has no effect here"));
   }
   EXPECT_TRUE(with(R"("forcediffuse" false)").scene);
   EXPECT_THAT(messages(with(R"("forcediffuse" true)")), HasSubstr("the Option 'forcediffuse' is not read"));
+  EXPECT_TRUE(with(R"("bool forcediffuse" [ false ])").scene);
+  EXPECT_THAT(messages(with(R"("forcediffuse" [true])")), HasSubstr("the Option 'forcediffuse' is not read"));
   EXPECT_THAT(messages(read_pbrt(R"(Option "seed")")), HasSubstr("the Option 'seed' has no value"));
+  for (const std::string_view option : {R"("seed" [])", R"("seed" [1 2])", R"("seed" ])", R"("seed" [)"})
+    EXPECT_THAT(messages(with(option)), HasSubstr("the Option 'seed' wants one value")) << option;
 }
 
 TEST(Pbrt, MovingObjectsStandWhereTheyAreWhenTheShutterOpens) {

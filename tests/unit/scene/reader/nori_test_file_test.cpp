@@ -21,7 +21,7 @@ TEST(NoriTest, OfScenesHoldsThemWithTheirReferences) {
   const std::string text = fmt::format(R"(<?xml version="1.0"?>
 <test type="ttest"><string name="references" value="2,
     5"/><float name="significanceLevel" value="0.05"/><integer name="sampleCount" value="1000"/>
-  <scene><mesh type="sphere"/>{0}</scene><scene><mesh type="obj"><string name="filename" value="mesh.obj"/></mesh>{0}</scene></test>)",
+  <scene><mesh type="sphere"/>{0}</scene><scene><shape type="obj"><string name="filename" value="mesh.obj"/></shape>{0}</scene></test>)",
                                        kNoriCamera);
 
   const auto r = read_test(text);
