@@ -41,7 +41,7 @@ constexpr std::uint64_t kTellingSamples = 16;
 constexpr std::size_t kSquare = 16;
 // What correlated errors add to the variance counts in full in an image of many squares. With this many, it
 // counts by half: their sum is then known to a third.
-constexpr double kTellingSquares = 16;
+constexpr double kHalfWeightSquares = 16;
 
 // Returns the expected amount by which skewed noise lowers the sum of squared relative errors, as a negative
 // number. error_estimate.h derives it. The sum is accumulated per column, so that the compiler vectorises the
@@ -114,9 +114,9 @@ double relative_spread(const NoiseSums& s, double pixels, bool trusted) {
   if (!trusted) return 2 * std::sqrt(trace_of_moments(s, false)) / s.squares;
   if (s.changes.square_products == 0)
     return 2 * std::pow(trace_of_moments(s, true) * trace_of_moments(s, false), 0.25) / s.squares;
-  const double squares = pixels / (kSquare * kSquare), telling = squares / (squares + kTellingSquares);
+  const double squares = pixels / (kSquare * kSquare), weight = squares / (squares + kHalfWeightSquares);
   const double correlated = std::max(0.0, s.changes.square_products - s.changes.products);
-  return 2 * std::sqrt(s.changes.products + telling * correlated) / s.changes.squares;
+  return 2 * std::sqrt(s.changes.products + weight * correlated) / s.changes.squares;
 }
 
 // Returns the sums from which the interval is computed. `a` and `b` are the changes of the means of half A
