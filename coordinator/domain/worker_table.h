@@ -111,7 +111,7 @@ struct Worker {
   TimePoint lost_at{};
   TimePoint progress_at{};  // when it last finished a unit, or when it got its first unit after being idle
   WorkedTime worked;        // since it last got a unit after being idle
-  // What `worked` was before, if leases were taken from the worker then that it may still be rendering
+  // The previous value of `worked`; nullopt: the worker can no longer be rendering units of that time
   std::optional<WorkedTime> worked_before;
   bool interrupted = false;  // true if such leases were taken from it since worked.since
 

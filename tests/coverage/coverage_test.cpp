@@ -89,7 +89,7 @@ TEST(ShortCoverage, HoldsForJobsThatStopAtATarget) {
 
 // Whole images of few samples whose pixels share their paths: single pixels carry much of the noise, weights
 // are uncertain, and errors are correlated. Intervals that ignore this hold for about half of such images.
-// The share that holds may be .95 - (.02 + five standard errors), .74 of 50 images.
+// The share that holds may be .95 - (.02 + five standard errors), .69 of 20 trusted images.
 TEST(ShortCoverage, HoldsForWholeImagesOfFewSamplesThatSharePaths) {
   const double level = Tests("coverage/rendered").level(2);
   const auto file = std::filesystem::path(testing::TempDir()) / "shared.xml";

@@ -26,7 +26,7 @@ struct RenderedJobs {
   std::string dump;  // file to which the half means after each round are written as float64; "": none
 };
 
-// What the images of one number of samples say of themselves, and what is true.
+// Compares the stated errors of all images with one number of samples with their true errors.
 struct RenderedCell {
   std::uint64_t spp = 0;
   int images = 0;

@@ -39,8 +39,8 @@ constexpr std::uint64_t kTellingSamples = 16;
 // Side in pixels of the squares over whose pixels errors may be correlated: those that share paths
 // (worker/render/integrator/path_reuse.h)
 constexpr std::size_t kSquare = 16;
-// What correlated errors add to the variance counts in full in an image of many squares. With this many, it
-// counts by half: their sum is then known to a third.
+// Number of squares at which the contribution of correlated errors to the variance gets the weight 1/2. The
+// sum over this many squares is known to a third. The weight approaches 1 in images of many squares.
 constexpr double kHalfWeightSquares = 16;
 
 // Returns the expected amount by which skewed noise lowers the sum of squared relative errors, as a negative

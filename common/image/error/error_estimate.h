@@ -67,8 +67,8 @@
 // covariance of D in pixels p and q, the variance is 4 times the sum over all pairs of tr(C_pq C_qp), not
 // over pixels alone. Pairs within squares of 16 x 16 pixels are included by
 //   E[(sum over the pixels p of a square of alpha_p . beta_p)^2] = sum over p, q of tr(C_pq C_qp).
-// Of S squares, this sum has a relative standard deviation of about sqrt(2 / S). What it exceeds the sum over
-// pixels by counts with the weight S / (S + 16).
+// The sum over S squares has a relative standard deviation of about sqrt(2 / S). So its excess over the sum
+// over pixels is multiplied by S / (S + 16).
 //
 // If the last round, or the rounds before it, have too few samples for this, tr(V^2) is a weighted mean of
 // those two other estimates, with the weights g^2 and 1 - g^2 in each pixel:

@@ -123,7 +123,7 @@ TEST(CorrelatedNoise, IsCountedWithinSquares) {
   std::normal_distribution<double> normal(0, 1e-3);
   constexpr double kCorrelation = .1;
   double squares = 0, pixels = 0;
-  for (int trial = 0; trial < 100; ++trial) {
+  for (int trial = 0; trial < 400; ++trial) {
     const auto draw = [&] {
       std::vector<double> out(3 * kNoisyPixels);
       std::array<double, 4> common;
@@ -142,10 +142,10 @@ TEST(CorrelatedNoise, IsCountedWithinSquares) {
     squares += told.plain.changes.square_products;
     pixels += told.plain.changes.products;
   }
-  // Each pixel has 255 others in its square. 400 squares tell the ratio to sqrt(2 / 400) = 7 %, doubled for
-  // products of normal values with a common part.
+  // Each pixel has 255 others in its square. 1,600 squares tell the ratio to sqrt(2 / 1600) = 3.5 %, doubled
+  // for products of normal values with a common part.
   const double right = 1 + 255 * kCorrelation * kCorrelation;
-  EXPECT_NEAR(squares / pixels, right, 5 * .14 * right);
+  EXPECT_NEAR(squares / pixels, right, 5 * .07 * right);
   EXPECT_GT(squares / pixels, 1.05) << "or the common part is not seen";
 }
 
