@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
@@ -78,8 +79,30 @@ std::string threads_of(const Json& report) {
                      : std::string();
 }
 
+// The mean of the image as "R, G, B", with the largest half width of its three intervals.
+std::string mean_figure(const Json& report) {
+  const Json &mean = member(report, "mean"), &intervals = member(report, "mean_ci95");
+  if (!mean.is_array() || mean.size() != 3) return "";
+  std::string text;
+  double half = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (!mean[c].is_number()) return "";
+    text += (c == 0 ? "" : ", ") + figure(mean[c].get<double>());
+    if (!intervals.is_array() || intervals.size() != 3) continue;
+    const Json& ends = intervals[c];
+    if (!ends.is_array() || ends.size() != 2 || !ends[0].is_number() || !ends[1].is_number()) continue;
+    half = std::max(half, (ends[1].get<double>() - ends[0].get<double>()) / 2);
+  }
+  const std::string note = doubtful(report) ? escape_html(phrase("doubt"))
+                           : half > 0       ? fmt::format("95 %: +- {} at most", figure(half))
+                                            : "";
+  return fact("Mean of the image", text, note);
+}
+
 std::string lesser_figures(const Json& report) {
   std::string out = fact("RMSE", figure(number(report, "rmse")), within(report, "rmse_ci95"));
+  out += fact("relMSE, 16 x 16", figure(number(report, "relmse_16")), within(report, "relmse_16_ci95"));
+  out += mean_figure(report);
   out += true_figures(report);
   if (!denoised_target(report)) out += denoised_figure(report, "");
   out +=

@@ -178,6 +178,26 @@ std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points
   return out;
 }
 
+namespace {
+
+// The errors of means over areas. Their intervals are unknown if the image's error is not trusted.
+void put_areas(json& j, const ReportFacts& facts) {
+  const bool trusted = facts.error && convergence_status_of(facts).trusted;
+  json mean, mean_interval;
+  for (std::size_t c = 0; facts.areas && c < 3; ++c) {
+    const double value = facts.areas->mean[c], half = facts.areas->half_width[c];
+    mean.push_back(number(value));
+    if (trusted) mean_interval.push_back(interval(value - half, value + half));
+  }
+  const AreaError areas = facts.areas.value_or(AreaError{});
+  j["mean"] = std::move(mean);
+  j["mean_ci95"] = std::move(mean_interval);
+  j["relmse_16"] = facts.areas ? number(areas.relmse) : json();
+  j["relmse_16_ci95"] = trusted && areas.relmse_hi > 0 ? interval(areas.relmse_lo, areas.relmse_hi) : json();
+}
+
+}  // namespace
+
 std::optional<ReferenceError> last_reference_error(const std::vector<ConvergencePoint>& points) {
   std::optional<ReferenceError> out;
   for (auto p = points.rbegin(); p != points.rend() && !out; ++p) out = p->reference_error;
@@ -191,7 +211,11 @@ void put_film(ReportFacts& facts, const Film& film) {
   facts.job.totals.spp_done =
       static_cast<double>(facts.samples) / static_cast<double>(std::int64_t{size.width} * size.height);
   facts.error.reset();
-  if (facts.samples > 0) facts.error = image_error(film.error());
+  facts.areas.reset();
+  if (facts.samples == 0) return;
+  const TileError sums = film.error();
+  facts.error = image_error(sums);
+  facts.areas = area_error(sums.areas, facts.job.techniques.has(Technique::light_vertices));
 }
 
 ConvergenceStatus convergence_status_of(const ReportFacts& facts) {
@@ -304,9 +328,10 @@ std::string report_json(const ReportFacts& facts) {
   j["techniques"] = json::parse(techniques_json(job.techniques, job.settings.integrator));
   const auto& e = facts.error;
   j["rmse"] = e ? number(e->rmse) : json();
-  j["rmse_ci95"] = e ? interval(e->rmse_lo, e->rmse_hi) : json();
+  j["rmse_ci95"] = e && (e->rmse_hi > 0 || e->rmse == 0) ? interval(e->rmse_lo, e->rmse_hi) : json();
   j["relmse"] = e ? number(e->relmse) : json();
   j["relmse_ci95"] = e ? interval(e->relmse_lo, e->relmse_hi) : json();
+  put_areas(j, facts);
   const auto reference_error = last_reference_error(facts.convergence);
   if (reference_error) put_reference_error(j, *reference_error);
   j["reference"] = reference_of(facts, reference_error);

@@ -31,6 +31,7 @@ struct ReportFacts {
   std::uint64_t samples = 0;
   // Error of the current image, over the pixels that have a sample. nullopt: no pixel has one
   std::optional<ImageError> error;
+  std::optional<AreaError> areas;  // of the same pixels
   std::uint64_t pixels_without_samples = 0;
   Digest pixels;
   std::uint64_t clamped_values = 0;  // number of values too large for the half floats of the final EXR
@@ -40,7 +41,7 @@ struct ReportFacts {
   std::optional<DenoisedFigures> denoised;        // nullopt: not requested, or not made yet
 };
 std::string report_json(const ReportFacts& facts);
-// Sets the facts that come from the film: samples, pixels without samples, and error.
+// Sets the facts that come from the film: samples, pixels without samples, error, and areas.
 void put_film(ReportFacts& facts, const Film& film);
 
 // Judges from the curve and the current error whether the image's error estimates can be trusted.

@@ -14,6 +14,7 @@
 #include "common/image/error/convergence.h"
 #include "common/image/film/film.h"
 #include "worker/render/render.h"
+#include "worker/render/world/world.h"
 
 namespace ls::test {
 namespace {
@@ -24,6 +25,7 @@ constexpr double kOfDenominator = 0.01;  // relMSE's
 struct Stage {
   std::vector<float> image;  // tile by tile
   ImageError error;
+  AreaError areas;
   bool trusted = false;
 };
 using Stages = std::vector<Stage>;
@@ -66,7 +68,8 @@ class Renders {
       }
       const ImageError e = image_error(film.error());
       points.push_back({e.spp, e.spp, e.relmse, e.relmse_lo, e.relmse_hi});
-      Stage stage{{}, e, judge(points, e.verdict).trusted};
+      Stage stage{
+          {}, e, area_error(film.error().areas, world->need.connected), judge(points, e.verdict).trusted};
       for (TileIndex t = 0; t < grid.count(); ++t) {
         const auto mean = film.pixels(t).mean;
         stage.image.insert(stage.image.end(), mean.begin(), mean.end());
@@ -107,7 +110,58 @@ std::vector<Stages> render_all(const RenderedJobs& jobs) {
 
 }  // namespace
 
+namespace {
+
+// The means of an image over squares of 16 x 16 pixels. The image is stored tile by tile, each as three
+// planes of 32 x 32 pixels.
+std::vector<double> square_means(const std::vector<float>& image) {
+  constexpr std::size_t kTile = 32, kSquare = 16, kAcross = kTile / kSquare;
+  std::vector<double> out(image.size() / (kSquare * kSquare));
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    const std::size_t plane = i / (kTile * kTile), y = i / kTile % kTile, x = i % kTile;
+    out[(plane * kAcross + y / kSquare) * kAcross + x / kSquare] += double{image[i]} / (kSquare * kSquare);
+  }
+  return out;
+}
+
+// Counts how often intervals of errors of areas hold, in the trusted images at one stage.
+void measure_areas(const std::vector<Stages>& all, std::size_t k, RenderedCell& cell) {
+  const auto n = static_cast<double>(all.size());
+  std::vector<std::vector<double>> last;
+  for (const Stages& s : all) last.push_back(square_means(s.back().image));
+  const std::size_t squares = last.front().size();
+  std::vector<double> sum(squares), variance(squares);
+  double green = 0;
+  for (const auto& means : last)
+    for (std::size_t i = 0; i < squares; ++i) sum[i] += means[i];
+  for (const auto& means : last)
+    for (std::size_t i = 0; i < squares; ++i) {
+      const double d = means[i] - sum[i] / n;
+      variance[i] += d * d / (n - 1);
+    }
+  for (const Stages& s : all) green += s.back().areas.mean[1];
+  for (std::size_t j = 0; j < all.size(); ++j) {
+    const Stage& stage = all[j][k];
+    if (!stage.trusted) continue;
+    const double right = (green - all[j].back().areas.mean[1]) / (n - 1);
+    cell.mean += std::abs(stage.areas.mean[1] - right) <= stage.areas.half_width[1];
+    const std::vector<double> means = square_means(stage.image);
+    double relmse = 0;
+    for (std::size_t i = 0; i < squares; ++i) {
+      const double m = (sum[i] - last[j][i]) / (n - 1), d = means[i] - m;
+      relmse += (d * d - variance[i] / (n - 1)) / (m * m + kOfDenominator) / static_cast<double>(squares);
+    }
+    cell.squares_known += stage.areas.relmse_hi > 0;
+    cell.squares +=
+        stage.areas.relmse_hi > 0 && stage.areas.relmse_lo <= relmse && relmse <= stage.areas.relmse_hi;
+  }
+}
+
+}  // namespace
+
 std::vector<RenderedCell> measure_rendered(const RenderedJobs& jobs) {
+  if (jobs.size.width % 32 != 0 || jobs.size.height % 32 != 0)
+    throw std::runtime_error("the sides of the images must be multiples of 32 pixels");
   const std::vector<Stages> all = render_all(jobs);
   const std::size_t values = all.front().front().image.size();
   const auto n = static_cast<double>(all.size());
@@ -140,9 +194,11 @@ std::vector<RenderedCell> measure_rendered(const RenderedJobs& jobs) {
       relmse.add(e.relmse, true_relmse);
       if (!s[k].trusted) continue;
       ++cell.trusted;
-      cell.rmse += e.rmse_lo <= rmse && rmse <= e.rmse_hi;
+      cell.rmse_known += e.rmse_hi > 0;
+      cell.rmse += e.rmse_hi > 0 && e.rmse_lo <= rmse && rmse <= e.rmse_hi;
       cell.relmse += e.relmse_lo <= true_relmse && true_relmse <= e.relmse_hi;
     }
+    measure_areas(all, k, cell);
     cell.mse_ratio = mse.ratio();
     cell.relmse_ratio = relmse.ratio();
     cells.push_back(cell);
@@ -151,14 +207,16 @@ std::vector<RenderedCell> measure_rendered(const RenderedJobs& jobs) {
 }
 
 std::string rendered_line(const RenderedJobs& jobs, const RenderedCell& c) {
-  const auto share = [&](int held) {
-    return c.trusted == 0 ? std::string("-") : fmt::format("{:.0f} %", 100.0 * held / c.trusted);
+  const auto share = [](int held, int of) {
+    return of == 0 ? std::string("-") : fmt::format("{:.0f} %", 100.0 * held / of);
   };
   return fmt::format(
-      "| {} | {} x {} | {} | {:.2g} | {} of {} | {} | {} | {:.3f} +- {:.3f} | {:.3f} +- {:.3f} |",
+      "| {} | {} x {} | {} | {:.2g} | {} of {} | {} of {} | {} | {} | {} of {} | {:.3f} +- {:.3f} | {:.3f} "
+      "+- {:.3f} |",
       std::filesystem::path(jobs.scene).stem().string(), jobs.size.width, jobs.size.height, c.spp,
-      c.true_relmse, c.trusted, c.images, share(c.rmse), share(c.relmse), c.mse_ratio.value,
-      c.mse_ratio.sigma, c.relmse_ratio.value, c.relmse_ratio.sigma);
+      c.true_relmse, c.trusted, c.images, share(c.rmse, c.rmse_known), c.rmse_known,
+      share(c.relmse, c.trusted), share(c.mean, c.trusted), share(c.squares, c.squares_known),
+      c.squares_known, c.mse_ratio.value, c.mse_ratio.sigma, c.relmse_ratio.value, c.relmse_ratio.sigma);
 }
 
 }  // namespace ls::test

@@ -30,8 +30,13 @@ struct RenderedJobs {
 struct RenderedCell {
   std::uint64_t spp = 0;
   int images = 0;
-  int trusted = 0;                // images whose verdict is not "don't trust yet"
-  int rmse = 0, relmse = 0;       // of the trusted ones, those whose interval holds the true figure
+  int trusted = 0;           // images whose verdict is not "don't trust yet"
+  int rmse_known = 0;        // of the trusted ones, those with an interval of RMSE
+  int rmse = 0, relmse = 0;  // of the trusted ones, those whose interval holds the true figure
+  // of the trusted ones, those whose interval holds the mean of green over the image, and the relMSE of means
+  // over squares of 16 x 16 pixels
+  int mean = 0, squares = 0;
+  int squares_known = 0;          // of the trusted ones, those with an interval of the latter
   double true_relmse = 0;         // mean over all images
   Ratio mse_ratio, relmse_ratio;  // mean estimated / mean true, over all images
 };

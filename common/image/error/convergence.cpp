@@ -7,12 +7,12 @@
 #include <cmath>
 #include <vector>
 
+#include "common/image/error/area_error.h"
 #include "common/image/frame/rounds.h"
 
 namespace ls {
 namespace {
 
-constexpr double kNormal95 = 1.959964;
 // Points with fewer samples per pixel than this are not used: each half of the samples would have only one or
 // two per pixel and be too noisy.
 constexpr double kLeastSpp = 8;

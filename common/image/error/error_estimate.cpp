@@ -15,8 +15,7 @@ namespace ls {
 
 namespace {
 
-constexpr int kReach = 2;                  // radius of the 5 x 5 window
-constexpr double k95 = 1.959963984540054;  // two-sided 95 % point of the normal distribution
+constexpr int kReach = 2;  // radius of the 5 x 5 window
 // The figures are not trusted if fewer than kFewPixels pixels carry the error: with 100 equal pixels of
 // Gaussian noise, the estimated sum of squared errors differs from the realised one with a relative standard
 // deviation of sqrt(4/3/100) = 12 %. In a small image 1 / kPartOfSmall of its pixels suffices, because object
@@ -31,14 +30,20 @@ constexpr double kLargeShare = 0.1;
 // (tests/coverage).
 constexpr double kHeavy = 10;
 // A pixel has few hits if one half of the samples has more than this many times the light of the other half.
-constexpr double kOneSided = 19;
+constexpr double kFewHits = 19;
+// A pixel is one-sided if one half of the samples has more than this many times the light of the other half.
+// If such pixels have less than kSettledShare of the error, few pixels that carry it are no reason for doubt:
+// they are not outliers, but pixels such as those at the edge of a lamp, whose light is found all the time.
+constexpr double kOneSided = 4, kSettledShare = 0.25;
+// Even then at least this many pixels must carry the error.
+constexpr double kFewestPixels = 8;
 // The interval is computed from the last round (range of samples) only if this round has at least this many
 // samples per pixel and all earlier rounds together have, too. With fewer, such as 8 in each half, a single
 // sample that finds rare light would dominate.
 constexpr std::uint64_t kTellingSamples = 16;
-// Side in pixels of the squares over whose pixels errors may be correlated: those that share paths
-// (worker/render/integrator/path_reuse.h)
-constexpr std::size_t kSquare = 16;
+// The interval of relMSE contains both sums of squared relative errors, which differ in their weights, and
+// reaches beyond by this part of the distance between their logarithms.
+constexpr double kBeyond = 0.5;
 // Number of squares at which the contribution of correlated errors to the variance gets the weight 1/2. The
 // sum over this many squares is known to a third. The weight approaches 1 in images of many squares.
 constexpr double kHalfWeightSquares = 16;
@@ -112,11 +117,14 @@ double trace_of_moments(const NoiseSums& s, bool trusted) {
 double relative_spread(const NoiseSums& s, double pixels, bool trusted) {
   if (!(s.squares > 0)) return 0;
   if (!trusted) return 2 * std::sqrt(trace_of_moments(s, false)) / s.squares;
-  if (s.changes.square_products == 0)
-    return 2 * std::pow(trace_of_moments(s, true) * trace_of_moments(s, false), 0.25) / s.squares;
-  const double squares = pixels / (kSquare * kSquare), weight = squares / (squares + kHalfWeightSquares);
-  const double correlated = std::max(0.0, s.changes.square_products - s.changes.products);
-  return 2 * std::sqrt(s.changes.products + weight * correlated) / s.changes.squares;
+  const double of_moments =
+      2 * std::pow(trace_of_moments(s, true) * trace_of_moments(s, false), 0.25) / s.squares;
+  if (s.changes.square_products == 0) return of_moments;
+  const double of_changes = 2 * std::sqrt(s.changes.products) / s.changes.squares;
+  const double squares = pixels / (kCorrelatedSide * kCorrelatedSide),
+               weight = squares / (squares + kHalfWeightSquares);
+  const double excess = std::max(0.0, s.changes.square_products - s.changes.products);
+  return std::hypot((of_moments + of_changes) / 2, 2 * std::sqrt(weight * excess) / s.changes.squares);
 }
 
 // Returns the sums from which the interval is computed. `a` and `b` are the changes of the means of half A
@@ -124,7 +132,7 @@ double relative_spread(const NoiseSums& s, double pixels, bool trusted) {
 // factor on their squares.
 ChangeSums change_sums(const std::vector<double>& a, const std::vector<double>& b, std::size_t width,
                        double scale) {
-  const std::size_t n = a.size() / 3, across = (width + kSquare - 1) / kSquare;
+  const std::size_t n = a.size() / 3, across = (width + kCorrelatedSide - 1) / kCorrelatedSide;
   ChangeSums out;
   std::vector<double> squares(across);  // sums of dot over the pixels of each square of the current row
   for (std::size_t i = 0; i < n; ++i) {
@@ -132,8 +140,8 @@ ChangeSums change_sums(const std::vector<double>& a, const std::vector<double>& 
     const double dot = ar * br + ag * bg + ab * bb;
     out.squares += ar * ar + ag * ag + ab * ab + br * br + bg * bg + bb * bb;
     out.products += dot * dot;
-    squares[i % width / kSquare] += dot;
-    if ((i + 1) % (kSquare * width) != 0 && i + 1 != n) continue;
+    squares[i % width / kCorrelatedSide] += dot;
+    if ((i + 1) % (kCorrelatedSide * width) != 0 && i + 1 != n) continue;
     for (double& sum : squares) {
       out.square_products += sum * sum;
       sum = 0;
@@ -145,17 +153,29 @@ ChangeSums change_sums(const std::vector<double>& a, const std::vector<double>& 
   return out;
 }
 
-// Returns the ratio of the two estimates of tr(V^2) that kHeavy limits. Returns 0 if the smooth parts of the
-// image have at most the share kPart of the fourth powers.
-double heaviness(const NoiseSums& s) {
+// The number of pixels that carry the error (ImageError::effective_pixels).
+double effective_pixels(const NoiseSums& s) {
+  return s.pixel_fourth > 0 ? s.squares * s.squares / s.pixel_fourth : 0;
+}
+
+// Returns true if the pixels with the largest noise have light in both halves: they are not outliers.
+bool settled(const NoiseSums& s) { return s.one_sided < kSettledShare * s.squares; }
+
+// Returns true if few pixels carry the error.
+bool carried_by_few(const NoiseSums& s, double pixels) {
+  return effective_pixels(s) < std::min(kFewPixels, pixels / kPartOfSmall) ||
+         (s.largest > kLargeShare * s.squares && pixels * kLargeShare > 4 * kFewPixels);
+}
+
+// Returns true if single pixels have far more noise than their neighbours, as outliers do. The noise of the
+// smooth parts of the image counts if they have more than the share kPart of the fourth powers.
+bool has_outliers(const NoiseSums& s) {
   constexpr double kPart = .25;
   const double flat = s.pixel_fourth - s.edge_pixel_fourth;
-  if (!(flat > kPart * s.pixel_fourth)) return 0;
-  return s.flat_pairs > 0 ? flat / 3 / s.flat_pairs : std::numeric_limits<double>::infinity();
+  return flat > kPart * s.pixel_fourth && flat / 3 > kHeavy * s.flat_pairs;
 }
 
 void judge(ImageError& out, const NoiseSums& sums, double pixels, bool lit) {
-  const double few = std::min(kFewPixels, pixels / kPartOfSmall);
   if (!lit) {
     out.verdict =
         "don't trust yet: no sample has found any light: either the camera sees none, or it is too hard to "
@@ -165,13 +185,14 @@ void judge(ImageError& out, const NoiseSums& sums, double pixels, bool lit) {
     out.trusted = out.spp >= 64;
     if (!out.trusted)
       out.verdict = "the two halves of the samples do not differ yet: too few samples to tell the error";
-  } else if (out.effective_pixels < few ||
-             (out.top_share > kLargeShare && pixels * kLargeShare > 4 * kFewPixels)) {
+  } else if (settled(sums) && out.effective_pixels >= std::min(kFewestPixels, pixels / kPartOfSmall)) {
+    out.trusted = true;
+  } else if (carried_by_few(sums, pixels)) {
     out.verdict = fmt::format(
         "don't trust yet: few pixels carry the error (like {:.0f} of {:.0f}; the worst one {:.0f} %); bright "
         "outliers may still be missing, so the true error may be larger",
         out.effective_pixels, pixels, 100 * out.top_share);
-  } else if (heaviness(sums) > kHeavy) {
+  } else if (has_outliers(sums)) {
     out.verdict =
         "don't trust yet: single pixels differ far more than those around them; more bright outliers may "
         "still be "
@@ -197,7 +218,7 @@ bool has_few_hits(const HalfMeans& h, int x, int y) {
     return static_cast<std::size_t>(j) * static_cast<std::size_t>(h.width) + static_cast<std::size_t>(i);
   };
   const double a = light(h.a, at(x, y), pixels), b = light(h.b, at(x, y), pixels);
-  if (a != 0 || b != 0) return std::max(a, b) > kOneSided * std::min(a, b);
+  if (a != 0 || b != 0) return std::max(a, b) > kFewHits * std::min(a, b);
   int lit = 0, all = 0;
   for (int j = std::max(0, y - kReach); j <= std::min(h.height - 1, y + kReach); ++j)
     for (int i = std::max(0, x - kReach); i <= std::min(h.width - 1, x + kReach); ++i) {
@@ -217,6 +238,7 @@ void NoiseSums::add(const NoiseSums& o) {
   edge_pixel_fourth += o.edge_pixel_fourth;
   flat_pairs += o.flat_pairs;
   largest = std::max(largest, o.largest);
+  one_sided += o.one_sided;
   changes.squares += o.changes.squares;
   changes.products += o.changes.products;
   changes.square_products += o.changes.square_products;
@@ -229,6 +251,7 @@ void TileError::add(const TileError& o) {
   lit += o.lit;
   skew += o.skew;
   other_weights += o.other_weights;
+  areas.add(o.areas);
   plain.add(o.plain);
   relative.add(o.relative);
 }
@@ -245,14 +268,14 @@ namespace {
 void count_hits(const HalfMeans& h, TileError& out) {
   const std::size_t n = h.pixels();
   const double *a = h.a.data(), *b = h.b.data();
-  std::uint64_t lit = 0, one_sided = 0;
+  std::uint64_t lit = 0, few_hits = 0;
   for (std::size_t i = 0; i < n; ++i) {
     const double of_a = a[i] + a[n + i] + a[2 * n + i], of_b = b[i] + b[n + i] + b[2 * n + i];
     lit += (of_a != 0) | (of_b != 0);
-    one_sided += (of_a > kOneSided * of_b) | (of_b > kOneSided * of_a);
+    few_hits += (of_a > kFewHits * of_b) | (of_b > kFewHits * of_a);
   }
   out.lit = lit;
-  out.few_hits = one_sided;
+  out.few_hits = few_hits;
   if (lit == n || lit == 0) return;
   for (std::size_t i = 0; i < n; ++i)
     if (light(h.a, i, n) == 0 && light(h.b, i, n) == 0)
@@ -282,6 +305,33 @@ void send_changes(const HalfMeans& h, std::uint64_t spp, const EarlierMeans& ear
 
 }  // namespace
 
+namespace {
+
+// Returns for each pixel 1 if it is one-sided (kOneSided), otherwise 0.
+std::vector<double> one_sided_pixels(const HalfMeans& h) {
+  const std::size_t n = h.pixels();
+  std::vector<double> out(n);
+  const double *a = h.a.data(), *b = h.b.data();
+  for (std::size_t i = 0; i < n; ++i) {
+    const double of_a = a[i] + a[n + i] + a[2 * n + i], of_b = b[i] + b[n + i] + b[2 * n + i];
+    out[i] = (of_a > kOneSided * of_b) | (of_b > kOneSided * of_a) ? 1. : 0.;
+  }
+  return out;
+}
+
+// Returns the sum of the squares of `values`, which has three planes, over the pixels for which `sides` is 1.
+double one_sided_squares(const std::vector<double>& values, const std::vector<double>& sides) {
+  const std::size_t n = sides.size();
+  double sum = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double r = values[i], g = values[n + i], b = values[2 * n + i];
+    sum += sides[i] * (r * r + g * g + b * b);
+  }
+  return sum;
+}
+
+}  // namespace
+
 TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMeans* earlier) {
   const std::size_t n = h.pixels();
   CHECK(h.a.size() == 3 * n && h.b.size() == 3 * n, "{} and {} values for {} x {} pixels", h.a.size(),
@@ -291,11 +341,15 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMea
   std::vector<double> d(3 * n);
   for (std::size_t i = 0; i < 3 * n; ++i) d[i] = 0.5 * (h.a[i] - h.b[i]);
   const RelativeWeights w = relative_weights(h);
+  const std::vector<double> sides = one_sided_pixels(h);
   out.plain = noise_sums(d, w.edges, h.width, h.height);
+  out.plain.one_sided = one_sided_squares(d, sides);
   for (std::size_t i = 0; i < 3 * n; ++i) d[i] *= w.roots[i];
   out.relative = noise_sums(d, w.edges, h.width, h.height);
+  out.relative.one_sided = one_sided_squares(d, sides);
   for (NoiseSums* sums : {&out.plain, &out.relative})
     sums->changes = {sums->squares, trace_of_moments(*sums, true), 0};
+  out.areas = area_sums(h, spp, earlier);
   if (!earlier) return out;
   CHECK(earlier->halves.a.size() == 3 * n && earlier->halves.b.size() == 3 * n && earlier->spp >= 2 &&
             earlier->spp < spp,
@@ -329,7 +383,7 @@ namespace {
 double half_width(const NoiseSums& s, double pixels, bool trusted) {
   if (!(s.pixel_fourth > 0)) return 0;
   const double freedom = s.squares * s.squares / s.pixel_fourth / 2;
-  return k95 * (1 + (k95 * k95 + 1) / (4 * freedom)) * relative_spread(s, pixels, trusted);
+  return kNormal95 * (1 + (kNormal95 * kNormal95 + 1) / (4 * freedom)) * relative_spread(s, pixels, trusted);
 }
 
 }  // namespace
@@ -342,18 +396,20 @@ ImageError image_error(const TileError& sums) {
   out.relmse = sums.relative.squares / (3 * pixels);
   out.spp = static_cast<double>(sums.samples) / pixels;
   out.few_hits = sums.few_hits;
-  if (sums.relative.pixel_fourth > 0) {
-    out.effective_pixels = sums.relative.squares * sums.relative.squares / sums.relative.pixel_fourth;
-    out.top_share = sums.relative.largest / sums.relative.squares;
-  }
+  out.effective_pixels = effective_pixels(sums.relative);
+  if (out.effective_pixels > 0) out.top_share = sums.relative.largest / sums.relative.squares;
   judge(out, sums.relative, pixels, sums.lit > 0);
-  const double plain = half_width(sums.plain, pixels, out.trusted),
-               relative = half_width(sums.relative, pixels, out.trusted);
-  out.rmse_lo = out.rmse * std::exp(-plain / 2);
-  out.rmse_hi = out.rmse * std::exp(plain / 2);
-  const double other = out.relmse + sums.other_weights / (3 * pixels);
-  out.relmse_lo = std::max(0.0, std::min(out.relmse, other)) * std::exp(-relative);
-  out.relmse_hi = std::max(out.relmse, other) * std::exp(relative);
+  if (!out.trusted || (!carried_by_few(sums.plain, pixels) && !has_outliers(sums.plain))) {
+    const double plain = half_width(sums.plain, pixels, out.trusted);
+    out.rmse_lo = out.rmse * std::exp(-plain / 2);
+    out.rmse_hi = out.rmse * std::exp(plain / 2);
+  }
+  const double relative = half_width(sums.relative, pixels, out.trusted);
+  const double other = std::max(0.0, out.relmse + sums.other_weights / (3 * pixels));
+  const double apart = other > 0 && out.relmse > 0 ? std::log(other / out.relmse) : 0;
+  const double up = std::max(apart, -kBeyond * apart), down = std::max(-apart, kBeyond * apart);
+  out.relmse_lo = out.relmse * std::exp(-relative - down);
+  out.relmse_hi = out.relmse * std::exp(relative + up);
   return out;
 }
 

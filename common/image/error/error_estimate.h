@@ -44,8 +44,10 @@
 // time, with weights that do not know the noise that they weigh:
 //   (n/N)^2 w_o D_n^2 + (o/N)^2 w_n D_o^2 + 2 (n o / N^2) w D_n D_o,
 // with w_n and w_o the weights from one part alone. Such weights are noisier, so the two sums err in
-// different ways. The interval reaches from the lower end that belongs to the smaller of the two sums to the
-// upper end that belongs to the larger.
+// different ways, and how far they are apart tells how little the weights are known. On a logarithmic scale
+// the interval reaches from the lower end that belongs to the smaller of the two sums to the upper end that
+// belongs to the larger, and beyond the first sum by half of their distance on the other side, since both may
+// be on the same side of the right value. (Half: chosen with images of few samples of tests/coverage.)
 //
 // Interval of the realised error: d - e^2 = -ab, so Var(sum of d - sum of e^2) = sum of 4 v^2 exactly,
 // whatever the distribution of a and b. Over channels it is 4 tr(V^2), with V the covariance of the channels
@@ -70,8 +72,9 @@
 // The sum over S squares has a relative standard deviation of about sqrt(2 / S). So its excess over the sum
 // over pixels is multiplied by S / (S + 16).
 //
-// If the last round, or the rounds before it, have too few samples for this, tr(V^2) is a weighted mean of
-// those two other estimates, with the weights g^2 and 1 - g^2 in each pixel:
+// There is another estimate, which is the only one if the last round, or the rounds before it, have too few
+// samples. Its tr(V^2) is a weighted mean of those two other estimates, with the weights g^2 and 1 - g^2 in
+// each pixel:
 //   From the pixel's own fourth powers. Let D_c be the D of channel c. For Gaussian D, E[D_c^4] = 3 V_cc^2
 //   and E[D_c^2 D_k^2] = V_cc V_kk (1 + 2 r^2), where r is the correlation of the channels c and k. Hence
 //     tr V^2 = sum_c E[D_c^4] / 3  +  sum_{c != k} E[D_c^2 D_k^2] r^2 / (1 + 2 r^2).
@@ -84,7 +87,10 @@
 //   the image, where g is small.
 //
 // Where pixels next to each other differ in their noise, as with few samples of rare light, this is too low,
-// and fourth powers alone (g = 1) are too high: of a trusted image their geometric mean is used.
+// and fourth powers alone (g = 1) are too high: of a trusted image their geometric mean is used. The estimate
+// from the last round is right in the mean, but where noise is skewed it is too low in most images and far
+// too high in a few. So the standard deviation is the mean of that from the last round and that from the
+// geometric mean.
 // If the image's figures are not trusted (ImageError::trusted), the interval is from fourth powers alone, and
 // wider.
 #pragma once
@@ -95,6 +101,7 @@
 #include <string>
 #include <vector>
 
+#include "common/image/error/area_error.h"
 #include "common/image/frame/frame.h"
 #include "common/image/frame/rounds.h"
 
@@ -121,6 +128,9 @@ struct NoiseSums {
   double edge_channel_fourth = 0, edge_pixel_fourth = 0;
   double flat_pairs = 0;  // sum over pixels p: (1 - g^2) times the mean over neighbours q of (D(p) . D(q))^2
   double largest = 0;     // largest (sum over channels of D^2) in any pixel
+  // sum of D^2 over the channels of the pixels in which one half of the samples has more than 4 times as much
+  // light as the other
+  double one_sided = 0;
   // The sums from which the interval of a trusted image is computed. If the last round has too few samples,
   // changes.squares is equal to NoiseSums::squares, and changes.products is the sum of tr(V^2) estimated from
   // the sums above.
@@ -149,6 +159,7 @@ struct TileError {
   // The sum of squared relative errors with weights from independent samples, minus relative.squares; 0 if
   // the rounds do not have equally many samples
   double other_weights = 0;
+  AreaSums areas;
   void add(const TileError& other);
   void subtract_skew(double part);
   bool operator==(const TileError&) const = default;
@@ -177,7 +188,9 @@ bool has_few_hits(const HalfMeans& halves, int x, int y);
 
 // The error figures shown to the user.
 struct ImageError {
-  // root mean squared error, and the 95 % interval of this image's realised error
+  // root mean squared error, and the 95 % interval of this image's realised error. The interval is unknown
+  // (both ends are 0) if the image is trusted, but so few bright pixels carry this error that it is not
+  // known.
   double rmse = 0, rmse_lo = 0, rmse_hi = 0;
   // the interval contains what is unknown of the weights, too
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;
@@ -189,7 +202,8 @@ struct ImageError {
   std::uint64_t few_hits = 0;  // as TileError::few_hits, over the whole image
   // False if the figures and their intervals are unreliable. This is so in four cases: no sample has found
   // light; the halves are equal and have fewer than 64 samples per pixel; few pixels carry the error; or
-  // single pixels have far more noise than their neighbours.
+  // single pixels have far more noise than their neighbours. The last two are no reason if the noise is that
+  // of pixels with light in both halves, such as those at the edge of a lamp (NoiseSums::one_sided).
   bool trusted = false;
   std::string verdict;  // why the figures are not trusted, in words; empty when trusted
 };

@@ -235,7 +235,8 @@ std::map<std::string, std::string> error_strings(const TileError& sums,
   strings["lightshaft:relmse"] = fmt::format("{:.9g}", error.relmse);
   strings["lightshaft:relmse_ci95"] = pair_text(error.relmse_lo, error.relmse_hi);
   strings["lightshaft:rmse"] = fmt::format("{:.9g}", error.rmse);
-  strings["lightshaft:rmse_ci95"] = pair_text(error.rmse_lo, error.rmse_hi);
+  if (error.rmse_hi > 0 || error.rmse == 0)
+    strings["lightshaft:rmse_ci95"] = pair_text(error.rmse_lo, error.rmse_hi);
   strings["lightshaft:verdict"] = error.trusted ? "trusted" : error.verdict;
   strings["lightshaft:few_hits"] = fmt::format("{}", error.few_hits);
   return strings;

@@ -1,9 +1,10 @@
 // Writes and reads a tile of the film as bytes, from which the coordinator restores the film after a restart.
 // A round is a range of samples; the tail is a last round with fewer samples than its full range (film.h).
 // The bytes are, little-endian:
-// - "LSTILE04"; u32 index of the tile; u32 number of full rounds; 32 bytes: digest chain of the full rounds;
+// - "LSTILE05"; u32 index of the tile; u32 number of full rounds; 32 bytes: digest chain of the full rounds;
 // - u64 s0, u64 s1: range of the tail's samples (0, 0: no tail); 32 bytes: digest of the tail;
-// - f64 skew; f64 other_weights; 3 f64 plain.changes; 3 f64 relative.changes: members of TileError. Only
+// - f64 skew; f64 other_weights; 3 f64 plain.changes; 3 f64 relative.changes; 3 f64 areas.last; u64
+// areas.fewest_before, which of one tile is areas.most_before, too: members of TileError. Only
 // these members are stored, since they depend on the tile as it was before its last round. The others are
 // computed again from the sums;
 // - the full rounds: 6 colour planes and the planes of AOV sums as doubles, then the planes of identifiers as
@@ -23,7 +24,7 @@
 namespace ls {
 namespace {
 
-constexpr std::string_view kTileMagic = "LSTILE04";
+constexpr std::string_view kTileMagic = "LSTILE05";
 
 class Writer {
  public:
@@ -82,7 +83,7 @@ std::vector<std::byte> Film::tile_bytes(const Tile* tile, TileIndex index) {
   const Tail tail = tile->tail.value_or(Tail{});
   out.values(index, tile->full_rounds, tile->chain.bytes, tail.samples.s0, tail.samples.s1, tail.digest.bytes,
              tile->error.skew, tile->error.other_weights, tile->error.plain.changes,
-             tile->error.relative.changes);
+             tile->error.relative.changes, tile->error.areas.last, tile->error.areas.fewest_before);
   out.put(std::as_bytes(std::span(tile->sums)));
   out.put(std::as_bytes(std::span(tile->ids)));
   out.put(std::as_bytes(std::span(tail.sums)));
@@ -102,14 +103,17 @@ Result<std::shared_ptr<const Film::Tile>> Film::parse_tile(TileIndex index,
   Tail tail;
   double skew = 0, other_weights = 0;
   ChangeSums plain, relative;
+  ChannelSums last{};
+  std::uint64_t before = 0;
   read(stored, tile->full_rounds, tile->chain.bytes, tail.samples.s0, tail.samples.s1, tail.digest.bytes,
-       skew, other_weights, plain, relative);
+       skew, other_weights, plain, relative, last, before);
   if (stored != index) return damaged(fmt::format("it is not tile {}", index));
   const bool has_tail = tail.samples.s1 != 0;
   const PixelRect rect = grid_.rect(index);
   const auto pixels = static_cast<std::size_t>(rect.pixels()), sums = pixels * planes_.sums,
              ids = pixels * planes_.ids;
   if (!std::isfinite(skew) || !std::isfinite(other_weights) || !sound(plain) || !sound(relative) ||
+      !std::all_of(last.begin(), last.end(), [](double v) { return std::isfinite(v); }) ||
       !read_finite(in, tile->sums, sums) || !read_finite(in, tile->ids, ids) ||
       (has_tail && !read_finite(in, tail.sums, sums + ids)) || in.left() != 0)
     return damaged(fmt::format("tile {} has the wrong size or a value that is not finite", index));
@@ -123,6 +127,8 @@ Result<std::shared_ptr<const Film::Tile>> Film::parse_tile(TileIndex index,
   tile->error.other_weights = other_weights;
   tile->error.plain.changes = plain;
   tile->error.relative.changes = relative;
+  tile->error.areas.last = last;
+  tile->error.areas.fewest_before = tile->error.areas.most_before = before;
   return tile;
 }
 

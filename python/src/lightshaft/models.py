@@ -470,6 +470,15 @@ class Report(TypedDict):
     relmse: Union[float, None]
     """Estimated."""
     relmse_ci95: Union[list[float], None]
+    mean: NotRequired[Union[list[float], None]]
+    """Mean of the image in R, G and B."""
+    mean_ci95: NotRequired[Union[list[list[float]], None]]
+    """95 % interval [low, high] of the right mean in R, G and B; null while the error is not trusted."""
+    relmse_16: NotRequired[Union[float, None]]
+    """relMSE of the means over squares of 16 x 16 pixels."""
+    relmse_16_ci95: NotRequired[Union[list[float], None]]
+    """[low, high] for the error of this very image; null while the error is not trusted, and where few
+    squares carry it."""
     pixels_without_samples: NotRequired[int]
     """The figures of the error are of the other pixels."""
     slope: NotRequired[Union[float, None]]

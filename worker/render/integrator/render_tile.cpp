@@ -101,13 +101,6 @@ class Samples {
   }
 
  private:
-  // A set of light vertices that is kept from one sample to the next, so that it has to be looked up in the
-  // LightVertexCache only when the set changes. kept_[0] is for samples with even numbers, kept_[1] for odd
-  // ones.
-  struct Kept {
-    std::uint64_t set = 0;
-    std::shared_ptr<const LightVertices> vertices;
-  };
   void mark(PixelAt p, std::uint64_t sample) {
     crumb_->x.store(p.x, std::memory_order_relaxed);
     crumb_->y.store(p.y, std::memory_order_relaxed);
@@ -115,11 +108,13 @@ class Samples {
   }
   Connections connections(std::uint64_t sample) {
     if (!w_.need.connected) return {};
-    Kept& kept = kept_[sample & 1];
-    const std::uint64_t set = LightVertexCache::set_of(sample);
-    if (!kept.vertices || kept.set != set)
-      kept = {set, w_.light_vertices.get(set, [&](std::uint64_t s) { return trace_light_vertices(w_, s); })};
-    return {.vertices = kept.vertices.get()};
+    const std::uint64_t set = LightVertexCache::set_of(sample),
+                        first = LightVertexCache::set_of(range_.s0 & ~1ull);
+    if (set - first >= sets_.size()) sets_.resize(set - first + 1);
+    auto& vertices = sets_[set - first];
+    if (!vertices)
+      vertices = w_.light_vertices.get(set, [&](std::uint64_t s) { return trace_light_vertices(w_, s); });
+    return {.vertices = vertices.get()};
   }
 
   SampleOutcome shared(int x, int y, std::uint64_t sample, LightSplit* split) {
@@ -162,7 +157,9 @@ class Samples {
   const Variant& v_;
   SampleRange range_;
   Breadcrumb* crumb_;
-  std::array<Kept, 2> kept_;
+  // The sets of light vertices of all samples of `range_`. They are held to the end, since every pixel needs
+  // all of them, while LightVertexCache keeps only those used last.
+  std::vector<std::shared_ptr<const LightVertices>> sets_;
   // With Features::reuse: the rendered blocks (SharingBlock) of the row of blocks `row_`; the key is the
   // block's column
   int row_ = -1;

@@ -181,10 +181,11 @@ class LightVertices {
 // Caches the sets of light vertices of a world. The even samples of a pixel form one half and the odd ones
 // the other; the error is estimated by comparing the halves. The halves use different sets, so that they are
 // independent. In each half kEpoch / 2 successive samples use the same set, and later samples the next one,
-// so that the image also averages over sets.
+// so that the image also averages over sets: all pixels have the error of a set in common, and it decides
+// the error of large areas (docs/decisions/0031-connections-to-light-vertices.md).
 class LightVertexCache {
  public:
-  static constexpr std::uint64_t kEpoch = 128;
+  static constexpr std::uint64_t kEpoch = 16;
   using Build = std::function<LightVertices(std::uint64_t set)>;
 
   static std::uint64_t set_of(std::uint64_t sample) { return 2 * (sample / kEpoch) + (sample & 1); }
@@ -193,7 +194,7 @@ class LightVertexCache {
   std::shared_ptr<const LightVertices> get(std::uint64_t set, const Build& build);
 
  private:
-  static constexpr std::size_t kKept = 8;
+  static constexpr std::size_t kKept = 16;
   struct Slot {
     std::once_flag once;
     std::shared_ptr<const LightVertices> vertices;

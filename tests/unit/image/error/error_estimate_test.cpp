@@ -262,6 +262,43 @@ TEST(ErrorEstimate, HeavyTailsGetAVerdictInsteadOfTrust) {
   EXPECT_GE(distrusted, 90);
 }
 
+// Twelve of 1,024 pixels carry the error. At the edge of a lamp each half has found light; an outlier is in
+// one half.
+TEST(ErrorEstimate, FewPixelsThatCarryTheErrorAreDoubtedOnlyIfTheirLightIsInOneHalf) {
+  std::vector<double> a(3 * kErrorPixels, 1.0), edge(3 * kErrorPixels, 1.0), outliers(3 * kErrorPixels, 1.0);
+  for (std::size_t i = 0; i < 3 * kErrorPixels; ++i) {
+    if (i % kErrorPixels % 85 != 3) continue;
+    edge[i] = 3;
+    outliers[i] = 30;
+  }
+
+  const ImageError settled = image_error(estimate_error({kErrorSide, kErrorSide, a, edge}, 64));
+  const ImageError doubtful = image_error(estimate_error({kErrorSide, kErrorSide, a, outliers}, 64));
+
+  EXPECT_NEAR(settled.effective_pixels, 13, .5);
+  EXPECT_TRUE(settled.trusted) << settled.verdict;
+  EXPECT_FALSE(doubtful.trusted);
+}
+
+// The noise of one pixel in a hundred is ten times as large as that of all others together. They are bright,
+// so that relative errors are alike.
+TEST(ErrorEstimate, RmseHasNoIntervalWhereFewBrightPixelsCarryIt) {
+  std::mt19937_64 random(15);
+  const auto glints = [](std::size_t p, std::size_t) { return p % 128 == 5 ? 1000. : 1.; };
+  const auto relative = [&](std::size_t p, std::size_t c) { return .1 * glints(p, c); };
+
+  const ImageError some = image_error(run(glints, relative, grey, random).estimate);
+  const ImageError none = image_error(run(bright, uneven, grey, random).estimate);
+
+  ASSERT_TRUE(some.trusted) << some.verdict;
+  EXPECT_EQ(some.rmse_lo, 0);
+  EXPECT_EQ(some.rmse_hi, 0);
+  EXPECT_GT(some.relmse_lo, 0);
+  EXPECT_GT(some.relmse_hi, some.relmse);
+  EXPECT_GT(none.rmse_lo, 0);
+  EXPECT_GT(none.rmse_hi, none.rmse);
+}
+
 TEST(ErrorEstimate, LowerEndStaysAboveZeroWhateverThePixels) {
   std::vector<double> a(3 * kErrorPixels, 1.0), b(3 * kErrorPixels, 1.0);
   a[17] = 1e6;

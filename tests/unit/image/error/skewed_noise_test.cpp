@@ -93,7 +93,7 @@ TEST(SkewedNoise, ThereIsNothingToCorrectWhereItIsDark) {
 }
 
 // With few samples, more is unknown of the weights than the first order of the noise tells.
-TEST(SkewedNoise, AnIntervalOfFewSamplesContainsBothWaysToWeigh) {
+TEST(SkewedNoise, AnIntervalOfFewSamplesContainsBothWaysToWeighAndReachesBeyond) {
   std::mt19937_64 random(13);
   Halves before = skewed(2, random), now = skewed(2, random);
   for (std::size_t h = 0; h < 2; ++h)
@@ -110,8 +110,9 @@ TEST(SkewedNoise, AnIntervalOfFewSamplesContainsBothWaysToWeigh) {
     both.other_weights = other * both.relative.squares;
     const ImageError image = image_error(both), without = image_error(alone);
     EXPECT_DOUBLE_EQ(image.relmse, without.relmse);
-    EXPECT_DOUBLE_EQ(image.relmse_lo, without.relmse_lo * (other < 0 ? 1 + other : 1));
-    EXPECT_DOUBLE_EQ(image.relmse_hi, without.relmse_hi * (other > 0 ? 1 + other : 1));
+    const double factor = 1 + other, beyond = std::sqrt(factor);
+    EXPECT_DOUBLE_EQ(image.relmse_lo, without.relmse_lo * (other < 0 ? factor : 1 / beyond));
+    EXPECT_DOUBLE_EQ(image.relmse_hi, without.relmse_hi * (other > 0 ? factor : 1 / beyond));
   }
   EXPECT_NE(told.other_weights, 0);
   EXPECT_EQ(estimate_error({kSkewedSide, kSkewedSide, now[0], now[1]}, 8).other_weights, 0);

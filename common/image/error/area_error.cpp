@@ -1,0 +1,120 @@
+#include "common/image/error/area_error.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/image/error/error_estimate.h"
+#include "common/image/error/relative_weights.h"
+
+namespace ls {
+namespace {
+
+// The same of Student's distribution with one and with two degrees of freedom: tan(0.95 pi / 2), and 0.95
+// sqrt(2 / (1 - 0.95^2)).
+constexpr double kOneDegree = 12.706204736432095, kTwoDegrees = 4.302652729911275;
+// The interval of squares is known if at least this many carry their error; Gaussian noise alike in all
+// squares counts as a third of them.
+constexpr double kFewestSquares = 8;
+// The number of samples that use one set of light vertices in each half (LightVertexCache::kEpoch).
+constexpr std::uint64_t kSetSamples = 16;
+
+// Student's quantile to second order in 1 / degrees of freedom (Abramowitz and Stegun 26.7.5).
+double student(double freedom) {
+  const double z2 = kNormal95 * kNormal95;
+  return kNormal95 * (1 + (z2 + 1) / (4 * freedom) + ((5 * z2 + 16) * z2 + 3) / (96 * freedom * freedom));
+}
+
+double fourth(double x) { return x * x * x * x; }
+
+}  // namespace
+
+void AreaSums::add(const AreaSums& o) {
+  if (o.pixels == 0) return;
+  fewest_before = pixels == 0 ? o.fewest_before : std::min(fewest_before, o.fewest_before);
+  most_before = std::max(most_before, o.most_before);
+  for (std::size_t c = 0; c < 3; ++c) {
+    values[c] += o.values[c];
+    noise[c] += o.noise[c];
+    last[c] += o.last[c];
+    squares[c] += o.squares[c];
+    fourths[c] += o.fourths[c];
+  }
+  relative += o.relative;
+  relative_squares += o.relative_squares;
+  pixels += o.pixels;
+  count += o.count;
+}
+
+AreaSums area_sums(const HalfMeans& h, std::uint64_t spp, const EarlierMeans* earlier) {
+  const auto width = static_cast<std::size_t>(h.width), height = static_cast<std::size_t>(h.height);
+  AreaSums out{.pixels = h.pixels()};
+  const std::size_t across = (width + kCorrelatedSide - 1) / kCorrelatedSide, down = (height + kCorrelatedSide - 1) / kCorrelatedSide;
+  out.count = across * down;
+  std::vector<double> of_squares(out.count);  // pixels * y
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::vector<double> values(out.count), noise(out.count);
+    for (std::size_t y = 0; y < height; ++y)
+      for (std::size_t square = 0; square < across; ++square) {
+        const std::size_t row = (c * height + y) * width, end = std::min(width, (square + 1) * kCorrelatedSide);
+        double value = 0, difference = 0;
+        for (std::size_t x = square * kCorrelatedSide; x < end; ++x) {
+          value += h.a[row + x] + h.b[row + x];
+          difference += h.a[row + x] - h.b[row + x];
+        }
+        values[y / kCorrelatedSide * across + square] += value / 2;
+        noise[y / kCorrelatedSide * across + square] += difference / 2;
+      }
+    for (std::size_t i = 0; i < out.count; ++i) {
+      const auto pixels = static_cast<double>(std::min(kCorrelatedSide, width - i % across * kCorrelatedSide) *
+                                              std::min(kCorrelatedSide, height - i / across * kCorrelatedSide));
+      const double mean = values[i] / pixels;
+      out.values[c] += values[i];
+      out.noise[c] += noise[i];
+      out.squares[c] += noise[i] * noise[i];
+      out.fourths[c] += fourth(noise[i]);
+      of_squares[i] += noise[i] * noise[i] / pixels / (mean * mean + kRelMseDenominator);
+    }
+    if (!earlier) continue;
+    double before = 0;
+    for (std::size_t i = c * h.pixels(); i < (c + 1) * h.pixels(); ++i)
+      before += earlier->halves.a[i] - earlier->halves.b[i];
+    out.last[c] = out.noise[c] - before / 2 * static_cast<double>(earlier->spp) / static_cast<double>(spp);
+  }
+  for (const double y : of_squares) {
+    out.relative += y;
+    out.relative_squares += y * y;
+  }
+  if (earlier) out.fewest_before = out.most_before = earlier->spp;
+  return out;
+}
+
+AreaError area_error(const AreaSums& s, bool common) {
+  AreaError out{};
+  if (s.pixels == 0) return out;
+  const auto pixels = static_cast<double>(s.pixels), count = static_cast<double>(s.count);
+  const bool two_parts = s.fewest_before == s.most_before && s.fewest_before >= kSetSamples;
+  double correlation = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    out.mean[c] = s.values[c] / pixels;
+    const double before = s.noise[c] - s.last[c],
+                 alike = two_parts ? s.last[c] * s.last[c] + before * before : s.noise[c] * s.noise[c];
+    if (!(s.squares[c] > 0)) continue;
+    const double freedom = 3 * s.squares[c] * s.squares[c] / s.fourths[c];
+    out.half_width[c] = (common ? (two_parts ? kTwoDegrees : kOneDegree) * std::sqrt(alike)
+                                : student(freedom) * std::sqrt(s.squares[c])) /
+                        pixels;
+    if (count > 1)
+      correlation = std::max(correlation, std::clamp((alike / s.squares[c] - 1) / (count - 1), 0.0, 1.0));
+  }
+  out.relmse = s.relative / (3 * pixels);
+  if (!(s.relative > 0)) return out;
+  const double effective = s.relative * s.relative / s.relative_squares;
+  if (effective < kFewestSquares) return out;
+  const double spread = std::sqrt(4 / (3 * effective) + (common ? 4 * correlation * correlation : 0));
+  const double relative = student(effective / 2) * spread;
+  out.relmse_lo = out.relmse * std::exp(-relative);
+  out.relmse_hi = out.relmse * std::exp(relative);
+  return out;
+}
+
+}  // namespace ls

@@ -1,0 +1,71 @@
+// The error of means over areas of an image: over the whole image and over squares of 16 x 16 pixels.
+//
+// The error of an area's mean is the mean of its pixels' errors, so it is small where the pixels' errors are
+// independent, and not where they have a part in common: pixels that share paths err alike within squares
+// (docs/decisions/0036-path-reuse.md), and with light vertices all pixels have the error of a set in common
+// (docs/decisions/0031-connections-to-light-vertices.md). As for pixels (error_estimate.h), half the
+// difference of the two half means, averaged over the area, has the variance of the area's error. Let D be
+// this value of a pixel.
+//
+// The mean of the image: if squares are independent, its variance is, per channel,
+//   sum over squares of (sum of D)^2 / pixels^2,
+// with 3 (sum of x)^2 / (sum of x^2) degrees of freedom, x = (sum of D)^2 of a square: the number of squares
+// if all are alike and Gaussian. If all pixels have errors in common, only the mean of D over the image tells
+// them. This mean is the sum of a part from the last round (range of samples) and a part from the samples
+// before it. If these use different sets of light vertices, the parts are independent, and the sum of their
+// squares has two degrees of freedom; otherwise the square of their sum has one. The interval is Student's.
+//
+// Squares: relMSE of their means is the mean over squares and channels, weighted by pixels, of
+//   E^2 / (S^2 + 0.01),   E: the mean of D over the square, S: its mean value.
+// The noise of S is neglected. The relative variance of the difference from the realised relMSE is estimated
+// from fourth powers, as for pixels: 4/3 sum of y^2 / (sum of y)^2, y being a square's term. If all pixels
+// have errors in common, two squares have the correlation r of their errors, and 4 r^2 is added; r follows
+// from the variance of the image's mean.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace ls {
+
+struct HalfMeans;
+struct EarlierMeans;
+
+// Side in pixels of the squares over whose pixels errors may be correlated: those that share paths
+// (worker/render/integrator/path_reuse.h)
+inline constexpr std::size_t kCorrelatedSide = 16;
+inline constexpr double kNormal95 = 1.959963984540054;  // two-sided 95 % point of the normal distribution
+
+using ChannelSums = std::array<double, 3>;
+
+// Sums over the squares of 16 x 16 pixels of one tile, whose corner is that of a square. The sums of several
+// tiles can be added. D and S are defined above.
+struct AreaSums {
+  ChannelSums values{}, noise{};  // sums over pixels of S and of D
+  // Sum over pixels of the part of D that comes from the last round. Cannot be computed from the tile's
+  // present samples alone.
+  ChannelSums last{};
+  // The smallest and largest number of samples per pixel that a tile had before its last round. Neither can
+  // be computed from the tile's present samples alone.
+  std::uint64_t fewest_before = 0, most_before = 0;
+  ChannelSums squares{}, fourths{};  // sums over squares of the 2nd and 4th power of (sum of D)
+  double relative = 0, relative_squares = 0;  // sums over squares of pixels * y and of (pixels * y)^2
+  std::uint64_t pixels = 0, count = 0;        // numbers of pixels and of squares
+  void add(const AreaSums& other);
+  bool operator==(const AreaSums&) const = default;
+};
+// `earlier` is null in the first round.
+AreaSums area_sums(const HalfMeans& halves, std::uint64_t spp, const EarlierMeans* earlier);
+
+struct AreaError {
+  ChannelSums mean{};      // mean of the image in each channel
+  ChannelSums half_width{};  // half the width of its 95 % interval
+  // relMSE of the means over squares, and the 95 % interval of this image's realised error; both ends are 0 if
+  // too few squares carry the error for an interval
+  double relmse = 0, relmse_lo = 0, relmse_hi = 0;
+};
+// `common`: all pixels have errors in common (light vertices). All figures are 0 without pixels.
+AreaError area_error(const AreaSums& sums, bool common);
+
+}  // namespace ls
