@@ -49,6 +49,7 @@ struct JobPlan {
   // A rectangle of the frame: the tiles that it touches are leased before all others; nullopt: no tile goes
   // first. It changes only the order in which units are leased, not the image.
   std::optional<PixelRect> focus;
+  bool held = false;  // true: no unit is leased, as the job waits for other jobs to end
 };
 
 // Jobs
@@ -110,6 +111,11 @@ struct JobStopped {
 struct JobPriority {
   JobId job;
   int priority = 0;
+};
+// Changes JobPlan::held. Units that are leased already are rendered.
+struct JobHeld {
+  JobId job;
+  bool held = false;
 };
 // Changes JobPlan::focus. A focus must lie in the frame; otherwise the event is ignored.
 struct JobFocused {
@@ -245,8 +251,8 @@ struct Tick {};
 
 using Event =
     std::variant<JobSubmitted, JobRestored, JobCancelled, JobPaused, JobResumed, JobStopped, JobPriority,
-                 JobFocused, JobRetargeted, JobExtended, JobForgotten, WorkerJoined, WorkerQuarantined,
-                 WorkerLost, WorkerDrains, LeaseProgress, ResultsWait, LeaseCameBack, ClassChosen,
-                 UnitAccepted, UnitFolded, DenoisedChecked, UnitFailed, Tick>;
+                 JobHeld, JobFocused, JobRetargeted, JobExtended, JobForgotten, WorkerJoined,
+                 WorkerQuarantined, WorkerLost, WorkerDrains, LeaseProgress, ResultsWait, LeaseCameBack,
+                 ClassChosen, UnitAccepted, UnitFolded, DenoisedChecked, UnitFailed, Tick>;
 
 }  // namespace ls::coordinator

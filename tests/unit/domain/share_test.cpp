@@ -175,6 +175,39 @@ TEST(Shares, DifferByABoundedAmountInRandomHistories) {
   }
 }
 
+TEST(Held, AJobGetsNoWorkerUntilItIsReleased) {
+  Rig rig;
+  rig.join("a", 2);
+  JobPlan plan = plan_for("ann", "later", 40);
+  plan.held = true;
+  rig.submit(plan);
+  rig.submit(plan_for("ann", "other", 2));
+  EXPECT_EQ(rig.job("later").units_leased, 0u);
+  EXPECT_EQ(rig.job("later").state, JobState::queued);
+  EXPECT_EQ(rig.farm.why_waiting({"later"}), "") << "workers do not keep it";
+  EXPECT_EQ(rig.job("other").units_leased, 2u);
+
+  rig.send(JobHeld{{"later"}, false});
+
+  EXPECT_GT(rig.job("later").units_leased, 0u);
+  EXPECT_EQ(audit(rig.farm), "");
+}
+
+TEST(Held, AJobThatIsHeldWhileItRendersKeepsItsLeasesAndGetsNoMore) {
+  Rig rig;
+  rig.join("a", 2);
+  rig.submit(plan_for("ann", "j", 400));
+  const std::uint64_t leased = rig.job("j").units_leased;
+  rig.send(JobHeld{{"j"}, true});
+  EXPECT_EQ(rig.job("j").units_leased, leased);
+
+  while (!rig.held[{"a"}].empty()) rig.render("a");
+
+  EXPECT_EQ(rig.job("j").units_leased, 0u);
+  EXPECT_EQ(rig.job("j").units_done, leased);
+  EXPECT_EQ(audit(rig.farm), "");
+}
+
 TEST(Shares, FramesOfASequenceGoInTheirOrderBeforeALaterJobOfTheirUser) {
   Clockwork work = four_workers();
   for (int frame = 1; frame <= 5; ++frame) {
