@@ -77,7 +77,7 @@ def test_on_a_farm_image_picture_and_report_have_it(fog, tmp_path):
         to = ("--to", f"http://127.0.0.1:{farm.http}", "--token-file", farm.data / "token")
         waited = lightshaft("submit", fog, *to, "--spp", 16, "--denoise", "--wait")
         denoised = farm.report(waited.stdout.split()[0])["denoised"]
-        assert f"denoised {denoised['relmse']:.3g} (" in waited.stderr
+        assert f"denoised relMSE {denoised['relmse']:.3g} (" in waited.stderr
         assert "denoised" not in lightshaft("submit", fog, *to, "--spp", 16, "--wait").stderr
         picture = farm.request("GET", f"/api/v1/jobs/{job}/image.png?layer=denoised")
         assert picture.startswith(b"\x89PNG") and picture != farm.request("GET", f"/api/v1/jobs/{job}/image.png")

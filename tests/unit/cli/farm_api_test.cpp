@@ -32,6 +32,12 @@ TEST(Problem, KeepsTheDiagnosticsWithTheirPlace) {
             (Diagnostic{Diagnostic::Severity::error, {"a.xml", 3, 7}, "no such plugin", "<bsdf/>", 4}));
 }
 
+TEST(Addresses, MayLeaveOutTheirScheme) {
+  EXPECT_EQ(addresses_in("farm:8080"), std::vector<std::string>{"http://farm:8080"});
+  EXPECT_EQ(addresses_in("https://a/,b:1/"), (std::vector<std::string>{"https://a", "http://b:1"}));
+  EXPECT_FALSE(HttpClient::open({.url = "ftp://farm"}));
+}
+
 TEST(Problem, SaysWhereATokenIsFound) {
   const auto problem = problem_of({401, R"({"detail": "the token is wrong"})"});
 
