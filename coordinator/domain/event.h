@@ -36,8 +36,8 @@ struct JobPlan {
   std::string replay = "lightshaft render SCENE";
   // Limits and fair shares (fair_share.h, docs/design/scheduling.md)
   std::string owner;  // the user (JobView::owner); empty: the administrator, to whom no user limits apply
-  // The sequence (a job with frames) that this job is a frame of; empty: none. Jobs of one owner and group
-  // count as one job for fair shares, and run in order.
+  // The sequence (a job with frames) that this job is a frame of; empty: none. The frames of a sequence share
+  // the limits below.
   std::string group;
   // Limits of the job; if it has a group, all jobs of the group share them
   std::uint32_t max_workers = 0;   // at most this many workers hold units at the same time; 0: no limit
