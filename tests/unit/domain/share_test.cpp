@@ -134,8 +134,7 @@ TEST(Shares, CountWithinAPriorityOnly) {
 }
 
 // Users have any number of jobs of any cost, and workers come and go. All users who have work all the time
-// get equal core seconds, up to one lease per worker and the preference for loaded worlds. No later job of a
-// user gets any as long as the first one has work for all.
+// get equal core seconds, up to one lease per worker and the preference for loaded worlds.
 TEST(Shares, DifferByABoundedAmountInRandomHistories) {
   for (std::uint64_t seed = 1; seed <= 15; ++seed) {
     std::mt19937_64 random(seed);
@@ -164,10 +163,7 @@ TEST(Shares, DifferByABoundedAmountInRandomHistories) {
     }
     ASSERT_EQ(audit(work.rig.farm), "") << "seed " << seed;
     std::map<std::string, double> had;
-    for (const auto& [id, owner] : owners) {
-      had[owner] += work.seconds[id];
-      if (!id.ends_with("-0")) EXPECT_EQ(work.seconds[id], 0) << id << ", seed " << seed;
-    }
+    for (const auto& [id, owner] : owners) had[owner] += work.seconds[id];
     const auto [least, most] = std::minmax_element(
         had.begin(), had.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
     EXPECT_LE(most->second - least->second, threads * (kQueuedLeases * kLeaseSeconds + 2 + kLocalitySeconds))
