@@ -163,11 +163,20 @@ std::variant<Flags, int> parse_flags(int argc, char** argv) {
       ->check(CLI::IsMember({"text", "json"}));
   app.set_config("--config", "", "file with these options, one 'name = value' a line");
   app.allow_config_extras(false);
-  for (const auto& [option, value] :
-       {std::pair("--http", "ADDRESS"), {"--grpc", "ADDRESS"}, {"--data", "DIR"}, {"--store", "STORE"},
-        {"--tls-names", "NAME,..."}, {"--tls-ca", "FILE"}, {"--tls-cert", "FILE"}, {"--tls-key", "FILE"},
-        {"--blobs", "PLACE"}, {"--secrets", "DIR"}, {"--public-http", "ADDRESS"}, {"--public-grpc", "ADDRESS"},
-        {"--webhook", "URL"}, {"--config", "FILE"}})
+  for (const auto& [option, value] : {std::pair("--http", "ADDRESS"),
+                                      {"--grpc", "ADDRESS"},
+                                      {"--data", "DIR"},
+                                      {"--store", "STORE"},
+                                      {"--tls-names", "NAME,..."},
+                                      {"--tls-ca", "FILE"},
+                                      {"--tls-cert", "FILE"},
+                                      {"--tls-key", "FILE"},
+                                      {"--blobs", "PLACE"},
+                                      {"--secrets", "DIR"},
+                                      {"--public-http", "ADDRESS"},
+                                      {"--public-grpc", "ADDRESS"},
+                                      {"--webhook", "URL"},
+                                      {"--config", "FILE"}})
     app.get_option(option)->type_name(value);
   add_limits(app, flags.limits);
   add_man_page_option(app, LIGHTSHAFT_VERSION);

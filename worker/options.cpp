@@ -75,9 +75,14 @@ void describe(CLI::App& app, Options& o, Files& files) {
   app.add_option("--fake-sample-seconds", o.fake_options.sample_seconds)->group("");
   app.add_option("--fake-fault", o.fake_fault_text)->group("");
   app.add_option("--fake-class", o.fake_class)->group("");
-  for (const auto& [option, value] :
-       {std::pair("--coordinator", "ADDRESS,..."), {"--cache", "DIR"}, {"--name", "NAME"}, {"--tags", "A,B"},
-        {"--token-file", "FILE"}, {"--tls-ca", "FILE"}, {"--tls-cert", "FILE"}, {"--tls-key", "FILE"}})
+  for (const auto& [option, value] : {std::pair("--coordinator", "ADDRESS,..."),
+                                      {"--cache", "DIR"},
+                                      {"--name", "NAME"},
+                                      {"--tags", "A,B"},
+                                      {"--token-file", "FILE"},
+                                      {"--tls-ca", "FILE"},
+                                      {"--tls-cert", "FILE"},
+                                      {"--tls-key", "FILE"}})
     app.get_option(option)->type_name(value);
   app.set_version_flag("--version", kBuild);
   add_man_page_option(app, LIGHTSHAFT_VERSION);

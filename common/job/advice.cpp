@@ -22,7 +22,8 @@ std::uint64_t next_spp(double done) {
 std::string advice_on(const ConvergenceStatus& status, const Advised& job) {
   if (status.trusted) return "";
   if (status.kind == ConvergenceStatus::Kind::bias_floor)
-    return "image and reference disagree, and more samples will not help: check that the reference shows this "
+    return "image and reference disagree, and more samples will not help: check that the reference shows "
+           "this "
            "scene with this camera and these settings";
   const bool dark = !(job.relmse > 0);
   const std::string what = dark ? "no light found yet: check that a light reaches what the camera sees"

@@ -75,6 +75,12 @@ def test_the_labels_of_the_axes_are_inside_of_the_picture():
         assert int(x) >= 0.65 * int(size) * len(text), text
 
 
+def test_an_address_may_leave_out_its_scheme():
+    assert repr(lightshaft.Farm("farm:8080/", "token")) == "<Farm http://farm:8080>"
+    with pytest.raises(lightshaft.RequestRejected, match="must begin with http"):
+        lightshaft.Farm("ftp://farm", "token")
+
+
 def test_a_job_names_itself():
     job = lightshaft.Job(None, VIEW)
     assert repr(job) == "<Job j-1 'ball.xml': done, 100 %>" and job.name == "ball.xml"

@@ -25,7 +25,9 @@ std::optional<JobState> prerequisite_state(const JobTable& jobs, const JobId& id
   const auto entries = jobs.job_or_frames(id);
   if (!entries) return std::nullopt;
   const auto any = [&](auto holds) { return std::ranges::any_of(*entries, holds); };
-  const auto in = [](JobState state) { return [state](const EntryPtr& e) { return e->stored.state == state; }; };
+  const auto in = [](JobState state) {
+    return [state](const EntryPtr& e) { return e->stored.state == state; };
+  };
   if (any(in(JobState::failed))) return JobState::failed;
   if (any(in(JobState::cancelled))) return JobState::cancelled;
   if (std::ranges::all_of(*entries, in(JobState::done))) return JobState::done;
@@ -87,13 +89,14 @@ Waiting waiting_of(const JobTable& jobs, const StoredJob& job) {
     if (out.held || (!never && !out.words.empty())) continue;
     out.held = never;
     out.words =
-        never ? fmt::format("job {}, for which it waits, {}: name another one (lightshaft after {} JOB), let it "
-                            "go without (lightshaft after {}), or cancel it",
-                            name,
-                            !state                          ? "is not here any more"
-                            : *state == JobState::cancelled ? "was cancelled"
-                                                            : "failed",
-                            job.id.value, job.id.value)
+        never ? fmt::format(
+                    "job {}, for which it waits, {}: name another one (lightshaft after {} JOB), let it "
+                    "go without (lightshaft after {}), or cancel it",
+                    name,
+                    !state                          ? "is not here any more"
+                    : *state == JobState::cancelled ? "was cancelled"
+                                                    : "failed",
+                    job.id.value, job.id.value)
               : fmt::format("waits for job {}, which is {}", name, to_string(*state));
   }
   return out;

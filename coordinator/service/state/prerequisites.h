@@ -1,5 +1,5 @@
-// Jobs that wait for other jobs to be done (JobSpec::after). A prerequisite is a job, a sequence or a frame. A
-// sequence is done when all its frames are.
+// Jobs that wait for other jobs to be done (JobSpec::after). A prerequisite is a job, a sequence or a frame.
+// A sequence is done when all its frames are.
 #pragma once
 
 #include <cstdint>

@@ -100,8 +100,7 @@ TEST(FarmTables, LetNoNameReachTheTerminalsControls) {
 }
 
 TEST(HttpClient, RefusesAddressesAndTokensThatCannotBeMeant) {
-  for (const char* url :
-       {"ftp://farm", "file:///etc/passwd", "http://farm/ x", "http://farm\r\nX: y", ""})
+  for (const char* url : {"ftp://farm", "file:///etc/passwd", "http://farm/ x", "http://farm\r\nX: y", ""})
     EXPECT_EQ(HttpClient::open({url, "", ""}).error().code, Errc::invalid_argument) << url;
   EXPECT_FALSE(HttpClient::open({"http://farm", "token\r\nX-Evil: 1", ""}));
   EXPECT_FALSE(HttpClient::open({"https://farm", "", "/no/such/file.pem"}));

@@ -1,4 +1,5 @@
-// Jobs that wait for others, over HTTP: in the query and in JSON, what is shown of them, and how that is changed.
+// Jobs that wait for others, over HTTP: in the query and in JSON, what is shown of them, and how that is
+// changed.
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {

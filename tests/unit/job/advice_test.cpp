@@ -31,15 +31,17 @@ TEST(Advice, NamesNoCommandForAJobThatCannotGoOn) {
 }
 
 TEST(Advice, TellsToLookForALightIfNoneWasFound) {
-  EXPECT_EQ(advice_on(kHeavy, {.job = "j-1", .relmse = 0, .spp_done = 64}),
-            "no light found yet: check that a light reaches what the camera sees; render on: lightshaft extend "
-            "j-1 --spp 256");
+  EXPECT_EQ(
+      advice_on(kHeavy, {.job = "j-1", .relmse = 0, .spp_done = 64}),
+      "no light found yet: check that a light reaches what the camera sees; render on: lightshaft extend "
+      "j-1 --spp 256");
 }
 
 TEST(Advice, TellsToCheckAReferenceThatDisagrees) {
-  EXPECT_EQ(advice_on({Kind::bias_floor, "bias floor", false}, {.job = "j-1", .relmse = .1, .spp_done = 64}),
-            "image and reference disagree, and more samples will not help: check that the reference shows this "
-            "scene with this camera and these settings");
+  EXPECT_EQ(
+      advice_on({Kind::bias_floor, "bias floor", false}, {.job = "j-1", .relmse = .1, .spp_done = 64}),
+      "image and reference disagree, and more samples will not help: check that the reference shows this "
+      "scene with this camera and these settings");
 }
 
 }  // namespace

@@ -51,7 +51,8 @@ TEST(After, AJobBeginsWhenTheOneBeforeItIsDone) {
 
   FakeFarm farm(*coordinator, 2);
   ASSERT_TRUE(farm.run([&] {
-    EXPECT_TRUE(coordinator->job(second)->units_done == 0 || coordinator->job(first)->state == JobState::done);
+    EXPECT_TRUE(coordinator->job(second)->units_done == 0 ||
+                coordinator->job(first)->state == JobState::done);
     return coordinator->job(second)->state == JobState::done;
   }));
 
@@ -160,7 +161,8 @@ TEST(After, ARestartKeepsTheWaitAndNoticesWhatWasDoneBeforeIt) {
   EXPECT_EQ(waits(*coordinator, third), std::vector{second.value});
   FakeFarm farm(*coordinator, 1);
   ASSERT_TRUE(farm.run([&] {
-    EXPECT_TRUE(coordinator->job(third)->units_done == 0 || coordinator->job(second)->state == JobState::done);
+    EXPECT_TRUE(coordinator->job(third)->units_done == 0 ||
+                coordinator->job(second)->state == JobState::done);
     return coordinator->job(third)->state == JobState::done;
   }));
 }

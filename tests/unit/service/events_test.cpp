@@ -199,8 +199,9 @@ TEST(Views, TellWhetherTheFiguresAreToBeTrusted) {
             (nlohmann::json{{"kind", "early"},
                             {"words", "don't trust yet"},
                             {"trusted", false},
-                            {"advice", "still noisy: a few bright pixels carry the error; more samples are on "
-                                       "their way"}}));
+                            {"advice",
+                             "still noisy: a few bright pixels carry the error; more samples are on "
+                             "their way"}}));
   EXPECT_EQ(j["rmse_ci95"], (nlohmann::json{.4, .6}));
   EXPECT_EQ(j["slope"], -1);
   EXPECT_EQ(j["slope_ci95"], (nlohmann::json{-1.5, -.5}));
