@@ -128,8 +128,9 @@ class Snapshot:
             html.escape(summary(view)),
         ]
         verdict = Verdict.of(view)
+        error, waits = view.get("error"), view.get("waits_for")
         doubt = (verdict.words, verdict.advice) if verdict else ()
-        for text in dict.fromkeys((view.get("error"), view.get("waits_for"), *doubt)):
+        for text in (error, waits if waits != error else None, *doubt):
             if text:
                 lines.append(html.escape(str(text)))
         picture = (
