@@ -317,7 +317,7 @@ def test_a_farm_that_is_down_is_named(local_farm):
         ) as farm:  # the next one answers
             assert farm.workers()
     with pytest.raises(lightshaft.RequestRejected, match="http://"):
-        lightshaft.Farm("localhost:8080", "x")
+        lightshaft.Farm("ftp://localhost:8080", "x")
 
 
 def test_certificates_are_checked(tmp_path):
