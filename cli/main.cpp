@@ -14,6 +14,7 @@
 #include "cli/output/console.h"
 #include "common/base/log.h"
 #include "common/command_line/command.h"
+#include "common/command_line/parse.h"
 
 namespace {
 
@@ -60,7 +61,7 @@ int main(int argc, char** argv) {
                "lightshaft");
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
-  app.footer("LIGHTSHAFT_LOG=warn, info or debug shows what coordinator and worker do inside `render`.");
+  ls::use_plain_help(app);
   app.option_defaults()->always_capture_default(false);
   Action action;
   add_render(app, action);
@@ -77,10 +78,10 @@ int main(int argc, char** argv) {
   add_doctor(app, action);
   add_completion(app, action);
   ls::add_man_page_option(app, LIGHTSHAFT_VERSION);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? kOk : kUsage;
+  if (argc == 1) {
+    fmt::print("{}", app.help());
+    return kUsage;
   }
+  if (const auto code = ls::parse_arguments(app, argc, argv)) return *code;
   return run_guarded(app.get_subcommands().front()->get_name(), action);
 }

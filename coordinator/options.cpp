@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include "common/command_line/command.h"
+#include "common/command_line/parse.h"
 #include "coordinator/service/open_stores.h"
 
 namespace ls::coordinator {
@@ -142,6 +143,8 @@ std::variant<Flags, int> parse_flags(int argc, char** argv) {
   std::string log_format = "text";
   CLI::App app("Cuts jobs into units, hands them to workers, and folds what they send into one exact image.",
                "lightshaft-coordinator");
+  use_plain_help(app);
+  app.set_version_flag("--version", "lightshaft-coordinator " LIGHTSHAFT_VERSION);
   app.add_option("--http", flags.http, "ADDR:PORT of the HTTP interface and the dashboard; port 0: any")
       ->capture_default_str();
   app.add_option("--grpc", flags.grpc, "ADDR:PORT that workers connect to; port 0: any")
@@ -160,13 +163,24 @@ std::variant<Flags, int> parse_flags(int argc, char** argv) {
       ->check(CLI::IsMember({"text", "json"}));
   app.set_config("--config", "", "file with these options, one 'name = value' a line");
   app.allow_config_extras(false);
+  for (const auto& [option, value] : {std::pair("--http", "ADDRESS"),
+                                      {"--grpc", "ADDRESS"},
+                                      {"--data", "DIR"},
+                                      {"--store", "STORE"},
+                                      {"--tls-names", "NAME,..."},
+                                      {"--tls-ca", "FILE"},
+                                      {"--tls-cert", "FILE"},
+                                      {"--tls-key", "FILE"},
+                                      {"--blobs", "PLACE"},
+                                      {"--secrets", "DIR"},
+                                      {"--public-http", "ADDRESS"},
+                                      {"--public-grpc", "ADDRESS"},
+                                      {"--webhook", "URL"},
+                                      {"--config", "FILE"}})
+    app.get_option(option)->type_name(value);
   add_limits(app, flags.limits);
   add_man_page_option(app, LIGHTSHAFT_VERSION);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : kUsage;
-  }
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
   for (const Result<void>& fits : {check_store(flags.store), check_blobs(flags.blobs), check_shared(flags)}) {
     if (fits) continue;
     fmt::print(stderr, "lightshaft-coordinator: error: {}\n", fits.error().message);

@@ -12,6 +12,7 @@
 #include "common/base/machine_memory.h"
 #include "common/base/secret.h"
 #include "common/command_line/command.h"
+#include "common/command_line/parse.h"
 #include "common/protocol/limits.h"
 #include "worker/child/child.h"
 #include "worker/machine.h"
@@ -74,6 +75,15 @@ void describe(CLI::App& app, Options& o, Files& files) {
   app.add_option("--fake-sample-seconds", o.fake_options.sample_seconds)->group("");
   app.add_option("--fake-fault", o.fake_fault_text)->group("");
   app.add_option("--fake-class", o.fake_class)->group("");
+  for (const auto& [option, value] : {std::pair("--coordinator", "ADDRESS,..."),
+                                      {"--cache", "DIR"},
+                                      {"--name", "NAME"},
+                                      {"--tags", "A,B"},
+                                      {"--token-file", "FILE"},
+                                      {"--tls-ca", "FILE"},
+                                      {"--tls-cert", "FILE"},
+                                      {"--tls-key", "FILE"}})
+    app.get_option(option)->type_name(value);
   app.set_version_flag("--version", kBuild);
   add_man_page_option(app, LIGHTSHAFT_VERSION);
 }
@@ -102,6 +112,11 @@ Result<void> read_tls(const Files& files, Options& o) {
   return {};
 }
 
+// Returns the address that may have been meant, with the default port for workers.
+std::string example_of(const std::string& rest) {
+  return rest.substr(0, rest.find_first_of(":/")) + ":50051";
+}
+
 int usage(const std::string& message) {
   std::cerr << "lightshaft-worker: " << message << "\n";
   return 2;
@@ -118,11 +133,14 @@ std::variant<Options, int> parse_options(int argc, char** argv) {
   Files files;
   CLI::App app("Renders units for a Lightshaft coordinator.", "lightshaft-worker");
   describe(app, o, files);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
+  use_plain_help(app);
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
+  for (const std::string& address : o.coordinators)
+    if (const std::size_t scheme = address.find("://"); scheme != std::string::npos)
+      return usage(fmt::format(
+          "--coordinator {}: it is HOST:PORT of the port for workers (the coordinator's --grpc), without {}; "
+          "{} say",
+          address, address.substr(0, scheme + 3), example_of(address.substr(scheme + 3))));
   if (const auto* delay = app.get_option("--fake-delay"); delay->count() > 0) {
     const double ms = delay->as<double>();
     if (!(ms >= 0 && ms < 1e6)) return usage("--fake-delay is a number of milliseconds");

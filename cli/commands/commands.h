@@ -32,7 +32,7 @@ void add_render(CLI::App& app, Action& action);
 void add_inspect(CLI::App& app, Action& action);
 void add_convert(CLI::App& app, Action& action);
 void add_submit(CLI::App& app, Action& action);
-// Adds the commands jobs, show, watch, pause, resume, cancel, extend, fetch, focus, video and workers.
+// Adds the commands for jobs, and `workers`.
 void add_farm_commands(CLI::App& app, Action& action);
 void add_farm_up(CLI::App& app, Action& action);
 void add_tokens(CLI::App& app, Action& action);

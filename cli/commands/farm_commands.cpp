@@ -12,6 +12,7 @@
 #include "cli/farm/farm_tables.h"
 #include "cli/farm/job_results.h"
 #include "cli/output/console.h"
+#include "cli/output/interrupt.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
@@ -28,6 +29,8 @@ using nlohmann::json;
 struct FarmFlags {
   FarmOptions farm;
   std::string id, frame, spp, target_error, out, report, html, region, fps, exposure, role, user;
+  std::string state, search, owner, sort, limit, offset, seconds, seed, priority;
+  std::vector<std::string> after;
   bool quiet = false, none = false, denoised = false;
 };
 constexpr std::chrono::milliseconds kVideoPause(500);  // pause between checks whether a video is ready
@@ -41,7 +44,18 @@ int show_answer(const FarmApi::Answer<json>& answer, const FarmFlags& flags,
 }
 
 int jobs(FarmApi& api, const FarmFlags& flags) {
-  return show_answer(api.get("/api/v1/jobs"), flags, jobs_table);
+  const auto answer = api.get("/api/v1/jobs" + query_of({{"state", flags.state},
+                                                         {"search", flags.search},
+                                                         {"owner", flags.owner},
+                                                         {"sort", flags.sort},
+                                                         {"limit", flags.limit},
+                                                         {"offset", flags.offset}}));
+  const int code = show_answer(answer, flags, jobs_table);
+  if (code != kOk || flags.farm.json) return code;
+  const std::size_t shown = objects_field(*answer, "jobs").size();
+  if (const auto total = number_field(*answer, "total"); total && *total > static_cast<double>(shown))
+    print_note(fmt::format("{} of {:.0f} jobs; --limit and --offset choose others", shown, *total));
+  return code;
 }
 int workers(FarmApi& api, const FarmFlags& flags) {
   return show_answer(api.get("/api/v1/workers"), flags, workers_table);
@@ -71,6 +85,64 @@ int extend(FarmApi& api, const FarmFlags& flags) {
   const auto spp = parse_whole("--spp", flags.spp, 1, kMaxSpp);
   if (!spp) return print_error(spp.error());
   return change(api, flags, {{"spp", *spp}});
+}
+
+int priority(FarmApi& api, const FarmFlags& flags) {
+  const auto value = parse_number<int>(flags.priority);
+  if (!value || std::abs(std::int64_t{*value}) > kMaxPriority)
+    return usage_error(fmt::format("priority '{0}': it must be a whole number from -{1} to {1}",
+                                   flags.priority, kMaxPriority));
+  return change(api, flags, {{"priority", *value}});
+}
+
+int after(FarmApi& api, const FarmFlags& flags) { return change(api, flags, {{"after", flags.after}}); }
+
+int log(FarmApi& api, const FarmFlags& flags) {
+  const auto text = api.text(job_path(flags.id) + "/log");
+  if (!text) return print_rejected(text.error());
+  for (std::size_t at = 0; at < text->size();) {
+    const std::size_t end = std::min(text->find('\n', at), text->size());
+    print(plain_text(text->substr(at, end - at)));
+    at = end + 1;
+  }
+  return kOk;
+}
+
+// Removes a job that has ended. HTTP's DELETE of a job that has not ended cancels it: who asks to remove a
+// job may not know that it still renders.
+int remove(FarmApi& api, const FarmFlags& flags) {
+  const auto job = api.get(job_path(flags.id));
+  if (!job) return print_rejected(job.error());
+  if (!is_over(*job)) {
+    complain(fmt::format("job {} is {}: end it first, with lightshaft cancel {}", flags.id,
+                         plain_text(text_field(*job, "state")), shell_word(flags.id)));
+    return kFailed;
+  }
+  const auto done = api.remove(job_path(flags.id));
+  return done ? kOk : print_rejected(done.error());
+}
+
+// Submits the scene of a job once more.
+int again(FarmApi& api, const FarmFlags& flags) {
+  JobOptions options;
+  options.spp = flags.spp;
+  options.target_error = flags.target_error;
+  options.time = flags.seconds;
+  options.seed = flags.seed;
+  options.priority = flags.priority;
+  options.after = flags.after;
+  const auto spec = options.parse();
+  if (!spec) return print_error(spec.error());
+  json body{{"priority", spec->priority}};
+  if (spec->spp) body["spp"] = *spec->spp;
+  if (spec->target_error) body["target_error"] = *spec->target_error;
+  if (spec->time) body["time"] = *spec->time;
+  if (spec->seed) body["seed"] = *spec->seed;
+  if (!spec->after.empty()) body["after"] = spec->after;
+  const auto job = api.post(job_path(flags.id) + "/again", body);
+  if (!job) return print_rejected(job.error());
+  print(flags.farm.json ? dump(*job) : plain_text(text_field(*job, "id")));
+  return kOk;
 }
 
 // Parses a rectangle "X0,Y0,X1,Y1" in pixels; returns a JSON array of the four numbers.
@@ -129,6 +201,7 @@ int video(FarmApi& api, const FarmFlags& flags) {
 }
 
 int watch(FarmApi& api, const FarmFlags& flags) {
+  const LastWords words(goes_on(flags.id));
   const auto end = watch_job(api, flags.id, {flags.quiet, flags.farm.json});
   if (!end) return print_rejected(end.error());
   if (const int code = print_end(*end, flags.quiet || !flags.farm.json); code != kOk) return code;
@@ -138,9 +211,14 @@ int watch(FarmApi& api, const FarmFlags& flags) {
 }
 
 int fetch(FarmApi& api, const FarmFlags& flags) {
-  if (flags.out.empty() && flags.report.empty() && flags.html.empty())
-    return usage_error("say what to fetch: -o OUT.exr, --report REPORT.json or --html REPORT.html");
-  return fetch_results(api, flags.id, {flags.out, flags.report, flags.html, flags.farm.json, false});
+  std::string out = flags.out;
+  if (flags.out.empty() && flags.report.empty() && flags.html.empty()) {
+    const auto job = api.get(job_path(flags.id));
+    if (!job) return print_rejected(job.error());
+    out = default_image(*job);
+    if (!flags.farm.json) print_note("writes " + out);
+  }
+  return fetch_results(api, flags.id, {out, flags.report, flags.html, flags.farm.json, false});
 }
 
 // With --frame, replaces the id of a sequence (a job with several frames) in `flags` by the id of that frame,
@@ -197,7 +275,20 @@ std::pair<CLI::App*, FarmFlags*> add(CLI::App& app, Action& action, const char* 
 }  // namespace
 
 void add_farm_commands(CLI::App& app, Action& action) {
-  add(app, action, "jobs", "the jobs of a farm", jobs);
+  const auto [jobs_command, listing] = add(app, action, "jobs", "the jobs of a farm", jobs);
+  jobs_command->footer(
+      "Examples:\n"
+      "  lightshaft jobs --state running,queued\n"
+      "  lightshaft jobs --search chapel --sort=-submitted --limit 20");
+  add_option(*jobs_command, "--state", listing->state, "STATE,...",
+             "only these: queued, running, paused, done, failed, cancelled");
+  add_option(*jobs_command, "--search", listing->search, "TEXT", "only those with this in their name or id");
+  add_option(*jobs_command, "--owner", listing->owner, "USER", "only those of this user");
+  add_option(*jobs_command, "--sort", listing->sort, "ORDER",
+             "order (of submission, the default), active, submitted, name, owner, state, progress or relmse; "
+             "with - before it the other way round");
+  add_option(*jobs_command, "--limit", listing->limit, "N", "at most so many");
+  add_option(*jobs_command, "--offset", listing->offset, "N", "without the first N of them");
   add(app, action, "show", "one job", show, true);
   const auto [watch_command, watching] = add(app, action, "watch", "follow a job until it ends", watch, true);
   watch_command->add_flag("--quiet", watching->quiet, "no progress bar");
@@ -209,10 +300,36 @@ void add_farm_commands(CLI::App& app, Action& action) {
   add_option(*extend_command, "--spp", extending->spp, "TOTAL", "the new total per pixel");
   add_option(*extend_command, "--target-error", extending->target_error, "E",
              "of a job that has one: go on until the image's relMSE is below this");
+  const auto [priority_command, ranking] =
+      add(app, action, "priority", "puts a job before others, or behind them", priority, true);
+  add_option(*priority_command, "priority", ranking->priority, "N", "higher goes first; 0 is the default")
+      ->required();
+  const auto [after_command, following] =
+      add(app, action, "after", "lets a job wait until others are done", after, true);
+  add_option(*after_command, "jobs", following->after, "JOB", "the jobs to wait for; none: it waits no more");
+  const auto [again_command, repeating] =
+      add(app, action, "again", "submits the scene of a job once more; prints the new job's id", again, true);
+  add_option(*again_command, "--spp", repeating->spp, "N", "samples per pixel instead of the job's end");
+  add_option(*again_command, "--target-error", repeating->target_error, "E", "a target instead");
+  add_option(*again_command, "--time", repeating->seconds, "SECONDS", "a time instead");
+  add_option(*again_command, "--seed", repeating->seed, "N", "other noise");
+  add_option(*again_command, "--priority", repeating->priority, "N", "higher goes first; default 0");
+  add_option(*again_command, "--after", repeating->after, "JOB,...", "begin when these jobs are done")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  add(app, action, "log", "what happened to a job", log, true);
+  add(app, action, "remove", "removes a job that has ended, with its image", remove, true);
   const auto [fetch_command, fetching] =
       add(app, action, "fetch", "the image of a job, finished or as it is", fetch, true);
-  add_option(*fetch_command, "-o,--output", fetching->out, "OUT.exr",
-             "the image, .exr or .png; of a sequence every frame's, out_####.exr say");
+  fetch_command->footer(
+      "Examples:\n"
+      "  lightshaft fetch j-1234abcd                     writes SCENE.exr, or SCENE_####.exr of a sequence\n"
+      "  lightshaft fetch j-1234abcd -o image.png\n"
+      "  lightshaft fetch j-1234abcd --frame 7 -o seventh.exr");
+  add_option(
+      *fetch_command, "-o,--output", fetching->out, "OUT.exr",
+      "the image, .exr or .png; of a sequence every frame's, out_####.exr say; default: the scene's name "
+      "in this folder");
   add_option(*fetch_command, "--report", fetching->report, "REPORT.json",
              "its report, too; with # in its name, every frame's");
   add_option(*fetch_command, "--html", fetching->html, "REPORT.html",

@@ -147,6 +147,13 @@ int run(const RenderFlags& flags) {
 void add_render(CLI::App& app, Action& action) {
   const auto [render, flags] =
       add_command<RenderFlags>(app, action, "render", "render a scene on this machine", run);
+  render->footer(
+      "Examples:\n"
+      "  lightshaft render scene.xml                                   writes scene.exr\n"
+      "  lightshaft render scene.xml -o a.png --spp 64 --size 640x360 --denoise\n"
+      "  lightshaft render scene.xml --target-error 1e-3 --html report.html\n"
+      "  lightshaft render smoke.xml --frames 1-10 -o out_####.exr\n"
+      "LIGHTSHAFT_LOG=warn, info or debug shows what coordinator and worker do inside `render`.");
   add_option(*render, "scene", flags->scene, "SCENE", "Mitsuba XML, .pbrt, .gltf or .glb")->required();
   add_option(*render, "-o,--output", flags->out, "OUT.exr",
              "the image: .exr with all layers, or .png; default: the scene's name, with .exr, in this "

@@ -1,11 +1,13 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <optional>
 
 #include "cli/commands/commands.h"
 #include "cli/farm/farm_api.h"
 #include "cli/farm/job_results.h"
 #include "cli/output/console.h"
+#include "cli/output/interrupt.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
@@ -16,7 +18,7 @@ namespace ls::cli {
 namespace {
 
 struct SubmitFlags {
-  std::string scene, out, report, html, reference;
+  std::string scene, name, out, report, html, reference;
   JobOptions job;
   FarmOptions farm;
   bool wait = false, quiet = false;
@@ -28,8 +30,9 @@ using Job = FarmApi::Answer<FarmApi::Json>;
 Job submit_scene(const SubmitFlags& flags, const JobSpec& spec) {
   auto reader = SceneReader::open(flags.scene, spec.defines, flags.job.strict);
   if (!reader) return tl::unexpected(reader.error());
-  const auto scene = spec.frames ? reader->read_all(*spec.frames) : reader->read({});
+  auto scene = spec.frames ? reader->read_all(*spec.frames) : reader->read({});
   if (!scene) return tl::unexpected(scene.error());
+  if (!flags.name.empty()) scene->title = flags.name;
   print_diagnostics(scene->warnings);
   auto api = FarmApi::open(flags.farm);
   if (!api) return coordinator::rejected(api.error());
@@ -48,7 +51,7 @@ Job submit_bundle(const SubmitFlags& flags, const JobSpec& spec, const std::stri
         {Errc::invalid_argument, fmt::format("{}: there is no such file", flags.scene)});
   auto api = FarmApi::open(flags.farm);
   if (!api) return coordinator::rejected(api.error());
-  auto job = api->submit_bundle(flags.scene, type, spec_query(spec, !flags.job.priority.empty()));
+  auto job = api->submit_bundle(flags.scene, type, spec_query(spec, !flags.job.priority.empty(), flags.name));
   if (!job) return job;
   for (const std::string& warning : texts_field(*job, "warnings")) print_note(warning);
   return job;
@@ -99,9 +102,11 @@ int run(const SubmitFlags& flags) {
   const std::string id = text_field(*job, "id");
   if (id.empty()) return print_error({Errc::internal, "the coordinator's answer names no job"});
   if (flag_field(*job, "reference_same_seed")) print_note(fmt::format("warning: {}", kSameSeed));
+  const bool waits = flags.wait || !flags.out.empty() || !flags.report.empty() || !flags.html.empty();
+  std::optional<LastWords> words;
+  if (waits) words.emplace(goes_on(id));
   print(flags.farm.json ? job->dump() : plain_text(id));
-  if (!flags.wait && flags.out.empty() && flags.report.empty() && flags.html.empty()) return kOk;
-  return wait_and_fetch(id, flags);
+  return waits ? wait_and_fetch(id, flags) : kOk;
 }
 
 }  // namespace
@@ -112,8 +117,20 @@ void add_submit(CLI::App& app, Action& action) {
   add_option(*submit, "scene", flags->scene, "SCENE",
              "Mitsuba XML, .pbrt, .gltf or .glb, or a .zip, .tar or .tar.gz with one and all its files")
       ->required();
+  submit->footer(
+      "Examples:\n"
+      "  lightshaft submit scene.xml --spp 256 --wait -o scene.exr\n"
+      "  lightshaft submit scene.xml --name 'chapel v3' --denoise      prints the job's id: watch, fetch\n"
+      "  lightshaft submit smoke.xml --frames 1-48 -o out_####.exr\n"
+      "  lightshaft submit beauty.xml --frames 1-48 --after j-1234abcd  each frame after that job's frame");
   flags->farm.add_to(*submit);
   flags->job.add_to(*submit);
+  add_option(*submit, "--name", flags->name, "NAME", "what lists call the job; default: the scene's file");
+  add_option(
+      *submit, "--after", flags->job.after, "JOB,...",
+      "begin when these jobs are done; of two sequences of the same frames, each frame after its frame")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   add_option(*submit, "--priority", flags->job.priority, "N", "higher goes first; default 0");
   add_option(*submit, "--tags", flags->job.tags, "A,B", "only workers with all of these")
       ->delimiter(',')

@@ -253,6 +253,9 @@ Result<Numbers> numbers_of(const VerifyFlags& flags) {
 }
 
 int run(const VerifyFlags& flags) {
+  if (flags.scene.empty())
+    return usage_error(fmt::format("say of which scene the image is: lightshaft verify {} --scene SCENE.xml",
+                                   shell_word(flags.image)));
   // Declared before `interrupt`, so that it outlives the thread of `interrupt`, which sets it.
   std::atomic<bool> stop{false};
   Interrupt interrupt;
@@ -305,7 +308,7 @@ void add_verify(CLI::App& app, Action& action) {
       app, action, "verify",
       "render random tiles of a finished image again and compare them with the digests sealed in it", run);
   add_option(*verify, "image", flags->image, "OUT.exr", "a finished EXR")->required();
-  add_option(*verify, "--scene", flags->scene, "SCENE", "the scene it was rendered from")->required();
+  add_option(*verify, "--scene", flags->scene, "SCENE", "the scene it was rendered from");
   add_option(*verify, "--tiles", flags->tiles, "K", fmt::format("how many (default {})", kDefaultTiles));
   add_option(*verify, "--seed", flags->seed, "N", "chooses the tiles; default: anew each time");
   add_defines(*verify, flags->defines);

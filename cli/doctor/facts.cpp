@@ -101,6 +101,17 @@ std::vector<WorkerFacts> workers_of(const json& answer) {
   return all;
 }
 
+// The newest jobs are asked for: a person looks for what they have submitted.
+constexpr const char* kOpenJobs = "/api/v1/jobs?state=queued,running,paused&sort=-submitted&limit=50";
+
+std::vector<StuckJob> stuck_jobs_of(const json& answer) {
+  std::vector<StuckJob> stuck;
+  for (const json& job : objects_field(answer, "jobs"))
+    if (std::string why = text_field(job, "error"); !why.empty())
+      stuck.push_back({text_field(job, "id"), std::move(why)});
+  return stuck;
+}
+
 void ask_readiness(HttpClient& client, FarmFacts& facts) {
   const auto ready = client.request("GET", "/readyz");
   if (!ready) {
@@ -131,6 +142,10 @@ void ask_session(HttpClient& client, FarmFacts& facts) {
   if (!workers || workers->status / 100 != 2) return;
   if (const json list = json::parse(workers->body, nullptr, false); list.is_object())
     facts.workers = workers_of(list);
+  const auto jobs = client.request("GET", kOpenJobs);
+  if (!jobs || jobs->status / 100 != 2) return;
+  if (const json list = json::parse(jobs->body, nullptr, false); list.is_object())
+    facts.stuck_jobs = stuck_jobs_of(list);
 }
 
 Result<FarmFacts> observe_one(const HttpClient::Options& connection) {

@@ -51,6 +51,11 @@ struct WorkerFacts {
   bool fake = false;
 };
 
+// A job that has not ended and stands still
+struct StuckJob {
+  std::string id, why;
+};
+
 struct FarmFacts {
   std::string url;  // address without user and password
   bool has_token = false;
@@ -67,6 +72,7 @@ struct FarmFacts {
   int session_status = 0;  // HTTP status of GET /api/v1/session, which returns the token's role
   std::string session_trouble, role, user, version;
   std::optional<std::vector<WorkerFacts>> workers;
+  std::optional<std::vector<StuckJob>> stuck_jobs;  // among the first jobs that have not ended
 };
 
 // Returns one result for each address of `connection`. invalid_argument: an address or the CA file cannot be

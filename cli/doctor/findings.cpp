@@ -8,6 +8,7 @@
 #include <set>
 
 #include "cli/output/console.h"
+#include "common/base/safe_text.h"
 #include "common/scene/limits.h"
 #include "worker/machine.h"
 
@@ -240,6 +241,15 @@ void add_workers(std::vector<Finding>& all, const FarmFacts& facts, const std::s
     all.push_back(ok("numeric-class", "the workers render the same bits as this machine"));
 }
 
+Finding of_jobs(const std::vector<StuckJob>& stuck) {
+  if (stuck.empty()) return ok("jobs", "none of those that have not ended stands still");
+  const StuckJob& first = stuck.front();
+  return warning("jobs",
+                 fmt::format("{} of those that have not ended {} still; {}: {}", stuck.size(),
+                             stuck.size() == 1 ? "stands" : "stand", first.id, first.why),
+                 fmt::format("lightshaft show {}", shell_word(first.id)));
+}
+
 }  // namespace
 
 std::string to_string(Status status) {
@@ -297,6 +307,7 @@ std::vector<Finding> judge_farm(const FarmFacts& facts, const std::string& progr
     all.push_back(of_token(facts));
     if (!facts.role.empty()) all.push_back(of_version(facts, program_version));
     if (facts.workers) add_workers(all, facts, numeric_class);
+    if (facts.stuck_jobs) all.push_back(of_jobs(*facts.stuck_jobs));
   }
   for (Finding& each : all) each.subject = facts.url;
   return all;

@@ -162,6 +162,12 @@ FarmApi::Answer<void> FarmApi::remove(const std::string& path) {
   return {};
 }
 
+FarmApi::Answer<std::string> FarmApi::text(const std::string& path) {
+  auto response = checked(client_.request("GET", path));
+  if (!response) return tl::unexpected(response.error());
+  return std::move(response->body);
+}
+
 FarmApi::Answer<void> FarmApi::download(const std::string& path, const std::filesystem::path& file) {
   const auto response = checked(client_.download(path, file));
   if (!response) return tl::unexpected(response.error());
@@ -251,9 +257,10 @@ FarmApi::Answer<json> FarmApi::submit(const LocalScene& scene, const JobSpec& sp
                                       const std::function<void(const std::string&)>& on_progress) {
   const Digest text = sha256(scene.text);
   if (auto sent = upload_missing(scene, spec, text, on_progress); !sent) return tl::unexpected(sent.error());
-  json body{{"scene", text.hex()},
-            {"assets", json::object()},
-            {"name", std::filesystem::path(scene.name).filename().string()}};
+  json body{
+      {"scene", text.hex()},
+      {"assets", json::object()},
+      {"name", scene.title.empty() ? std::filesystem::path(scene.name).filename().string() : scene.title}};
   for (const auto& [name, file] : scene.files) body["assets"][name] = file.digest.hex();
   body["spec"] = json::parse(canonical_json(spec), nullptr, false);
   return as_json(client_.request("POST", "/api/v1/jobs", dump(body, -1)));
@@ -285,6 +292,13 @@ class Query {
 
 }  // namespace
 
+std::string query_of(const std::vector<std::pair<std::string, std::string>>& given) {
+  Query query;
+  for (const auto& [key, value] : given)
+    if (!value.empty()) query.add(key, value);
+  return query.take();
+}
+
 std::optional<std::string> bundle_type(const std::string& file) {
   std::string name = file;
   std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
@@ -294,8 +308,9 @@ std::optional<std::string> bundle_type(const std::string& file) {
   return std::nullopt;
 }
 
-std::string spec_query(const JobSpec& spec, bool with_priority) {
+std::string spec_query(const JobSpec& spec, bool with_priority, const std::string& name) {
   Query query;
+  if (!name.empty()) query.add("name", name);
   query.add("spp", spec.spp);
   query.add("target_error", spec.target_error);
   if (spec.target_layer != TargetLayer::raw)
@@ -315,6 +330,7 @@ std::string spec_query(const JobSpec& spec, bool with_priority) {
   query.add("max_units", spec.max_units);
   query.add("memory", spec.memory);
   query.add("numeric_class", spec.numeric_class);
+  if (!spec.after.empty()) query.add("after", fmt::format("{}", fmt::join(spec.after, ",")));
   if (spec.reference) query.add("reference", spec.reference->hex());
   return query.take();
 }

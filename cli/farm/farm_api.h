@@ -37,6 +37,7 @@ class FarmApi {
   Answer<Json> post(const std::string& path, const Json& body);
   Answer<void> remove(const std::string& path);
   Answer<Json> patch(const std::string& path, const Json& body);
+  Answer<std::string> text(const std::string& path);
   Answer<void> download(const std::string& path, const std::filesystem::path& file);
 
   // Uploads the scene and those of its files that the coordinator does not have, then creates the job.
@@ -71,6 +72,9 @@ class FarmApi {
 
 std::string job_path(const std::string& id);  // "/api/v1/jobs/ID" with the id percent-encoded
 
+// Returns "?key=value&...", percent-encoded, without the keys whose value is empty.
+std::string query_of(const std::vector<std::pair<std::string, std::string>>& given);
+
 // Converts a response with an error status to an error, including its diagnostics.
 coordinator::Rejected problem_of(const HttpResponse& response);
 
@@ -81,7 +85,7 @@ std::optional<std::string> bundle_type(const std::string& file);
 
 // Returns the spec as query parameters, such as "?spp=8&define=a%3D1", or an empty text. Options that the
 // user did not give are left out, because the archive may set them. `with_priority`: true if the user gave
-// a priority; `spec` alone does not show that, since it always has one.
-std::string spec_query(const JobSpec& spec, bool with_priority);
+// a priority; `spec` alone does not show that, since it always has one. `name`: the job's; empty: not given.
+std::string spec_query(const JobSpec& spec, bool with_priority, const std::string& name = {});
 
 }  // namespace ls::cli

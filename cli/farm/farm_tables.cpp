@@ -91,6 +91,7 @@ std::string denoised_check_text(const json& check) {
 }
 
 void add_error_rows(std::vector<Row>& rows, const json& job) {
+  if (const std::string text = denoised_text(job); !text.empty()) rows.push_back({"denoised relMSE", text});
   rows.push_back({"relMSE", estimate_text(job, "relmse", "relmse_ci95")});
   const bool denoised = text_field(job, "target_layer") == "denoised";
   add_known(rows, denoised ? "target relMSE, denoised" : "target relMSE", job, "target_error", "{:g}");
@@ -109,7 +110,9 @@ void add_error_rows(std::vector<Row>& rows, const json& job) {
   }
   add_pixels(rows, "few hits", job, "few_hits", "too few for their error to be known");
   add_pixels(rows, "not reached yet", job, "pixels_without_samples", "the error is of the others");
-  if (const std::string words = verdict_of(job).words; !words.empty()) rows.push_back({"verdict", words});
+  const Verdict verdict = verdict_of(job);
+  if (!verdict.words.empty()) rows.push_back({"verdict", verdict.words});
+  if (!verdict.advice.empty()) rows.push_back({"what to do", verdict.advice});
   if (const auto slope = number_field(job, "slope")) {
     const auto ci = verdict_of(job).doubtful ? std::nullopt : pair_field(job, "slope_ci95");
     rows.push_back({"slope", ci ? fmt::format("{:.3g} ({:.3g} to {:.3g})", *slope, ci->first, ci->second)
@@ -148,6 +151,7 @@ std::string jobs_table(const json& answer) {
                     text(job, "name") + (flag_field(job, "fake") ? " (fake pixels)" : "") +
                         (unclean(job) ? " (numbers not clean)" : "") +
                         (verdict_of(job).doubtful ? " (don't trust its error yet)" : "") +
+                        (text(job, "waits_for").empty() ? "" : " (waits for another job)") +
                         (frames ? fmt::format(" (frames: {})", frames_done(*frames)) : "")});
   }
   return rows.size() == 1 ? "no jobs" : aligned(rows);
@@ -195,7 +199,9 @@ std::string job_text(const json& job) {
   if (const std::string pinned = class_text(job); !pinned.empty()) rows.push_back({"numeric class", pinned});
   if (const json* share = object_field(job, "class_share"))
     rows.push_back({"can take it", share_text(*share)});
-  if (const std::string error = text(job, "error"); !error.empty()) rows.push_back({"error", error});
+  const std::string error = text(job, "error"), waits = text(job, "waits_for");
+  if (!waits.empty() && waits != error) rows.push_back({"waits", waits});
+  if (!error.empty()) rows.push_back({"error", error});
   if (flag_field(job, "fake")) rows.push_back({"fake", kFakePixels});
   for (const std::string& warning : texts_field(job, "warnings"))
     rows.push_back({"warning", plain_text(warning)});

@@ -148,6 +148,8 @@ std::vector<std::string> addresses_in(const std::string& url) {
     const std::size_t comma = std::min(url.find(',', at), url.size());
     addresses.push_back(url.substr(at, comma - at));
     while (addresses.back().ends_with('/')) addresses.back().pop_back();
+    if (!addresses.back().empty() && addresses.back().find("://") == std::string::npos)
+      addresses.back().insert(0, "http://");
     at = comma + 1;
   }
   return addresses;
@@ -238,6 +240,10 @@ Result<HttpResponse> HttpClient::State::perform(const std::string& path, const H
                             "coordinators name each other by https (--public-http)",
                             asked));
   if (code != CURLE_COULDNT_CONNECT) current = (current + 1) % urls.size();
+  if (code == CURLE_SSL_CONNECT_ERROR &&
+      std::string_view(problem).find("wrong version number") != std::string::npos)
+    return fail(Errc::unavailable,
+                fmt::format("{} answers without TLS: its address begins with http://", asked));
   return fail(Errc::unavailable,
               fmt::format("{} cannot be reached{}: {}{}",
                           urls.size() > 1 && code == CURLE_COULDNT_CONNECT ? options.url : asked,

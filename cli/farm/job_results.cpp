@@ -101,6 +101,20 @@ std::string fetch_command(const std::string& id, const Results& wanted) {
 
 }  // namespace
 
+std::string goes_on(const std::string& id) {
+  const std::string word = shell_word(id);
+  return fmt::format("job {} goes on: lightshaft watch {} follows it, lightshaft cancel {} ends it", id, word,
+                     word);
+}
+
+std::string default_image(const json& job) {
+  // The name comes from whoever submitted the job: only its last part is used, and no hidden file is made.
+  std::string stem = std::filesystem::path(plain_text(text_field(job, "name"))).stem().string();
+  stem.erase(0, stem.find_first_not_of('.'));
+  if (stem.empty()) stem = "image";
+  return stem + (object_field(job, "frames") ? "_####.exr" : ".exr");
+}
+
 int done_frames(const json& job) {
   const json* frames = object_field(job, "frames");
   return frames ? int_field(*frames, "done", 0) : 0;
@@ -163,6 +177,7 @@ int print_end(const json& job, bool quiet) {
   if (state == "done") {
     if (const std::string worth = error_text(job); !worth.empty() && (!quiet || verdict_of(job).doubtful))
       print_note(worth);
+    if (const std::string advice = verdict_of(job).advice; !advice.empty()) print_note(advice);
     return kOk;
   }
   const std::string error = text_field(job, "error");
@@ -176,12 +191,12 @@ int print_end(const json& job, bool quiet) {
 
 void print_denoised(FarmApi& api, const json& job) {
   // A sequence has no error of its own; the report of each frame has the error of that frame.
-  if (!flag_field(job, "denoise") || object_field(job, "frames")) return;
+  if (!flag_field(job, "denoise") || object_field(job, "denoised") || object_field(job, "frames")) return;
   const auto report = api.get(job_path(text_field(job, "id")) + "/report");
   if (!report)
     print_note("the error of the denoised image is unknown: " + report.error().error.message);
   else if (const std::string denoised = denoised_text(*report); !denoised.empty())
-    print_note(denoised);
+    print_note("denoised relMSE: " + denoised);
 }
 
 int fetch_results(FarmApi& api, const std::string& id, const Results& wanted) {

@@ -16,6 +16,11 @@ struct WatchOptions {
 // restart, keeps trying for a while (RetryPolicy), and then returns the error.
 FarmApi::Answer<nlohmann::json> watch_job(FarmApi& api, const std::string& id, const WatchOptions& options);
 
+// Says that the job goes on after Ctrl-C, and how to come back to it.
+std::string goes_on(const std::string& id);
+// Returns a name for the image of a job, in the working folder: that of its scene, as `render` names it.
+std::string default_image(const nlohmann::json& job);
+
 ProgressFigures progress_of(const nlohmann::json& job);
 
 // Returns how many frames of a sequence (a job with several frames) are done; 0 for other jobs.
@@ -25,8 +30,8 @@ int done_frames(const nlohmann::json& job);
 // be trusted) and returns kOk; otherwise prints the reason, and how to fetch the frames that are done, and
 // returns kFailed.
 int print_end(const nlohmann::json& job, bool quiet);
-// Prints the error of the denoised image of a job that is done. Only the job's report, which this function
-// downloads, contains that error. Prints nothing if no denoising was requested.
+// Prints the error of the denoised image of a job that is done, or why there is none, of the job's report,
+// which this function downloads. Prints nothing if no denoising was requested, or if `job` has that error.
 void print_denoised(FarmApi& api, const nlohmann::json& job);
 
 struct Results {

@@ -230,6 +230,8 @@ class LocalRender {
       if (auto saved = save_html_report(*options_.html, coordinator, job_, text); !saved) return saved;
     if (!options_.quiet && print_summary)
       print_note(fmt::format("{}: {}", options_.out.string(), report_summary(*report)));
+    if (!options_.quiet && print_summary)
+      if (const std::string advice = text_field(*report, "advice"); !advice.empty()) print_note(advice);
     print_report_health(*report);
     if (options_.quiet || !print_summary) return {};
     print("pixels_sha256 " + text_field(*report, "pixels_sha256"));
@@ -258,6 +260,13 @@ Result<json> local_report(const std::string& report, const LocalFacts& facts) {
   j["load_seconds"] = facts.load_seconds;
   j["peak_rss_bytes"] = facts.peak_rss_bytes;
   j["threads"] = facts.threads;
+  // The job ends with this command: another one renders on.
+  if (std::string advice = text_field(j, "advice"); !advice.empty()) {
+    const std::string extend = fmt::format("lightshaft extend {} ", text_field(j, "job"));
+    if (const std::size_t at = advice.find(extend); at != std::string::npos)
+      advice.replace(at, extend.size(), fmt::format("lightshaft render {} ", text_field(j, "name")));
+    j["advice"] = advice;
+  }
   if (facts.interrupted) j["stopped"] = "user";
   if (facts.instructions) {
     const double samples = number(j, "samples");
@@ -273,7 +282,11 @@ std::string report_summary(const json& j) {
   std::string line =
       fmt::format("{:g} samples per pixel in {} ({} of loading)", number(j, "spp"),
                   show_seconds(number(j, "render_seconds")), show_seconds(number(j, "load_seconds")));
-  if (const auto relmse = number_field(j, "relmse")) line += fmt::format(", relMSE {:.3g}", *relmse);
+  // Who has an image denoised looks at the denoised layers: their error comes first.
+  const std::string denoised = denoised_text(j);
+  if (!denoised.empty()) line += fmt::format(", denoised relMSE {}; as rendered", denoised);
+  if (const auto relmse = number_field(j, "relmse"))
+    line += fmt::format("{} relMSE {:.3g}", denoised.empty() ? "," : "", *relmse);
   const Verdict verdict = verdict_of_report(j);
   if (const auto ci = pair_field(j, "relmse_ci95"); ci && !verdict.doubtful)
     line += fmt::format(" ({:.3g} to {:.3g})", ci->first, ci->second);
@@ -284,7 +297,6 @@ std::string report_summary(const json& j) {
       !reference_error.empty())
     line += ", true relMSE " + reference_error;
   if (const auto flip = number_field(j, "true_flip")) line += fmt::format(", FLIP {:.3g}", *flip);
-  if (const std::string denoised = denoised_text(j); !denoised.empty()) line += ", " + denoised;
   if (const auto target = number_field(j, "target_error"))
     line += fmt::format(", target {:g}{}", *target,
                         text_field(j, "target_layer") == "denoised" ? " for the denoised layers" : "");

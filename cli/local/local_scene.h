@@ -39,6 +39,7 @@ struct LocalScene {
   // Assets that are not needed are not uploaded.
   std::array<std::set<Digest>, 2> needed = {};
   std::shared_ptr<const KeptFolder> made = {};
+  std::string title = {};  // what lists call a job of it; empty: the name of its file
 };
 
 // True if the job uses this file of the scene.

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <exception>
 #include <new>
+#include <system_error>
 
 #include "common/base/safe_text.h"
 
@@ -50,6 +51,10 @@ void print_diagnostics(const std::vector<Diagnostic>& diagnostics) {
 int run_guarded(const std::string& command, const std::function<int()>& action) {
   try {
     return action();
+  } catch (const std::system_error& e) {
+    // Whoever read the output has enough of it: `lightshaft jobs | head`
+    if (e.code() == std::errc::broken_pipe) return kOk;
+    complain("`" + command + "` failed: " + e.what());
   } catch (const std::bad_alloc&) {
     complain("out of memory in `" + command + "`");
   } catch (const std::exception& e) {

@@ -17,7 +17,7 @@ Verdict verdict(const json& object, const char* kind_key, const char* words_key)
   const std::string kind = text_field(object, kind_key);
   const bool untrusted = object.value("trusted", json()) == json(false);
   Verdict out{untrusted || kind == "heavy_tail" || kind == "bias_floor",
-              plain_text(text_field(object, words_key))};
+              plain_text(text_field(object, words_key)), plain_text(text_field(object, "advice"))};
   if (out.doubtful && !out.words.starts_with(kDoubt))
     out.words = fmt::format("{}{}{}", kDoubt, out.words.empty() ? "" : ": ", out.words);
   return out;
@@ -103,21 +103,23 @@ std::string error_text(const json& job) {
   const Verdict verdict = verdict_of(job);
   const auto relmse = number_field(job, "relmse");
   if (!relmse) return verdict.doubtful ? verdict.words : "";
-  std::string out = fmt::format("relMSE {:.3g}", *relmse);
+  const std::string denoised = denoised_text(job);
+  std::string out = denoised.empty() ? "" : fmt::format("denoised relMSE {}; as rendered ", denoised);
+  out += fmt::format("relMSE {:.3g}", *relmse);
   if (const auto ci = pair_field(job, "relmse_ci95"); ci && !verdict.doubtful)
     out += fmt::format(" ({:.3g} to {:.3g})", ci->first, ci->second);
   out += reference_errors_text(job);
   return verdict.doubtful ? out + ": " + verdict.words : out;
 }
 
-std::string denoised_text(const json& report) {
-  const json* denoised = object_field(report, "denoised");
+std::string denoised_text(const json& of) {
+  const json* denoised = object_field(of, "denoised");
   if (!denoised) return "";
   const auto relmse = number_field(*denoised, "relmse");
-  if (!relmse) return "not denoised: " + text_field(*denoised, "error");
+  if (!relmse) return "not denoised: " + plain_text(text_field(*denoised, "error"));
   if (const auto ci = pair_field(*denoised, "relmse_ci95"))
-    return fmt::format("denoised {:.3g} ({:.3g} to {:.3g})", *relmse, ci->first, ci->second);
-  return fmt::format("denoised {:.3g} (a few pixels carry its noise: no interval)", *relmse);
+    return fmt::format("{:.3g} ({:.3g} to {:.3g})", *relmse, ci->first, ci->second);
+  return fmt::format("{:.3g} (a few pixels carry its noise: no interval)", *relmse);
 }
 
 std::vector<std::string> health_lines(const json& job) {

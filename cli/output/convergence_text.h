@@ -13,7 +13,8 @@ struct Verdict {
   // True if few pixels contribute most of the error, if the error has reached a bias floor (it no longer
   // falls), or if no light has been found yet.
   bool doubtful = false;
-  std::string words;  // plain text; begins with kDoubt if doubtful
+  std::string words;   // plain text; begins with kDoubt if doubtful
+  std::string advice;  // what to do about the doubt; empty: nothing is known
 };
 inline constexpr const char* kDoubt = report::phrase("doubt");
 
@@ -36,9 +37,9 @@ std::string reference_error_text(const nlohmann::json& object, const char* key, 
                                  bool same_seed, int digits = 3);
 // Returns one line on the error of a job's image; empty: unknown.
 std::string error_text(const nlohmann::json& job);
-// Returns the error of the denoised image of a report (GET /jobs/ID/report): "denoised 0.0123 (0.0118 to
-// 0.0129)", or why there is no such image; empty: no denoising was requested.
-std::string denoised_text(const nlohmann::json& report);
+// Returns the error of the denoised image of a report (GET /jobs/ID/report) or a job: "0.0123 (0.0118 to
+// 0.0129)", or why there is no such image; empty: no denoising was requested, or the image is not made yet.
+std::string denoised_text(const nlohmann::json& of);
 
 // Returns lines for the user about the numeric health of `job` (invalid samples and the like). `job` is a
 // report or a farm's answer about a job. Each cause has its first location and the command that renders that

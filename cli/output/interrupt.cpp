@@ -1,7 +1,9 @@
 #include "cli/output/interrupt.h"
 
+#include <fmt/format.h>
 #include <pthread.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include <utility>
 
@@ -50,6 +52,26 @@ void Interrupt::on_signal(std::function<void()> stop) {
 
 Interrupt::~Interrupt() {
   if (thread_.joinable()) pthread_kill(thread_.native_handle(), SIGUSR1);
+}
+
+LastWords::LastWords(std::string words) {
+  const sigset_t set = watched();
+  pthread_sigmask(SIG_BLOCK, &set, nullptr);
+  thread_ = std::jthread([words = std::move(words)] {
+    const sigset_t set = watched();
+    int signal = 0;
+    if (sigwait(&set, &signal) != 0 || signal == SIGUSR1) return;
+    if (::isatty(STDERR_FILENO) == 1) fmt::print(stderr, "\n");
+    print_note(words);
+    die_of(signal);
+  });
+}
+
+LastWords::~LastWords() {
+  pthread_kill(thread_.native_handle(), SIGUSR1);
+  thread_.join();
+  const sigset_t set = watched();
+  pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
 }
 
 }  // namespace ls::cli

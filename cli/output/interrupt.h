@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <string>
 #include <thread>
 
 namespace ls::cli {
@@ -18,6 +19,19 @@ class Interrupt {
 
   // Calls `stop` once, on a separate thread, at the first signal. on_signal() may be called only once.
   void on_signal(std::function<void()> stop);
+
+ private:
+  std::jthread thread_;
+};
+
+// While it lives, prints `words` if Ctrl-C or SIGTERM ends the program. Like an Interrupt it must be created
+// before any other thread.
+class LastWords {
+ public:
+  explicit LastWords(std::string words);
+  ~LastWords();
+  LastWords(const LastWords&) = delete;
+  LastWords& operator=(const LastWords&) = delete;
 
  private:
   std::jthread thread_;

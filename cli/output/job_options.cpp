@@ -169,6 +169,7 @@ Result<JobSpec> JobOptions::parse() const {
     return bad_argument("--target-layer says which error --target-error means: give that, too");
   spec.denoise = denoise || spec.target_layer == TargetLayer::denoised;
   spec.tags = tags;
+  spec.after = after;
   if (workers) spec.max_workers = static_cast<std::uint32_t>(*workers);
   if (units) spec.max_units = static_cast<std::uint32_t>(*units);
   return spec;

@@ -25,7 +25,7 @@ CLI::Option* add_option(CLI::App& app, const std::string& name, T& value, const 
 struct JobOptions {
   std::string spp, target_error, target_layer, time, seed, size, integrator, priority, frames;
   std::string max_workers, max_units, memory, numeric_class;
-  std::vector<std::string> aov, defines, tags;
+  std::vector<std::string> aov, defines, tags, after;
   bool float_output = false;
   bool denoise = false;
   bool strict = false;

@@ -17,6 +17,10 @@ namespace ls::cli {
 
 namespace fs = std::filesystem;
 
+namespace {
+constexpr unsigned kByUmask = 0666;  // who else may read a result is for the umask of its user to say
+}
+
 Result<void> check_output(const std::string& option, const fs::path& file) {
   std::error_code error;
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
@@ -78,7 +82,7 @@ Result<void> write_output(const fs::path& file, std::span<const std::byte> bytes
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
   if (!fs::exists(status) || fs::is_regular_file(status))
-    return coordinator::write_atomically(fs::absolute(file, error), bytes);
+    return coordinator::write_atomically(fs::absolute(file, error), bytes, kByUmask);
   // A pipe or device cannot be replaced by renaming, so it is written directly.
   std::ofstream out(file, std::ios::binary);
   out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));

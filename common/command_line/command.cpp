@@ -58,6 +58,13 @@ bool CommandOption::takes_file() const {
          name.find('.') != std::string::npos;
 }
 
+std::string sentence_of(const CommandOption& option) {
+  std::string text = option.help;
+  if (!option.choices.empty()) text += fmt::format(" ({})", fmt::join(option.choices, ", "));
+  if (!option.default_value.empty()) text += fmt::format(" (default: {})", option.default_value);
+  return text.empty() ? option.value : text;
+}
+
 Command describe_command(const CLI::App& app) {
   Command command{app.get_name(), app.get_description(), app.get_footer(), {}, {}};
   for (const CLI::Option* option : app.get_options())
@@ -109,13 +116,6 @@ std::string quoted(const std::string& text) {
 std::string upper(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
   return text;
-}
-
-std::string sentence_of(const CommandOption& option) {
-  std::string text = option.help;
-  if (!option.choices.empty()) text += fmt::format(" ({})", fmt::join(option.choices, ", "));
-  if (!option.default_value.empty()) text += fmt::format(" (default: {})", option.default_value);
-  return text.empty() ? option.value : text;
 }
 
 void add_options(std::string& page, const Command& command) {

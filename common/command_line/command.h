@@ -30,6 +30,9 @@ struct Command {
   std::vector<Command> commands;
 };
 
+// Returns the help of an option with its choices and its default.
+std::string sentence_of(const CommandOption& option);
+
 // Describes a program without its hidden commands and options.
 Command describe_command(const CLI::App& app);
 

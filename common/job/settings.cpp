@@ -173,6 +173,7 @@ std::string canonical_json(const JobSpec& spec) {
   if (spec.max_units) json["max_units"] = *spec.max_units;
   if (spec.memory) json["memory"] = *spec.memory;
   if (spec.numeric_class) json["numeric_class"] = *spec.numeric_class;
+  if (!spec.after.empty()) json["after"] = spec.after;
   if (spec.reference) json["reference"] = spec.reference->hex();
   return dump(json);
 }
@@ -186,10 +187,10 @@ Result<JobSpec> parse_job_spec(std::string_view text) {
 
 Result<JobSpec> job_spec_of(const nlohmann::json& object) {
   if (!object.is_object()) return bad_argument("spec: must be a JSON object {...}");
-  Fields fields(object, "spec",
-                {"spp", "target_error", "target_layer", "time", "seed", "size", "integrator", "aov",
-                 "defines", "priority", "float", "denoise", "tags", "frames", "max_workers", "max_units",
-                 "memory", "numeric_class", "reference"});
+  Fields fields(object, "spec", {"spp",       "target_error", "target_layer",  "time",    "seed",
+                                 "size",      "integrator",   "aov",           "defines", "priority",
+                                 "float",     "denoise",      "tags",          "frames",  "max_workers",
+                                 "max_units", "memory",       "numeric_class", "after",   "reference"});
   JobSpec spec;
   spec.spp = fields.whole("spp", 1, kMaxSpp);
   spec.target_error = fields.positive("target_error", kMaxTargetError);
@@ -212,6 +213,7 @@ Result<JobSpec> job_spec_of(const nlohmann::json& object) {
   spec.max_units = some("max_units");
   spec.memory = fields.whole("memory", 1, kMaxMemory);
   spec.numeric_class = fields.name("numeric_class");
+  spec.after = fields.names("after").value_or(spec.after);
   read_reference(fields, spec);
   if (fields.error()) return tl::unexpected(*fields.error());
   return spec;

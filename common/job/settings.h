@@ -69,6 +69,9 @@ struct JobSpec {
   // The text is the beginning of the class's digest in hexadecimal, or the beginning of its platform
   // (WorkerHello::platform).
   std::optional<std::string> numeric_class;
+  // Ids of jobs that must be done before this one begins. Of a job that the coordinator has taken: those that
+  // are not done yet.
+  std::vector<std::string> after;
   std::optional<Digest> reference;  // digest of the reference image, an EXR of the job's size
   bool operator==(const JobSpec&) const = default;
 };

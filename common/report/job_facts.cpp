@@ -52,6 +52,8 @@ std::string verdict(const Json& report) {
     const std::string words = text(report, "verdict");
     out += fmt::format("<p class=\"verdict\" role=\"note\">{}</p>",
                        escape_html(words.empty() ? phrase("estimateInDoubt") : words));
+    if (const std::string advice = text(report, "advice"); !advice.empty())
+      out += fmt::format("<p class=\"verdict\" role=\"note\"><b>What to do</b>: {}</p>", escape_html(advice));
     // Prints a sentence on the convergence. If the report has convergence curves, the sentence is below the
     // curves instead.
   } else if (objects(report, "convergence").empty()) {

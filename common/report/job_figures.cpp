@@ -47,13 +47,14 @@ std::string denoised_figure(const Json& report, const std::string& note, const c
 
 std::string key_figures(const Json& report) {
   constexpr const char* kKey = " class=\"key\"";
-  std::string out = fact("relMSE", figure(number(report, "relmse")), within(report, "relmse_ci95"), kKey);
   const double target = number(report, "target_error");
   const std::string note = target > 0 ? fmt::format("target {}", given(target)) : "";
-  if (denoised_target(report))
-    out += denoised_figure(report, note, kKey);
-  else if (!note.empty() && !out.empty())
-    out.insert(out.rfind("</dd>"), fmt::format("<small>{}</small>", note));
+  // Who has an image denoised looks at the denoised layers: their error comes first.
+  std::string out = denoised_figure(report, denoised_target(report) ? note : "", kKey);
+  std::string raw = fact("relMSE", figure(number(report, "relmse")), within(report, "relmse_ci95"), kKey);
+  if (!denoised_target(report) && !note.empty() && !raw.empty())
+    raw.insert(raw.rfind("</dd>"), fmt::format("<small>{}</small>", note));
+  out += raw;
   out += fact("Samples per pixel", given(number(report, "spp")), "", kKey);
   out += fact("Render time", duration(number(report, "render_seconds")), "first ray to last fold", kKey);
   return out + fact("Core time", duration(number(report, "core_seconds")), "spent on rendering", kKey);
@@ -104,7 +105,6 @@ std::string lesser_figures(const Json& report) {
   out += fact("relMSE, 16 x 16", figure(number(report, "relmse_16")), within(report, "relmse_16_ci95"));
   out += mean_figure(report);
   out += true_figures(report);
-  if (!denoised_target(report)) out += denoised_figure(report, "");
   out +=
       fact("Efficiency", figure(number(report, "efficiency")), "1 / (relMSE × seconds)" + threads_of(report));
   out += fact("Efficiency per core", figure(number(report, "efficiency_per_core")),

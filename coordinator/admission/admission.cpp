@@ -348,6 +348,7 @@ Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, c
     job.spec.time = changes.time;
   }
   job.spec.priority = changes.priority;
+  job.spec.after = changes.after;
   if (changes.seed) job.settings.seed = *(job.spec.seed = changes.seed);
   for (const BlobRef& asset : job.assets)
     if (!blobs.has(asset.digest))
@@ -416,7 +417,8 @@ JobPlan plan_of(const StoredJob& job) {
           .max_units = job.spec.max_units.value_or(0),
           .memory_bytes = memory_need(job),
           .class_asked = job.spec.numeric_class.value_or(""),
-          .focus = job.focus};
+          .focus = job.focus,
+          .held = !job.spec.after.empty()};
 }
 
 }  // namespace ls::coordinator

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/image/exr/final_image.h"
+#include "common/job/advice.h"
 
 namespace ls::coordinator {
 namespace {
@@ -345,6 +346,11 @@ std::string report_json(const ReportFacts& facts) {
   j["trusted"] = convergence_status.trusted;
   j["verdict"] = convergence_status.words;
   j["verdict_kind"] = to_string(convergence_status.kind);
+  j["advice"] = text_or_null(advice_on(convergence_status, {.job = job.id.value,
+                                                            .relmse = e ? e->relmse : 0,
+                                                            .spp_done = totals.spp_done,
+                                                            .goes_on = !is_terminal(job.state),
+                                                            .can_extend = !is_closed(job.state)}));
   const Efficiency efficiency = efficiency_of(facts);
   j["efficiency"] = number(efficiency.wall);
   j["efficiency_per_core"] = number(efficiency.per_core);

@@ -36,8 +36,8 @@ struct JobPlan {
   std::string replay = "lightshaft render SCENE";
   // Limits and fair shares (fair_share.h, docs/design/scheduling.md)
   std::string owner;  // the user (JobView::owner); empty: the administrator, to whom no user limits apply
-  // The sequence (a job with frames) that this job is a frame of; empty: none. Jobs of one owner and group
-  // count as one job for fair shares, and run in order.
+  // The sequence (a job with frames) that this job is a frame of; empty: none. The frames of a sequence share
+  // the limits below.
   std::string group;
   // Limits of the job; if it has a group, all jobs of the group share them
   std::uint32_t max_workers = 0;   // at most this many workers hold units at the same time; 0: no limit
@@ -49,6 +49,7 @@ struct JobPlan {
   // A rectangle of the frame: the tiles that it touches are leased before all others; nullopt: no tile goes
   // first. It changes only the order in which units are leased, not the image.
   std::optional<PixelRect> focus;
+  bool held = false;  // true: no unit is leased, as the job waits for other jobs to end
 };
 
 // Jobs
@@ -110,6 +111,11 @@ struct JobStopped {
 struct JobPriority {
   JobId job;
   int priority = 0;
+};
+// Changes JobPlan::held. Units that are leased already are rendered.
+struct JobHeld {
+  JobId job;
+  bool held = false;
 };
 // Changes JobPlan::focus. A focus must lie in the frame; otherwise the event is ignored.
 struct JobFocused {
@@ -245,8 +251,8 @@ struct Tick {};
 
 using Event =
     std::variant<JobSubmitted, JobRestored, JobCancelled, JobPaused, JobResumed, JobStopped, JobPriority,
-                 JobFocused, JobRetargeted, JobExtended, JobForgotten, WorkerJoined, WorkerQuarantined,
-                 WorkerLost, WorkerDrains, LeaseProgress, ResultsWait, LeaseCameBack, ClassChosen,
-                 UnitAccepted, UnitFolded, DenoisedChecked, UnitFailed, Tick>;
+                 JobHeld, JobFocused, JobRetargeted, JobExtended, JobForgotten, WorkerJoined,
+                 WorkerQuarantined, WorkerLost, WorkerDrains, LeaseProgress, ResultsWait, LeaseCameBack,
+                 ClassChosen, UnitAccepted, UnitFolded, DenoisedChecked, UnitFailed, Tick>;
 
 }  // namespace ls::coordinator

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 namespace ls::coordinator {
 
@@ -45,6 +46,13 @@ struct DenoisedCheck {
   // Upper end of the 95 % confidence interval of `relmse`; nullopt: the interval is not known
   std::optional<double> at_most;
   bool operator==(const DenoisedCheck&) const = default;
+};
+
+// The error of the denoised layers of a finished image
+struct DenoisedFigure {
+  double relmse = 0;
+  std::optional<std::pair<double, double>> relmse_ci95;  // nullopt: the interval is not known
+  bool operator==(const DenoisedFigure&) const = default;
 };
 
 }  // namespace ls::coordinator

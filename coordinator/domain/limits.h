@@ -74,9 +74,10 @@ inline double plausible_seconds(double reported) {
 }
 // Core seconds charged for a unit until a cost is measured for its job
 inline constexpr double kAssumedUnitSeconds = 1.0;
-// Loading a scene takes time. So a worker may get units of a job whose scene it has loaded, although another
-// job is next in turn. The condition is that the lag of the loaded job (fair_share.h), in core seconds,
-// exceeds that of the job in turn by at most kLocalitySeconds times the number of the farm's threads.
+// Loading a scene takes time. So a worker may get units of a job whose scene it has loaded, although a job of
+// another user is next in turn. The condition is that the lag of the loaded job (fair_share.h), in core
+// seconds, exceeds that of the job in turn by at most kLocalitySeconds times the number of the farm's
+// threads.
 inline constexpr double kLocalitySeconds = 5.0;
 // At most this many jobs are checked to find one whose scene the worker has loaded
 inline constexpr std::uint32_t kJobsLookedAt = 64;

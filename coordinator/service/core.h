@@ -43,6 +43,12 @@ class FarmDriver {
   // Unloads an ended job whose files are complete on disk: frees its image in memory and its state in the
   // farm; only its files and its record remain. Results that still arrive for it are dropped.
   void unload(JobEntry& entry);
+  // Lets the jobs that wait for this job, frame or sequence begin if it is done and was the last one that
+  // they waited for. Called when a job has ended or was removed, outside of run() if it is done.
+  void notify_jobs_after(const JobId& ended);
+  // Sets what the job waits for (JobSpec::after), in the farm and in its record.
+  void set_after(const EntryPtr& entry, std::vector<std::string> after);
+  void forget_done_prerequisites(const EntryPtr& entry);
 
  private:
   void on(const Send& e);
@@ -90,7 +96,7 @@ struct Core {
       : tracing(tracing),
         driver(*this, std::move(farm), clock, files, images, comparer),
         jobs(shared),
-        views(driver.farm(), clock),
+        views(driver.farm(), jobs, clock),
         records(store, jobs, writes),
         publisher(hub, views, jobs, workers, records, clock) {}
 

@@ -12,6 +12,7 @@
 #include "coordinator/service/core.h"
 #include "coordinator/service/image_writer.h"
 #include "coordinator/service/reference_comparer.h"
+#include "coordinator/service/state/prerequisites.h"
 
 namespace ls::coordinator {
 
@@ -56,6 +57,39 @@ void FarmDriver::unload(JobEntry& entry) {
   entry.free_image();
   entry.trace.reset();
   run(JobForgotten{entry.stored.id});
+}
+
+void FarmDriver::set_after(const EntryPtr& entry, std::vector<std::string> after) {
+  const bool held = !after.empty();
+  core_.jobs.set_after(*entry, std::move(after));
+  core_.records.put(entry);
+  if (!entry->unloaded) run(JobHeld{entry->stored.id, held});
+  core_.publisher.job(*entry);
+}
+
+void FarmDriver::forget_done_prerequisites(const EntryPtr& entry) {
+  std::vector<std::string> left = entry->stored.spec.after;
+  const auto done = [&](const std::string& name) {
+    return prerequisite_state(core_.jobs, {name}) == JobState::done;
+  };
+  if (std::erase_if(left, done) == 0) return;
+  if (left.empty()) core_.records.log(entry->stored.id, "the jobs for which it waited are done");
+  set_after(entry, std::move(left));
+}
+
+void FarmDriver::notify_jobs_after(const JobId& ended) {
+  std::vector<EntryPtr> waiting = core_.jobs.waiting_for(ended);
+  if (const auto frame = frame_of(ended)) {
+    const auto of_all = core_.jobs.waiting_for(frame->sequence);
+    waiting.insert(waiting.end(), of_all.begin(), of_all.end());
+  }
+  for (const EntryPtr& entry : waiting) {
+    const auto state = prerequisite_state(core_.jobs, ended);
+    if (state == JobState::done)
+      forget_done_prerequisites(entry);
+    else
+      core_.publisher.job(*entry);
+  }
 }
 
 // Effects that concern leases
@@ -281,6 +315,7 @@ void FarmDriver::on(const JobStateChanged& e) {
   }
   core_.records.put(entry);
   core_.publisher.job(*entry);
+  if (is_terminal(e.to)) notify_jobs_after(e.job);
   core_.ended.notify_all();
 }
 

@@ -237,6 +237,13 @@ void ImageWriter::write_final(const EntryPtr& entry, std::uint64_t number) {
   entry->stored.totals.spp_done = facts.job.totals.spp_done;
   entry->stored.totals.units = facts.job.totals.units;
   entry->stored.totals.units_planned = facts.job.totals.units_planned;
+  entry->stored.denoised.reset();
+  if (facts.denoised && !facts.denoised->by.empty()) {
+    const DenoisedError& e = facts.denoised->error;
+    entry->stored.denoised = {
+        std::max(0.0, e.relmse),
+        e.relmse_interval ? std::optional(std::pair(e.relmse_lo, e.relmse_hi)) : std::nullopt};
+  }
   core->records.put(entry);
   failpoint("job-done");
   if (entry->trace) {
@@ -247,6 +254,7 @@ void ImageWriter::write_final(const EntryPtr& entry, std::uint64_t number) {
   log_info(fmt::format("job={} state=done stopped={}", facts.job.id.value, to_string(*facts.job.stopped)),
            facts.job.name);
   core->publisher.job(*entry);
+  core->driver.notify_jobs_after(facts.job.id);
   core->ended.notify_all();
 }
 

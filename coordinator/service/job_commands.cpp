@@ -13,6 +13,7 @@
 #include "common/job/limits.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/service/core.h"
+#include "coordinator/service/state/prerequisites.h"
 
 namespace ls::coordinator {
 namespace {
@@ -183,6 +184,7 @@ Result<void> JobCommands::remove_job(Core& core, const JobId& id) const {
   if (auto removed = store_.remove_job(id); !removed) return removed;
   drop(core, entry);
   core.publisher.job_removed(id, entry->stored.owner);
+  core.driver.notify_jobs_after(id);
   return {};
 }
 
@@ -204,6 +206,8 @@ Result<void> JobCommands::change_job(Core& core, const EntryPtr& entry, const Jo
   }
   if (change.focus)
     if (auto done = set_focus(core, {entry}, *change.focus); !done) return done;
+  if (change.after)
+    if (auto done = set_after(core, entry->stored.id, {entry}, *change.after); !done) return done;
   return change.state ? become(core, {entry}, *change.state) : Result<void>{};
 }
 
@@ -271,6 +275,25 @@ Result<void> JobCommands::set_priority(Core& core, const Entries& jobs, int prio
     return put;
   for (const EntryPtr& job : jobs)
     if (!job->unloaded) core.driver.run(JobPriority{job->stored.id, priority});
+  return {};
+}
+
+Result<void> JobCommands::set_after(Core& core, const JobId& id, const Entries& jobs,
+                                    const std::vector<std::string>& after) const {
+  const auto ended = [](const EntryPtr& job) { return is_terminal(job->stored.state); };
+  if (std::ranges::all_of(jobs, ended))
+    return fail(Errc::failed_precondition,
+                fmt::format("job {} has ended: it can no longer wait for others", id.value));
+  if (auto ok = check_no_cycle(core.jobs, id, after); !ok) return ok;
+  std::vector<std::uint32_t> frames;
+  if (core.jobs.sequence(id))
+    for (const EntryPtr& job : jobs) frames.push_back(frame_of(job->stored.id)->frame);
+  auto lists = prerequisites_of(core.jobs, after, frames);
+  if (!lists) return tl::unexpected(lists.error());
+  core.records.put_together([&] {
+    for (std::size_t i = 0; i < jobs.size(); ++i)
+      if (!ended(jobs[i])) core.driver.set_after(jobs[i], std::move((*lists)[i]));
+  });
   return {};
 }
 
@@ -417,6 +440,8 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
     if (auto done = set_priority(core, sound, *change.priority); !done) return done;
   if (change.focus)
     if (auto done = set_focus(core, sound, *change.focus); !done) return done;
+  if (change.after)
+    if (auto done = set_after(core, id, sequence.frames, *change.after); !done) return done;
   if (change.state) {
     open.insert(open.end(), extended.begin(), extended.end());
     if (auto done = become(core, open, *change.state); !done) return done;
@@ -444,6 +469,7 @@ Result<void> JobCommands::remove_sequence(Core& core, const JobId& id, const Seq
   core.jobs.unlist(id);
   for (const EntryPtr& frame : frames) drop(core, frame);
   core.publisher.job_removed(id, frames.front()->stored.owner);
+  for (const EntryPtr& frame : frames) core.driver.notify_jobs_after(frame->stored.id);
   return {};
 }
 

@@ -63,6 +63,10 @@ Result<void> Restore::restart(Core& core) const {
     const auto missing = needs_files ? missing_blobs_of(job, blobs_) : std::vector<BlobRef>();
     add(core, std::move(job), missing);
   }
+  const std::vector<JobId> all = core.jobs.order();
+  for (const JobId& id : all)
+    if (const auto entries = core.jobs.job_or_frames(id))
+      for (const EntryPtr& entry : *entries) core.driver.forget_done_prerequisites(entry);
   return {};
 }
 
@@ -280,6 +284,8 @@ void Takeover::take_over(Inheritance inheritance) {
                       inheritance.job.from));
   if (!entry->broken.empty()) core->records.log(id, entry->broken);
   core->publisher.job(*entry);
+  core->driver.forget_done_prerequisites(entry);
+  core->driver.notify_jobs_after(id);
   core->driver.run(Tick{});
 }
 

@@ -1,11 +1,13 @@
 #include "coordinator/service/submission.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "common/base/clock.h"
 #include "common/base/log.h"
 #include "coordinator/admission/admission.h"
 #include "coordinator/service/core.h"
+#include "coordinator/service/state/prerequisites.h"
 
 namespace ls::coordinator {
 namespace {
@@ -89,6 +91,9 @@ Result<JobId> Submission::take(std::vector<StoredJob> jobs, const std::optional<
     return tl::unexpected(room.error());
   const JobId id = core->jobs.unused_id();
   const auto frames = range ? range->frames() : std::vector<std::uint32_t>();
+  auto after = prerequisites_of(core->jobs, jobs.front().spec.after, frames);
+  if (!after) return tl::unexpected(after.error());
+  for (std::size_t i = 0; i < jobs.size(); ++i) jobs[i].spec.after = std::move((*after)[i]);
   std::vector<std::shared_ptr<PartialLog>> logs(jobs.size());
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     jobs[i].id = range ? frame_job(id, frames[i]) : id;
@@ -119,6 +124,9 @@ Result<JobId> Submission::take(std::vector<StoredJob> jobs, const std::optional<
     core->records.log(id, "submitted");
     core->publisher.job(first);
   }
+  for (const EntryPtr& entry : entries)
+    if (const auto& names = entry->stored.spec.after; !names.empty())
+      core->records.log(entry->stored.id, fmt::format("waits for {}", fmt::join(names, ", ")));
   for (const EntryPtr& entry : entries)
     if (entry->trace) entry->trace->step("admit scene", began, clock_.now());
   for (const EntryPtr& entry : entries) core->driver.run(JobSubmitted{plan_of(entry->stored)});

@@ -118,9 +118,9 @@ Result<std::vector<std::filesystem::path>> list_folder(const std::filesystem::pa
   return paths;
 }
 
-Result<AtomicFile> AtomicFile::create(std::filesystem::path path, std::string_view suffix) {
+Result<AtomicFile> AtomicFile::create(std::filesystem::path path, std::string_view suffix, unsigned mode) {
   std::filesystem::path temporary = path.string() + std::string(suffix);
-  auto file = File::open(temporary, O_WRONLY | O_CREAT | O_TRUNC);
+  auto file = File::open(temporary, O_WRONLY | O_CREAT | O_TRUNC, mode);
   if (!file) return tl::unexpected(file.error());
   return AtomicFile(std::move(path), std::move(temporary), std::move(*file));
 }
@@ -162,8 +162,9 @@ Result<void> AtomicFile::commit_unsynced() {
   return {};
 }
 
-Result<void> write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  auto file = AtomicFile::create(path);
+Result<void> write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes,
+                              unsigned mode) {
+  auto file = AtomicFile::create(path, ".tmp", mode);
   if (!file) return tl::unexpected(file.error());
   if (auto written = file->write(bytes); !written) return written;
   return file->commit();

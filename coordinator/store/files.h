@@ -48,14 +48,16 @@ Result<void> sync_folder(const std::filesystem::path& folder);
 Result<std::vector<std::filesystem::path>> list_folder(const std::filesystem::path& folder);
 // Writes a temporary file, syncs it, renames it to `path` and syncs the folder, so that after a crash the
 // file at `path` has either its old or its new content.
-Result<void> write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
+Result<void> write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes,
+                              unsigned mode = 0640);
 
 // Like write_atomically(), for content too large for memory: the content is written piece by piece to a file
 // named PATH + `suffix`, which commit() renames to PATH. If the object is destroyed without a commit, the
 // temporary file is removed.
 class AtomicFile {
  public:
-  static Result<AtomicFile> create(std::filesystem::path path, std::string_view suffix = ".tmp");
+  static Result<AtomicFile> create(std::filesystem::path path, std::string_view suffix = ".tmp",
+                                   unsigned mode = 0640);
   AtomicFile(AtomicFile&&) noexcept = default;
   ~AtomicFile();
 

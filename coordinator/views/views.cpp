@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/parse_number.h"
+#include "common/job/advice.h"
 
 namespace ls::coordinator {
 namespace {
@@ -73,6 +74,21 @@ json to_value(const ReferenceError& e) {
           {"rmse_below_noise", e.rmse_below_noise()}};
 }
 
+json to_value(const std::vector<AfterView>& after) {
+  json all = json::array();
+  for (const AfterView& one : after)
+    all.push_back({{"id", one.id.value}, {"state", one.state ? json(to_string(*one.state)) : json()}});
+  return all;
+}
+
+std::string advice_of(const JobView& v) {
+  return advice_on(*v.convergence_status, {.job = v.id.value,
+                                           .relmse = v.error_now ? v.error_now->relmse : 0,
+                                           .spp_done = v.spp_done,
+                                           .goes_on = !is_terminal(v.state),
+                                           .can_extend = !is_closed(v.state)});
+}
+
 json to_value(const JobView& v) {
   const auto frame = frame_of(v.id);
   const ErrorFigures* error = v.error_now ? &*v.error_now : nullptr;
@@ -89,6 +105,9 @@ json to_value(const JobView& v) {
           {"target_layer", v.target_error ? json(to_string(v.target_layer)) : json()},
           {"denoised_check", v.denoised_check ? to_value(*v.denoised_check) : json()},
           {"denoise", v.denoise},
+          {"denoised", v.denoised ? json{{"relmse", number(v.denoised->relmse)},
+                                         {"relmse_ci95", interval(v.denoised->relmse_ci95)}}
+                                  : json()},
           {"eta_seconds", number(v.eta_seconds)},
           {"eta_ci95", interval(v.eta_ci95)},
           {"eta_with_more", v.eta_with_more ? json{{"workers", kMoreWorkers},
@@ -99,6 +118,8 @@ json to_value(const JobView& v) {
           {"eta_with_8_more", number(v.eta_with_more)},
           {"eta_with_8_more_ci95", interval(v.eta_with_more_ci95)},
           {"error", text_or_null(v.error)},
+          {"after", to_value(v.after)},
+          {"waits_for", text_or_null(v.waits_for)},
           {"warnings", v.warnings},
           {"fake", v.fake},
           {"size", {v.size.width, v.size.height}},
@@ -130,7 +151,8 @@ json to_value(const JobView& v) {
           {"reference_same_seed", v.reference_same_seed},
           {"verdict", v.convergence_status ? json{{"kind", to_string(v.convergence_status->kind)},
                                                   {"words", v.convergence_status->words},
-                                                  {"trusted", v.convergence_status->trusted}}
+                                                  {"trusted", v.convergence_status->trusted},
+                                                  {"advice", text_or_null(advice_of(v))}}
                                            : json()},
           {"few_hits", or_null(v.few_hits)},
           {"pixels_without_samples", or_null(v.pixels_without_samples)},

@@ -121,6 +121,12 @@ struct FramesView {
   std::vector<FrameView> all;  // all frames, ascending; filled in by Coordinator::job() only
 };
 
+// A job that another one waits for
+struct AfterView {
+  JobId id;
+  std::optional<JobState> state;  // nullopt: there is no such job any more
+};
+
 struct JobView {
   JobId id;
   std::string name;  // name of the scene file, for display
@@ -142,7 +148,9 @@ struct JobView {
   // no check was made yet
   std::optional<DenoisedCheck> denoised_check;
   bool denoise = false;  // true: its image also gets denoised layers
-  double spp_done = 0;   // samples per pixel so far, mean over all pixels
+  std::optional<DenoisedFigure>
+      denoised;         // error of the denoised layers; nullopt: not made yet, or a sequence
+  double spp_done = 0;  // samples per pixel so far, mean over all pixels
   std::optional<ErrorFigures> error_now;
   // Error against the reference image, at the last checkpoint that was compared with it; nullopt: no
   // checkpoint was compared yet
@@ -167,6 +175,8 @@ struct JobView {
   std::optional<std::pair<double, double>> eta_with_more_ci95;
   std::string error;                  // why the job failed or waits; empty: it does neither
   std::vector<std::string> warnings;  // warnings about the scene
+  std::vector<AfterView> after;       // jobs that must be done before this one begins, and are not yet
+  std::string waits_for;              // says so in words; empty: it waits for no other job
   FrameSize size;
   int tile = 32;
   int priority = 0;
@@ -208,6 +218,7 @@ struct JobChange {
   // Pixels whose tiles are rendered before the others from now on. Outer nullopt: no change; inner nullopt:
   // no tiles are preferred any more.
   std::optional<std::optional<PixelRect>> focus = {};
+  std::optional<std::vector<std::string>> after = {};  // replaces the jobs that it waits for
 };
 
 // How a list of jobs is sorted. `order`: in order of submission. `active`: running jobs first, then paused,

@@ -317,7 +317,7 @@ def test_a_farm_that_is_down_is_named(local_farm):
         ) as farm:  # the next one answers
             assert farm.workers()
     with pytest.raises(lightshaft.RequestRejected, match="http://"):
-        lightshaft.Farm("localhost:8080", "x")
+        lightshaft.Farm("ftp://localhost:8080", "x")
 
 
 def test_certificates_are_checked(tmp_path):
@@ -416,3 +416,33 @@ def test_both_farms_have_the_same_methods():
 
     assert methods(lightshaft.Farm) == methods(lightshaft.AsyncFarm)
     assert methods(lightshaft.Job) == methods(lightshaft.AsyncJob)
+
+
+def test_jobs_are_chosen_by_state_name_and_order(farm):
+    waiting = [farm.submit(SCENE, name=name, spp=4, tags=["nobody"]) for name in ("chapel", "hall")]
+    ids = [job.id for job in waiting]
+    waiting[1].pause()
+
+    assert [job.id for job in farm.jobs(search="chapel")] == ids[:1]
+    assert [job.id for job in farm.jobs(state=["paused"], search="hall")] == ids[1:]
+    assert [job.id for job in farm.jobs(sort="-submitted", limit=2)] == ids[::-1]
+    assert [job.id for job in farm.jobs(sort="-submitted", limit=1, offset=1)] == ids[:1]
+    assert repr(waiting[0]) == f"<Job {ids[0]} 'chapel': queued, 0 %>"
+    with pytest.raises(lightshaft.RequestRejected, match="unknown word"):
+        farm.jobs(state="runing")
+    for job in waiting:
+        job.remove()
+
+
+def test_a_job_waits_for_others_until_they_are_done(farm):
+    first = farm.submit(SCENE, spp=4, tags=["nobody"])
+    second = farm.submit(SCENE, spp=4, after=[first.id])
+    assert second.view["after"] == [{"id": first.id, "state": "queued"}]
+    assert second.view["waits_for"] == f"waits for job {first.id}, which is queued"
+    with pytest.raises(lightshaft.RequestRejected, match="would wait for itself"):
+        first.wait_for(second)
+
+    assert second.wait_for().view["after"] == []
+    assert second.wait().state == "done"
+    assert first.wait_for(second).view["after"] == []
+    first.remove()

@@ -183,14 +183,23 @@ def test_names_are_shown_and_do_nothing(farm, stub):
     stub.answers["/api/v1/jobs/j-1"] = (
         200,
         {},
-        json.dumps({**JOB, "name": evil, "error": evil, "verdict": {"words": evil}}).encode(),
+        json.dumps(
+            {
+                **JOB,
+                "name": evil,
+                "error": evil,
+                "waits_for": f"{evil} too",
+                "denoised": {"relmse": evil, "relmse_ci95": [evil, evil]},
+                "verdict": {"words": evil, "advice": evil},
+            }
+        ).encode(),
     )
     stub.answers["/api/v1/jobs/j-1/image.png"] = (200, {}, evil.encode())
     stub.answers["/api/v1/jobs/j-1/convergence.csv"] = (200, {}, b"core_seconds,relmse\n1,2\n2,1\n")
     html = farm.job("j-1")._repr_html_()
     assert (
         "<script>" not in html
-        and html.count("&lt;script&gt;") == 3
+        and html.count("&lt;script&gt;") == 5
         and "no picture yet" in html
         and "<svg" in html
     )

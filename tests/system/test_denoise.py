@@ -25,7 +25,7 @@ def test_the_command_adds_layers_and_tells_their_error(fog, tmp_path):
     assert digest(done) == plain
     figures = json.loads((tmp_path / "report.json").read_text())["denoised"]
     assert figures["by"] == "Open Image Denoise 2.99.7" and figures["relmse_ci95"][0] <= figures["relmse"] <= figures["relmse_ci95"][1]
-    assert f", denoised {figures['relmse']:.3g} (" in done.stderr
+    assert f", denoised relMSE {figures['relmse']:.3g} (" in done.stderr
     assert "relMSE, denoised" in (tmp_path / "report.html").read_text()
     rows, strings, types = read(tmp_path / "out.exr")
     assert {types[f"denoised.{c}"] for c in "RGB"} == {"e"} and rows["denoised.R"] != rows["R"]
@@ -77,7 +77,7 @@ def test_on_a_farm_image_picture_and_report_have_it(fog, tmp_path):
         to = ("--to", f"http://127.0.0.1:{farm.http}", "--token-file", farm.data / "token")
         waited = lightshaft("submit", fog, *to, "--spp", 16, "--denoise", "--wait")
         denoised = farm.report(waited.stdout.split()[0])["denoised"]
-        assert f"denoised {denoised['relmse']:.3g} (" in waited.stderr
+        assert f"denoised relMSE {denoised['relmse']:.3g} (" in waited.stderr
         assert "denoised" not in lightshaft("submit", fog, *to, "--spp", 16, "--wait").stderr
         picture = farm.request("GET", f"/api/v1/jobs/{job}/image.png?layer=denoised")
         assert picture.startswith(b"\x89PNG") and picture != farm.request("GET", f"/api/v1/jobs/{job}/image.png")

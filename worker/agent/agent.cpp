@@ -144,7 +144,7 @@ void Agent::Impl::connection_ended(const Error& why) {
   const Duration pause = backoff.next();
   connection_timer = now + pause;
   if (!ended && !(draining && outbox.empty()))
-    log_warn(fmt::format("worker={}", id.value),
+    log_warn(fmt::format("worker={}", id.empty() ? options.hello.name : id.value),
              fmt::format("no connection to the coordinator ({}); trying again in {:.1f} s", why.message,
                          seconds(pause)));
 }

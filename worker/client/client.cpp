@@ -54,7 +54,12 @@ Errc code_of(grpc::StatusCode code) {
 
 // Converts a gRPC status to an Error: the inverse of to_status() in coordinator/rpc/streams.cpp.
 Error to_error(const grpc::Status& status) {
-  return {code_of(status.error_code()), std::string(status.error_message())};
+  std::string message(status.error_message());
+  // gRPC says so of a server that speaks HTTP/1
+  if (message.find("http1.x server") != std::string::npos)
+    message +=
+        ": this is the port for people and programs; workers connect to the one of --grpc, 50051 by default";
+  return {code_of(status.error_code()), std::move(message)};
 }
 
 // One gRPC stream to the coordinator. Messages to the coordinator are queued; the size of the agent's outbox

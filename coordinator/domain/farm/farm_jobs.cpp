@@ -32,7 +32,7 @@ void Farm::State::set_state(Job& job, JobState to) {
 }
 
 void Farm::State::refresh(Job& job) {
-  const bool units = job.leasable() && !job.queue.empty(job.units);
+  const bool units = job.leasable() && !job.plan.held && !job.queue.empty(job.units);
   // work_appeared is set even if FairShare lists the job already: it may be listed only for an audit, which
   // few workers can render, whereas more workers can render these units.
   work_appeared |= units && !job.has_units;
@@ -154,6 +154,13 @@ void Farm::State::on(const JobPriority& event) {
   shares.leave(*job);
   job->plan.priority = event.priority;
   shares.enter(*job);
+  refresh(*job);
+}
+
+void Farm::State::on(const JobHeld& event) {
+  Job* job = find(event.job);
+  if (job == nullptr) return;
+  job->plan.held = event.held;
   refresh(*job);
 }
 

@@ -215,7 +215,7 @@ bool Farm::State::in_good_hands(const Job& job) const {
 
 std::string Farm::why_waiting(const JobId& id) const {
   const Job* job = state_->find(id);
-  if (job == nullptr || !job->leasable() || state_->in_good_hands(*job)) return "";
+  if (job == nullptr || !job->leasable() || job->plan.held || state_->in_good_hands(*job)) return "";
   if (job->losses_in_a_row >= kLossesInARow)
     return fmt::format(
         "{} times in a row the worker that held its units was lost before it finished one; the "

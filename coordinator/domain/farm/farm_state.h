@@ -80,6 +80,7 @@ struct Farm::State {
   void on(const JobResumed& event);
   void on(const JobStopped& event);
   void on(const JobPriority& event);
+  void on(const JobHeld& event);
   void on(const JobFocused& event);
   void on(const JobRetargeted& event);
   void on(const JobExtended& event);

@@ -1,8 +1,8 @@
 // Decides which worker gets which units next; a unit is one round (range of samples) of one tile. Higher
-// priorities go first, and jobs of one priority get equal shares (fair_share.h). Within a job lower rounds go
-// first, so that a preview of the whole image is available early. Idle workers go before busy ones, and among
-// them those that have loaded the job's world. Leases (lists of units that are assigned to one worker) shrink
-// near the end of a job.
+// priorities go first, users get equal shares, and a user's jobs go one after the other (fair_share.h).
+// Within a job lower rounds go first, so that a preview of the whole image is available early. Idle workers
+// go before busy ones, and among them those that have loaded the job's world. Leases (lists of units that are
+// assigned to one worker) shrink near the end of a job.
 #include <algorithm>
 #include <limits>
 
@@ -209,24 +209,28 @@ bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
 }
 
 // Returns the job whose units this worker gets next; null: none. This is the first job in turn or, to save
-// loading time, a later one whose world (loaded scene) or scene file the worker has. A later job is chosen
-// only if it is not far ahead of its fair share and some worker is rendering the first job. The result is
-// also null if the worker will get units of the first job soon: leases of another job would delay these.
+// loading time, the first job of another user, if the worker has its world (loaded scene) or scene file. The
+// other user must not be far ahead of their fair share, and some worker must be rendering the job that is
+// first in turn. A later job of the same user never goes before an earlier one. The result is also null if
+// the worker will get units of the first job soon: leases of another job would delay these.
 Job* Farm::State::choose(const Worker& worker) {
+  using Then = FairShare::Then;
   Job* fair = nullptr;
   Job* chosen = nullptr;
   double least = 0;
   std::uint32_t looked_at = 0;
   const double slack = kLocalitySeconds * workers.threads();
   shares.in_turn([&](Job& job, double lag) {
-    if (fair != nullptr && ++looked_at > kJobsLookedAt) return true;
-    if (fair != nullptr && (lag - least > slack || !holds(job, worker))) return false;
+    if (fair != nullptr &&
+        (++looked_at > kJobsLookedAt || job.plan.priority != fair->plan.priority || lag - least > slack))
+      return Then::stop;
     const Takes when = takes(job, worker);
-    if (when != Takes::now) return when == Takes::later && fair == nullptr;
+    if (when == Takes::nothing) return Then::next_job;
+    if (when == Takes::later) return fair == nullptr ? Then::stop : Then::next_user;
     if (fair == nullptr) fair = &job, least = lag;
-    if (!holds(job, worker) && job.load.units > 0) return false;
+    if (!holds(job, worker) && job.load.units > 0) return Then::next_user;
     chosen = &job;
-    return true;
+    return Then::stop;
   });
   return chosen != nullptr ? chosen : fair;
 }

@@ -82,10 +82,11 @@ Result<SubmitRequest> from_xml(const Request& request) {
 // Reads all changes in the body of a PATCH, so that an error in one is found before any is applied.
 Result<coordinator::JobChange> read_change(std::string_view text) {
   using coordinator::JobState;
-  const auto body = read_object(text, {"state", "priority", "spp", "target_error", "focus"});
+  const auto body = read_object(text, {"state", "priority", "spp", "target_error", "focus", "after"});
   if (!body) return tl::unexpected(body.error());
   if (body->empty())
-    return bad_argument("the body changes nothing; possible: state, priority, spp, target_error, focus");
+    return bad_argument(
+        "the body changes nothing; possible: state, priority, spp, target_error, focus, after");
   coordinator::JobChange change;
   if (const auto target = body->find("target_error"); target != body->end()) {
     if (!target->is_number() || !(target->get<double>() > 0))
@@ -118,7 +119,20 @@ Result<coordinator::JobChange> read_change(std::string_view text) {
     change.focus =
         rect ? std::optional(PixelRect{(*focus)[0], (*focus)[1], (*focus)[2], (*focus)[3]}) : std::nullopt;
   }
+  if (const auto after = body->find("after"); after != body->end()) {
+    const auto spec = job_spec_of({{"after", *after}});
+    if (!spec) return tl::unexpected(spec.error());
+    change.after = spec->after;
+  }
   return change;
+}
+
+// Refuses prerequisites that the caller may not see, as if there were no such jobs.
+std::optional<Response> refuse_after(Api& api, const Caller& caller, const std::vector<std::string>& after) {
+  for (const std::string& name : after)
+    if (const auto owner = api.coordinator().owner({name}); !owner || !caller.sees(*owner))
+      return problem(Error{Errc::invalid_argument, fmt::format("after: there is no job {}", name)});
+  return std::nullopt;
 }
 
 constexpr std::size_t kMaxPage = 1000;
@@ -191,11 +205,12 @@ Response get_jobs(Api& api, const Request& request, const Params&) {
 
 Response post_again(Api& api, const Request& request, const JobId& id) {
   if (const auto owner = api.coordinator().owner(id); !owner) return problem(owner.error());
-  const auto body = read_object(request.body, {"spp", "target_error", "time", "seed", "priority"});
+  const auto body = read_object(request.body, {"spp", "target_error", "time", "seed", "priority", "after"});
   if (!body) return problem(body.error());
   const auto changes = job_spec_of(*body);
   if (!changes) return problem(changes.error());
   if (auto refused = refuse_priority(api, request.caller, changes->priority)) return std::move(*refused);
+  if (auto refused = refuse_after(api, request.caller, changes->after)) return std::move(*refused);
   const auto made = api.coordinator().submit_again(id, *changes, request.caller.user,
                                                    std::string(request.header("traceparent")));
   return made ? submitted(api, *made) : problem(made.error());
@@ -221,6 +236,8 @@ Response patch_job(Api& api, const Request& request, const JobId& id) {
   if (!change) return problem(change.error());
   if (change->priority)
     if (auto refused = refuse_priority(api, request.caller, *change->priority)) return std::move(*refused);
+  if (change->after)
+    if (auto refused = refuse_after(api, request.caller, *change->after)) return std::move(*refused);
   if (const auto done = api.coordinator().change(id, *change); !done) return problem(done.error());
   return get_job(api, request, id);
 }
@@ -255,6 +272,7 @@ std::optional<Response> refuse_priority(const Api& api, const Caller& caller, in
 
 Response submit_job(Api& api, coordinator::SubmitRequest request, const Caller& caller) {
   if (auto refused = refuse_priority(api, caller, request.spec.priority)) return std::move(*refused);
+  if (auto refused = refuse_after(api, caller, request.spec.after)) return std::move(*refused);
   const auto id = api.coordinator().submit(std::move(request));
   return id ? submitted(api, *id) : problem(id.error().error, id.error().diagnostics);
 }

@@ -49,7 +49,7 @@ std::optional<Result<Json>> parse_value(std::string_view key, std::string_view t
   if (key == "integrator" || key == "frames" || key == "reference" || key == "target_layer" ||
       key == "numeric_class")
     return Result<Json>(Json(std::string(text)));
-  if (key == "aov" || key == "tags") return Result<Json>(parse_list(text));
+  if (key == "aov" || key == "tags" || key == "after") return Result<Json>(parse_list(text));
   if (key == "float" || key == "denoise") {
     if (text == "true" || text == "1") return Result<Json>(Json(true));
     if (text == "false" || text == "0") return Result<Json>(Json(false));
@@ -92,7 +92,7 @@ Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, cons
           fmt::format("unknown query parameter '{}'; known: {}{}spp, target_error, target_layer, time, seed, "
                       "size, integrator, "
                       "aov, define, priority, float, denoise, tags, frames, max_workers, max_units, memory, "
-                      "numeric_class, reference",
+                      "numeric_class, after, reference",
                       key, also, also.empty() ? "" : ", "));
     if (!*value) return tl::unexpected(value->error());
     spec[key] = std::move(**value);

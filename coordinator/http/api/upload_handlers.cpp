@@ -273,13 +273,15 @@ class BundleSink final : public BodySink {
         read_bundle(spool_->fd, received_, kind_, limits, api_.coordinator().blobs(), api_.stop_token());
     if (!bundle) return problem(bundle.error());
     coordinator::SubmitRequest job;
-    auto spec = spec_from_query(query_, "", bundle->spec);
+    auto spec = spec_from_query(query_, "name", bundle->spec);
     if (!spec) return problem(spec.error());
     job.spec = std::move(*spec);
     auto text = read_scene_blob(api_, bundle->scene_digest);
     if (!text) return problem(text.error());
     job.scene_text = std::move(*text);
     job.scene_name = bundle->scene;
+    for (const auto& [key, value] : query_)
+      if (key == "name") job.scene_name = value.substr(0, kMaxAssetName);
     job.assets = bundle->assets;
     job.owner = caller_.user;
     job.traceparent = traceparent_;
@@ -362,7 +364,7 @@ std::variant<Response, std::unique_ptr<BodySink>> open_bundle(Api& api, const Re
   if (!request.header("content-encoding").empty())
     return problem(415, "send the bundle as it is: Content-Encoding is not decoded");
   // The query is checked before the body is received, since the body may be gigabytes long.
-  const auto spec = spec_from_query(request.query, "");
+  const auto spec = spec_from_query(request.query, "name");
   if (!spec) return problem(spec.error());
   if (auto refused = refuse_priority(api, request.caller, spec->priority)) return std::move(*refused);
   auto spool = open_spool(api.limits().spool);

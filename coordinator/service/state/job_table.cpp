@@ -102,6 +102,29 @@ Sequence* JobTable::sequence(const JobId& id) {
   return found == sequences_.end() ? nullptr : &found->second;
 }
 
+const Sequence* JobTable::sequence(const JobId& id) const {
+  const auto found = sequences_.find(id);
+  return found == sequences_.end() ? nullptr : &found->second;
+}
+
+std::vector<EntryPtr> JobTable::waiting_for(const JobId& id) const {
+  std::vector<EntryPtr> all;
+  if (const auto found = waiting_.find(id); found != waiting_.end())
+    for (const JobId& job : found->second) all.push_back(jobs_.at(job));
+  return all;
+}
+
+void JobTable::set_after(JobEntry& entry, std::vector<std::string> after) {
+  for (const std::string& name : entry.stored.spec.after) {
+    const auto found = waiting_.find({name});
+    if (found == waiting_.end()) continue;
+    found->second.erase(entry.stored.id);
+    if (found->second.empty()) waiting_.erase(found);
+  }
+  entry.stored.spec.after = std::move(after);
+  for (const std::string& name : entry.stored.spec.after) waiting_[{name}].insert(entry.stored.id);
+}
+
 Result<EntryPtr> JobTable::job(const JobId& id) const {
   if (auto entry = find(id)) return entry;
   const auto frame = frame_of(id);
@@ -201,6 +224,7 @@ Result<void> JobTable::film_room_for(std::span<const StoredJob> more, std::uint6
 void JobTable::add(const EntryPtr& entry) {
   const JobId& id = entry->stored.id;
   jobs_.emplace(id, entry);
+  set_after(*entry, entry->stored.spec.after);
   const auto frame = frame_of(id);
   if (!frame) return order_.push_back(id);
   auto [found, fresh] = sequences_.try_emplace(frame->sequence);
@@ -224,6 +248,7 @@ void JobTable::unlist(const JobId& id) {
 
 std::optional<JobId> JobTable::remove(const EntryPtr& entry) {
   JobId listed = entry->stored.id;
+  set_after(*entry, {});
   jobs_.erase(listed);
   if (const auto frame = frame_of(listed)) {
     listed = frame->sequence;

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -108,6 +109,7 @@ class JobTable {
 
   EntryPtr find(const JobId& id) const;  // null if there is no such job
   Sequence* sequence(const JobId& id);   // null if there is no such sequence
+  const Sequence* sequence(const JobId& id) const;
   // job() returns the job with this id, or an error if there is none; the id of a sequence is an error.
   // usable() also gives an error for a job that could not be restored at the start, which can only be
   // removed.
@@ -138,7 +140,13 @@ class JobTable {
   // before.
   std::optional<JobId> remove(const EntryPtr& entry);
 
+  // The jobs that wait for this job, frame or sequence (JobSpec::after)
+  std::vector<EntryPtr> waiting_for(const JobId& id) const;
+  // Sets what the job waits for. Only this function may change JobSpec::after of a job in the table.
+  void set_after(JobEntry& entry, std::vector<std::string> after);
+
  private:
+  std::map<JobId, std::set<JobId>> waiting_;  // by the job that others wait for
   const bool shared_;
   std::map<JobId, EntryPtr> jobs_;
   std::map<JobId, Sequence> sequences_;

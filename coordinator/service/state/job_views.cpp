@@ -7,6 +7,7 @@
 #include "common/base/clock.h"
 #include "coordinator/admission/admission.h"
 #include "coordinator/domain/limits.h"
+#include "coordinator/service/state/prerequisites.h"
 
 namespace ls::coordinator {
 namespace {
@@ -147,6 +148,7 @@ JobView JobViews::job(const JobEntry& entry) const {
   v.target_layer = job.spec.target_layer;
   if (!job.denoised_checks.empty()) v.denoised_check = job.denoised_checks.back();
   v.denoise = job.spec.denoise;
+  if (job.state == JobState::done) v.denoised = job.denoised;
   v.error = job.error.empty() ? entry.trouble : job.error;
   v.warnings = job.warnings;
   v.fake = job.fake;
@@ -188,9 +190,13 @@ JobView JobViews::job(const JobEntry& entry) const {
     if (!is_terminal(v.state)) v.class_share = figures->class_share;
     const Eta out = eta(entry, *figures, v);
     v.progress = out.progress;
+    Waiting other = waiting_of(jobs_, job);
+    v.after = std::move(other.after);
+    v.waits_for = std::move(other.words);
+    if (v.error.empty() && other.held) v.error = v.waits_for;
     const std::string waits = entry.finishing ? "" : farm_.why_waiting(job.id);
     if (v.error.empty()) v.error = waits;
-    if (waits.empty() && (v.state == JobState::running || v.state == JobState::queued)) {
+    if (waits.empty() && v.after.empty() && (v.state == JobState::running || v.state == JobState::queued)) {
       v.eta_seconds = out.seconds;
       v.eta_ci95 = out.ci95;
       v.eta_with_more = out.with_more;

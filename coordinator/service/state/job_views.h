@@ -84,7 +84,8 @@ FrameView frame_view(const JobView& frame);
 
 class JobViews {
  public:
-  JobViews(const Farm& farm, const Clock& clock) : farm_(farm), clock_(clock) {}
+  JobViews(const Farm& farm, const JobTable& jobs, const Clock& clock)
+      : farm_(farm), jobs_(jobs), clock_(clock) {}
 
   JobView job(const JobEntry& entry) const;
   JobView sequence(const JobId& id, const Sequence& sequence, bool with_frames) const;
@@ -94,6 +95,7 @@ class JobViews {
   Eta eta(const JobEntry& entry, const JobFigures& figures, const JobView& v) const;
 
   const Farm& farm_;
+  const JobTable& jobs_;
   const Clock& clock_;
 };
 

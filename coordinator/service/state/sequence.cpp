@@ -202,6 +202,11 @@ JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frame
   for (const JobView& f : frames)
     if (f.few_hits) v.few_hits = v.few_hits.value_or(0) + *f.few_hits;
   v.error = trouble_of(frames);
+  if (const auto waits = std::ranges::find_if(frames, [](const JobView& f) { return !f.after.empty(); });
+      waits != frames.end()) {
+    v.after = waits->after;
+    v.waits_for = fmt::format("frame {} {}", frame_of(waits->id)->frame, waits->waits_for);
+  }
   v.warnings = facts.warnings;
   v.size = first.size;
   v.tile = first.tile;

@@ -99,6 +99,7 @@ struct StoredJob {
   // The checks of the denoised layers' error made so far, if the job's target error applies to these layers
   // (DenoisedTarget in domain/adaptive_stop.h). They decide when the job ends
   std::vector<DenoisedCheck> denoised_checks;
+  std::optional<DenoisedFigure> denoised;  // of the final image, if it has denoised layers
   // Blobs that the job needs but that are missing or damaged; the job is paused until they are available
   std::set<Digest> missing_blobs;
   // Pixels whose tiles are rendered before the others (domain/event.h: JobPlan::focus)

@@ -132,6 +132,11 @@ StoredJob stored_from(const json& j) {
       job.denoised_checks.push_back(
           {number_of(c.at("spp")), number_of(c.at("relmse")),
            c.at("at_most").is_null() ? std::nullopt : std::optional(number_of(c.at("at_most")))});
+  if (const auto denoised = j.find("denoised"); denoised != j.end()) {
+    job.denoised = {number_of(denoised->at(0)), std::nullopt};
+    if (denoised->size() == 3)
+      job.denoised->relmse_ci95 = {number_of(denoised->at(1)), number_of(denoised->at(2))};
+  }
   if (const auto focus = j.find("focus"); focus != j.end())
     job.focus = PixelRect{focus->at(0), focus->at(1), focus->at(2), focus->at(3)};
   job.revision = count_or_none(j, "revision");
@@ -197,6 +202,11 @@ std::string to_json(const StoredJob& job) {
     j["denoised_checks"].push_back({{"spp", finite(c.spp)},
                                     {"relmse", finite(c.relmse)},
                                     {"at_most", c.at_most ? json(finite(*c.at_most)) : json()}});
+  if (job.denoised) {
+    j["denoised"] = {finite(job.denoised->relmse)};
+    if (const auto& ci = job.denoised->relmse_ci95)
+      j["denoised"].insert(j["denoised"].end(), {finite(ci->first), finite(ci->second)});
+  }
   if (job.reference_same_seed) j["reference_same_seed"] = true;
   if (!job.platform.empty()) j["platform"] = job.platform;
   if (job.fake) j["fake"] = true;

@@ -29,6 +29,7 @@ from .errors import (
     WaitTimeout,
 )
 from .farm import Farm, Job
+from .job import Verdict
 from .scene_dict import scene_of_dict
 from .snapshot import Snapshot
 
@@ -56,6 +57,7 @@ __all__ = [
     "Snapshot",
     "StageRejected",
     "Unauthorised",
+    "Verdict",
     "WaitTimeout",
     "models",
     "scene_of_dict",

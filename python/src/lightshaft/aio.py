@@ -46,6 +46,7 @@ class AsyncFarm:
         return f"<AsyncFarm {self._address.url}>"
 
     async def close(self) -> None:
+        """Closes the connections; `with AsyncFarm() as farm` does so by itself."""
         await self._transport.close()
 
     async def submit(
@@ -76,15 +77,39 @@ class AsyncFarm:
         return await self.job(answer["id"])
 
     async def job(self, id: str) -> AsyncJob:
+        """The job, sequence or frame with this id."""
         return AsyncJob(self._transport, await self._transport.run(steps.get_job(id)))
 
-    async def jobs(self) -> list[AsyncJob]:
+    async def jobs(
+        self,
+        *,
+        state: str | Iterable[str] | None = None,
+        search: str | None = None,
+        owner: str | None = None,
+        sort: str | None = None,
+        limit: int | None = None,
+        offset: int | None = None,
+    ) -> list[AsyncJob]:
+        """The jobs of the farm, in order of submission; a sequence is one job.
+
+        `state`: only those in this state or these, such as 'running'. `search`: only those with this text in
+        their name or id. `owner`: only those of this user. `sort`: 'submitted', 'name', 'progress', 'relmse',
+        ...; '-submitted' is the newest first. `limit`, `offset`: at most so many, without the first ones.
+        """
+        filters = {
+            "state": state,
+            "search": search,
+            "owner": owner,
+            "sort": sort,
+            "limit": limit,
+            "offset": offset,
+        }
         return [
-            AsyncJob(self._transport, view)
-            for view in await self._transport.run(steps.listed("/api/v1/jobs", "jobs"))
+            AsyncJob(self._transport, view) for view in await self._transport.run(jobs_of.matching(filters))
         ]
 
     async def workers(self) -> list[models.Worker]:
+        """The workers of the farm, and what each does."""
         return await self._transport.run(steps.listed("/api/v1/workers", "workers"))
 
 
@@ -96,6 +121,7 @@ class AsyncJob(JobState):
         self._transport = transport
 
     async def refresh(self) -> models.Job:
+        """Asks the farm again; state, progress and view are then those of now."""
         return self._keep(await self._transport.run(steps.get_job(self.id)))
 
     async def wait(self, progress: Progress = None, timeout: float | None = None) -> AsyncJob:
@@ -122,6 +148,7 @@ class AsyncJob(JobState):
         return await self._transport.run(jobs_of.layers(self.id))
 
     async def png(self, exposure: float = 0, denoised: bool = False) -> bytes:
+        """The image as a PNG file, brightened by `exposure` stops; `denoised`: its denoised layers."""
         return await self._transport.run(jobs_of.png(self.id, exposure, denoised))
 
     async def save(self, path: str | os.PathLike[str]) -> None:
@@ -129,6 +156,8 @@ class AsyncJob(JobState):
         await self._transport.run(jobs_of.save(self.id, path))
 
     async def report(self) -> models.Report:
+        """How the image was made, what it cost and how large its error is. Verdict.of(report) is the verdict
+        in it."""
         return await self._transport.run(jobs_of.report(self.id))
 
     async def convergence(self) -> Curve:
@@ -137,9 +166,11 @@ class AsyncJob(JobState):
         return await self._transport.run(snapshot.get_curve(self.id))
 
     async def tiles(self) -> list[models.Tile]:
+        """The tiles of the image: where they lie, their samples, error and workers."""
         return await self._transport.run(jobs_of.tiles(self.id))
 
     async def log(self) -> str:
+        """What happened to the job, a line for each event."""
         return await self._transport.run(jobs_of.log(self.id))
 
     async def snapshot(self) -> Snapshot:
@@ -154,16 +185,27 @@ class AsyncJob(JobState):
         ]
 
     async def pause(self) -> AsyncJob:
+        """Hands out no more of the job; workers finish what they have begun."""
         return await self._change({"state": "paused"})
 
     async def resume(self) -> AsyncJob:
+        """Goes on with a paused job."""
         return await self._change({"state": "running"})
 
     async def cancel(self) -> AsyncJob:
+        """Ends the job for good; its image stays as far as it has come."""
         return await self._change({"state": "cancelled"})
 
     async def prioritise(self, priority: int) -> AsyncJob:
+        """Puts the job before all of a lower priority; 0 is the default."""
         return await self._change({"priority": priority})
+
+    async def wait_for(self, *jobs: str | JobState) -> AsyncJob:
+        """Lets the job begin when these jobs are done, by their ids or as AsyncJob objects; without any, it waits
+        no more. `submit(after=[...])` says so from the first."""
+        return await self._change(
+            {"after": [job.id if isinstance(job, JobState) else job for job in jobs]}
+        )
 
     async def extend(self, *, spp: int | None = None, target_error: float | None = None) -> AsyncJob:
         """Goes on to `spp` samples per pixel in all, or to a smaller error: the pixels of a job that had it

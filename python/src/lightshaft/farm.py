@@ -46,6 +46,7 @@ class Farm:
         return f"<Farm {self._address.url}>"
 
     def close(self) -> None:
+        """Closes the connections; `with Farm() as farm` does so by itself."""
         self._transport.close()
 
     def submit(
@@ -76,15 +77,39 @@ class Farm:
         return self.job(answer["id"])
 
     def job(self, id: str) -> Job:
+        """The job, sequence or frame with this id."""
         return Job(self._transport, self._transport.run(steps.get_job(id)))
 
-    def jobs(self) -> list[Job]:
+    def jobs(
+        self,
+        *,
+        state: str | Iterable[str] | None = None,
+        search: str | None = None,
+        owner: str | None = None,
+        sort: str | None = None,
+        limit: int | None = None,
+        offset: int | None = None,
+    ) -> list[Job]:
+        """The jobs of the farm, in order of submission; a sequence is one job.
+
+        `state`: only those in this state or these, such as 'running'. `search`: only those with this text in
+        their name or id. `owner`: only those of this user. `sort`: 'submitted', 'name', 'progress', 'relmse',
+        ...; '-submitted' is the newest first. `limit`, `offset`: at most so many, without the first ones.
+        """
+        filters = {
+            "state": state,
+            "search": search,
+            "owner": owner,
+            "sort": sort,
+            "limit": limit,
+            "offset": offset,
+        }
         return [
-            Job(self._transport, view)
-            for view in self._transport.run(steps.listed("/api/v1/jobs", "jobs"))
+            Job(self._transport, view) for view in self._transport.run(jobs_of.matching(filters))
         ]
 
     def workers(self) -> list[models.Worker]:
+        """The workers of the farm, and what each does."""
         return self._transport.run(steps.listed("/api/v1/workers", "workers"))
 
 
@@ -96,6 +121,7 @@ class Job(JobState):
         self._transport = transport
 
     def refresh(self) -> models.Job:
+        """Asks the farm again; state, progress and view are then those of now."""
         return self._keep(self._transport.run(steps.get_job(self.id)))
 
     def wait(self, progress: Progress = None, timeout: float | None = None) -> Job:
@@ -122,6 +148,7 @@ class Job(JobState):
         return self._transport.run(jobs_of.layers(self.id))
 
     def png(self, exposure: float = 0, denoised: bool = False) -> bytes:
+        """The image as a PNG file, brightened by `exposure` stops; `denoised`: its denoised layers."""
         return self._transport.run(jobs_of.png(self.id, exposure, denoised))
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -129,6 +156,8 @@ class Job(JobState):
         self._transport.run(jobs_of.save(self.id, path))
 
     def report(self) -> models.Report:
+        """How the image was made, what it cost and how large its error is. Verdict.of(report) is the verdict
+        in it."""
         return self._transport.run(jobs_of.report(self.id))
 
     def convergence(self) -> Curve:
@@ -137,9 +166,11 @@ class Job(JobState):
         return self._transport.run(snapshot.get_curve(self.id))
 
     def tiles(self) -> list[models.Tile]:
+        """The tiles of the image: where they lie, their samples, error and workers."""
         return self._transport.run(jobs_of.tiles(self.id))
 
     def log(self) -> str:
+        """What happened to the job, a line for each event."""
         return self._transport.run(jobs_of.log(self.id))
 
     def snapshot(self) -> Snapshot:
@@ -154,16 +185,27 @@ class Job(JobState):
         ]
 
     def pause(self) -> Job:
+        """Hands out no more of the job; workers finish what they have begun."""
         return self._change({"state": "paused"})
 
     def resume(self) -> Job:
+        """Goes on with a paused job."""
         return self._change({"state": "running"})
 
     def cancel(self) -> Job:
+        """Ends the job for good; its image stays as far as it has come."""
         return self._change({"state": "cancelled"})
 
     def prioritise(self, priority: int) -> Job:
+        """Puts the job before all of a lower priority; 0 is the default."""
         return self._change({"priority": priority})
+
+    def wait_for(self, *jobs: str | JobState) -> Job:
+        """Lets the job begin when these jobs are done, by their ids or as Job objects; without any, it waits
+        no more. `submit(after=[...])` says so from the first."""
+        return self._change(
+            {"after": [job.id if isinstance(job, JobState) else job for job in jobs]}
+        )
 
     def extend(self, *, spp: int | None = None, target_error: float | None = None) -> Job:
         """Goes on to `spp` samples per pixel in all, or to a smaller error: the pixels of a job that had it

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import pathlib
 import tempfile
+from collections.abc import Mapping
 from typing import Any
 from urllib.parse import urlencode
 
@@ -12,6 +14,40 @@ from . import models
 from .errors import NotFound, RequestRejected
 from .images import Array, decode_layers, layer_of
 from .steps import Call, Steps, ask_json, change_job, fetch, get_job, job_path, listed, succeed, work
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """What to think of the figures of an image, of a job or of its report."""
+
+    kind: str
+    """early, converging, fast, heavy_tail or bias_floor."""
+    words: str
+    trusted: bool
+    """False: don't trust the figures yet; the words say why."""
+    advice: str | None
+    """What to do then, with the command; None: nothing is needed."""
+
+    @staticmethod
+    def of(told: Mapping[str, Any]) -> Verdict | None:
+        """The verdict in a job's view or in a report; None: there is none yet."""
+        found = told.get("verdict")
+        if isinstance(found, str):  # a report has its parts under keys of their own
+            found = {
+                "kind": told.get("verdict_kind"),
+                "words": found,
+                "trusted": told.get("trusted"),
+                "advice": told.get("advice"),
+            }
+        if not isinstance(found, Mapping):
+            return None
+        advice = found.get("advice")
+        return Verdict(
+            str(found.get("kind") or ""),
+            str(found.get("words") or ""),
+            found.get("trusted") is not False,
+            str(advice) if advice else None,
+        )
 
 
 class JobState:
@@ -39,8 +75,19 @@ class JobState:
         """From 0 to 1."""
         return self._view["progress"]
 
+    @property
+    def name(self) -> str:
+        """What lists call the job: the name of its scene, if no other was given."""
+        return str(self._view.get("name") or "")
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """What to think of the figures; None: nothing is known yet."""
+        return Verdict.of(self._view)
+
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.id}: {self.state}, {100 * self.progress:.0f} %>"
+        name = f" {self.name!r}" if self.name else ""
+        return f"<{type(self).__name__} {self.id}{name}: {self.state}, {100 * self.progress:.0f} %>"
 
 
 def layers(job: str) -> Steps[dict[str, Array]]:
@@ -107,6 +154,16 @@ def extend(job: str, spp: int | None, target_error: float | None) -> Steps[model
             job, {"spp": int(spp)} if spp is not None else {"target_error": float(target_error or 0)}
         )
     )
+
+
+def matching(filters: Mapping[str, Any]) -> Steps[list[models.Job]]:
+    """The jobs of a farm that the filters of GET /jobs choose; those that are None choose nothing."""
+    given = {
+        key: value if isinstance(value, (str, int, float)) else ",".join(value)
+        for key, value in filters.items()
+        if value is not None
+    }
+    return listed("/api/v1/jobs" + (f"?{urlencode(given)}" if given else ""), "jobs")
 
 
 def remove(job: str) -> Steps[None]:

@@ -92,6 +92,10 @@ class JobSpec(TypedDict):
     numeric_class: NotRequired[str]
     """Only workers of this numeric class render it, by the beginning of its digits or of its platform:
     armv8-a, say."""
+    after: NotRequired[list[str]]
+    """Ids of jobs that must be done before this one begins. A frame waits for the frame of its number in a
+    sequence of the same frames, and for all frames of another. Unknown jobs are refused with 400, those
+    that have failed or were cancelled with 409."""
     frames: NotRequired[str]
     """A sequence: FIRST-LAST, or FIRST-LASTxSTEP; at most 10000 frames. In the names of files a run of #
     stands for the frame's number, zero-padded to its length, and $frame is defined to be it. Frame N has
@@ -130,6 +134,9 @@ class JobChange(TypedDict):
     target_error: NotRequired[float]
     """Of a job that has one. A smaller one goes on where a larger one ended, to the same pixels as with the
     smaller one from the first. Not together with `spp`."""
+    after: NotRequired[list[str]]
+    """The jobs that it waits for from now on, instead of those before; []: for none. A job that would wait
+    for itself, directly or by way of others, is refused with 400."""
     focus: NotRequired[Union[list[int], None]]
     """[x0, y0, x1, y1] in pixels, x1 and y1 excluded: the tiles that these pixels lie in get the next
     samples before all others. null: all tiles are treated alike again. It changes the order of the work
@@ -197,7 +204,15 @@ class Job(TypedDict):
     eta_with_8_more_ci95: NotRequired[Union[list[float], None]]
     """ci95 of eta_with_more; goes with the next version."""
     error: Union[str, None]
-    """Why it failed."""
+    """Why it failed, or stands still."""
+    after: NotRequired[list["JobAfter"]]
+    """The jobs that it waits for and that are not done yet; it is `queued` and gets no worker before they
+    are. Of a sequence: those of its first frame that waits."""
+    waits_for: NotRequired[Union[str, None]]
+    """The same in a sentence. If one of them has failed, was cancelled or removed, the sentence says what
+    to do, and is in `error`, too."""
+    denoised: NotRequired[Union["JobDenoised", None]]
+    """Error of the denoised layers of a job that is done; null: it has none, or is a sequence."""
     warnings: NotRequired[list[str]]
     fake: NotRequired[bool]
     """Fake workers (--fake) make its pixels up: it is no picture of the scene."""
@@ -269,6 +284,8 @@ class JobVerdict(TypedDict):
     words: NotRequired[str]
     trusted: NotRequired[bool]
     """false: don't trust yet, the words say why; the intervals mean little."""
+    advice: NotRequired[Union[str, None]]
+    """What a user can do where the figures are not trusted, with the command; null: nothing is needed."""
 
 
 class JobEtaWithMore(TypedDict):
@@ -278,6 +295,18 @@ class JobEtaWithMore(TypedDict):
     seconds: NotRequired[float]
     ci95: NotRequired[Union[list[float], None]]
     """[low, high] for seconds, as eta_ci95."""
+
+
+class JobAfter(TypedDict):
+    id: NotRequired[str]
+    state: NotRequired[Union[str, None]]
+    """null: there is no such job any more."""
+
+
+class JobDenoised(TypedDict):
+    """Error of the denoised layers of a job that is done; null: it has none, or is a sequence."""
+    relmse: NotRequired[float]
+    relmse_ci95: NotRequired[Union[list[float], None]]
 
 
 class JobClassShare(TypedDict):
@@ -519,6 +548,8 @@ class Report(TypedDict):
     verdict_kind: NotRequired[Literal["early", "converging", "fast", "heavy_tail", "bias_floor"]]
     trusted: NotRequired[bool]
     """false: don't trust yet, the verdict says why; the intervals mean little."""
+    advice: NotRequired[Union[str, None]]
+    """What a user can do where the figures are not trusted, with the command; null: nothing is needed."""
     few_hits_pixels: NotRequired[Union[int, None]]
     """Pixels that too few samples have brought light to; magenta in error.png."""
     true_rmse: NotRequired[float]

@@ -16,11 +16,14 @@ import numpy.typing as npt
 
 from . import models
 from .errors import BadAnswer, Conflict, NotFound
+from .job import Verdict
 from .steps import Call, Steps, fetch, get_job, job_path, succeed
 
 Curve = dict[str, npt.NDArray[np.float64]]
 ENDED = ("done", "failed", "cancelled")
-WIDTH, HEIGHT, MARGIN = 420, 180, 46  # of the curve, in CSS pixels
+# Of the curve, in CSS pixels. MARGIN holds a label of 7 characters, such as 1.2e-03: with FONT a character is at
+# most 0.65 FONT wide in the fonts that notebooks use.
+WIDTH, HEIGHT, MARGIN, FONT = 420, 180, 58, 11
 MAX_ROWS = 1_000_000
 
 
@@ -78,19 +81,27 @@ def summary(view: models.Job) -> str:
         f"{view['state']} {100 * _figure(view.get('progress')):.0f} %",
         f"{_figure(view.get('spp_done')):.4g} samples per pixel",
     ]
-    relmse, interval, left = view.get("relmse"), view.get("relmse_ci95"), view.get("eta_seconds")
-    if relmse is not None:
+    left = view.get("eta_seconds")
+    denoised = view.get("denoised")
+    if isinstance(denoised, dict):
+        parts.append("denoised " + _error(denoised.get("relmse"), denoised.get("relmse_ci95")))
+    if view.get("relmse") is not None:
+        verdict = Verdict.of(view)
         parts.append(
-            f"relMSE {_figure(relmse):.3g}"
-            + (
-                f" ({_figure(interval[0]):.3g} to {_figure(interval[1]):.3g})"
-                if interval and len(interval) == 2
-                else ""
-            )
+            _error(view["relmse"], view.get("relmse_ci95"))
+            if verdict is None or verdict.trusted
+            else f"relMSE {_figure(view['relmse']):.3g} (don't trust yet)"
         )
     if left is not None and view["state"] not in ENDED:
         parts.append(f"{_figure(left):.0f} s left")
     return ", ".join(parts)
+
+
+def _error(relmse: Any, interval: Any) -> str:
+    text = f"relMSE {_figure(relmse):.3g}"
+    if not isinstance(interval, list) or len(interval) != 2:
+        return text
+    return f"{text} ({_figure(interval[0]):.3g} to {_figure(interval[1]):.3g})"
 
 
 def _figure(value: Any) -> float:
@@ -116,7 +127,10 @@ class Snapshot:
             f"<b>{html.escape(str(view.get('name') or 'job'))}</b> {html.escape(view['id'])}",
             html.escape(summary(view)),
         ]
-        for text in (view.get("error"), (view.get("verdict") or {}).get("words")):
+        verdict = Verdict.of(view)
+        error, waits = view.get("error"), view.get("waits_for")
+        doubt = (verdict.words, verdict.advice) if verdict else ()
+        for text in (error, waits if waits != error else None, *doubt):
             if text:
                 lines.append(html.escape(str(text)))
         picture = (
@@ -126,7 +140,7 @@ class Snapshot:
             else "<i>no picture yet</i>"
         )
         return (
-            f'<div>{"<br>".join(lines)}<div style="display:flex;flex-wrap:wrap;gap:12px">'
+            f'<div>{"<br>".join(lines)}<div style="display:flex;flex-wrap:wrap;gap:12px;align-items:flex-start">'
             f"{picture}{self._curve_svg()}</div></div>"
         )
 
@@ -148,7 +162,7 @@ class Snapshot:
             f"{MARGIN + a * (WIDTH - MARGIN - 8):.1f},{8 + (1 - b) * (HEIGHT - 40):.1f}"
             for a, b in zip(u, v)
         )
-        style = 'fill="currentColor" font-size="11"'
+        style = f'fill="currentColor" font-size="{FONT}"'
         bottom = HEIGHT - 32
         return (
             f'<svg width="{WIDTH}" height="{HEIGHT}" role="img" aria-label="relMSE over core seconds">'

@@ -76,6 +76,8 @@ class Address:
 
 def _checked_url(text: str) -> str:
     url = text.strip().rstrip("/")
+    if url and "://" not in url:
+        url = f"http://{url}"
     if not url.startswith(("http://", "https://")):
         raise RequestRejected(f"the farm's address {url!r} must begin with http:// or https://")
     if any(character <= " " or character == "\x7f" for character in url):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import html
 import sys
 import time
 from collections.abc import Callable
@@ -85,9 +87,53 @@ def _ended(view: models.Job) -> models.Job:
     raise JobFailed(f"job {view['id']} was given up{why}")
 
 
+@dataclasses.dataclass(frozen=True)
+class Bar:
+    """The progress of a job in a notebook: a bar and a line."""
+
+    view: models.Job
+
+    def __repr__(self) -> str:
+        return snapshot.summary(self.view)
+
+    def _repr_html_(self) -> str:
+        progress = self.view.get("progress")
+        value = progress if isinstance(progress, (int, float)) else 0
+        return (
+            f'<progress value="{value:.3f}" max="1" style="width:240px;vertical-align:middle"></progress> '
+            f"{html.escape(repr(self))}"
+        )
+
+
+def _in_notebook() -> bool:
+    """Whether what this process prints is shown by a notebook, which shows the standard error stream as an
+    error."""
+    module = sys.modules.get("IPython")
+    shell = module.get_ipython() if module is not None else None
+    return shell is not None and hasattr(shell, "kernel")
+
+
+def _displayed() -> Callable[[models.Job], None]:
+    """Shows a bar below the cell, in one place."""
+    from IPython.display import display
+
+    handle: Any = None
+
+    def show(view: models.Job) -> None:
+        nonlocal handle
+        if handle is None:
+            handle = display(Bar(view), display_id=True)  # type: ignore[no-untyped-call]
+        else:
+            handle.update(Bar(view))
+
+    return show
+
+
 def _printer() -> Callable[[models.Job], None]:
-    """Writes one line to the standard error stream, over and over in a terminal, once for each change
-    elsewhere."""
+    """Shows a bar in a notebook. Elsewhere writes one line to the standard error stream, over and over in a
+    terminal, once for each change otherwise."""
+    if _in_notebook():
+        return _displayed()
     last = ""
 
     def show(view: models.Job) -> None:

@@ -78,7 +78,7 @@ DOORS = [
     Door("stb", r"^(stb/)?stb_", r"^common/assets/hdr_\w+\.cpp$", "the HDR decoder"),
     Door("OpenSSL", r"^openssl/", r"^(common/base/(digest|secret)|common/report/html|coordinator/http/(auth/token_registry|net/byte_stream)|coordinator/tls/tls_files)\.cpp$", "digests, tokens, TLS, Base64"),
     Door("TBB", r"^(tbb|oneapi)/", r"^worker/render/", "the renderer"),
-    Door("CLI11", r"^CLI/", r"^cli/|/(main|options)\.cpp$|^common/command_line/command\.cpp$", "the executables, and what describes their command lines"),
+    Door("CLI11", r"^CLI/", r"^cli/|/(main|options)\.cpp$|^common/command_line/(command|parse)\.cpp$", "the executables, and what describes their command lines"),
     Door("libcurl", r"^curl/", r"^cli/|^coordinator/store/blobs/s3_link\.cpp$|^common/http/post\.cpp$", "the command line's client, the link to S3, and what posts webhooks and traces"),
     Door("nlohmann-json", r"^nlohmann/(?!json_fwd)", EVERYWHERE, "our own code"),
 ]

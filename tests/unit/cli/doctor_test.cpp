@@ -35,6 +35,7 @@ FarmFacts good_farm() {
   facts.session_status = 200;
   facts.role = "admin";
   facts.version = "1.0";
+  facts.stuck_jobs.emplace();
   facts.workers = {{"w1", "connected", "1.0", "abc", false}};
   return facts;
 }
@@ -140,6 +141,10 @@ INSTANTIATE_TEST_SUITE_P(
         FarmFault{"version", Status::warning, "0.9", [](FarmFacts& f) { f.version = "0.9"; }},
         FarmFault{"version", Status::warning, "does not tell", [](FarmFacts& f) { f.version = ""; }},
         FarmFault{"workers", Status::warning, "none", [](FarmFacts& f) { f.workers->at(0).state = "lost"; }},
+        FarmFault{"jobs", Status::warning, "1 of those that have not ended stands still; j-7: lacks a tag",
+                  [](FarmFacts& f) {
+                    f.stuck_jobs = std::vector{StuckJob{"j-7", "lacks a tag"}};
+                  }},
         FarmFault{"workers", Status::warning, "w1", [](FarmFacts& f) { f.workers->at(0).state = "sick"; }},
         FarmFault{"workers", Status::warning, "--fake", [](FarmFacts& f) { f.workers->at(0).fake = true; }},
         FarmFault{"worker-versions", Status::warning, "w1",

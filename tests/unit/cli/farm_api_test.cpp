@@ -32,6 +32,12 @@ TEST(Problem, KeepsTheDiagnosticsWithTheirPlace) {
             (Diagnostic{Diagnostic::Severity::error, {"a.xml", 3, 7}, "no such plugin", "<bsdf/>", 4}));
 }
 
+TEST(Addresses, MayLeaveOutTheirScheme) {
+  EXPECT_EQ(addresses_in("farm:8080"), std::vector<std::string>{"http://farm:8080"});
+  EXPECT_EQ(addresses_in("https://a/,b:1/"), (std::vector<std::string>{"https://a", "http://b:1"}));
+  EXPECT_FALSE(HttpClient::open({.url = "ftp://farm"}));
+}
+
 TEST(Problem, SaysWhereATokenIsFound) {
   const auto problem = problem_of({401, R"({"detail": "the token is wrong"})"});
 
@@ -94,8 +100,7 @@ TEST(FarmTables, LetNoNameReachTheTerminalsControls) {
 }
 
 TEST(HttpClient, RefusesAddressesAndTokensThatCannotBeMeant) {
-  for (const char* url :
-       {"farm:8080", "ftp://farm", "file:///etc/passwd", "http://farm/ x", "http://farm\r\nX: y", ""})
+  for (const char* url : {"ftp://farm", "file:///etc/passwd", "http://farm/ x", "http://farm\r\nX: y", ""})
     EXPECT_EQ(HttpClient::open({url, "", ""}).error().code, Errc::invalid_argument) << url;
   EXPECT_FALSE(HttpClient::open({"http://farm", "token\r\nX-Evil: 1", ""}));
   EXPECT_FALSE(HttpClient::open({"https://farm", "", "/no/such/file.pem"}));

@@ -170,6 +170,66 @@ TEST(WatchedJob, SaysADoubtAlsoQuietly) {
             "don't trust yet: all is black\n");
 }
 
+constexpr const char* kAdvice = "still noisy; render on: lightshaft extend j-1 --spp 2048";
+
+TEST(ShownJob, InDoubtSaysWhatToDo) {
+  json job = untrusted_job();
+  job["verdict"]["advice"] = kAdvice;
+
+  EXPECT_THAT(job_text(job), ContainsRegex(std::string("what to do +") + kAdvice));
+  EXPECT_EQ(said_at_the_end(job, true), std::string("relMSE 0.00418: ") + kWords + "\n" + kAdvice + "\n");
+}
+
+TEST(ShownJob, HasTheErrorOfTheDenoisedLayersFirst) {
+  json job = some_job();
+  job["denoised"] = {{"relmse", 0.0005}, {"relmse_ci95", {0.0004, 0.0006}}};
+  const std::string shown = job_text(job);
+
+  EXPECT_THAT(shown, ContainsRegex("denoised relMSE +0.0005 \\(0.0004 to 0.0006\\)"));
+  EXPECT_LT(shown.find("denoised relMSE"), shown.find("\nrelMSE"));
+  EXPECT_EQ(said_at_the_end(job, false),
+            "denoised relMSE 0.0005 (0.0004 to 0.0006); as rendered relMSE 0.00418 (0.0039 to 0.00448)\n");
+  job["denoised"]["relmse_ci95"] = nullptr;
+  EXPECT_THAT(job_text(job), HasSubstr("0.0005 (a few pixels carry its noise: no interval)"));
+}
+
+TEST(ShownJob, SaysForWhichJobItWaitsAndOnceIfThatIsItsError) {
+  json job = some_job();
+  job["waits_for"] = "waits for job j-0, which is running";
+  EXPECT_THAT(job_text(job), ContainsRegex("waits +waits for job j-0, which is running"));
+  EXPECT_THAT(jobs_table({{"jobs", {job}}}), HasSubstr("(waits for another job)"));
+  job["error"] = job["waits_for"];
+  EXPECT_THAT(job_text(job), Not(ContainsRegex("\nwaits ")));
+  EXPECT_THAT(job_text(job), ContainsRegex("error +waits for job j-0"));
+}
+
+TEST(DefaultImage, IsNamedByTheSceneInTheWorkingFolder) {
+  const auto name = [](const char* of) { return default_image({{"name", of}}); };
+  EXPECT_EQ(name("bath.xml"), "bath.exr");
+  EXPECT_EQ(name("../../etc/bath.xml"), "bath.exr");
+  EXPECT_EQ(name("chapel v3"), "chapel v3.exr");
+  EXPECT_EQ(name(".profile"), "profile.exr");
+  EXPECT_EQ(name(".."), "image.exr");
+  EXPECT_EQ(name(""), "image.exr");
+  EXPECT_EQ(default_image({{"name", "smoke.xml"}, {"frames", {{"total", 3}}}}), "smoke_####.exr");
+}
+
+TEST(ReportSummary, HasTheErrorOfTheDenoisedLayersFirst) {
+  json report = json::parse(R"({"spp": 64, "render_seconds": 9, "relmse": 0.39, "relmse_ci95": [0.2, 0.8],
+    "trusted": true, "verdict_kind": "early", "denoised": {"relmse": 0.01, "relmse_ci95": [0.009, 0.011]}})");
+  EXPECT_THAT(report_summary(report),
+              HasSubstr(", denoised relMSE 0.01 (0.009 to 0.011); as rendered relMSE 0.39 (0.2 to 0.8)"));
+}
+
+TEST(LocalReport, RendersOnByTheCommandThatMadeIt) {
+  const auto report = local_report(
+      R"({"job": "j-7", "name": "/home/anna/ball.xml", "advice": "still noisy; render on: lightshaft extend j-7 --spp 256"})",
+      {.instructions = fail(Errc::unavailable, "no counter")});
+
+  ASSERT_TRUE(report);
+  EXPECT_EQ((*report)["advice"], "still noisy; render on: lightshaft render ball.xml --spp 256");
+}
+
 TEST(ReportSummary, OfAnImageInDoubtHasNoInterval) {
   json report = json::parse(R"({"spp": 64, "render_seconds": 9, "relmse": 0.39, "relmse_ci95": [0.2, 0.8],
     "trusted": false, "verdict_kind": "early", "verdict": "no sample has found light",

@@ -195,7 +195,7 @@ std::string audit(const Farm& farm) {
       return "worker " + worker->id.value + ": its load is counted wrong";
     if (!worker->available() || worker->saturated() || !worker->wants_more()) continue;
     for (const auto& [seq, job] : state.jobs) {
-      if (!job->leasable() || state.takes(*job, *worker) != State::Takes::now) continue;
+      if (!job->leasable() || job->plan.held || state.takes(*job, *worker) != State::Takes::now) continue;
       return "worker " + worker->id.value + " idles while job " + job->plan.brief.job.value +
              " has a unit for it";
     }

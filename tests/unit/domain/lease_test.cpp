@@ -121,6 +121,7 @@ TEST(Lease, HigherPriorityGoesFirstThenThoseThatHaveHadLess) {
   for (const auto& [id, priority] : {std::pair{"low", 0}, {"high", 5}, {"late", 0}}) {
     JobPlan plan = plan_of(id, 3, 2);
     plan.priority = priority;
+    plan.owner = id;
     rig.submit(plan);
   }
 

@@ -45,7 +45,7 @@ std::string Walk::run_into_foul_weather(int events) {
     habits.emplace_back(name, static_cast<Habit>(pick(5)));
     if (!workers_[name].connected) join(name);
   }
-  for (const auto& [id, job] : jobs_) send(JobResumed{id});
+  for (const auto& [id, job] : jobs_) send(JobResumed{id}), send(JobHeld{id, false});
   // Long enough for workers to be found stuck, and for audits without a third worker to be given up
   constexpr Duration kStep = 5s, kLong = 4 * kNoGrowthLimit, kWatched = 20 * kStep;
   for (Duration passed{}; passed < kLong && wrong_.empty(); passed += kStep) {
@@ -195,6 +195,8 @@ void Walk::user_acts() {
       const PixelRect half{x0, 0, frame.width, frame.height};
       return send(JobFocused{id, chance(30) ? std::nullopt : std::optional(half)});
     }
+    case 8:
+      return send(JobHeld{id, chance(50)});
     default:
       return send(JobResumed{id});
   }
@@ -352,7 +354,7 @@ bool Walk::all_ended() const {
 
 void Walk::calm_down() {
   for (auto& [name, worker] : workers_) worker.crashes = worker.stalled = worker.gives_back = false;
-  for (const auto& [id, job] : jobs_) send(JobResumed{id});
+  for (const auto& [id, job] : jobs_) send(JobResumed{id}), send(JobHeld{id, false});
   now_ += kForgiveAfter;
   for (int i = 0; i < 5; ++i) join("w" + std::to_string(i));
   for (int turn = 0; turn < 20000 && wrong_.empty(); ++turn) {

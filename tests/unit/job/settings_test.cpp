@@ -77,7 +77,8 @@ TEST(JobSpec, ReadsEveryKeyOfTheContract) {
   const auto spec =
       parse_job_spec(R"({"spp": 128, "target_error": 0.001, "time": 60, "seed": 7, "size": [320, 200],
     "integrator": "volpath", "aov": ["depth"], "defines": {"density": "2.5", "n": 3, "on": true}, "priority": -2, "float": true,
-    "tags": ["gpu", "big-memory"], "max_workers": 4, "max_units": 100, "memory": 8589934592, "numeric_class": "armv8-a"})");
+    "tags": ["gpu", "big-memory"], "max_workers": 4, "max_units": 100, "memory": 8589934592, "numeric_class": "armv8-a",
+    "after": ["j-1", "j-2-frame3"]})");
 
   ASSERT_TRUE(spec) << spec.error().message;
   EXPECT_EQ(*spec, (JobSpec{.spp = 128,
@@ -94,7 +95,8 @@ TEST(JobSpec, ReadsEveryKeyOfTheContract) {
                             .max_workers = 4,
                             .max_units = 100,
                             .memory = 8589934592,
-                            .numeric_class = "armv8-a"}));
+                            .numeric_class = "armv8-a",
+                            .after = {"j-1", "j-2-frame3"}}));
   EXPECT_EQ(parse_job_spec(canonical_json(*spec)).value(), *spec);
 }
 

@@ -150,6 +150,24 @@ TEST(JobPage, ADoubtfulEstimateAndUncleanNumbersAreSaid) {
   expect(page, "12 pixels got too few hits");
 }
 
+TEST(JobPage, InDoubtSaysWhatToDo) {
+  json report = some_report();
+  expect_not(page_of(report), "What to do");
+  doubt(report);
+  report["advice"] = "still noisy; render on: lightshaft extend j-1 --spp 256";
+
+  expect(page_of(report), "<b>What to do</b>: still noisy; render on: lightshaft extend j-1 --spp 256");
+}
+
+TEST(JobPage, HasTheErrorOfTheDenoisedLayersFirst) {
+  json report = some_report();
+  report["denoised"] = {{"by", "OIDN"}, {"relmse", 0.0012}, {"relmse_ci95", {0.001, 0.0014}}};
+  const std::string page = page_of(report);
+
+  expect(page, "class=\"key\"><dt>relMSE, denoised</dt>");
+  EXPECT_LT(page.find("<dt>relMSE, denoised</dt>"), page.find("<dt>relMSE</dt>"));
+}
+
 // The verdict is shown for every report with `trusted` false, even early ones, and whatever its
 // `verdict_kind` is.
 TEST(JobPage, IsInDoubtWhereTheReportDoesNotTrustItself) {

@@ -196,7 +196,12 @@ TEST(Views, TellWhetherTheFiguresAreToBeTrusted) {
   const auto j = nlohmann::json::parse(job_json(v));
 
   EXPECT_EQ(j["verdict"],
-            (nlohmann::json{{"kind", "early"}, {"words", "don't trust yet"}, {"trusted", false}}));
+            (nlohmann::json{{"kind", "early"},
+                            {"words", "don't trust yet"},
+                            {"trusted", false},
+                            {"advice",
+                             "still noisy: a few bright pixels carry the error; more samples are on "
+                             "their way"}}));
   EXPECT_EQ(j["rmse_ci95"], (nlohmann::json{.4, .6}));
   EXPECT_EQ(j["slope"], -1);
   EXPECT_EQ(j["slope_ci95"], (nlohmann::json{-1.5, -.5}));

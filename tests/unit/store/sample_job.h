@@ -22,6 +22,7 @@ inline StoredJob sample_job(std::string id) {
   job.warnings = {"a \"quoted\" warning\n"};
   job.reference_same_seed = true;
   job.techniques.add(Technique::light_tree);
+  job.denoised = DenoisedFigure{2e-4, std::pair(1e-4, 3e-4)};
   job.denoised_checks = {{64, -1e-5, std::nullopt}, {90.5, 2e-4, 3e-4}};
   job.features_used = {"volume grids"};
   job.state = JobState::running;

@@ -1,0 +1,21 @@
+// What a user can do about an image whose error figures are not trusted yet, in a sentence.
+#pragma once
+
+#include <string>
+
+#include "common/image/error/convergence.h"
+
+namespace ls {
+
+struct Advised {
+  std::string job;         // id of the job; a command that goes on with it is named
+  double relmse = 0;       // of the image so far; 0: no light was found, or there is no sample
+  double spp_done = 0;     // samples per pixel so far
+  bool goes_on = false;    // the job is not over: it gets more samples by itself
+  bool can_extend = true;  // false for jobs that have failed or were cancelled
+};
+
+// Empty: the figures are trusted.
+std::string advice_on(const ConvergenceStatus& status, const Advised& job);
+
+}  // namespace ls

@@ -1,0 +1,84 @@
+// Messages on wrong usage, and the help.
+#include "common/command_line/parse.h"
+
+#include <gmock/gmock.h>
+
+#include <CLI/CLI.hpp>
+
+namespace ls {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class Usage : public ::testing::Test {
+ protected:
+  Usage() {
+    use_plain_help(app_);
+    app_.require_subcommand(1);
+    CLI::App* render = app_.add_subcommand("render", "renders");
+    render->add_option("--spp", text_, "samples")->type_name("N");
+    render->add_option("--target-error", text_, "error")->type_name("E");
+    render->add_option("scene", text_, "the scene")->type_name("SCENE")->required();
+    render->add_option("--kind", text_, "kind")->check(CLI::IsMember({"one", "two"}));
+    render->add_option("--number", number_, "number")->check(CLI::Range(1, 9))->capture_default_str();
+    CLI::App* token = app_.add_subcommand("token", "tokens");
+    token->require_subcommand(1);
+    token->add_subcommand("revoke", "revokes");
+  }
+  std::string message(std::vector<std::string> arguments) {
+    std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
+    try {
+      app_.parse(arguments);
+    } catch (const CLI::ParseError& error) {
+      return unknown_argument(app_, error);
+    }
+    return "no error";
+  }
+
+  CLI::App app_{"A program.", "program"};
+  std::string text_;
+  unsigned number_ = 7;
+};
+
+TEST_F(Usage, SuggestsTheCommandThatWasMeant) {
+  EXPECT_EQ(message({"rendr", "scene.xml"}), "program has no command 'rendr'; did you mean 'render'?");
+}
+TEST_F(Usage, SuggestsTheCommandOfACommand) {
+  EXPECT_EQ(message({"token", "revok"}), "program token has no command 'revok'; did you mean 'revoke'?");
+}
+TEST_F(Usage, SuggestsTheOptionThatWasMeant) {
+  EXPECT_EQ(message({"render", "scene.xml", "--sp", "4"}),
+            "program render has no option --sp; did you mean '--spp'?");
+}
+TEST_F(Usage, SuggestsTheOptionOfAValueWithEqualsSign) {
+  EXPECT_EQ(message({"render", "scene.xml", "--spo=4"}),
+            "program render has no option --spo; did you mean '--spp'?");
+}
+TEST_F(Usage, SuggestsTheOnlyOptionThatBeginsSo) {
+  EXPECT_EQ(message({"render", "scene.xml", "--target", ".1"}),
+            "program render has no option --target; did you mean '--target-error'?");
+}
+TEST_F(Usage, SuggestsNothingForWhatIsLikeNoOther) {
+  EXPECT_EQ(message({"render", "scene.xml", "--wavelength"}), "program render has no option --wavelength");
+}
+TEST_F(Usage, NamesAnArgumentTooMany) {
+  EXPECT_EQ(message({"render", "scene.xml", "other.xml"}), "program render takes no argument 'other.xml'");
+}
+TEST_F(Usage, LeavesOtherErrorsToTheParser) {
+  EXPECT_EQ(message({"render"}), "") << "the scene is missing";
+  EXPECT_EQ(message({"render", "scene.xml", "--number", "10"}), "");
+}
+
+TEST_F(Usage, TheHelpShowsValuesInWords) {
+  const std::string help = app_.get_subcommand("render")->help();
+
+  EXPECT_THAT(help, HasSubstr("--spp N"));
+  EXPECT_THAT(help, HasSubstr("kind (one, two)"));
+  EXPECT_THAT(help, HasSubstr("number (default: 7)"));
+  EXPECT_THAT(help, HasSubstr("SCENE"));
+  for (const char* type : {"TEXT", "UINT", "{one,two}", "REQUIRED"}) EXPECT_THAT(help, Not(HasSubstr(type)));
+}
+
+}  // namespace
+}  // namespace ls

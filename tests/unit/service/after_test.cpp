@@ -1,0 +1,181 @@
+// Jobs that wait for other jobs: when they begin, what is said of them, and what ends their wait.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/service/fake_farm.h"
+#include "tests/unit/store/temp_folder.h"
+
+namespace ls::coordinator {
+namespace {
+
+using testing::HasSubstr;
+
+JobSpec after(const std::vector<JobId>& jobs, const std::string& frames = "") {
+  JobSpec spec;
+  for (const JobId& job : jobs) spec.after.push_back(job.value);
+  if (!frames.empty()) spec.frames = parse_frames(frames).value();
+  return spec;
+}
+JobSpec frames(const std::string& range) { return after({}, range); }
+
+std::vector<std::string> waits(const Coordinator& coordinator, const JobId& job) {
+  std::vector<std::string> ids;
+  const auto view = coordinator.job(job);
+  for (const AfterView& one : view->after) ids.push_back(one.id.value);
+  return ids;
+}
+
+Result<void> set_after(Coordinator& coordinator, const JobId& job, const std::vector<JobId>& jobs) {
+  JobChange change;
+  change.after = after(jobs).after;
+  return coordinator.change(job, change);
+}
+
+std::string refusal(Coordinator& coordinator, JobSpec spec) {
+  SubmitRequest request;
+  request.scene_name = "scene.xml";
+  request.scene_text = kSceneText;
+  request.spec = std::move(spec);
+  const auto taken = coordinator.submit(request);
+  return taken ? "" : taken.error().error.message;
+}
+
+TEST(After, AJobBeginsWhenTheOneBeforeItIsDone) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  const JobId first = submit(*coordinator), second = submit(*coordinator, after({first}));
+  EXPECT_EQ(coordinator->job(second)->state, JobState::queued);
+  EXPECT_EQ(waits(*coordinator, second), std::vector{first.value});
+  EXPECT_EQ(coordinator->job(second)->waits_for, "waits for job " + first.value + ", which is queued");
+  EXPECT_EQ(coordinator->job(second)->error, "");
+
+  FakeFarm farm(*coordinator, 2);
+  ASSERT_TRUE(farm.run([&] {
+    EXPECT_TRUE(coordinator->job(second)->units_done == 0 ||
+                coordinator->job(first)->state == JobState::done);
+    return coordinator->job(second)->state == JobState::done;
+  }));
+
+  EXPECT_EQ(waits(*coordinator, second), std::vector<std::string>());
+}
+
+TEST(After, AJobWithSeveralBeforeItWaitsForTheLast) {
+  auto coordinator = open_at({});
+  const JobId one = submit(*coordinator), two = submit(*coordinator);
+  const JobId last = submit(*coordinator, after({two, one}));
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.run([&] { return coordinator->job(one)->state == JobState::done; }));
+
+  EXPECT_EQ(coordinator->job(last)->units_done, 0u);
+  ASSERT_TRUE(farm.run([&] { return coordinator->job(last)->state == JobState::done; }));
+  EXPECT_EQ(coordinator->job(two)->state, JobState::done);
+}
+
+TEST(After, AFrameWaitsForTheFrameOfItsNumberInASequenceOfTheSameFrames) {
+  auto coordinator = open_at({});
+  const JobId first = submit(*coordinator, frames("1-3"));
+  const JobId same = submit(*coordinator, after({first}, "1-3"));
+  const JobId other = submit(*coordinator, after({first}, "2-3"));
+
+  EXPECT_EQ(waits(*coordinator, frame_job(same, 2)), std::vector{frame_job(first, 2).value});
+  EXPECT_EQ(waits(*coordinator, frame_job(other, 2)), std::vector{first.value});
+  EXPECT_THAT(coordinator->job(same)->waits_for, HasSubstr("frame 1 waits for job " + first.value));
+
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.run([&] { return coordinator->job(frame_job(first, 1))->state == JobState::done; }));
+  EXPECT_EQ(waits(*coordinator, frame_job(same, 1)), std::vector<std::string>());
+  EXPECT_EQ(waits(*coordinator, frame_job(other, 2)), std::vector{first.value});
+  ASSERT_TRUE(farm.run([&] { return coordinator->job(other)->state == JobState::done; }));
+  EXPECT_EQ(coordinator->job(first)->state, JobState::done);
+}
+
+TEST(After, UnknownAndCancelledJobsAreRefused) {
+  auto coordinator = open_at({});
+  EXPECT_EQ(refusal(*coordinator, after({{"j-none"}})), "after: there is no job j-none");
+  const JobId cancelled = submit(*coordinator);
+  ASSERT_TRUE(coordinator->remove(cancelled));
+
+  EXPECT_EQ(refusal(*coordinator, after({cancelled})),
+            "after: job " + cancelled.value +
+                " is cancelled and will never be done: submit it again, and name the new job here");
+}
+
+TEST(After, AJobThatIsDoneIsNotWaitedFor) {
+  auto coordinator = open_at({});
+  const JobId first = submit(*coordinator);
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.finish(first));
+
+  EXPECT_EQ(waits(*coordinator, submit(*coordinator, after({first}))), std::vector<std::string>());
+}
+
+TEST(After, ACancelledJobLeavesTheOthersHeldAndTheirErrorSaysWhatToDo) {
+  auto coordinator = open_at({});
+  const JobId first = submit(*coordinator), second = submit(*coordinator, after({first}));
+  ASSERT_TRUE(coordinator->remove(first));
+  const std::string advice = ": name another one (lightshaft after " + second.value +
+                             " JOB), let it go without (lightshaft after " + second.value + "), or cancel it";
+  EXPECT_EQ(coordinator->job(second)->state, JobState::queued);
+  EXPECT_EQ(coordinator->job(second)->error,
+            "job " + first.value + ", for which it waits, was cancelled" + advice);
+  ASSERT_TRUE(coordinator->remove(first));
+  EXPECT_EQ(coordinator->job(second)->error,
+            "job " + first.value + ", for which it waits, is not here any more" + advice);
+
+  ASSERT_TRUE(set_after(*coordinator, second, {}));
+
+  EXPECT_EQ(coordinator->job(second)->error, "no worker is connected");
+  FakeFarm farm(*coordinator, 1);
+  EXPECT_TRUE(farm.finish(second));
+  EXPECT_EQ(coordinator->job(second)->state, JobState::done);
+}
+
+TEST(After, AJobThatWouldWaitForItselfIsRefused) {
+  auto coordinator = open_at({});
+  const JobId one = submit(*coordinator), two = submit(*coordinator, after({one}));
+  const JobId three = submit(*coordinator, after({two}, "1-2"));
+
+  for (const JobId& last : {one, two, three, frame_job(three, 2)}) {
+    const auto refused = set_after(*coordinator, one, {last});
+    ASSERT_FALSE(refused) << last.value;
+    EXPECT_THAT(refused.error().message, HasSubstr("would wait for itself"));
+  }
+  EXPECT_EQ(waits(*coordinator, one), std::vector<std::string>());
+}
+
+TEST(After, ARestartKeepsTheWaitAndNoticesWhatWasDoneBeforeIt) {
+  TempFolder dir;
+  JobId first, second, third;
+  {
+    auto coordinator = open_at(dir.path());
+    first = submit(*coordinator);
+    second = submit(*coordinator, after({first}));
+    third = submit(*coordinator, after({second}));
+    FakeFarm farm(*coordinator, 1);
+    ASSERT_TRUE(farm.finish(first));
+  }
+
+  auto coordinator = open_at(dir.path());
+
+  EXPECT_EQ(waits(*coordinator, second), std::vector<std::string>());
+  EXPECT_EQ(waits(*coordinator, third), std::vector{second.value});
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.run([&] {
+    EXPECT_TRUE(coordinator->job(third)->units_done == 0 ||
+                coordinator->job(second)->state == JobState::done);
+    return coordinator->job(third)->state == JobState::done;
+  }));
+}
+
+TEST(After, AJobThatIsSubmittedAgainWaitsForNobody) {
+  auto coordinator = open_at({});
+  const JobId first = submit(*coordinator), second = submit(*coordinator, after({first}));
+
+  const auto again = coordinator->submit_again(second, {}, "");
+
+  ASSERT_TRUE(again);
+  EXPECT_EQ(waits(*coordinator, *again), std::vector<std::string>());
+}
+
+}  // namespace
+}  // namespace ls::coordinator
