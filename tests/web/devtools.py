@@ -14,7 +14,7 @@ FLAGS = [
     "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--no-first-run", "--hide-scrollbars",
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--remote-debugging-pipe",
 ]
-ANSWER_S = 180  # far more than a busy machine needs
+ANSWER_S = int(os.environ.get("LIGHTSHAFT_ANSWER_S", 180))  # far more than a busy machine needs
 
 
 def chromium_path():

@@ -70,6 +70,8 @@ class StubFarm:
         self.image = png(64, 48, (200, 120, 40))
         self.thumbnail = png(16, 12, (40, 160, 90))
         self.images = {}  # by job, before `image`
+        self.denoised = png(64, 48, (90, 120, 200))
+        self.changes = []  # (job, body) of every PATCH
         self.maps = {"error": png(64, 48, (150, 30, 110)), "samples": png(64, 48, (20, 10, 60))}
         self.size = [96, 64]  # of pictures in numbers
         self.layers = {"rgb": Layer(["R", "G", "B"], gradient), "stderr": Layer(["R", "G", "B"], lambda x, y: (0.25, 0.125, 0.0625)),
@@ -256,6 +258,8 @@ def _handler(farm):
                 return self._send(200, farm.video)
             if what == "thumbnail.png":
                 return self._send(200, farm.thumbnail, "image/png")
+            if what == "image.png" and "layer=denoised" in self.path:
+                return self._send(200, farm.denoised, "image/png")
             if what == "image.png":
                 return self._send(200, farm.images.get(parts[0], farm.image), "image/png")
             if what.removesuffix(".png") in farm.maps:
@@ -263,6 +267,7 @@ def _handler(farm):
             return self._problem(404, "nothing here")
 
         def _patch_jobs(self, parts, body):
+            farm.changes.append((parts[0], json.loads(body)))
             farm.change(parts[0], **json.loads(body))
             return self._send(200, farm.jobs[parts[0]])
 

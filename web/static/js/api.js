@@ -81,6 +81,7 @@ export const api = {
 /** Addresses of files that the browser downloads by itself. */
 export const downloads = {
   exr: (id) => `${kBase}${jobPath(id)}/image.exr`,
+  png: (id, exposure, layer) => `${kBase}${jobPath(id)}/image.png?exposure=${exposure}${layer === "denoised" ? "&layer=denoised" : ""}`,
   report: (id) => `${kBase}${jobPath(id)}/report`,
   page: (id) => `${kBase}${jobPath(id)}/report.html`,
   csv: (id) => `${kBase}${jobPath(id)}/convergence.csv`,

@@ -44,7 +44,7 @@ export const openJob = (id, shown = id) => ({
   folds: 0, // number of folds: a change means that the image has changed
   exposure: 0,
   showTiles: true,
-  layer: "picture", // or "denoised"; as a map over the image: "error", "samples"
+  layer: null, // "picture", "denoised", or as a map over the image "error", "samples"; null: the best picture there is
   clock: "seconds", // axis of the plot; or "core_seconds"
   picked: null, // point of the plot under the pointer
   problem: null, // why the job cannot be shown
@@ -52,6 +52,9 @@ export const openJob = (id, shown = id) => ({
   fps: 24, // pictures per second of what is played, and of a video
   video: null, // what the coordinator says of the sequence's video
 });
+
+/** The layer that is shown of a job: the one that was chosen, or the denoised picture of a job that is done and has one. */
+export const layerOf = ({ layer, report }, job) => layer ?? (job?.denoise && job.state === "done" && !report?.denoised?.error ? "denoised" : "picture");
 
 /** What the coordinator would not take from this token anyway is not offered. */
 export const mayChange = (state) => state.me.role === "admin" || state.me.role === "submit";

@@ -3,8 +3,7 @@ import { h } from "../dom.js";
 import { isNarrowed, kAges, kPageSize, kSorts, kStates } from "../job_list.js";
 import { isOver, jobsInOrder, mayChange, ownerOf, seesOthers } from "../state.js";
 import { count, duration, figure, jobName, kAbsent, moment, percent, plural, spp } from "../format.js";
-import { phrases } from "../phrases.js";
-import { atLeast, doubtful } from "../verdict.js";
+import { atLeast, doubtWord, doubtful } from "../verdict.js";
 import { jobActions, progressBar, safeClass, statePill, stateWord } from "./pieces.js";
 
 export function jobsView(state, actions) {
@@ -92,7 +91,7 @@ function row(state, job, actions) {
     h("td", { "data-label": "State" }, statePill(job)),
     h("td", { class: "progress" }, progressBar(job.progress, `${jobName(job)}, ${stateWord(job)}`, `in-${safeClass(job.state)}`), h("span", { class: "number" }, percent(job.progress))),
     h("td", { class: "number", "data-label": "Samples" }, spp(job.spp_done), job.spp_asked === null ? goal(job) : h("span", { key: "of", class: "of" }, ` / ${count(job.spp)}`)),
-    figureCell("relMSE", figure(job.relmse), doubtful(job.verdict) ? h("small", { key: "doubt", class: "doubt" }, phrases.doubt) : null),
+    figureCell("relMSE", figure(job.relmse), doubtful(job.verdict) ? h("small", { key: "doubt", class: "doubt" }, doubtWord(job.verdict)) : null),
     figureCell("Time left", duration(job.state === "running" ? job.eta_seconds : null), null, job.state === "running" && atLeast(job) ? h("small", { key: "least" }, "at least ") : null),
     h("td", { class: "acts" }, jobActions(state, job, actions)));
 }
