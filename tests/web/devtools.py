@@ -220,6 +220,10 @@ class Page:
         node = self.call("DOM.querySelector", {"nodeId": root, "selector": selector})["nodeId"]
         self.call("DOM.setFileInputFiles", {"nodeId": node, "files": [os.path.abspath(path) for path in paths]})
 
+    def events(self):
+        """(method, params) of all that the browser has told of this page."""
+        return self._browser.events(self._session)
+
     def complaints(self):
         """Errors of scripts, of the console and of the page's policy. A 4xx that a script asked for is no error of the page."""
         out = []

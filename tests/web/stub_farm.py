@@ -218,10 +218,11 @@ def _handler(farm):
             states = asked["state"].split(",") if "state" in asked else None
             found = [job for job in everything
                      if (states is None or job["state"] in states) and asked.get("owner", job["owner"]) == job["owner"]
-                     and job["submitted_unix"] >= float(asked.get("since", 0)) and asked.get("search", "").lower() in f"{job['name']} {job['id']}".lower()]
+                     and job["submitted_unix"] >= float(asked.get("since", 0)) and all(word in f"{job['name']}\n{job['id']}".lower() for word in asked.get("search", "").lower().split())]
             rank = {"running": 0, "paused": 1, "queued": 2}
             keys = {"active": lambda job: (rank.get(job["state"], 3), -job["submitted_unix"]), "name": lambda job: job["name"].lower(),
-                    "submitted": lambda job: job["submitted_unix"], "relmse": lambda job: job["relmse"]}
+                    "submitted": lambda job: job["submitted_unix"], "relmse": lambda job: job["relmse"], "owner": lambda job: job["owner"], "state": lambda job: job["state"],
+                    "progress": lambda job: job["progress"]}
             sort = asked.get("sort", "active")
             found.sort(key=keys[sort.lstrip("-")], reverse=sort.startswith("-"))
             first = int(asked.get("offset", 0))
@@ -285,8 +286,13 @@ def _handler(farm):
             if farm.refusal:
                 refusal, farm.refusal = farm.refusal, None
                 return self._send(400, refusal, "application/problem+json")
-            request = json.loads(body)
-            farm.submitted.append(request)
+            if self.headers["Content-Type"] in ("application/zip", "application/x-tar"):
+                query = dict(urllib.parse.parse_qsl(self.path.partition("?")[2]))
+                farm.submitted.append((self.headers["Content-Type"], query, hashlib.sha256(body).hexdigest()))
+                request = {"name": "archive.xml"}
+            else:
+                request = json.loads(body)
+                farm.submitted.append(request)
             farm.jobs["j-new"] = job("j-new", request["name"], "queued", progress=0, units_done=0)
             return self._send(201, {"id": "j-new", "url": "/api/v1/jobs/j-new"})
 

@@ -135,7 +135,7 @@ def test_a_finished_denoised_job_opens_on_the_denoised_layer_with_its_error(farm
 
 
 def test_the_wipe_says_which_side_is_which(compared):  # noqa: F811
-    page = compared()
+    page = compared("with=j-2")
     page.wait(f"{VIEW}.dataset.painted")
     page.evaluate(f"""void (() => {{
       window.words = [];

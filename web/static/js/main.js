@@ -256,9 +256,26 @@ window.addEventListener("hashchange", () => {
   else showRoute();
 });
 
+// ---- files dropped on the page ----
+
+const dragsFiles = (event) => [...(event.dataTransfer?.types ?? [])].includes("Files");
+const marked = (over) => document.documentElement.classList.toggle("dragging", over);
+document.addEventListener("dragover", (event) => {
+  if (!dragsFiles(event)) return;
+  event.preventDefault();
+  marked(true);
+});
+document.addEventListener("dragleave", (event) => (event.relatedTarget ? null : marked(false)));
+document.addEventListener("drop", (event) => {
+  if (!dragsFiles(event)) return;
+  event.preventDefault();
+  marked(false);
+  if (state.session === "in") actions.takeDrop(event);
+});
+
 // ---- actions ----
 
-const seam = { get: () => state, set, attempt, api, snapshot, showRoute };
+const seam = { get: () => state, set, attempt, api, snapshot, showRoute, compareFile: (file) => actions.compareFile(file) };
 const actions = {
   signIn,
   takeLink: () => {

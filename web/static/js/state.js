@@ -11,8 +11,8 @@ export function initialState() {
     me: { role: "read", user: "" }, // the role with the fewest rights, until the role is known
     link: "connecting", // also "live", "lost"
     route: { view: "jobs", id: null, frame: null },
-    // a page of the list of jobs; ids: null until it is known
-    list: { asked: kWholeList, ids: null, total: 0, states: {}, owners: [], picked: new Set() },
+    // a page of the list of jobs; ids: null until it is known; doing: how far what is done to the selected jobs is
+    list: { asked: kWholeList, ids: null, total: 0, states: {}, owners: [], picked: new Set(), doing: null },
     jobs: null, // Map id -> job JSON; of frames only the one that is shown; null: not known yet
     workers: null, // Map id -> worker JSON
     colours: new Map(), // worker name -> index into the palette, in order of appearance
@@ -32,7 +32,7 @@ export const emptySubmission = () => ({
   progress: 0,
   step: "",
   error: null, // {message, diagnostics}
-  settings: { spp: "", target_error: "", time: "", width: "", height: "", frames: "" },
+  settings: { name: "", spp: "", target_error: "", time: "", width: "", height: "", frames: "", denoise: false, aov: "", priority: "", seed: "", tags: "" },
 });
 
 export const openJob = (id, shown = id) => ({
