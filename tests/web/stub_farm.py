@@ -71,7 +71,8 @@ class StubFarm:
         self.thumbnail = png(16, 12, (40, 160, 90))
         self.images = {}  # by job, before `image`
         self.denoised = png(64, 48, (90, 120, 200))
-        self.changes = []  # (job, body) of every PATCH
+        self.changes = []  # (job or worker, body) of every PATCH
+        self.join = {"address": "0.0.0.0:15151", "tls": False, "token_file": "/srv/farm/join-token"}
         self.maps = {"error": png(64, 48, (150, 30, 110)), "samples": png(64, 48, (20, 10, 60))}
         self.size = [96, 64]  # of pictures in numbers
         self.layers = {"rgb": Layer(["R", "G", "B"], gradient), "stderr": Layer(["R", "G", "B"], lambda x, y: (0.25, 0.125, 0.0625)),
@@ -297,7 +298,13 @@ def _handler(farm):
             return self._send(201, {"id": "j-new", "url": "/api/v1/jobs/j-new"})
 
         def _get_workers(self, parts, body):
-            return self._send(200, {"workers": list(farm.workers.values())})
+            return self._send(200, {"workers": list(farm.workers.values()), **({"join": farm.join} if farm.join else {})})
+
+        def _patch_workers(self, parts, body):
+            farm.changes.append((parts[0], json.loads(body)))
+            farm.workers[parts[0]] = {**farm.workers[parts[0]], **json.loads(body)}
+            farm.emit("worker", farm.workers[parts[0]])
+            return self._send(202)
 
         def _post_blobs(self, parts, body):
             return self._send(200, {"missing": [digest for digest in json.loads(body)["digests"] if digest not in farm.blobs]})

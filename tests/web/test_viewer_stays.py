@@ -11,10 +11,9 @@ from test_viewer import SRGB_HALF, VIEW, colour, compared, press, query, viewer 
 
 def test_a_region_dragged_in_a_running_job_is_where_the_pointer_was(farm, viewer):  # noqa: F811
     page = viewer("zoom=4&x=48&y=32")
-    page.click(".choice [value=region]")
     corners = page.evaluate(f"(() => {{ const v = {VIEW}, b = v.getBoundingClientRect(); return [[20, 16], [60, 48]].map((p) => {{ const w = v.windowPoint(p); return [b.left + w[0] + 2, b.top + w[1] + 2]; }}); }})()")
     middle = [(corners[0][i] + corners[1][i]) / 2 for i in (0, 1)]
-    mouse = lambda kind, at: page.call("Input.dispatchMouseEvent", {"type": kind, "x": at[0], "y": at[1], "button": "left", "buttons": 1, "clickCount": 1})
+    mouse = lambda kind, at: page.call("Input.dispatchMouseEvent", {"type": kind, "x": at[0], "y": at[1], "button": "left", "buttons": 1, "clickCount": 1, "modifiers": 8})  # Shift
     top = page.evaluate(f"{VIEW}.getBoundingClientRect().top")
 
     mouse("mousePressed", corners[0])

@@ -50,7 +50,9 @@ export const api = {
   job: async (id) => (await call("GET", jobPath(id))).json(),
   tiles: async (id) => (await (await call("GET", `${jobPath(id)}/tiles`)).json()).tiles,
   report: async (id) => (await call("GET", `${jobPath(id)}/report`)).json(),
-  workers: async () => (await (await call("GET", "/workers")).json()).workers,
+  /** {workers, join}: join says how further ones come in. */
+  workers: async () => (await call("GET", "/workers")).json(),
+  drainWorker: (id) => call("PATCH", `/workers/${encodeURIComponent(id)}`, json({ state: "draining" })),
   remove: (id) => call("DELETE", jobPath(id)),
   again: async (id, changes) => (await call("POST", `${jobPath(id)}/again`, json(changes))).json(),
   thumbnail: async (id, signal) => createImageBitmap(await (await call("GET", `${jobPath(id)}/thumbnail.png`, { signal })).blob()),

@@ -11,6 +11,7 @@ import { makeJobActions } from "./job_actions.js";
 import { listOf, parametersOf } from "./job_list.js";
 import { makeListActions } from "./list_actions.js";
 import { makeSubmitActions } from "./submit_actions.js";
+import { makeWorkerActions } from "./worker_actions.js";
 import { makeViewerActions } from "./viewer_actions.js";
 import { jobName } from "./format.js";
 import { initialState, openJob, shownOf, withEvent, withJob, withList, withListed, withOpen, withTiles, withUi, withWorkers, withoutJob } from "./state.js";
@@ -149,7 +150,7 @@ async function onOpen() {
   set({ ...state, link: "live" });
   await Promise.all([
     actions.refreshList(),
-    snapshot("workers", () => attempt(api.workers), withWorkers)]);
+    snapshot("workers", () => attempt(api.workers), (now, { workers, join = null }) => ({ ...withWorkers(now, workers), join }))]);
   actions.viewerEvent(null);
   await refreshOpen();
 }
@@ -294,6 +295,7 @@ const actions = {
   ...makeJobActions(seam),
   ...makeListActions(seam),
   ...makeAgainActions(seam),
+  ...makeWorkerActions(seam),
   ...makeSubmitActions(seam),
   ...makeViewerActions(seam),
 };

@@ -15,6 +15,8 @@ export function initialState() {
     list: { asked: kWholeList, ids: null, total: 0, states: {}, owners: [], picked: new Set(), doing: null },
     jobs: null, // Map id -> job JSON; of frames only the one that is shown; null: not known yet
     workers: null, // Map id -> worker JSON
+    join: null, // how further workers join: {address, tls, token_file}
+    workerList: { search: "", sort: "Worker", descending: false },
     colours: new Map(), // worker name -> index into the palette, in order of appearance
     open: null, // the state of the job that is open, see openJob()
     viewer: null, // the state of the viewer, see viewer_actions.js

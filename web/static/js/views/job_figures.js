@@ -72,7 +72,7 @@ export function inFlight(state, job) {
   if (isOver(job)) return null;
   const tiles = [...state.open.tiles.values()];
   return h("section", { key: "flight", class: "panel flight" },
-    h("h2", null, "Tiles in flight", tiles.length ? h("span", { class: "count" }, tiles.length) : null),
+    h("h2", null, "Tiles being rendered", tiles.length ? h("span", { class: "count" }, tiles.length) : null),
     tiles.length === 0 ? h("p", { class: "help" }, "None at this moment.") : h("ul", null, tiles.slice(0, kListed).map((tile) => h("li", { key: tile.tile },
       h("span", { class: "number" }, `tile ${tile.tile}`),
       h("span", { class: "number dim" }, `${spp(tile.spp)} spp`),

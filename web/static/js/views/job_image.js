@@ -33,7 +33,7 @@ export function imagePanel(state, job, actions) {
       choice("layer", "What is shown", job.denoise ? kDenoised : kLayers, layer, actions.setLayer),
       isPicture(layer) ? exposureTool(open, actions) : legend(layer, job.few_hits),
       h("a", { key: "viewer", class: "to-viewer", href: viewHref(job.id) }, "Open in the viewer"),
-      h("label", { class: "check" }, h("input", { type: "checkbox", ".checked": open.showTiles, onchange: actions.toggleTiles }), "Tiles in flight")));
+      h("label", { class: "check" }, h("input", { type: "checkbox", ".checked": open.showTiles, onchange: actions.toggleTiles }), "Tiles being rendered")));
 }
 
 /** What <frame-film> shows; the picture of the frame before stays below an image that has not come yet. */

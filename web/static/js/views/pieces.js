@@ -35,7 +35,7 @@ export function jobActions(state, job, actions, large = false) {
   if ((over && !large) || !mayChange(state)) return null;
   const busy = state.ui.busy === job.id;
   const button = (key, label, onclick, className = "") =>
-    h("button", { key, type: "button", class: `${large ? "" : "small "}${className}`, disabled: busy, onclick, "aria-label": `${label}: ${job.name || job.id}` }, label);
+    h("button", { key, type: "button", class: `${large ? "" : "small "}${className}`, disabled: busy, onclick, "aria-label": `${label}: ${[job.name, job.id].filter(Boolean).join(", ")}` }, label);
   if (state.ui.confirming === job.id) {
     return h("span", { class: "actions" },
       over ? button("gone", "Really remove, with its images", () => actions.remove(job.id), "danger") : button("yes", "Really cancel", () => actions.cancel(job.id), "danger"),
