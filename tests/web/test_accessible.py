@@ -3,7 +3,7 @@ import pytest
 
 NAMES = """[...document.querySelectorAll("a[href], button, input, select, summary")].filter((e) => e.getClientRects().length).map((e) => ({
   tag: e.localName, text: (e.innerText ?? "").trim(), href: e.getAttribute("href"),
-  name: (e.getAttribute("aria-label") || (e.labels?.length ? [...e.labels].map((l) => l.innerText).join(" ") : "") || e.innerText || e.title || "").trim(),
+  name: (e.getAttribute("aria-label") || (e.labels?.length ? [...e.labels].map((l) => l.textContent).join(" ") : "") || e.innerText || e.title || "").trim(),
 }))"""
 
 

@@ -29,7 +29,7 @@ FACTS = {
     "viewer-compare": ["Compare with", "Wipe", "Difference", "relMSE", "FLIP"],
     "viewer-error": ["relative standard error of a pixel, from 0.1 % to 100 % or more", "Relative error", "Point at a pixel"],
     "viewer-objects": ["Selected: lamp"],
-    "workers": ["5 workers", "36 threads", "lab-01", "fetching steam.vdb", "2 numeric classes", "lost", "6.2 min ago"],
+    "workers": ["5 workers", "36 threads", "lab-01", "fetching steam.vdb", "2 different ways", "lost", "6.2 min ago"],
     "workers-empty": ["No worker is connected", "lightshaft-worker --coordinator"],
     "submit": ["Drop a scene here", "Choose a folder"],
     "submit-ready": ["bath.xml", "meshes/tub.obj", "61.4 MiB", "not named by the scene", "Render"],

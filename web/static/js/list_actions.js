@@ -4,6 +4,7 @@ import { withList, withListed, withoutJob, withUi } from "./state.js";
 
 const kTypingPauseMs = 250;
 const kRefreshPauseMs = 1000;
+const kAtOnce = 4; // requests, of those that change several jobs
 const kMostListed = 1000; // jobs that the coordinator lists at once
 
 export function makeListActions({ get, set, attempt, api, snapshot }) {
@@ -38,21 +39,23 @@ export function makeListActions({ get, set, attempt, api, snapshot }) {
     refreshList(typed ? kTypingPauseMs : 0);
   }
 
-  /** Does one thing to all that are picked, one after the other; what can't be done is said, and stays picked. */
+  /** Does one thing to all that are picked, a few at once; what can't be done is said, and stays picked. */
   async function forPicked(act) {
     const failed = new Map();
     const { picked } = get().list;
+    const left = [...picked];
     set(withUi(get(), { busy: "picked", confirming: null }));
-    let done = 0;
-    for (const id of picked) {
-      set(withList(get(), { doing: `${done} of ${picked.size}` }));
-      done += 1;
-      try {
-        await act(id);
-      } catch (error) {
-        failed.set(id, error.message);
+    const work = async () => {
+      for (let id = left.shift(); id !== undefined; id = left.shift()) {
+        set(withList(get(), { doing: `${picked.size - left.length} of ${picked.size}` }));
+        try {
+          await act(id);
+        } catch (error) {
+          failed.set(id, error.message);
+        }
       }
-    }
+    };
+    await Promise.all(Array.from({ length: kAtOnce }, work));
     const text = failed.size ? `${failed.size === 1 ? "One job was" : `${failed.size} jobs were`} left as they are: ${[...failed.values()][0]}` : null;
     set(withUi(withList(get(), { picked: new Set(failed.keys()), doing: null }), { busy: null, notice: text }));
     await fetchList();

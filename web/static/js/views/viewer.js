@@ -28,7 +28,7 @@ export function viewerView(state, actions) {
   const layer = a.layer(view.layer);
   const fits = b && b.size[0] === a.size[0] && b.size[1] === a.size[1];
   const second = fits && b.layer(layer.name).name === layer.name ? b : null;
-  const parts = [tools(viewer, layer, job ?? { id: viewer.id }, actions), compareTools(state, viewer, fits, second, actions)];
+  const parts = [tools(viewer, layer, actions), compareTools(state, viewer, fits, second, actions)];
   // What comes and goes stands below the picture: it must not move while somebody drags in it.
   const picture = [
     stage(state, viewer, layer, second, job ?? { id: viewer.id }, actions),
@@ -39,7 +39,8 @@ export function viewerView(state, actions) {
       h("h1", null, jobName(job ?? { id: viewer.id })),
       h("a", { href: jobHref(viewer.id) }, "Job"),
       h("span", { class: "dim number" }, `${a.size[0]} × ${a.size[1]}`),
-      errorText(job, viewer.report, layer)),
+      errorText(job, viewer.report, layer),
+      h("button", { key: "save", type: "button", class: "small", onclick: () => actions.savePicture(`${jobName(job ?? { id: viewer.id }).replace(/\.xml$/i, "")}-${layer.name}.png`) }, "Save as PNG")),
     state.narrow ? [picture, parts] : [parts, picture], // on a phone the picture comes first
     h("details", { key: "keys", class: "viewer-keys" }, h("summary", null, "Keys"), h("dl", null, kKeys.map(([key, what]) => h("div", { key }, h("dt", null, h("kbd", null, key)), h("dd", null, what))))));
 }
@@ -71,7 +72,7 @@ function stage(state, viewer, layer, second, job, actions) {
   }));
 }
 
-function tools(viewer, layer, job, actions) {
+function tools(viewer, layer, actions) {
   const { a, view } = viewer;
   const coloured = kindOf(layer) === "colour";
   return h("div", { key: "tools", class: "viewer-tools" },
@@ -87,8 +88,7 @@ function tools(viewer, layer, job, actions) {
     choice("tool", "What dragging does", [["pan", "Move"], ["region", "Region"]], viewer.tool, actions.setTool),
     h("span", { key: "zoom", class: "viewer-zoom" },
       zoomButton("−", "Zoom out", "-"), zoomButton("+", "Zoom in", "+"), zoomButton("Fit", "Fit into the window", "0"), zoomButton("1:1", "1:1, one pixel to one", "z")),
-    h("label", { key: "histogram", class: "check" }, h("input", { type: "checkbox", id: "histogram", ".checked": viewer.histogram, onchange: actions.toggleHistogram }), "Histogram"),
-    h("button", { key: "save", type: "button", class: "small", onclick: () => actions.savePicture(`${jobName(job).replace(/\.xml$/i, "")}-${layer.name}.png`) }, "Save as PNG"));
+    h("label", { key: "histogram", class: "check" }, h("input", { type: "checkbox", id: "histogram", ".checked": viewer.histogram, onchange: actions.toggleHistogram }), "Histogram"));
 }
 
 const zoomButton = (text, label, key) => h("button", { key, type: "button", class: "small", "aria-label": label, onclick: () => document.querySelector("float-view")?.press(key) }, text);
