@@ -62,6 +62,24 @@ def test_the_coordinators_own_advice_comes_before_the_pages(farm, dashboard):
     page.wait("document.querySelector('.noisy')?.innerText.includes('four times the samples')")
 
 
+def test_a_job_that_waits_for_others_says_for_which(farm, dashboard):
+    why = "It waits for j-7, which is rendering."
+    farm.jobs["j-1"] = job(state="queued", units_done=0, waits_for=why, after=[{"id": "j-7", "state": "running"}, {"id": "j-8", "state": None}])
+    page = dashboard()
+    assert page.text("[data-job=j-1] .reason") == why
+    page.evaluate("void (location.hash = '#/jobs/j-1')")
+    assert page.text(".job-head .sub") == why
+    assert "After j-7 (rendering), j-8 (removed)" in " ".join(page.text(".job-facts").split())
+    assert page.evaluate("document.querySelector('.job-facts a').getAttribute('href')") == "#/jobs/j-7"
+
+
+def test_the_error_of_the_denoised_picture_comes_with_the_job(farm, dashboard):
+    farm.jobs["j-1"] = job(denoise=True, denoised={"relmse": 0.002, "relmse_ci95": None})
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('.figures')")
+    assert "relMSE, denoised 0.00200 no interval" in page.text(".figures")
+
+
 def test_who_may_only_look_is_not_offered_to_render_on(farm, dashboard):
     farm.role = "read"
     farm.jobs["j-1"] = job(state="done", verdict=HEAVY)

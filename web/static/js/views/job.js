@@ -40,7 +40,7 @@ function shownJob(state, job, actions) {
     job.sequence && job.error ? h("div", { key: "frame-error" }, notice("bad", `Frame ${job.frame}`, failure(job.error))) : null,
     h("div", { key: "columns", class: "columns" },
       h("div", { class: "picture" }, imagePanel(state, job, actions), started ? errorPlot(job, state.open, actions, state.narrow) : null, downloadLinks(job, state.open)),
-      h("div", { class: "facts" }, started ? figures(job, state.open.report) : null, started ? timeSplit(job) : null, jobFacts(state, job, actions), inFlight(state, job))),
+      h("div", { class: "facts" }, started ? figures(job, job.denoised ?? state.open.report?.denoised) : null, started ? timeSplit(job) : null, jobFacts(state, job, actions), inFlight(state, job))),
   ];
 }
 
@@ -57,7 +57,7 @@ function heading(state, job, actions) {
 function sentence(job) {
   if (job.state === "done") return `Done after ${duration(job.elapsed_seconds)}: ${whyStopped(job) ?? "finished"}.`;
   if (job.state === "running") return `${percent(job.progress)} · ${job.eta_seconds === null ? "time left not known yet" : `${timeLeft(job)} left`} · submitted ${moment(job.submitted_unix)}`;
-  if (job.state === "queued") return "Waiting for a worker that may take it.";
+  if (job.state === "queued") return job.waits_for || "Waiting for a worker that may take it.";
   return `${stateWord(job)[0].toUpperCase()}${stateWord(job).slice(1)} at ${percent(job.progress)}, after ${duration(job.elapsed_seconds)}${isOver(job) && whyStopped(job) ? `: ${whyStopped(job)}` : ""}.`;
 }
 

@@ -2,6 +2,8 @@
 import { h } from "../dom.js";
 import { isOver, mayChange, ownerOf } from "../state.js";
 import { count, kAbsent, moment } from "../format.js";
+import { jobHref } from "../route.js";
+import { stateWord } from "./pieces.js";
 
 export function jobFacts(state, job, actions) {
   const report = state.open.report ?? {};
@@ -12,7 +14,7 @@ export function jobFacts(state, job, actions) {
     row("Integrator", integrator(report)),
     row("Seed", typeof report.seed === "number" ? String(report.seed) : kAbsent),
     row("Denoised", job.denoise ? "yes" : "no"),
-    waits.length ? row("After", waits.join(", ")) : null,
+    waits.length ? row("After", waits.map(({ id, state: now }, i) => [i ? ", " : null, h("a", { key: id, href: jobHref(id) }, id), now ? ` (${stateWord({ state: now })})` : " (removed)"])) : null,
     job.max_workers ? row("Workers at most", count(job.max_workers)) : null,
     priority(state, job, actions)));
 }

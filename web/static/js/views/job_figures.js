@@ -9,12 +9,12 @@ import { workerMark } from "./pieces.js";
 const kListed = 12;
 const kDoubtWords = new Set(["heavy_tail", "early", "bias_floor"].map((kind) => doubtWord({ kind })));
 
-/** What follows each figure has its lines kept free, so that nothing moves when it becomes known. */
-export function figures(job, report) {
+/** What follows each figure has its lines kept free, so that nothing moves when it becomes known. denoised: the error of the denoised picture, or why there is none; absent until it is known. */
+export function figures(job, denoised) {
   const clean = healthComplaints(job).length === 0;
   return h("dl", { class: "panel figures" },
     fact("relMSE", figure(job.relmse), [confidence(job, job.relmse_ci95) ?? "not known yet", job.target_error > 0 && !denoisedTarget(job) ? target(job) : null], "key"),
-    job.denoise || denoisedTarget(job) ? denoisedFact(job, report?.denoised) : null,
+    job.denoise || denoisedTarget(job) ? denoisedFact(job, denoised) : null,
     isOver(job) ? fact("Took", duration(job.elapsed_seconds), ["wall clock"], "key") : fact(atLeast(job) ? "Time left, at least" : "Time left", duration(job.eta_seconds), timeNotes(job), "key"),
     fact("Samples per pixel", spp(job.spp_done), samplesAsked(job)),
     fact("RMSE", figure(job.rmse), [confidence(job, job.rmse_ci95)]),

@@ -120,7 +120,7 @@ function row(state, job, actions) {
 
 /** Why a job failed, or why it does not go on: as the coordinator says it, its first line. */
 function reason(job) {
-  const text = job.error || job.waiting;
+  const text = job.error || job.waits_for;
   if (typeof text !== "string" || !text || job.state === "done") return null;
   return h("small", { key: "reason", class: job.state === "failed" ? "reason bad" : "reason", title: text }, causeFirst(text).cause.split("\n")[0]);
 }
