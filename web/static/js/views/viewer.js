@@ -47,7 +47,8 @@ export function viewerView(state, actions) {
 
 /** The error of the picture that is shown. */
 function errorText(job, report, layer) {
-  if (layer.name === "denoised" && typeof report?.denoised?.relmse === "number") return relMse(report.denoised.relmse, interval(report.denoised.relmse_ci95));
+  const denoised = job?.denoised ?? report?.denoised;
+  if (layer.name === "denoised" && typeof denoised?.relmse === "number") return relMse(denoised.relmse, interval(denoised.relmse_ci95));
   if (layer.name !== "rgb" || typeof job?.relmse !== "number") return null;
   return relMse(job.relmse, doubtful(job.verdict) ? null : interval(job.relmse_ci95), doubtful(job.verdict) ? doubtWord(job.verdict) : null);
 }
