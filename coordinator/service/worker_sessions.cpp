@@ -212,7 +212,8 @@ void WorkerSessions::note_progress(Core& core, Connection& from, WorkerEntry& wo
 Result<void> WorkerSessions::drain(const WorkerId& id) {
   const auto core = core_.lock();
   const auto found = core->workers.find(id);
-  if (found == core->workers.end()) return fail(Errc::not_found, fmt::format("there is no worker \"{}\"", id.value));
+  if (found == core->workers.end())
+    return fail(Errc::not_found, fmt::format("there is no worker \"{}\"", id.value));
   const auto& connection = found->second.connection;
   if (!connection || !connection->open)
     return fail(Errc::failed_precondition,

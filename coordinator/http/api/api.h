@@ -35,8 +35,8 @@ class BodySink {
 
 // How workers join this farm.
 struct Joining {
-  std::string address;     // HOST:PORT of the workers' port: as the coordinator listens, or as the operator says
-  bool tls = false;        // workers need the certificate of the authority, too
+  std::string address;  // HOST:PORT of the workers' port: as the coordinator listens, or as the operator says
+  bool tls = false;     // workers need the certificate of the authority, too
   std::string token_file;  // the file with the join token, on the coordinator's machine
 };
 

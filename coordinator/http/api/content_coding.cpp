@@ -51,7 +51,8 @@ std::optional<std::string> gzipped(std::span<const std::byte> bytes) {
 
 void compress(Response& response, const Request& request) {
   const auto* body = std::get_if<std::string>(&response.body);
-  if (body == nullptr || body->size() < kWorthIt || !media_type(response.content_type).ends_with("json")) return;
+  if (body == nullptr || body->size() < kWorthIt || !media_type(response.content_type).ends_with("json"))
+    return;
   response.headers.emplace_back("Vary", "Accept-Encoding");
   if (!accepts_gzip(request)) return;
   auto shorter = gzipped(std::as_bytes(std::span(*body)));

@@ -1,5 +1,5 @@
-// Compresses bodies with gzip for clients that accept it: over slow links the dashboard and long lists of jobs
-// arrive several times as fast.
+// Compresses bodies with gzip for clients that accept it: over slow links the dashboard and long lists of
+// jobs arrive several times as fast.
 #pragma once
 
 #include <cstddef>

@@ -35,8 +35,8 @@ void each_line(std::string_view text, const Line& line) {
   }
 }
 
-// Each module becomes a function that is called once and returns what it exports. What a module imports stands
-// before it.
+// Each module becomes a function that is called once and returns what it exports. What a module imports
+// stands before it.
 class Joined {
  public:
   explicit Joined(const Sources& sources) : sources_(sources) {}
@@ -50,7 +50,9 @@ class Joined {
     std::string body;
     std::vector<std::string> exported;
     bool known = true;
-    each_line(source->second, [&](std::string_view line) { known = known && add_line(name, std::string(line), body, exported); });
+    each_line(source->second, [&](std::string_view line) {
+      known = known && add_line(name, std::string(line), body, exported);
+    });
     if (!known) return false;
     text_ += fmt::format("modules[\"{}\"] = (() => {{\n{}\nreturn {{ {} }};\n}})();\n", name, body,
                          fmt::join(exported, ", "));
@@ -60,7 +62,8 @@ class Joined {
   std::string text() const { return "const modules = {};\n" + text_; }
 
  private:
-  bool add_line(const std::string& name, std::string line, std::string& body, std::vector<std::string>& exported) {
+  bool add_line(const std::string& name, std::string line, std::string& body,
+                std::vector<std::string>& exported) {
     static const std::regex kImport(R"re(import (?:\{ (.*) \} from )?"(\.[^"]*)";\s*)re");
     static const std::regex kExport(R"(^export (?:const|function|async function|class) (\w+))");
     static const std::regex kAs(R"((\w+) as (\w+))");
@@ -68,10 +71,12 @@ class Joined {
     std::smatch parts;
     if (line.starts_with("import ")) {
       if (!std::regex_match(line, parts, kImport)) return false;
-      const auto from = (std::filesystem::path(name).parent_path() / parts[2].str()).lexically_normal().generic_string();
+      const auto from =
+          (std::filesystem::path(name).parent_path() / parts[2].str()).lexically_normal().generic_string();
       if (!add(from)) return false;
       if (parts[1].matched)
-        body += fmt::format("const {{ {} }} = modules[\"{}\"];\n", std::regex_replace(parts[1].str(), kAs, "$1: $2"), from);
+        body += fmt::format("const {{ {} }} = modules[\"{}\"];\n",
+                            std::regex_replace(parts[1].str(), kAs, "$1: $2"), from);
       return true;
     }
     if (line.starts_with("export ")) {

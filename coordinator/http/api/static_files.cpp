@@ -63,8 +63,8 @@ std::optional<Response> StaticFiles::find(const Request& request) const {
   if (found == entries_.end()) return std::nullopt;
   const Entry& entry = found->second;
   const bool gzip = !entry.gzip.empty() && accepts_gzip(request);
-  // With "no-cache" the browser checks for changes each time, and gets a 304 if the file has not changed. A file
-  // whose name contains its digest never changes.
+  // With "no-cache" the browser checks for changes each time, and gets a 304 if the file has not changed. A
+  // file whose name contains its digest never changes.
   Response response{
       .headers = {{"ETag", fmt::format("\"{}{}\"", entry.digest, gzip ? "-gzip" : "")},
                   {"Cache-Control", entry.immutable ? "public, max-age=31536000, immutable" : "no-cache"},

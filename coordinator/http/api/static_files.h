@@ -1,6 +1,6 @@
 // Serves the dashboard's files, which are built into the executable. Files are looked up by their exact names
-// in a table in memory, so no request can read other files of the disk. The page's modules and styles are joined to
-// one file each, whose name contains its digest; clients that accept gzip get all files compressed.
+// in a table in memory, so no request can read other files of the disk. The page's modules and styles are
+// joined to one file each, whose name contains its digest; clients that accept gzip get all files compressed.
 #pragma once
 
 #include <map>
@@ -39,7 +39,8 @@ class StaticFiles {
   std::span<const std::byte> keep(std::string text);
 
   std::map<std::string, Entry, std::less<>> entries_;
-  std::vector<std::shared_ptr<const std::string>> made_;  // bytes that are built into no program; copies share them
+  std::vector<std::shared_ptr<const std::string>>
+      made_;  // bytes that are built into no program; copies share them
 };
 
 std::string_view content_type_of(std::string_view file_name);

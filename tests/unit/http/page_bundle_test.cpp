@@ -41,19 +41,23 @@ std::string unpacked(std::string_view gzip) {
 }
 
 TEST(PageBundle, JoinsModulesInTheOrderInWhichTheyNeedEachOther) {
-  const auto bundle = bundled("import \"./deep/other.js\";\nimport { x as y } from \"./deep/other.js\";\nexport function f() { return y; }\n",
-                              "export const x = 1;\nconst here = new URL(\"./w.js\", import.meta.url);\n");
+  const auto bundle = bundled(
+      "import \"./deep/other.js\";\nimport { x as y } from \"./deep/other.js\";\nexport function f() { "
+      "return y; }\n",
+      "export const x = 1;\nconst here = new URL(\"./w.js\", import.meta.url);\n");
   ASSERT_TRUE(bundle);
 
-  EXPECT_EQ(bundle->script,
-            "const modules = {};\n"
-            "modules[\"js/deep/other.js\"] = (() => {\nconst x = 1;\nconst here = new URL(\"./w.js\", new "
-            "URL(\"js/deep/other.js\", document.baseURI));\n\nreturn { x };\n})();\n"
-            "modules[\"js/main.js\"] = (() => {\nconst { x: y } = modules[\"js/deep/other.js\"];\nfunction f() { "
-            "return y; }\n\nreturn { f };\n})();\n");
+  EXPECT_EQ(
+      bundle->script,
+      "const modules = {};\n"
+      "modules[\"js/deep/other.js\"] = (() => {\nconst x = 1;\nconst here = new URL(\"./w.js\", new "
+      "URL(\"js/deep/other.js\", document.baseURI));\n\nreturn { x };\n})();\n"
+      "modules[\"js/main.js\"] = (() => {\nconst { x: y } = modules[\"js/deep/other.js\"];\nfunction f() { "
+      "return y; }\n\nreturn { f };\n})();\n");
   EXPECT_EQ(bundle->style, "a {}\nb {}\n");
   EXPECT_EQ(bundle->page, "<head>\n  <link rel=\"stylesheet\" href=\"" + bundle->style_name +
-                              "\">\n  <script type=\"module\" src=\"" + bundle->script_name + "\"></script>\n</head>\n");
+                              "\">\n  <script type=\"module\" src=\"" + bundle->script_name +
+                              "\"></script>\n</head>\n");
 }
 
 TEST(PageBundle, NamesItsFilesByWhatIsInThem) {
@@ -68,8 +72,9 @@ TEST(PageBundle, NamesItsFilesByWhatIsInThem) {
 }
 
 TEST(PageBundle, LeavesWhatItDoesNotKnowAsItIs) {
-  for (const std::string_view main : {"import * as all from \"./deep/other.js\";\n", "import \"./missing.js\";\n",
-                                      "export default 1;\n", "export { x };\n", "import \"./main.js\";\n"})
+  for (const std::string_view main :
+       {"import * as all from \"./deep/other.js\";\n", "import \"./missing.js\";\n", "export default 1;\n",
+        "export { x };\n", "import \"./main.js\";\n"})
     EXPECT_FALSE(bundled(main)) << main;
 }
 
@@ -81,7 +86,8 @@ TEST(PageBundle, HasEveryModuleOfTheDashboardButThoseOfItsWorker) {
     const bool module = file.name.starts_with("js/") && file.name.ends_with(".js");
     const bool of_worker = file.name == "js/viewer/flip_worker.js" || file.name == "js/viewer/flip.js";
     if (module && !of_worker)
-      EXPECT_NE(bundle->script.find("modules[\"" + std::string(file.name) + "\"] = "), std::string::npos) << file.name;
+      EXPECT_NE(bundle->script.find("modules[\"" + std::string(file.name) + "\"] = "), std::string::npos)
+          << file.name;
   }
 }
 
@@ -91,7 +97,8 @@ TEST(StaticFiles, AreCompressedForWhoAcceptsItAndKeptForEverByTheirDigest) {
   ASSERT_TRUE(bundle);
 
   const auto plain = files.find(request(Method::get, "/" + bundle->script_name));
-  const auto gzip = files.find(request(Method::get, "/" + bundle->script_name, {{"accept-encoding", "br, gzip"}}));
+  const auto gzip =
+      files.find(request(Method::get, "/" + bundle->script_name, {{"accept-encoding", "br, gzip"}}));
   ASSERT_TRUE(plain && gzip);
   const auto text = [](const Response& r) {
     return std::string(reinterpret_cast<const char*>(r.bytes().data()), r.bytes().size());
@@ -109,12 +116,20 @@ TEST(StaticFiles, AreCompressedForWhoAcceptsItAndKeptForEverByTheirDigest) {
   EXPECT_NE(field(*plain, "ETag"), field(*gzip, "ETag"));
   EXPECT_NE(field(*gzip, "Cache-Control").find("immutable"), std::string::npos);
   EXPECT_EQ(field(*files.find(request(Method::get, "/")), "Cache-Control"), "no-cache");
-  EXPECT_EQ(files.find(request(Method::get, "/", {{"if-none-match", field(*files.find(request(Method::get, "/")), "ETag")}}))->status, 304);
+  EXPECT_EQ(files
+                .find(request(Method::get, "/",
+                              {{"if-none-match", field(*files.find(request(Method::get, "/")), "ETag")}}))
+                ->status,
+            304);
 }
 
 TEST(ContentCoding, IsGzipOnlyForWhoTakesIt) {
-  for (const auto& [field, takes] : {std::pair{"gzip", true}, {"br;q=1, GZIP ; q=0.5", true}, {"gzip;q=0", false},
-                                     {"gzip;q=0.000", false}, {"", false}, {"deflate, x-gzip", false}})
+  for (const auto& [field, takes] : {std::pair{"gzip", true},
+                                     {"br;q=1, GZIP ; q=0.5", true},
+                                     {"gzip;q=0", false},
+                                     {"gzip;q=0.000", false},
+                                     {"", false},
+                                     {"deflate, x-gzip", false}})
     EXPECT_EQ(accepts_gzip(request(Method::get, "/", {{"accept-encoding", field}})), takes) << field;
 }
 
