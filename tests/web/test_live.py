@@ -59,6 +59,7 @@ def test_signing_out_forgets_what_was_shown(farm, dashboard):
     page.evaluate("[...document.querySelectorAll('header button')].at(-1).click()")
 
     page.wait("document.getElementById('token')")
+    assert page.count(".field-error") == 0
     assert not farm.signed_in and page.count("[data-job]") == 0
 
 
@@ -69,6 +70,7 @@ def test_a_session_that_ends_leads_back_to_the_sign_in(farm, dashboard):
     farm.drop_streams()
 
     page.wait("document.getElementById('token')")
+    assert page.text(".field-error").startswith("Your session has ended")
 
 
 # ---- jobs ----

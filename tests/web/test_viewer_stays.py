@@ -115,6 +115,25 @@ def test_what_is_seen_is_saved_as_a_png(farm, viewer):  # noqa: F811
     assert name == "steam-rgb.png" and base64.b64decode(data)[:8] == b"\x89PNG\r\n\x1a\n"
 
 
+def test_a_picture_that_has_not_come_says_that_it_loads(farm, dashboard):
+    farm.jobs["j-1"] = job(size=farm.size)
+    page = dashboard()
+    page.hold_reply("url.includes('/pixels')")
+    page.evaluate("void (location.hash = '#/view/j-1')")
+    word = f"getComputedStyle({VIEW}, '::after').content"
+    page.wait(f"window.held && {word} === '\"Loading …\"'")
+    page.release_reply()
+    page.wait(f"{VIEW}.dataset.painted && {word} === 'none'")
+
+
+def test_flip_says_that_it_is_computed(compared):  # noqa: F811
+    page = compared("with=j-2")
+    page.evaluate(f"""void (window.words = [], new MutationObserver(() => window.words.push({VIEW}.dataset.busy)).observe({VIEW}, {{ attributes: true, attributeFilter: ["data-busy"] }}))""")
+    page.click("[name=by][value=flip]")
+    page.wait("window.words.includes('Computing FLIP …')")
+    page.wait(f"{VIEW}.dataset.painted && {VIEW}.dataset.busy === ''")
+
+
 def test_a_viewer_of_no_job_ends_in_its_error(farm, dashboard):
     page = dashboard("#/view/NOPE")
     page.wait("document.querySelector('.notice.bad')?.innerText.includes('There is no job \"NOPE\"')")

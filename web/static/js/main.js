@@ -19,6 +19,7 @@ import { page } from "./views/shell.js";
 
 const kReportPauseMs = 2000;
 const kListPauseMs = 50;
+const kEnded = "Your session has ended: its time is up, or its token was revoked. Sign in again.";
 const kPhone = "(max-width: 40rem)";
 
 let state = initialState();
@@ -116,7 +117,8 @@ async function enter() {
   return null;
 }
 
-function signedOut(message = null) {
+/** message: why; without one, that a session that was open has ended. */
+function signedOut(message = state.session === "in" ? kEnded : null) {
   closeEvents?.();
   closeEvents = null;
   set(withUi({ ...initialState(), narrow: state.narrow, route: state.route, session: "out" }, { signInError: message }));
@@ -289,7 +291,7 @@ const actions = {
   leaveLink: () => set(withUi(state, { link: null })),
   signOut: async () => {
     await attempt(api.signOut);
-    signedOut();
+    signedOut(null);
   },
   dismiss: () => set(withUi(state, { notice: null })),
   ...makeJobActions(seam),
