@@ -68,6 +68,7 @@ def test_only_an_admin_sends_workers_away(some, dashboard, role):
 def test_the_command_that_adds_a_worker_has_this_coordinators_address(farm, dashboard, join, command, more):
     farm.join = join
     page = dashboard("#/workers")
+    page.wait("document.querySelector('.empty h1')?.innerText === 'No worker is connected'")
     assert page.text(".empty pre") == command
     assert more in page.text(".empty")
 
@@ -81,6 +82,7 @@ def test_a_real_worker_ends_when_it_is_sent_away_and_the_command_is_right(tmp_pa
         page = open_page(f"{farm.url()}/#token={farm.token}")
         page.wait("document.querySelector('.link.live')")
         page.evaluate("void (location.hash = '#/workers')")
+        page.wait("document.querySelector('.empty h1')?.innerText === 'No worker is connected'")
         command = page.text(".empty pre")
         assert f"--coordinator 127.0.0.1:{farm.grpc} " in command
 
