@@ -80,6 +80,7 @@ class StubFarm:
         self.layers_of = {}  # by job, before `layers`
         self.video = {"state": "none", "fps": None, "exposure": None, "layer": None, "frames": 0, "frames_done": 0, "bytes": None, "error": None}
         self.no_video = None  # why none is made
+        self.log = ""  # of every job
         self.blobs = {}
         self.submitted = []
         self.refusal = None  # problem details for the next POST /jobs
@@ -256,6 +257,8 @@ def _handler(farm):
                 asked = dict(urllib.parse.parse_qsl(self.path.split("?")[1]))
                 rect = [int(v) for v in asked["rect"].split(",")]
                 return self._send(200, layers[asked["layer"]].bytes(int(asked["level"]), rect), "application/octet-stream")
+            if what == "log":
+                return self._send(200, farm.log.encode(), "text/plain")
             if what == "video":
                 return self._send(200, farm.video)
             if what == "thumbnail.png":

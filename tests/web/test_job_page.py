@@ -3,6 +3,7 @@ import json
 
 import pytest
 
+from local_farm import wait_until
 from stub_farm import job, png
 
 HEAVY = {"kind": "heavy_tail", "words": "don't trust yet: few pixels carry the error", "trusted": False}
@@ -52,7 +53,7 @@ def test_a_noisy_job_says_so_plainly_and_renders_on(farm, dashboard, fields, lab
 
     button(page, label)
 
-    page.wait("!document.querySelector('.go-on button').disabled")
+    wait_until(lambda: farm.changes, "the farm is asked")
     assert farm.changes == [("j-1", changes)]
 
 
@@ -120,6 +121,27 @@ def test_an_empty_picture_says_why_it_is_empty(farm, dashboard, state, words):
     assert page.text(".stage-text") == words
 
 
+def test_the_log_is_read_on_the_page(farm, dashboard):
+    farm.jobs["j-1"] = job()
+    farm.log = "12:00:01 submitted\n12:00:02 <b>lab-01</b> took it\n"
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('.job-log')")
+    assert farm.asked("GET", "/api/v1/jobs/j-1/log") == 0
+
+    page.click(".job-log summary")
+
+    page.wait("document.querySelector('.job-log pre')?.textContent.endsWith('<b>lab-01</b> took it\\n')")
+    farm.log += "12:00:09 done\n"
+    page.click(".job-log button")
+    page.wait("document.querySelector('.job-log pre').textContent.includes('12:00:09 done')")
+
+
+def test_what_has_no_sample_is_not_offered_as_a_picture(farm, dashboard):
+    farm.jobs["j-1"] = job(state="failed", units_done=0, error="no")
+    page = dashboard("#/jobs/j-1")
+    assert "EXR" not in page.text(".downloads") and "Report" in page.text(".downloads")
+
+
 def test_priority_is_set_on_the_page_of_a_job(farm, dashboard):
     farm.jobs["j-1"] = job(priority=2)
     page = dashboard("#/jobs/j-1")
@@ -130,7 +152,7 @@ def test_priority_is_set_on_the_page_of_a_job(farm, dashboard):
     page.type("7")
     page.key("Enter", virtual=13, text="\r")
 
-    page.wait("document.getElementById('priority').value === '7'")
+    wait_until(lambda: farm.changes, "the farm is asked")
     assert farm.changes == [("j-1", {"priority": 7})]
 
 

@@ -49,6 +49,7 @@ export const api = {
   list: async (parameters) => (await call("GET", `/jobs?${parameters}`)).json(),
   job: async (id) => (await call("GET", jobPath(id))).json(),
   tiles: async (id) => (await (await call("GET", `${jobPath(id)}/tiles`)).json()).tiles,
+  log: async (id) => (await call("GET", `${jobPath(id)}/log`)).text(),
   report: async (id) => (await call("GET", `${jobPath(id)}/report`)).json(),
   /** {workers, join}: join says how further ones come in. */
   workers: async () => (await call("GET", "/workers")).json(),

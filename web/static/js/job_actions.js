@@ -84,6 +84,10 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
       return watchVideo(id, api.makeVideo(id, { exposure, fps, ...(layer === "denoised" ? { layer } : {}) }));
     },
     setState: change,
+    readLog: async (id) => {
+      const log = await attempt(() => api.log(id));
+      if (log !== undefined && get().open?.shown === id) set(withOpen(get(), { log }));
+    },
     renderOn: alter,
     setPriority: (id, priority) => alter(id, { priority }),
     remove,

@@ -39,7 +39,7 @@ function shownJob(state, job, actions) {
   return [
     job.sequence && job.error ? h("div", { key: "frame-error" }, notice("bad", `Frame ${job.frame}`, failure(job.error))) : null,
     h("div", { key: "columns", class: "columns" },
-      h("div", { class: "picture" }, imagePanel(state, job, actions), started ? errorPlot(job, state.open, actions, state.narrow) : null, downloadLinks(job, state.open)),
+      h("div", { class: "picture" }, imagePanel(state, job, actions), started ? errorPlot(job, state.open, actions, state.narrow) : null, downloadLinks(job, state.open), logOf(job, state.open, actions)),
       h("div", { class: "facts" }, started ? figures(job, job.denoised ?? state.open.report?.denoised) : null, started ? timeSplit(job) : null, jobFacts(state, job, actions), inFlight(state, job))),
   ];
 }
@@ -84,13 +84,20 @@ function failure(text) {
   return [h("pre", { key: "cause" }, cause), where ? h("p", { key: "where", class: "failure-where" }, where) : null];
 }
 
+/** What happened to the job, the latest last; it is fetched when it is opened. */
+const logOf = (job, { log }, actions) => h("details", { key: `log ${job.id}`, class: "panel job-log", ontoggle: (event) => (event.currentTarget.open ? actions.readLog(job.id) : null) },
+  h("summary", null, "Log"),
+  log === null ? h("p", { key: "waiting", class: "help" }, "Fetching the log …") : h("pre", { key: "lines", tabindex: 0, "aria-label": "Log" }, log || "Nothing has happened yet."),
+  log === null ? null : h("button", { key: "again", type: "button", class: "small", onclick: () => actions.readLog(job.id) }, "Read it again"));
+
 function downloadLinks(job, open) {
+  const taken = !isOver(job) || job.units_done > 0; // before the end there may be a picture soon
   const shown = layerOf(open, job) === "denoised" ? "denoised" : "picture";
   const link = (href, label, hint, name) => h("a", { key: hint, class: "button", href, download: name }, label, h("small", null, hint));
   const stem = jobName(job).replace(/\.xml$/i, "") + (job.sequence ? `.${job.frame}` : "");
   return h("nav", { class: "downloads", "aria-label": "Downloads" },
-    link(downloads.exr(job.id), "EXR", "image", `${stem}.exr`),
-    link(downloads.png(job.id, open.exposure, shown), "PNG", shown === "denoised" ? "denoised" : "as shown", `${stem}.png`),
+    taken ? link(downloads.exr(job.id), "EXR", "image", `${stem}.exr`) : null,
+    taken ? link(downloads.png(job.id, open.exposure, shown), "PNG", shown === "denoised" ? "denoised" : "as shown", `${stem}.png`) : null,
     h("a", { key: "page", class: "button", href: downloads.page(job.id), target: "_blank", rel: "noopener" }, "Report", h("small", null, "page")),
     link(downloads.report(job.id), "Report", "JSON", `${stem}.report.json`),
     link(downloads.csv(job.id), "Convergence", "CSV", `${stem}.convergence.csv`),
