@@ -264,6 +264,8 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
                     identity != nullptr);
   if (*webhooks) api.webhooks([&hooks = **webhooks] { return hooks.figures(); });
   api.workers_port([&grpc] { return grpc.trouble(); });
+  api.joining({flags.public_grpc.empty() ? with_port(flags.grpc, *grpc_port) : flags.public_grpc,
+               grpc_tls.has_value(), (secrets / "join-token").string()});
   if (*tracer) api.traces([tracer = *tracer] { return tracer->figures(); });
   (*coordinator)
       ->announce(flags.public_http.empty()

@@ -334,6 +334,8 @@ std::vector<WorkerView> Coordinator::workers() const {
   return all;
 }
 
+Result<void> Coordinator::drain_worker(const WorkerId& id) { return parts_->sessions.drain(id); }
+
 Result<std::unique_ptr<WorkerSession>> Coordinator::connect(const WorkerHello& hello,
                                                             std::shared_ptr<WorkerSink> sink,
                                                             const std::string& principal) {

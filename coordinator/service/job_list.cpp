@@ -1,6 +1,8 @@
 // The list of jobs that a client asks for.
 #include <algorithm>
 #include <cctype>
+#include <iterator>
+#include <sstream>
 #include <thread>
 
 #include "coordinator/service/core.h"
@@ -31,11 +33,19 @@ int rank(JobState state) {
   return state == JobState::running ? 0 : state == JobState::paused ? 1 : state == JobState::queued ? 2 : 3;
 }
 
-bool asked_for(const Row& row, const JobsAsked& asked, const std::string& search) {
+// Returns the words of a search, in lower case.
+std::vector<std::string> words_of(const std::string& search) {
+  std::istringstream text(lower(search));
+  return {std::istream_iterator<std::string>(text), {}};
+}
+
+bool asked_for(const Row& row, const JobsAsked& asked, const std::vector<std::string>& words) {
+  const auto has = [text = lower(row.name + '\n' + row.id.value)](const std::string& word) {
+    return text.find(word) != std::string::npos;
+  };
   return (asked.states.empty() || asked.states.contains(row.state)) &&
          (!asked.owner || *asked.owner == row.owner) && row.submitted >= asked.since_unix &&
-         (search.empty() || lower(row.name).find(search) != std::string::npos ||
-          lower(row.id.value).find(search) != std::string::npos);
+         (words.empty() || std::ranges::all_of(words, has));
 }
 
 // Returns the relative mean squared error to sort by; infinity if the job has no error estimate yet.
@@ -109,7 +119,7 @@ void sort(std::vector<Row>& rows, const JobsAsked& asked) {
 JobsPage list_jobs(Guarded<Core>& core, const JobsAsked& asked) {
   JobsPage page;
   std::vector<Row> rows;
-  const std::string search = lower(asked.search);
+  const std::vector<std::string> words = words_of(asked.search);
   const std::vector<JobId> all = core.lock()->jobs.order();
   const bool by_view = asked.by == JobOrder::progress || asked.by == JobOrder::relmse;
   step_through(core, all.size(), [&](Core& locked, std::size_t i) {
@@ -117,7 +127,7 @@ JobsPage list_jobs(Guarded<Core>& core, const JobsAsked& asked) {
     if (!row) return;
     ++page.states[static_cast<std::size_t>(row->state)];
     page.owners.insert(row->owner);
-    if (asked_for(*row, asked, search)) rows.push_back(std::move(*row));
+    if (asked_for(*row, asked, words)) rows.push_back(std::move(*row));
   });
   page.total = rows.size();
   sort(rows, asked);

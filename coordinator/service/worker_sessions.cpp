@@ -209,6 +209,19 @@ void WorkerSessions::note_progress(Core& core, Connection& from, WorkerEntry& wo
   core.publisher.worker(from.worker, false);
 }
 
+Result<void> WorkerSessions::drain(const WorkerId& id) {
+  const auto core = core_.lock();
+  const auto found = core->workers.find(id);
+  if (found == core->workers.end())
+    return fail(Errc::not_found, fmt::format("there is no worker \"{}\"", id.value));
+  const auto& connection = found->second.connection;
+  if (!connection || !connection->open)
+    return fail(Errc::failed_precondition,
+                fmt::format("worker {} is not connected: it can't be asked to end", id.value));
+  connection->sink->send(DrainNow{});
+  return {};
+}
+
 void WorkerSessions::report_held_back(Core& core) const {
   for (const auto& [id, worker] : core.workers)
     if (worker.connection && worker.connection->open && worker.connection->held_back)

@@ -233,7 +233,7 @@ struct JobsAsked {
   std::function<bool(const std::string& owner)> visible;
   std::set<JobState> states;  // states to list; empty: all
   std::optional<std::string> owner;
-  std::string search;     // text that the name or id must contain (case is ignored); empty: all jobs
+  std::string search;  // words, each of which the name or id must contain (case is ignored); empty: all jobs
   double since_unix = 0;  // earliest time of submission, in seconds since 1970
   JobOrder by = JobOrder::order;
   bool descending = false;

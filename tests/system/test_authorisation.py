@@ -79,6 +79,8 @@ class Door:
             job = self.submit("owner")
         if method == "patch":
             body = b'{"priority": -3}'  # which also a user may choose
+        if "{worker}" in path:
+            path, body = path.replace("{worker}", "nobody"), b'{"state": "draining"}'
         if operation == "post /api/v1/jobs":
             path, body, kind = path + "?spp=2", SCENE.encode(), "application/xml"
         if operation == "post /api/v1/jobs/{id}/again":

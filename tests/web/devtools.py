@@ -14,7 +14,7 @@ FLAGS = [
     "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--no-first-run", "--hide-scrollbars",
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--remote-debugging-pipe",
 ]
-ANSWER_S = 180  # far more than a busy machine needs
+ANSWER_S = int(os.environ.get("LIGHTSHAFT_ANSWER_S", 180))  # far more than a busy machine needs
 
 
 def chromium_path():
@@ -219,6 +219,10 @@ class Page:
         root = self.call("DOM.getDocument")["root"]["nodeId"]
         node = self.call("DOM.querySelector", {"nodeId": root, "selector": selector})["nodeId"]
         self.call("DOM.setFileInputFiles", {"nodeId": node, "files": [os.path.abspath(path) for path in paths]})
+
+    def events(self):
+        """(method, params) of all that the browser has told of this page."""
+        return self._browser.events(self._session)
 
     def complaints(self):
         """Errors of scripts, of the console and of the page's policy. A 4xx that a script asked for is no error of the page."""

@@ -70,6 +70,9 @@ class StubFarm:
         self.image = png(64, 48, (200, 120, 40))
         self.thumbnail = png(16, 12, (40, 160, 90))
         self.images = {}  # by job, before `image`
+        self.denoised = png(64, 48, (90, 120, 200))
+        self.changes = []  # (job or worker, body) of every PATCH
+        self.join = {"address": "0.0.0.0:15151", "tls": False, "token_file": "/srv/farm/join-token"}
         self.maps = {"error": png(64, 48, (150, 30, 110)), "samples": png(64, 48, (20, 10, 60))}
         self.size = [96, 64]  # of pictures in numbers
         self.layers = {"rgb": Layer(["R", "G", "B"], gradient), "stderr": Layer(["R", "G", "B"], lambda x, y: (0.25, 0.125, 0.0625)),
@@ -77,6 +80,7 @@ class StubFarm:
         self.layers_of = {}  # by job, before `layers`
         self.video = {"state": "none", "fps": None, "exposure": None, "layer": None, "frames": 0, "frames_done": 0, "bytes": None, "error": None}
         self.no_video = None  # why none is made
+        self.log = ""  # of every job
         self.blobs = {}
         self.submitted = []
         self.refusal = None  # problem details for the next POST /jobs
@@ -216,10 +220,11 @@ def _handler(farm):
             states = asked["state"].split(",") if "state" in asked else None
             found = [job for job in everything
                      if (states is None or job["state"] in states) and asked.get("owner", job["owner"]) == job["owner"]
-                     and job["submitted_unix"] >= float(asked.get("since", 0)) and asked.get("search", "").lower() in f"{job['name']} {job['id']}".lower()]
+                     and job["submitted_unix"] >= float(asked.get("since", 0)) and all(word in f"{job['name']}\n{job['id']}".lower() for word in asked.get("search", "").lower().split())]
             rank = {"running": 0, "paused": 1, "queued": 2}
             keys = {"active": lambda job: (rank.get(job["state"], 3), -job["submitted_unix"]), "name": lambda job: job["name"].lower(),
-                    "submitted": lambda job: job["submitted_unix"], "relmse": lambda job: job["relmse"]}
+                    "submitted": lambda job: job["submitted_unix"], "relmse": lambda job: job["relmse"], "owner": lambda job: job["owner"], "state": lambda job: job["state"],
+                    "progress": lambda job: job["progress"]}
             sort = asked.get("sort", "active")
             found.sort(key=keys[sort.lstrip("-")], reverse=sort.startswith("-"))
             first = int(asked.get("offset", 0))
@@ -252,10 +257,14 @@ def _handler(farm):
                 asked = dict(urllib.parse.parse_qsl(self.path.split("?")[1]))
                 rect = [int(v) for v in asked["rect"].split(",")]
                 return self._send(200, layers[asked["layer"]].bytes(int(asked["level"]), rect), "application/octet-stream")
+            if what == "log":
+                return self._send(200, farm.log.encode(), "text/plain")
             if what == "video":
                 return self._send(200, farm.video)
             if what == "thumbnail.png":
                 return self._send(200, farm.thumbnail, "image/png")
+            if what == "image.png" and "layer=denoised" in self.path:
+                return self._send(200, farm.denoised, "image/png")
             if what == "image.png":
                 return self._send(200, farm.images.get(parts[0], farm.image), "image/png")
             if what.removesuffix(".png") in farm.maps:
@@ -263,6 +272,7 @@ def _handler(farm):
             return self._problem(404, "nothing here")
 
         def _patch_jobs(self, parts, body):
+            farm.changes.append((parts[0], json.loads(body)))
             farm.change(parts[0], **json.loads(body))
             return self._send(200, farm.jobs[parts[0]])
 
@@ -280,13 +290,24 @@ def _handler(farm):
             if farm.refusal:
                 refusal, farm.refusal = farm.refusal, None
                 return self._send(400, refusal, "application/problem+json")
-            request = json.loads(body)
-            farm.submitted.append(request)
+            if self.headers["Content-Type"] in ("application/zip", "application/x-tar"):
+                query = dict(urllib.parse.parse_qsl(self.path.partition("?")[2]))
+                farm.submitted.append((self.headers["Content-Type"], query, hashlib.sha256(body).hexdigest()))
+                request = {"name": "archive.xml"}
+            else:
+                request = json.loads(body)
+                farm.submitted.append(request)
             farm.jobs["j-new"] = job("j-new", request["name"], "queued", progress=0, units_done=0)
             return self._send(201, {"id": "j-new", "url": "/api/v1/jobs/j-new"})
 
         def _get_workers(self, parts, body):
-            return self._send(200, {"workers": list(farm.workers.values())})
+            return self._send(200, {"workers": list(farm.workers.values()), **({"join": farm.join} if farm.join else {})})
+
+        def _patch_workers(self, parts, body):
+            farm.changes.append((parts[0], json.loads(body)))
+            farm.workers[parts[0]] = {**farm.workers[parts[0]], **json.loads(body)}
+            farm.emit("worker", farm.workers[parts[0]])
+            return self._send(202)
 
         def _post_blobs(self, parts, body):
             return self._send(200, {"missing": [digest for digest in json.loads(body)["digests"] if digest not in farm.blobs]})

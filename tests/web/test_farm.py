@@ -84,7 +84,7 @@ def test_downloads_are_what_the_coordinator_gives(real_farm, page):
       return [link.download.split('.').pop(), response.status, bytes.length, [...bytes.slice(0, 4)]];
     }))""")
 
-    assert [kind for kind, *_ in sizes] == ["exr", "", "json", "csv", "log"], "the page is opened, not saved"
+    assert [kind for kind, *_ in sizes] == ["exr", "png", "", "json", "csv", "log"], "the page is opened, not saved"
     assert all(status == 200 and size > 0 for _, status, size, _ in sizes), sizes
     assert sizes[0][3] == [0x76, 0x2F, 0x31, 0x01]  # OpenEXR's magic number
 
@@ -94,12 +94,12 @@ def test_cancel_and_pause_reach_the_farm(real_farm, page):
     job = real_farm.submit(SCENE, spp=4096, name="long.xml")
     page.wait("document.querySelector('[data-job] .pill')?.innerText === 'rendering'")
 
-    page.click("[aria-label='Pause: long.xml']")
+    page.click("[aria-label^='Pause: long.xml']")
     page.wait("document.querySelector('[data-job] .pill').innerText === 'paused'")
     assert real_farm.job(job)["state"] == "paused"
-    page.click("[aria-label='Resume: long.xml']")
+    page.click("[aria-label^='Resume: long.xml']")
     page.wait("document.querySelector('[data-job] .pill').innerText === 'rendering'")
-    page.click("[aria-label='Cancel: long.xml']")
+    page.click("[aria-label^='Cancel: long.xml']")
     page.click("button.danger")
 
     page.wait("document.querySelector('[data-job] .pill').innerText === 'cancelled'")
@@ -196,10 +196,11 @@ def test_the_denoised_picture_is_offered_where_there_is_one(real_farm, page):
     picture = "document.querySelector('.stage live-image canvas').toDataURL()"
     page.evaluate(f"void (location.hash = '#/jobs/{jobs['true']}')")
     page.wait("document.querySelector('.stage live-image')?.dataset.painted")
-    plain = page.evaluate(picture)
+    assert page.evaluate("document.querySelector('.image-tools [value=denoised]').checked"), "of a job that is done it is what is shown first"
+    denoised = page.evaluate(picture)
 
-    page.click(".image-tools [value=denoised]")
-    page.wait(f"{picture} !== {json.dumps(plain)}")
+    page.click(".image-tools [value=picture]")
+    page.wait(f"{picture} !== {json.dumps(denoised)}")
     assert page.evaluate("document.querySelector('.image-tools input[type=range]') !== null"), "with its exposure"
 
     page.evaluate(f"void (location.hash = '#/jobs/{jobs['false']}')")

@@ -82,7 +82,7 @@ def test_several_jobs_are_cancelled_at_once_after_one_more_question(farm, dashbo
     page.evaluate("document.querySelector('[data-job=j-2] input').focus()")
     page.key(" ", "Space", 32, " ")
     page.click("[data-job=j-1] input")
-    page.wait("document.querySelector('.list-picked b')?.innerText === '2 jobs picked'")
+    page.wait("document.querySelector('.list-picked b')?.innerText === '2 jobs selected'")
 
     page.click(".list-picked button:nth-of-type(1)")
     page.wait("document.querySelector('.list-picked .danger')?.innerText === 'Really cancel'")
@@ -102,7 +102,117 @@ def test_what_cannot_be_removed_stays_picked_and_says_why(farm, dashboard):
 
     page.wait("document.querySelector('.toast')?.innerText.includes('A job that renders is cancelled first.')")
     shows(page, ["j-0"])
-    page.wait("document.querySelector('.list-picked b')?.innerText === '1 job picked'")
+    page.wait("document.querySelector('.list-picked b')?.innerText === '1 job selected'")
+
+
+def three(farm):
+    farm.jobs = {f"j-{n}": job(f"j-{n}", f"shot v00{n}.xml", submitted_unix=1765000000 + n, relmse=0.1 / (n + 1)) for n in range(3)}
+
+
+def test_back_undoes_each_change_of_the_list(many, dashboard):
+    page = dashboard()
+    page.wait("document.querySelectorAll('[data-job]').length === 50")
+    page.click(".pager button:nth-of-type(3)")
+    page.wait("location.hash === '#/jobs?page=2'")
+    page.click("[name=state][value=running]")
+    page.wait("location.hash === '#/jobs?state=running'")
+    page.click("#list-search")
+    for letter in "3200":
+        page.type(letter)
+    page.wait("document.querySelectorAll('[data-job]').length === 1")
+
+    for hash, number in (("#/jobs?state=running", "1 – 50 of 322"), ("#/jobs?page=2", "51 – 100 of 3,214"), ("#/jobs", "1 – 50 of 3,214")):
+        page.evaluate("history.back()")
+        page.wait(f"location.hash === {json.dumps(hash)} && document.querySelector('.pager .number')?.innerText === {json.dumps(number)}")
+
+
+def test_a_search_needs_all_its_words(farm, dashboard):
+    three(farm)
+    page = dashboard()
+    page.click("#list-search")
+    page.type("v002 SHOT")
+    shows(page, ["j-2"])
+
+
+def test_the_heads_of_columns_order_the_list(farm, dashboard):
+    three(farm)
+    page = dashboard()
+    shows(page, ["j-2", "j-1", "j-0"])
+    for sort, ids, way in (("name", ["j-0", "j-1", "j-2"], "ascending"), ("-name", ["j-2", "j-1", "j-0"], "descending")):
+        page.evaluate("[...document.querySelectorAll('.sort')].find(b => b.innerText.startsWith('Scene')).click()")
+        page.wait(f"location.hash === '#/jobs?sort={sort}'")
+        shows(page, ids)
+        assert page.evaluate("document.querySelector('[aria-sort]').getAttribute('aria-sort')") == way
+    assert page.evaluate("document.getElementById('list-sort').value") == "-name"
+
+
+def test_shift_selects_a_range(many, dashboard):
+    page = dashboard()
+    page.wait("document.querySelectorAll('[data-job]').length === 50")
+    page.click("[data-job]:nth-child(2) input")
+    page.evaluate("document.querySelector('[data-job]:nth-child(6) input').dispatchEvent(new MouseEvent('click', { shiftKey: true, bubbles: true }))")
+    page.wait("document.querySelector('.list-picked b')?.innerText === '5 jobs selected'")
+    assert page.evaluate("[...document.querySelectorAll('td.pick input')].map((e, i) => e.checked ? i : -1).filter(i => i >= 0)") == [1, 2, 3, 4, 5]
+
+
+def press(page, name):
+    page.wait(f"[...document.querySelectorAll('.list-picked button')].some(b => b.innerText === {json.dumps(name)} && !b.disabled)")
+    page.evaluate(f"[...document.querySelectorAll('.list-picked button')].find(b => b.innerText === {json.dumps(name)}).click()")
+
+
+def test_all_that_match_are_selected_over_all_pages_and_changed(farm, dashboard):
+    farm.jobs = {f"j-{n:03}": job(f"j-{n:03}", state="running" if n % 2 else "done", submitted_unix=n) for n in range(120)}
+    page = dashboard("#/jobs?state=running")
+    page.wait("document.querySelector('.pager .number')?.innerText === '1 – 50 of 60'")
+    page.click("thead input")
+    press(page, "Select all 60 that match")
+    page.wait("document.querySelector('.list-picked b').innerText === '60 jobs selected'")
+
+    press(page, "Pause")
+
+    page.wait("document.querySelector('.list-picked.none')")
+    assert [one["state"] for one in farm.jobs.values()].count("paused") == 60
+
+
+def test_priority_of_several_jobs_is_set_at_once(farm, dashboard):
+    three(farm)
+    page = dashboard()
+    shows(page, ["j-2", "j-1", "j-0"])
+    page.click("[data-job=j-2] input")
+    page.click("[data-job=j-0] input")
+    page.click("#picked-priority")
+    page.type("40")
+    press(page, "Set")
+    page.wait("document.querySelector('.list-picked.none')")
+    assert sorted(farm.changes) == [("j-0", {"priority": 40}), ("j-2", {"priority": 40})]
+
+
+def test_a_row_says_why_its_job_does_not_go_on(farm, dashboard):
+    why = "no connected worker may take it: lab-01 lacks a tag that the job asks for"
+    farm.jobs = {"j-0": job("j-0", state="queued", error=why), "j-1": job("j-1", state="failed", error="tile 0 (pixels 0,0 to 8,8), round 0 (samples 0 to 4) failed in 1 attempt; on a: the disk is full"),
+                 "j-2": job("j-2", state="done", error=""), "j-3": job("j-3", state="paused", error="the disk is full: make room in /srv/farm")}
+    page = dashboard()
+    assert page.text("[data-job=j-0] .reason") == why
+    assert page.text("[data-job=j-1] .reason.bad") == "the disk is full"
+    assert page.text("[data-job=j-3] .reason") == "the disk is full: make room in /srv/farm"
+    assert page.count("[data-job=j-2] .reason") == 0
+
+
+@pytest.mark.parametrize("role, user, shown", [("admin", "", "admin"), ("submit", "anna", "anna")])
+def test_whose_session_it_is_is_shown(farm, dashboard, role, user, shown):
+    farm.role, farm.user = role, user
+    page = dashboard()
+    assert page.text("header .me") == shown
+
+
+def test_a_sequence_that_is_done_follows_nothing_and_has_figures_of_its_own(farm, dashboard):
+    frames = [{"frame": n, "id": f"j-1-frame{n}", "state": "done", "progress": 1, "spp_done": 64, "relmse": 0.01, "error": None} for n in (1, 2)]
+    farm.jobs["j-1"] = job(state="done", relmse=0.0123, core_seconds=120, elapsed_seconds=70, spp_done=64, frames={"range": "1-2", "total": 2, "done": 2, "running": 0, "failed": 0, "cancelled": 0, "current": 2, "list": frames})
+    for n in (1, 2):
+        farm.jobs[f"j-1-frame{n}"] = job(f"j-1-frame{n}", state="done", sequence="j-1", frame=n)
+    page = dashboard("#/jobs/j-1")
+    assert page.text(".frames-whole") == "Whole sequence: relMSE 0.0123 on average · 64 samples per pixel · 2 min of core time · took 70 s"
+    assert "following" not in page.text(".frames")
 
 
 def test_every_row_has_a_small_picture_of_its_job(farm, dashboard):

@@ -59,6 +59,7 @@ def test_signing_out_forgets_what_was_shown(farm, dashboard):
     page.evaluate("[...document.querySelectorAll('header button')].at(-1).click()")
 
     page.wait("document.getElementById('token')")
+    assert page.count(".field-error") == 0
     assert not farm.signed_in and page.count("[data-job]") == 0
 
 
@@ -69,6 +70,7 @@ def test_a_session_that_ends_leads_back_to_the_sign_in(farm, dashboard):
     farm.drop_streams()
 
     page.wait("document.getElementById('token')")
+    assert page.text(".field-error").startswith("Your session has ended")
 
 
 # ---- jobs ----
@@ -144,7 +146,7 @@ def test_cancelling_asks_once_more(farm, dashboard):
     farm.jobs["j-1"] = job()
     page = dashboard()
 
-    page.click("[aria-label='Cancel: steam.xml']")
+    page.click("[aria-label^='Cancel: steam.xml']")
     page.wait("document.querySelector('button.danger')")
     assert farm.jobs["j-1"]["state"] == "running"
     page.click("button.danger")
@@ -157,9 +159,9 @@ def test_pause_and_resume(farm, dashboard):
     farm.jobs["j-1"] = job()
     page = dashboard()
 
-    page.click("[aria-label='Pause: steam.xml']")
+    page.click("[aria-label^='Pause: steam.xml']")
     page.wait("document.querySelector('[data-job] .pill').innerText === 'paused'")
-    page.click("[aria-label='Resume: steam.xml']")
+    page.click("[aria-label^='Resume: steam.xml']")
 
     page.wait("document.querySelector('[data-job] .pill').innerText === 'rendering'")
 
@@ -170,7 +172,7 @@ def test_a_slow_reply_to_a_change_does_not_undo_what_an_event_said_meanwhile(far
     page.wait("document.querySelector('[data-job]')")
     page.hold_reply("url.endsWith('/jobs/j-1') && method === 'GET'")
 
-    page.click("[aria-label='Pause: steam.xml']")
+    page.click("[aria-label^='Pause: steam.xml']")
     page.wait("window.held")
     farm.change("j-1", state="done", progress=1)
     page.wait("document.querySelector('[data-job] .pill').innerText === 'done'")
@@ -185,7 +187,7 @@ def test_a_refused_action_says_why(farm, dashboard):
     page.wait("document.querySelector('[data-job]')")
 
     page.evaluate("fetch = () => Promise.resolve(new Response(JSON.stringify({title: 'x', detail: 'The job is over already.'}), {status: 409, headers: {'Content-Type': 'application/problem+json'}}))")
-    page.click("[aria-label='Pause: steam.xml']")
+    page.click("[aria-label^='Pause: steam.xml']")
 
     assert "The job is over already." in page.text(".toast")
 

@@ -6,20 +6,20 @@ FACTS = {
     "signin-refused": ["This token is not known here."],
     "jobs-empty": ["Nothing is rendering yet", "curl -H", "application/xml"],
     "jobs": ["7 jobs", "steam-bath.xml", "43 %", "215 / 512", "0.00418", "4.2 min", "1 h 12 min", "7.20 × 10⁻⁵", "failed",
-             "don't trust yet", "at least 1 h 12 min", "36 until the target"],
+             "still noisy", "at least 1 h 12 min", "36 until the target"],
     "jobs-confirm": ["Really cancel", "Keep"],
-    "jobs-page": ["3,214 jobs · 12 rendering · 80 waiting", "2 jobs picked", "Pick none", "101 – 107 of 3,214", "everybody", "done 3,080"],
+    "jobs-page": ["3,214 jobs · 12 rendering · 80 waiting", "2 jobs selected", "Select none", "101 – 107 of 3,214", "everybody", "done 3,080"],
     "jobs-lost": ["connection lost", "The coordinator does not answer."],
-    "job": ["steam-bath.xml", "0.00390 – 0.00448", "4.2 min left", "Error against time", "target 0.001", "clean", "tile 104", "lab-03", "EXR",
+    "job": ["steam-bath.xml", "0.00390 – 0.00448", "4.2 min left", "Error against time", "target 0.001", "Broken numbers none", "tile 104", "lab-03", "EXR",
             "3.1 min to 5.5 min", "with 8 more: 66 s", "slope −0.98 (−1.06 to −0.90)", "converging as expected", "target 0.001 at 7.3 min (6.2 min to 8.6 min)",
             "Where the threads' time went", "transfer 6.2 s 1 %", "RMSE 0.0312 95 %: 0.0302 – 0.0322", "Efficiency 0.322 1 / (relMSE × core s)"],
-    "job-untrusted": ["Can take it 11 % 1 of 4 workers: of its numeric class", "relMSE 0.0386 don't trust yet target 0.005", "Time left, at least 1 h 12 min", "at least 1 h 12 min left", "RMSE 0.0921 don't trust yet", "Samples per pixel 36 until the target at most 65,536",
+    "job-untrusted": ["Can take it 11 % 1 of 4 workers: the others' processors or builds round differently", "relMSE 0.0386 still noisy target 0.005", "Still noisy: a few bright pixels carry the error", "Time left, at least 1 h 12 min", "at least 1 h 12 min left", "RMSE 0.0921 still noisy", "Samples per pixel 36 until the target at most 65,536",
                       "don't trust yet: few pixels carry the error (like 16 of 230400; the worst one 25 %)", "target 0.005 not before"],
     "job-stopped": ["Cancelled at 55 %, after 99 s: someone stopped it."],
-    "job-reference": ["True relMSE 0.00443 against the reference", "FLIP 0.0271", "12 pixels got too few hits", "against the reference 0.00443, FLIP 0.0273"],
+    "job-reference": ["True relMSE 0.00443 against the reference", "FLIP 0.0271", "12 pixels have too few samples that found light", "against the reference 0.00443, FLIP 0.0273"],
     "job-map": ["0.1 %", "100 %", "12 min of core time", "target 0.001 at 29 min (25 min to 34 min)"],
     "job-removed": ["Somebody has removed this job"],
-    "job-sequence": ["smoke.xml", "Frame 5", "4 of 10 done, 1 failed", "following what is rendered", "smoke.0009.vdb has no grid", "0.00390 – 0.00448"],
+    "job-sequence": ["smoke.xml", "Frame 5", "4 of 10 done, 1 failed", "following what is rendered", "Whole sequence: relMSE 0.00418 on average", "smoke.0009.vdb has no grid", "0.00390 – 0.00448"],
     "job-queued": ["Waiting for a worker", "The first point appears"],
     "job-done": ["Done after 7 min: the target error is reached."],
     "job-failed": ["The job failed", "SIGSEGV on 3 workers", "lightshaft render forge-v12.xml --pixel 412,96 --sample 11"],
@@ -28,8 +28,8 @@ FACTS = {
     "viewer": ["fogbox.xml", "640 × 360", "Exposure", "Pixel 233, 120", "R 0.7341 ± 0.018", "512 samples", "Region 300, 250 to 420, 330: mean R 0.2113 ± 4.0"],
     "viewer-compare": ["Compare with", "Wipe", "Difference", "relMSE", "FLIP"],
     "viewer-error": ["relative standard error of a pixel, from 0.1 % to 100 % or more", "Relative error", "Point at a pixel"],
-    "viewer-objects": ["Picked: lamp"],
-    "workers": ["5 workers", "36 threads", "lab-01", "fetching steam.vdb", "2 numeric classes", "lost", "6.2 min ago"],
+    "viewer-objects": ["Selected: lamp"],
+    "workers": ["5 workers", "36 threads", "lab-01", "fetching steam.vdb", "2 different ways", "lost", "6.2 min ago"],
     "workers-empty": ["No worker is connected", "lightshaft-worker --coordinator"],
     "submit": ["Drop a scene here", "Choose a folder"],
     "submit-ready": ["bath.xml", "meshes/tub.obj", "61.4 MiB", "not named by the scene", "Render"],
@@ -124,6 +124,7 @@ def test_pointing_at_the_plot_names_the_nearest_point(open_page, farm):
     page = open_page(f"{farm.url}/demo.html?view=job")
     assert "3.1 min" in page.text(".plot-reading")
 
+    page.evaluate("document.querySelector('.plot').scrollIntoView({ behavior: 'instant' })")
     box = page.wait("(() => { const b = document.querySelectorAll('.plot-point')[1].getBoundingClientRect(); return [b.left + 2, b.top + 2]; })()")
     page.call("Input.dispatchMouseEvent", {"type": "mouseMoved", "x": box[0], "y": box[1] + 20})
 

@@ -105,7 +105,7 @@ def test_the_keyboard_alone_moves_zooms_and_reads(farm, viewer):
     page = viewer()
     focus(page)
 
-    press(page, "1")
+    press(page, "z")
     assert query(page) == "zoom=1&x=48&y=32"
     press(page, "+")
     assert query(page).startswith("zoom=2&")
@@ -213,7 +213,7 @@ def test_objects_are_picked_by_their_cryptomatte_and_the_link_names_them(farm, v
     page.key("Enter")
 
     page.wait("location.hash.includes('matte=lamp')")
-    page.wait("document.querySelector('.viewer-reading').innerText.includes('Picked: lamp')")
+    page.wait("document.querySelector('.viewer-reading').innerText.includes('Selected: lamp')")
     page.wait(f"(() => {{ const v = {VIEW}, at = v.windowPoint([60.5, 20.5]).map(Math.round); return v.querySelector('canvas').getContext('2d').getImageData(at[0], at[1], 1, 1).data[1] < {max(bright)} / 2; }})()")
 
 
@@ -405,7 +405,7 @@ def test_the_viewer_fits_the_screen_and_every_control_is_reached_by_tab(compared
 
 def frame_region(page):
     focus(page)
-    press(page, "1")
+    press(page, "z")
     page.key("r")
     page.wait("location.hash.includes('region=')")
     return [int(v) for v in page.evaluate("new URLSearchParams(location.hash.split('?')[1]).get('region')").split(",")]

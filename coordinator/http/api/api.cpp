@@ -11,6 +11,7 @@
 #include "common/base/safe_text.h"
 #include "common/protocol/limits.h"
 #include "common/scene/limits.h"
+#include "coordinator/http/api/content_coding.h"
 #include "coordinator/http/api/handlers.h"
 
 namespace ls::http {
@@ -179,7 +180,9 @@ Response Api::handle(const Match& match, const Request& request) {
       const std::uint64_t pixels = id ? coordinator_.pixels_of(*id) : 0;
       turn.emplace(pictures_, request.caller.token_id, pixels * kMemoryPerPixel);
     }
-    return match.route->handler(*this, request, match.params);
+    Response response = match.route->handler(*this, request, match.params);
+    if (request.method == Method::get) compress(response, request);
+    return response;
   });
 }
 

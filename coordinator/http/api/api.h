@@ -33,6 +33,13 @@ class BodySink {
   virtual Response finish() = 0;
 };
 
+// How workers join this farm.
+struct Joining {
+  std::string address;  // HOST:PORT of the workers' port: as the coordinator listens, or as the operator says
+  bool tls = false;     // workers need the certificate of the authority, too
+  std::string token_file;  // the file with the join token, on the coordinator's machine
+};
+
 class Api {
  public:
   // `tokens` must outlive the object. `secure`: requests arrive over TLS.
@@ -76,6 +83,9 @@ class Api {
   void webhooks(std::function<coordinator::WebhookFigures()> figures) { webhooks_ = std::move(figures); }
   // Sets the function that says what is wrong with the workers' port (empty: nothing); /readyz asks it
   void workers_port(std::function<std::string()> trouble) { workers_port_ = std::move(trouble); }
+  // Sets how workers join, which the dashboard tells those who add one
+  void joining(Joining joining) { joining_ = std::move(joining); }
+  const Joining& joining() const { return joining_; }
   std::string workers_port_trouble() const { return workers_port_ ? workers_port_() : std::string(); }
   // Sets the function from which /metrics gets the counters of trace spans; call this before the first
   // request
@@ -97,6 +107,7 @@ class Api {
   Auth auth_;
   Limits limits_;
   StaticFiles files_;
+  Joining joining_;
   Counters counters_;
   PartialUploads partial_uploads_{coordinator::limits::kMaxUnfinishedUploads / 4};
   coordinator::Gate pictures_;  // callers take turns to have answers about images made

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "common/base/digest.h"
+#include "coordinator/http/api/content_coding.h"
+#include "coordinator/http/api/page_bundle.h"
 
 namespace ls::http {
 namespace {
@@ -36,9 +38,23 @@ std::string_view content_type_of(std::string_view file_name) {
 }
 
 StaticFiles::StaticFiles(std::span<const StaticFile> files) {
-  for (const auto& file : files)
-    entries_.emplace(std::string(file.name), Entry{file.bytes, content_type_of(file.name),
-                                                   "\"" + sha256(file.bytes).hex().substr(0, 32) + "\""});
+  for (const auto& file : files) add(std::string(file.name), file.bytes, false);
+  auto bundle = bundle_page(files);
+  if (!bundle) return;
+  add(bundle->script_name, keep(std::move(bundle->script)), true);
+  add(bundle->style_name, keep(std::move(bundle->style)), true);
+  add("index.html", keep(std::move(bundle->page)), false);
+}
+
+std::span<const std::byte> StaticFiles::keep(std::string text) {
+  return std::as_bytes(std::span(*made_.emplace_back(std::make_shared<const std::string>(std::move(text)))));
+}
+
+void StaticFiles::add(std::string name, std::span<const std::byte> bytes, bool immutable) {
+  const std::string_view type = content_type_of(name);
+  Entry entry{bytes, {}, type, sha256(bytes).hex().substr(0, 32), immutable};
+  if (auto shorter = gzipped(bytes)) entry.gzip = keep(std::move(*shorter));
+  entries_[std::move(name)] = std::move(entry);
 }
 
 std::optional<Response> StaticFiles::find(const Request& request) const {
@@ -46,16 +62,21 @@ std::optional<Response> StaticFiles::find(const Request& request) const {
       request.segments.empty() ? "index.html" : fmt::format("{}", fmt::join(request.segments, "/")));
   if (found == entries_.end()) return std::nullopt;
   const Entry& entry = found->second;
-  // With "no-cache" the browser checks for changes each time, and gets a 304 if the file has not changed.
-  Response response{.headers = {{"ETag", entry.etag},
-                                {"Cache-Control", "no-cache"},
-                                {"Content-Security-Policy", std::string(kPagePolicy)}}};
-  if (request.header("if-none-match").find(entry.etag) != std::string_view::npos) {
+  const bool gzip = !entry.gzip.empty() && accepts_gzip(request);
+  // With "no-cache" the browser checks for changes each time, and gets a 304 if the file has not changed. A
+  // file whose name contains its digest never changes.
+  Response response{
+      .headers = {{"ETag", fmt::format("\"{}{}\"", entry.digest, gzip ? "-gzip" : "")},
+                  {"Cache-Control", entry.immutable ? "public, max-age=31536000, immutable" : "no-cache"},
+                  {"Vary", "Accept-Encoding"},
+                  {"Content-Security-Policy", std::string(kPagePolicy)}}};
+  if (request.header("if-none-match").find(entry.digest) != std::string_view::npos) {
     response.status = 304;
     return response;
   }
   response.content_type = entry.content_type;
-  response.body = entry.bytes;
+  if (gzip) response.headers.emplace_back("Content-Encoding", "gzip");
+  response.body = gzip ? entry.gzip : entry.bytes;
   return response;
 }
 

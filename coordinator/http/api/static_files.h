@@ -1,8 +1,10 @@
 // Serves the dashboard's files, which are built into the executable. Files are looked up by their exact names
-// in a table in memory, so no request can read other files of the disk.
+// in a table in memory, so no request can read other files of the disk. The page's modules and styles are
+// joined to one file each, whose name contains its digest; clients that accept gzip get all files compressed.
 #pragma once
 
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -28,10 +30,17 @@ class StaticFiles {
  private:
   struct Entry {
     std::span<const std::byte> bytes;
+    std::span<const std::byte> gzip;  // the same compressed; empty: it would not be shorter
     std::string_view content_type;
-    std::string etag;
+    std::string digest;
+    bool immutable = false;  // its name changes with its bytes
   };
+  void add(std::string name, std::span<const std::byte> bytes, bool immutable);
+  std::span<const std::byte> keep(std::string text);
+
   std::map<std::string, Entry, std::less<>> entries_;
+  std::vector<std::shared_ptr<const std::string>>
+      made_;  // bytes that are built into no program; copies share them
 };
 
 std::string_view content_type_of(std::string_view file_name);

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "common/base/parse_number.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
@@ -89,7 +91,25 @@ Response get_workers(Api& api, const Request& request, const Params&) {
     const auto owner = api.coordinator().owner(JobId{worker.job});
     if (!owner || !request.caller.sees(*owner)) hide_work(worker);
   }
-  return json_response(200, coordinator::workers_json(workers));
+  auto answer = nlohmann::json::parse(coordinator::workers_json(workers));
+  const Joining& join = api.joining();
+  answer["join"] = {{"address", join.address}, {"tls", join.tls}};
+  // Where a secret lies is told only to those who may read everything else, too.
+  if (request.caller.role == Role::admin) answer["join"]["token_file"] = join.token_file;
+  return json_response(200, answer.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
+// A worker takes no other wish than to end after its units: it comes back when somebody starts it again.
+Response patch_worker(Api& api, const Request& request, const Params& params) {
+  const auto body = read_object(request.body, {"state"});
+  if (!body) return problem(body.error());
+  const auto state = body->find("state");
+  if (state == body->end() || *state != "draining")
+    return problem(400, "a worker can be given the state \"draining\" alone: {\"state\": \"draining\"}");
+  const WorkerId id{params.empty() ? std::string() : params[0]};
+  if (!plausible_id(id.value)) return problem(404, "there is no such worker");
+  if (const auto done = api.coordinator().drain_worker(id); !done) return problem(done.error());
+  return {.status = 202};
 }
 
 Response get_events(Api&, const Request& request, const Params&) { return event_stream(request, {}); }

@@ -698,6 +698,18 @@ class ListTokensAnswer(TypedDict):
 
 class ListWorkersAnswer(TypedDict):
     workers: list["Worker"]
+    join: NotRequired["ListWorkersAnswerJoin"]
+    """How further workers join."""
+
+
+class ListWorkersAnswerJoin(TypedDict):
+    """How further workers join."""
+    address: NotRequired[str]
+    """HOST:PORT of the workers' port: as the coordinator listens, or as its operator says."""
+    tls: NotRequired[bool]
+    """Workers need the authority's certificate, too."""
+    token_file: NotRequired[str]
+    """On the coordinator's machine; for admins."""
 
 
 class MissingBlobsAnswer(TypedDict):

@@ -288,6 +288,21 @@ TEST_F(Routes, OpenAndCloseASession) {
   EXPECT_EQ(ask(request(Method::get, "/api/v1/jobs", {{"cookie", cookie}})).status, 401);
 }
 
+TEST_F(Routes, SendNoWorkerAwayThatIsNotThereOrToAnotherState) {
+  const auto patch = [&](const std::string& worker, const std::string& body) {
+    return ask(request(
+                   Method::patch, "/api/v1/workers/" + worker,
+                   {{"authorization", "Bearer " + std::string(kToken)}, {"content-type", "application/json"}},
+                   body))
+        .status;
+  };
+
+  EXPECT_EQ(patch("w-1", R"({"state": "draining"})"), 404);
+  EXPECT_EQ(patch("w-1", R"({"state": "connected"})"), 400);
+  EXPECT_EQ(patch("w-1", R"({"name": "x"})"), 400);
+  EXPECT_EQ(patch("..", R"({"state": "draining"})"), 404);
+}
+
 TEST_F(Routes, ServeThePagesByExactNameOnly) {
   const Response page = ask(request(Method::get, "/"));
   EXPECT_EQ(text(page), kPage);

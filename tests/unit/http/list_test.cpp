@@ -35,6 +35,9 @@ TEST_F(List, IsChosenByStateNameIdOwnerAndTime) {
   EXPECT_EQ(names("state=queued,running"), (Names{"bath.xml", "bathroom.xml"}));
   EXPECT_EQ(names("search=BATH&state=queued"), (Names{"bath.xml", "bathroom.xml"}));
   EXPECT_EQ(names("search=" + ids[1]), Names{"Cloud.xml"});
+  EXPECT_EQ(names("search=xml%20%20bath%20ROOM"), Names{"bathroom.xml"}) << "all words, in any order";
+  EXPECT_EQ(names("search=bath%20cloud"), Names{});
+  EXPECT_EQ(names("search=%20").size(), 3u);
   EXPECT_EQ(names("owner=").size(), 3u);
   EXPECT_EQ(names("owner=anna"), Names{});
   EXPECT_EQ(names("since=99999999999"), Names{});

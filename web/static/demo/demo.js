@@ -2,7 +2,7 @@
 import "../js/live_image.js";
 import "../js/viewer/float_view.js";
 import { h, patch } from "../js/dom.js";
-import { withList, withOpen, withUi, withViewer } from "../js/state.js";
+import { layerOf, withList, withOpen, withUi, withViewer } from "../js/state.js";
 import { page } from "../js/views/shell.js";
 import { paint, paintMap } from "./picture.js";
 import { stories } from "./stories.js";
@@ -34,12 +34,13 @@ const images = new Map();
 function imageOf(state) {
   const job = state.jobs?.get(state.open?.shown ?? state.route.id);
   if (!job) return null;
-  const key = `${job.id} ${state.open?.layer}`;
+  const layer = state.open ? layerOf(state.open, job) : "picture";
+  const key = `${job.id} ${layer}`;
   if (!images.has(key)) {
     images.set(key, async (exposure) => {
       if (job.units_done === 0) throw new Error("nothing folded yet");
       const done = job.state === "running" ? 0.52 : 1;
-      return state.open.layer === "picture" ? paint(job.size[0], job.size[1], done, exposure) : paintMap(job.size[0], job.size[1], done, state.open.layer);
+      return layer === "picture" || layer === "denoised" ? paint(job.size[0], job.size[1], done, exposure) : paintMap(job.size[0], job.size[1], done, layer);
     });
   }
   return images.get(key);

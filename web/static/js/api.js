@@ -49,8 +49,11 @@ export const api = {
   list: async (parameters) => (await call("GET", `/jobs?${parameters}`)).json(),
   job: async (id) => (await call("GET", jobPath(id))).json(),
   tiles: async (id) => (await (await call("GET", `${jobPath(id)}/tiles`)).json()).tiles,
+  log: async (id) => (await call("GET", `${jobPath(id)}/log`)).text(),
   report: async (id) => (await call("GET", `${jobPath(id)}/report`)).json(),
-  workers: async () => (await (await call("GET", "/workers")).json()).workers,
+  /** {workers, join}: join says how further ones come in. */
+  workers: async () => (await call("GET", "/workers")).json(),
+  drainWorker: (id) => call("PATCH", `/workers/${encodeURIComponent(id)}`, json({ state: "draining" })),
   remove: (id) => call("DELETE", jobPath(id)),
   again: async (id, changes) => (await call("POST", `${jobPath(id)}/again`, json(changes))).json(),
   thumbnail: async (id, signal) => createImageBitmap(await (await call("GET", `${jobPath(id)}/thumbnail.png`, { signal })).blob()),
@@ -75,12 +78,19 @@ export const api = {
   missingBlobs: async (digests) => (await (await call("POST", "/blobs/missing", json({ digests }))).json()).missing,
   putBlob: (digest, body) =>
     call("PUT", `/blobs/${digest}`, { headers: { "Content-Type": "application/octet-stream" }, body }),
+  /** A scene with all its files in one archive; `spec` as in submit. */
+  submitArchive: async (file, type, spec) => {
+    const text = (value) => (Array.isArray(value) ? value.join(",") : String(value));
+    const query = new URLSearchParams(Object.entries(spec).map(([name, value]) => [name, name === "size" ? value.join("x") : text(value)]));
+    return (await call("POST", `/jobs?${query}`, { headers: { "Content-Type": type }, body: file })).json();
+  },
   submit: async (request) => (await call("POST", "/jobs", json(request))).json(),
 };
 
 /** Addresses of files that the browser downloads by itself. */
 export const downloads = {
   exr: (id) => `${kBase}${jobPath(id)}/image.exr`,
+  png: (id, exposure, layer) => `${kBase}${jobPath(id)}/image.png?exposure=${exposure}${layer === "denoised" ? "&layer=denoised" : ""}`,
   report: (id) => `${kBase}${jobPath(id)}/report`,
   page: (id) => `${kBase}${jobPath(id)}/report.html`,
   csv: (id) => `${kBase}${jobPath(id)}/convergence.csv`,

@@ -31,41 +31,105 @@ async function walk(entry) {
 const folderOf = (path) => path.split("/").slice(0, -1);
 const baseOf = (path) => path.split("/").pop();
 
-/** Scene files among them, the least nested first. */
+const kScenes = [/\.xml$/i, /\.gltf$/i, /\.glb$/i, /\.pbrt$/i, /\.zip$/i, /\.(tar|tar\.gz|tgz)$/i]; // the most likely first
+export const kSceneEndings = ".xml, .gltf, .glb, .pbrt, .zip, .tar or .tar.gz";
+const kindOf = (path) => kScenes.findIndex((ending) => ending.test(path));
+
+/** Scene files among them, and archives with a scene in them: the least nested first. */
 export function scenesAmong(files) {
   return files
     .map(({ path }) => path)
-    .filter((path) => path.toLowerCase().endsWith(".xml"))
-    .sort((a, b) => folderOf(a).length - folderOf(b).length || (a < b ? -1 : 1));
+    .filter((path) => kindOf(path) >= 0)
+    .sort((a, b) => folderOf(a).length - folderOf(b).length || kindOf(a) - kindOf(b) || byName(a, b));
+}
+
+/** smoke.2 before smoke.10. */
+const byName = (a, b) => a.localeCompare(b, "en", { numeric: true }) || (a < b ? -1 : 1);
+
+/** What to do with files of which none is a scene here. */
+export function noScene(files) {
+  const usd = files.find(({ path }) => /\.usd[acz]?$/i.test(path));
+  if (usd) return `The coordinator reads no USD. The Python package turns it into a scene with its files, to be dropped here: python -m lightshaft.usd ${baseOf(usd.path)} -o shot`;
+  return `There is no scene among these files. Add it: ${kSceneEndings}.`;
 }
 
 /**
- * {main, assets: [{name, file}], missing: [name], unused: [path]}: `name` is where the coordinator looks for the file
+ * {main, assets: [{name, file}], missing: [name], unused: [path], frames, archive}: `name` is where the coordinator looks for the file
  * first among the places that have it. A file is found by its path relative to the scene, or else by its base name if
  * that is unique (files dropped without their folders). A scene that can't be read, or names that hold $parameters,
- * take all files along.
+ * take all files along. frames: the numbers of the files that stand for frames, as the form of a job says them; "" if
+ * there are none. archive: the type of an archive, which has all files in itself; null of a scene.
  */
 export async function plan(files, main) {
   const scene = files.find(({ path }) => path === main);
   const others = files.filter((file) => file !== scene);
+  const found = await planned(scene, others, main);
+  return {
+    main: scene.file, frames: "", archive: null, ...found,
+    assets: [...found.assets].sort((a, b) => byName(a.name, b.name)), missing: [...found.missing].sort(byName), unused: [...found.unused].sort(byName),
+  };
+}
+
+const everything = (others, main) => ({ assets: others.map(({ path, file }) => ({ name: relative(path, main), file })), missing: [], unused: [] });
+
+async function planned(scene, others, main) {
+  if (/\.(zip|tar|tgz|tar\.gz)$/i.test(main)) return { archive: /\.zip$/i.test(main) ? "application/zip" : "application/x-tar", assets: [], missing: [], unused: others.map(({ path }) => path) };
+  if (/\.pbrt$/i.test(main)) return everything(others, main);
+  if (/\.gl(tf|b)$/i.test(main)) return planOfGltf(scene, others, main);
   const survey = new Survey(others, main);
   if (!(await survey.read(scene.file, [])) || survey.hasParameters) {
-    return { main: scene.file, assets: others.map(({ path, file }) => ({ name: relative(path, main), file })), missing: [], unused: [] };
+    return everything(others, main);
   }
   survey.resolveStrings();
   const used = new Set(survey.found.values());
   return {
-    main: scene.file,
+    frames: framesOf(survey.numbers),
     assets: [...survey.found].map(([name, { file }]) => ({ name, file })),
     missing: [...survey.missing],
     unused: others.filter((entry) => !used.has(entry)).map(({ path }) => path),
   };
 }
 
+const kGlbHead = 20; // bytes: magic, version, length; then length and type of the first chunk, which is JSON
+
+/** What a glTF names: its buffers and images, unless they are within it. */
+async function planOfGltf(scene, others, main) {
+  let described;
+  try {
+    if (/\.gltf$/i.test(main)) described = JSON.parse(await scene.file.text());
+    else {
+      const head = new DataView(await scene.file.slice(0, kGlbHead).arrayBuffer());
+      described = JSON.parse(await scene.file.slice(kGlbHead, kGlbHead + head.getUint32(12, true)).text());
+    }
+  } catch {
+    return everything(others, main); // the coordinator says what is wrong with it
+  }
+  const names = [...(described.buffers ?? []), ...(described.images ?? [])].map(({ uri }) => uri).filter((uri) => typeof uri === "string" && !uri.startsWith("data:")).map(decodeURIComponent);
+  const found = new Map([...new Set(names)].map((name) => [joined("", name), others.find(({ path }) => relative(path, main) === joined("", name)) ?? only(others, name)]));
+  const used = new Set(found.values());
+  return {
+    assets: [...found].filter(([, entry]) => entry).map(([name, { file }]) => ({ name, file })),
+    missing: [...found].filter(([, entry]) => !entry).map(([name]) => name),
+    unused: others.filter((entry) => !used.has(entry)).map(({ path }) => path),
+  };
+}
+
+/** "1-8", or "1-15x2" for every second one; "" if there is no order in the numbers, or none. */
+export function framesOf(numbers) {
+  const sorted = [...numbers].sort((a, b) => a - b);
+  if (sorted.length < 2) return sorted.length ? String(sorted[0]) : "";
+  const by = sorted[1] - sorted[0];
+  const last = sorted.at(-1);
+  // one that is missing in between is the coordinator's to name
+  if (by === 1 || sorted.some((n, i) => n !== sorted[0] + i * by)) return `${sorted[0]}-${last}`;
+  return `${sorted[0]}-${last}x${by}`;
+}
+
 /** What a scene names, found as the coordinator's reader finds it (common/scene/reader/load_document.cpp, reader.cpp). */
 class Survey {
   found = new Map(); // files found: name -> {path, file}
   missing = new Set();
+  numbers = new Set(); // of the files that stand for frames
   hasParameters = false;
   #files;
   #main;
@@ -113,12 +177,17 @@ class Survey {
     for (const place of places) {
       for (const entry of this.#files) {
         const path = relative(entry.path, this.#main);
-        if (fits(place, path)) this.found.set((any ??= path, path), entry);
+        if (!fits(place, path)) continue;
+        this.found.set((any ??= path, path), entry);
+        this.numbers.add(numberIn(place, path));
       }
       if (any !== null) return any;
     }
     const alike = this.#files.filter(({ path }) => fits(baseOf(name), baseOf(path)));
-    for (const entry of alike) this.found.set(joined(`${places.at(-1)}/..`, baseOf(entry.path)), entry);
+    for (const entry of alike) {
+      this.found.set(joined(`${places.at(-1)}/..`, baseOf(entry.path)), entry);
+      this.numbers.add(numberIn(baseOf(name), baseOf(entry.path)));
+    }
     if (alike.length === 0) this.missing.add(name);
     return null;
   }
@@ -138,9 +207,12 @@ class Survey {
 }
 
 /** "fog.0007.vdb" fits "fog.####.vdb": a number of at least as many digits as there are #. */
-export function fits(pattern, path) {
-  const source = pattern.split(/(#+)/).map((part) => (part.startsWith("#") ? `\\d{${part.length},}` : part.replace(/[.*+?^${}()|[\]\\]/g, "\\$&")));
-  return new RegExp(`^${source.join("")}$`).test(path);
+export const fits = (pattern, path) => numbered(pattern).test(path);
+const numberIn = (pattern, path) => Number(numbered(pattern).exec(path)[1]);
+
+function numbered(pattern) {
+  const source = pattern.split(/(#+)/).map((part) => (part.startsWith("#") ? `(\\d{${part.length},})` : part.replace(/[.*+?^${}()|[\]\\]/g, "\\$&")));
+  return new RegExp(`^${source.join("")}$`);
 }
 
 /** The one file of this base name. */

@@ -1,6 +1,6 @@
 // What the user can do with a job and its page.
 import { frameHref } from "./route.js";
-import { doneFrames, withJob, withOpen, withUi } from "./state.js";
+import { doneFrames, layerOf, withJob, withOpen, withUi, withoutJob } from "./state.js";
 
 const kVideoPauseMs = 1000;
 
@@ -11,6 +11,23 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
     if (changed) await snapshot(`job ${id}`, () => attempt(() => api.job(id)), withJob);
     set(withUi(get(), { busy: null }));
   }
+
+  async function alter(id, changes) {
+    set(withUi(get(), { busy: id, confirming: null }));
+    await snapshot(`job ${id}`, () => attempt(() => api.change(id, changes)), withJob);
+    set(withUi(get(), { busy: null }));
+  }
+
+  async function remove(id) {
+    set(withUi(get(), { busy: id, confirming: null }));
+    const gone = await attempt(async () => (await api.remove(id), true));
+    set(withUi(get(), { busy: null }));
+    if (!gone) return;
+    set(withoutJob(get(), id));
+    window.location.hash = "#/jobs";
+  }
+
+  const shownLayer = () => layerOf(get().open, get().jobs?.get(get().open.shown));
 
   const film = (more) => set(withOpen(get(), { film: more }));
 
@@ -47,7 +64,7 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
   }
 
   const pictureOf = (id, exposure, signal) => {
-    const { layer } = get().open;
+    const layer = shownLayer();
     return layer === "picture" || layer === "denoised" ? api.image(id, exposure, layer, signal) : api.map(id, layer, signal);
   };
 
@@ -62,10 +79,18 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
     /** Of a sequence that was opened: there may be a video already, or one is being made. */
     openVideo: (id) => watchVideo(id, api.video(id).catch(() => null)),
     makeVideo: (id) => {
-      const { exposure, fps, layer } = get().open;
+      const { exposure, fps } = get().open;
+      const layer = shownLayer();
       return watchVideo(id, api.makeVideo(id, { exposure, fps, ...(layer === "denoised" ? { layer } : {}) }));
     },
     setState: change,
+    readLog: async (id) => {
+      const log = await attempt(() => api.log(id));
+      if (log !== undefined && get().open?.shown === id) set(withOpen(get(), { log }));
+    },
+    renderOn: alter,
+    setPriority: (id, priority) => alter(id, { priority }),
+    remove,
     cancel: (id) => change(id, "cancelled"),
     confirm: (id) => set(withUi(get(), { confirming: id })),
     image: (exposure, signal) => pictureOf(get().open.shown, exposure, signal),

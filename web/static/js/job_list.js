@@ -3,7 +3,8 @@
 
 export const kPageSize = 50;
 export const kStates = ["running", "queued", "paused", "done", "failed", "cancelled"];
-export const kSorts = [["active", "Rendering first"], ["-submitted", "Newest first"], ["submitted", "Oldest first"], ["name", "Name"], ["owner", "Owner"], ["-progress", "Progress"], ["relmse", "Smallest error"], ["-relmse", "Largest error"]];
+export const kSorts = [["active", "Rendering first"], ["-submitted", "Newest first"], ["submitted", "Oldest first"], ["name", "Name"], ["-name", "Name, last first"], ["owner", "Owner"], ["-owner", "Owner, last first"], ["state", "State"], ["-state", "State, last first"],
+  ["-progress", "Most progress"], ["progress", "Least progress"], ["relmse", "Smallest error"], ["-relmse", "Largest error"]];
 export const kAges = [["", "any time"], ["1", "last day"], ["7", "last 7 days"], ["30", "last 30 days"]];
 
 export const kWholeList = { search: "", states: [], owner: null, days: "", sort: "active", page: 0 };
@@ -36,13 +37,16 @@ export function queryOfList({ search, states, owner, days, sort, page }) {
 }
 
 /** The parameters of the coordinator for it. */
-export function parametersOf({ search, states, owner, days, sort, page }, nowSeconds) {
-  const of = new URLSearchParams({ sort, limit: String(kPageSize), offset: String(page * kPageSize) });
+export function parametersOf({ search, states, owner, days, sort, page }, nowSeconds, size = kPageSize) {
+  const of = new URLSearchParams({ sort, limit: String(size), offset: String(page * size) });
   if (search) of.set("search", search);
   if (states.length) of.set("state", states.join());
   if (owner !== null) of.set("owner", owner);
   if (days) of.set("since", String(Math.floor(nowSeconds - Number(days) * 86400)));
   return of.toString();
 }
+
+/** The order after a press on the head of a column, whose first order is `first`: the other way round at each further press. */
+export const turned = (sort, first) => (sort === first ? (first.startsWith("-") ? first.slice(1) : `-${first}`) : first);
 
 export const isNarrowed = ({ search, states, owner, days }) => search !== "" || states.length > 0 || owner !== null || days !== "";

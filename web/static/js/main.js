@@ -11,6 +11,7 @@ import { makeJobActions } from "./job_actions.js";
 import { listOf, parametersOf } from "./job_list.js";
 import { makeListActions } from "./list_actions.js";
 import { makeSubmitActions } from "./submit_actions.js";
+import { makeWorkerActions } from "./worker_actions.js";
 import { makeViewerActions } from "./viewer_actions.js";
 import { jobName } from "./format.js";
 import { initialState, openJob, shownOf, withEvent, withJob, withList, withListed, withOpen, withTiles, withUi, withWorkers, withoutJob } from "./state.js";
@@ -18,6 +19,7 @@ import { page } from "./views/shell.js";
 
 const kReportPauseMs = 2000;
 const kListPauseMs = 50;
+const kEnded = "Your session has ended: its time is up, or its token was revoked. Sign in again.";
 const kPhone = "(max-width: 40rem)";
 
 let state = initialState();
@@ -115,7 +117,8 @@ async function enter() {
   return null;
 }
 
-function signedOut(message = null) {
+/** message: why; without one, that a session that was open has ended. */
+function signedOut(message = state.session === "in" ? kEnded : null) {
   closeEvents?.();
   closeEvents = null;
   set(withUi({ ...initialState(), narrow: state.narrow, route: state.route, session: "out" }, { signInError: message }));
@@ -149,7 +152,7 @@ async function onOpen() {
   set({ ...state, link: "live" });
   await Promise.all([
     actions.refreshList(),
-    snapshot("workers", () => attempt(api.workers), withWorkers)]);
+    snapshot("workers", () => attempt(api.workers), (now, { workers, join = null }) => ({ ...withWorkers(now, workers), join }))]);
   actions.viewerEvent(null);
   await refreshOpen();
 }
@@ -256,9 +259,26 @@ window.addEventListener("hashchange", () => {
   else showRoute();
 });
 
+// ---- files dropped on the page ----
+
+const dragsFiles = (event) => [...(event.dataTransfer?.types ?? [])].includes("Files");
+const marked = (over) => document.documentElement.classList.toggle("dragging", over);
+document.addEventListener("dragover", (event) => {
+  if (!dragsFiles(event)) return;
+  event.preventDefault();
+  marked(true);
+});
+document.addEventListener("dragleave", (event) => (event.relatedTarget ? null : marked(false)));
+document.addEventListener("drop", (event) => {
+  if (!dragsFiles(event)) return;
+  event.preventDefault();
+  marked(false);
+  if (state.session === "in") actions.takeDrop(event);
+});
+
 // ---- actions ----
 
-const seam = { get: () => state, set, attempt, api, snapshot, showRoute };
+const seam = { get: () => state, set, attempt, api, snapshot, showRoute, compareFile: (file) => actions.compareFile(file) };
 const actions = {
   signIn,
   takeLink: () => {
@@ -271,12 +291,13 @@ const actions = {
   leaveLink: () => set(withUi(state, { link: null })),
   signOut: async () => {
     await attempt(api.signOut);
-    signedOut();
+    signedOut(null);
   },
   dismiss: () => set(withUi(state, { notice: null })),
   ...makeJobActions(seam),
   ...makeListActions(seam),
   ...makeAgainActions(seam),
+  ...makeWorkerActions(seam),
   ...makeSubmitActions(seam),
   ...makeViewerActions(seam),
 };

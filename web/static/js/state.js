@@ -11,10 +11,12 @@ export function initialState() {
     me: { role: "read", user: "" }, // the role with the fewest rights, until the role is known
     link: "connecting", // also "live", "lost"
     route: { view: "jobs", id: null, frame: null },
-    // a page of the list of jobs; ids: null until it is known
-    list: { asked: kWholeList, ids: null, total: 0, states: {}, owners: [], picked: new Set() },
+    // a page of the list of jobs; ids: null until it is known; doing: how far what is done to the selected jobs is
+    list: { asked: kWholeList, ids: null, total: 0, states: {}, owners: [], picked: new Set(), doing: null },
     jobs: null, // Map id -> job JSON; of frames only the one that is shown; null: not known yet
     workers: null, // Map id -> worker JSON
+    join: null, // how further workers join: {address, tls, token_file}
+    workerList: { search: "", sort: "Worker", descending: false },
     colours: new Map(), // worker name -> index into the palette, in order of appearance
     open: null, // the state of the job that is open, see openJob()
     viewer: null, // the state of the viewer, see viewer_actions.js
@@ -32,7 +34,7 @@ export const emptySubmission = () => ({
   progress: 0,
   step: "",
   error: null, // {message, diagnostics}
-  settings: { spp: "", target_error: "", time: "", width: "", height: "", frames: "" },
+  settings: { name: "", spp: "", target_error: "", time: "", width: "", height: "", frames: "", denoise: false, aov: "", priority: "", seed: "", tags: "" },
 });
 
 export const openJob = (id, shown = id) => ({
@@ -44,14 +46,18 @@ export const openJob = (id, shown = id) => ({
   folds: 0, // number of folds: a change means that the image has changed
   exposure: 0,
   showTiles: true,
-  layer: "picture", // or "denoised"; as a map over the image: "error", "samples"
+  layer: null, // "picture", "denoised", or as a map over the image "error", "samples"; null: the best picture there is
   clock: "seconds", // axis of the plot; or "core_seconds"
   picked: null, // point of the plot under the pointer
+  log: null, // the lines of the job's log, if they were asked for
   problem: null, // why the job cannot be shown
   film: null, // {id, playing} while frames of a sequence are scrubbed or played: the frame that is seen
   fps: 24, // pictures per second of what is played, and of a video
   video: null, // what the coordinator says of the sequence's video
 });
+
+/** The layer that is shown of a job: the one that was chosen, or the denoised picture of a job that is done and has one. */
+export const layerOf = ({ layer, report }, job) => layer ?? (job?.denoise && job.state === "done" && !report?.denoised?.error ? "denoised" : "picture");
 
 /** What the coordinator would not take from this token anyway is not offered. */
 export const mayChange = (state) => state.me.role === "admin" || state.me.role === "submit";

@@ -1,9 +1,9 @@
 // What the user can do on the page "New job".
 import { filesOfDrop, filesOfList, plan as planOf, scenesAmong } from "./bundle.js";
-import { emptySubmission, withSubmit } from "./state.js";
-import { submitJob } from "./submit.js";
+import { emptySubmission, mayChange, withSubmit, withUi } from "./state.js";
+import { inPlainWords, submitJob } from "./submit.js";
 
-export function makeSubmitActions({ get, set, api }) {
+export function makeSubmitActions({ get, set, api, compareFile }) {
   const busy = () => ["hashing", "sending"].includes(get().submit.phase);
 
   async function take(files, main = null) {
@@ -14,7 +14,9 @@ export function makeSubmitActions({ get, set, api }) {
     if (!scene) return;
     try {
       const plan = await planOf(all, scene);
-      if (get().submit.files === all) set(withSubmit(get(), { plan }));
+      if (get().submit.files !== all) return;
+      const { settings } = get().submit;
+      set(withSubmit(get(), { plan, settings: plan.frames && !settings.frames ? { ...settings, frames: plan.frames } : settings }));
     } catch {
       if (get().submit.files === all) set(withSubmit(get(), { error: { message: `The browser can't read ${scene}. If it was moved or changed, choose it again.`, diagnostics: [] } }));
     }
@@ -27,10 +29,10 @@ export function makeSubmitActions({ get, set, api }) {
     set(withSubmit(get(), { error: null, phase: "hashing", step: "Reading the files", progress: 0 }));
     try {
       const id = await submitJob(api, plan, settings, (step) => set(withSubmit(get(), step)));
-      set({ ...get(), submit: { ...emptySubmission(), settings } });
+      set({ ...get(), submit: { ...emptySubmission(), settings: { ...settings, name: "", frames: "" } } });
       window.location.hash = `#/jobs/${encodeURIComponent(id)}`;
     } catch (error) {
-      set(withSubmit(get(), { phase: "refused", error: { message: error.message, diagnostics: error.diagnostics ?? [] } }));
+      set(withSubmit(get(), { phase: "refused", error: { message: inPlainWords(error.message), diagnostics: (error.diagnostics ?? []).map((one) => ({ ...one, text: inPlainWords(one.text) })) } }));
     }
   }
 
@@ -40,22 +42,27 @@ export function makeSubmitActions({ get, set, api }) {
       // Otherwise choosing the same file again, after an edit, would not be a change
       event.currentTarget.value = "";
     },
-    onDrop: async (event) => {
-      event.preventDefault();
-      event.currentTarget.classList.remove("over");
-      take(await filesOfDrop(event.dataTransfer));
+    /** Of files dropped anywhere on any page: else the browser would open them, and the dashboard would be gone. */
+    takeDrop: async (event) => {
+      const files = await filesOfDrop(event.dataTransfer);
+      if (files.length === 0) return;
+      if (get().viewer && files.length === 1 && /\.exr$/i.test(files[0].path)) {
+        compareFile(files[0].file);
+        return;
+      }
+      if (!mayChange(get())) {
+        set(withUi(get(), { notice: "Your token lets you look; jobs are submitted with another one." }));
+        return;
+      }
+      if (get().route.view !== "submit") window.location.hash = "#/submit";
+      take(files);
     },
-    onDragOver: (event) => {
-      event.preventDefault();
-      event.currentTarget.classList.add("over");
-    },
-    onDragLeave: (event) => event.currentTarget.classList.remove("over"),
     onMain: (event) => take([], event.currentTarget.value),
     onSetting: (event) => {
-      const { name, value } = event.currentTarget;
-      set(withSubmit(get(), { settings: { ...get().submit.settings, [name]: value } }));
+      const { name, type, value, checked } = event.currentTarget;
+      set(withSubmit(get(), { settings: { ...get().submit.settings, [name]: type === "checkbox" ? checked : value } }));
     },
-    clearFiles: () => busy() || set(withSubmit(get(), { ...emptySubmission(), settings: get().submit.settings })),
+    clearFiles: () => busy() || set(withSubmit(get(), { ...emptySubmission(), settings: { ...get().submit.settings, name: "", frames: "" } })),
     onSubmit: send,
   };
 }

@@ -2,6 +2,12 @@
 import { duration, figure, interval } from "./format.js";
 import { phrases } from "./phrases.js";
 
+/** Why an error can't be trusted, in a few words: of a job's verdict. */
+export const kDoubts = { heavy_tail: "Still noisy: a few bright pixels carry the error", bias_floor: "The error does not fall as it should", early: "Too early to tell the error" };
+export const kUnsure = "The error is not known well yet";
+const kShortDoubts = { heavy_tail: "still noisy", early: "too early to tell" };
+export const doubtWord = (verdict) => kShortDoubts[verdict?.kind] ?? phrases.doubt;
+
 const kDoubtful = new Set(["heavy_tail", "bias_floor"]);
 
 /** {kind, words, trusted}; that of an older coordinator has no `trusted`. */
@@ -13,7 +19,7 @@ export const verdictOf = (job, report) =>
 
 /** "95 %: 0.00390 – 0.00448", or why there is no interval. */
 export function confidence(job, ci) {
-  if (doubtful(job.verdict)) return phrases.doubt;
+  if (doubtful(job.verdict)) return doubtWord(job.verdict);
   if (job.pixels_without_samples > 0) return "of the part rendered so far";
   const known = interval(ci);
   return known ? `95 %: ${known}` : null;

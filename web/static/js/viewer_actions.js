@@ -4,11 +4,13 @@ import { kCompared, kMostExposure, kOverlays, queryOf, viewOf } from "./viewer/a
 import { kCurves } from "./viewer/tone.js";
 import { openFile } from "./viewer/file_source.js";
 import { PixelSource } from "./viewer/source.js";
+import { kindOf } from "./viewer/paint.js";
 import { regionFigures } from "./viewer/region.js";
 import { viewHref } from "./route.js";
 import { isOver, mayChange, withJob, withViewer } from "./state.js";
 
-const kLetters = { e: "exposure", c: "curve", l: "layer", o: "overlay", f: "falseColour", b: "by" };
+const kLetters = { e: "exposure", c: "curve", l: "layer", o: "overlay", f: "falseColour", b: "by", k: "channel" };
+const kBins = 64; // of a histogram
 const kExposureStep = 0.5;
 
 const next = (list, value, by) => list[(list.indexOf(value) + by + list.length) % list.length];
@@ -21,21 +23,69 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
     if (!get().viewer) return;
     set(withViewer(get(), more));
     const { route, viewer } = get();
-    window.history.replaceState(null, "", viewHref(route.id, queryOf(viewer.view)));
+    window.history.replaceState(null, "", viewHref(route.id, queryOf(viewer.view, viewer.plain)));
   }
-  const look = (more) => change({ view: { ...get().viewer.view, ...more } });
+
+  function look(more) {
+    const before = get().viewer?.view;
+    if (!before) return;
+    change({ view: { ...before, ...more } });
+    if ((more.layer ?? before.layer) !== before.layer) {
+      probeAgain();
+      survey();
+    }
+  }
+
+  /** What is read from the pixel under the pointer stays when another layer or picture comes. */
+  function probeAgain() {
+    const pixel = get().viewer?.probe?.pixel;
+    if (pixel) point(pixel);
+  }
+
+  /** The ends and the histogram of the layer that is shown, if it needs them. */
+  async function survey() {
+    const { a, view, histogram } = get().viewer ?? {};
+    if (!a) return;
+    const layer = a.layer(view.layer);
+    const kind = kindOf(layer);
+    if (kind === "matte" || (kind !== "measure" && !histogram)) return;
+    const found = await a.survey(layer.name, kBins).catch(() => null);
+    if (found && get().viewer?.a === a) set(withViewer(get(), { survey: { layer: layer.name, ...found } }));
+  }
 
   function came(problem) {
     if (get().viewer) set(withViewer(get(), { changed: get().viewer.changed + 1, problem: problem ? problem.message : null }));
   }
 
   async function openJob(which, id) {
-    const meta = await attempt(() => api.layers(id));
-    if (!meta || get().viewer === null) return;
+    const { viewer: opened } = get();
+    let meta;
+    let plain = opened?.plain;
+    try {
+      meta = await api.layers(id);
+      if (which === "a") plain = await bestLayer(id, meta);
+    } catch (error) {
+      if (error.status === 401) await attempt(() => Promise.reject(error));
+      else if (get().viewer?.id === opened?.id) set(withViewer(get(), { problem: error.message }));
+      return;
+    }
+    if (get().viewer === null || get().viewer.id !== opened.id) return;
     sources[which]?.close();
     sources[which] = new PixelSource(meta, (layer, level, rect) => api.pixels(id, layer, level, rect), came);
-    set(withViewer(get(), { [which]: sources[which] }));
+    const { view } = get().viewer;
+    set(withViewer(get(), { [which]: sources[which], plain, ...(which === "a" ? { view: { ...view, layer: view.layer ?? plain } } : {}) }));
     refreshFigures();
+    probeAgain();
+    if (which === "a") survey();
+  }
+
+  /** The denoised picture of a job that is done, if it has one. */
+  async function bestLayer(id, { layers }) {
+    if (!layers.some(({ name }) => name === "denoised")) return "rgb";
+    const job = get().jobs?.get(id) ?? await api.job(id);
+    const report = await api.report(id).catch(() => null);
+    if (get().viewer?.id === id) set(withViewer(get(), { report }));
+    return job.state === "done" ? "denoised" : "rgb";
   }
 
   async function compare(id) {
@@ -43,6 +93,20 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
     sources.b = null;
     change({ b: null, file: null, view: { ...get().viewer.view, other: id || null } });
     if (id) await openJob("b", id);
+    else probeAgain();
+  }
+
+  /** Of the pictures by their numbers: 1 is the first, 2 to 9 are compared with it, in the order of their list. */
+  async function showPicture(number) {
+    const { viewer } = get();
+    if (number === 1) {
+      look({ by: "a" });
+      return;
+    }
+    const id = comparable(get(), viewer)[number - 2]?.id;
+    if (!id) return;
+    look({ by: "b" });
+    if (viewer.view.other !== id) await compare(id);
   }
 
   async function compareFile(file) {
@@ -115,6 +179,20 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
     else if (job.focus) focus(null);
   }
 
+  function toggleHistogram() {
+    set(withViewer(get(), { histogram: !get().viewer.histogram }));
+    survey();
+  }
+
+  /** What the window of the viewer shows, as a PNG. */
+  function savePicture(name) {
+    document.querySelector("float-view")?.picture.toBlob((blob) => {
+      const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: name });
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+    });
+  }
+
   function command(key) {
     const { view, a } = get().viewer;
     const by = key === key.toLowerCase() ? 1 : -1;
@@ -124,6 +202,9 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
     else if (what === "curve") look({ curve: next(kCurves.map(([name]) => name), view.curve, by) });
     else if (what === "overlay") look({ overlay: next(kOverlays.map(([name]) => name), view.overlay, by) });
     else if (what === "layer" && a) look({ layer: next(a.layers.map((layer) => layer.name), view.layer, by) });
+    else if (what === "channel" && a) look({ channel: next([null, 0, 1, 2].slice(0, 1 + a.layer(view.layer).channels.length), view.channel, by) });
+    else if (key === "h") toggleHistogram();
+    else if (/^[1-9]$/.test(key) && a) showPicture(Number(key));
     else if (what === "by" && get().viewer.b) look({ by: next(kCompared.map(([name]) => name), view.by, by) });
     else if (key === "p") toggleFocus();
     else if (key === "x" && get().viewer.b) look({ by: view.by === "a" ? "b" : "a" });
@@ -136,13 +217,15 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
       const view = viewOf(query);
       const before = get().viewer;
       if (before?.id === id) {
-        set(withViewer(get(), { view }));
+        set(withViewer(get(), { view: { ...view, layer: view.layer ?? (before.a ? before.plain : null) } }));
+        probeAgain();
+        survey();
         if (view.other !== before.view.other) compare(view.other);
         return;
       }
       for (const which of ["a", "b"]) sources[which]?.close();
       sources.a = sources.b = null;
-      set({ ...get(), viewer: { id, view, a: null, b: null, file: null, others: null, tool: "pan", probe: null, figures: null, flip: null, problem: null, changed: 0 } });
+      set({ ...get(), viewer: { id, view, a: null, b: null, plain: "rgb", report: null, survey: null, histogram: false, file: null, others: null, tool: "pan", probe: null, figures: null, flip: null, problem: null, changed: 0 } });
       openJob("a", id);
       // if this fails, the viewer says so for the layers
       snapshot(`job ${id}`, () => api.job(id), (now, job) => (now.viewer?.id === id ? withJob(now, job) : now)).catch(() => {});
@@ -172,9 +255,17 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
     focus,
     compare,
     compareFile,
+    toggleHistogram,
+    savePicture,
     flipped: (flip) => set(withViewer(get(), { flip })),
     setTool: (tool) => set(withViewer(get(), { tool })),
   };
+}
+
+/** Jobs whose pictures have the size of the first, the newest first. */
+export function comparable(state, viewer) {
+  const same = (job) => job.id !== viewer.id && !job.frames && job.size?.[0] === viewer.a.size[0] && job.size?.[1] === viewer.a.size[1];
+  return [...(viewer.others ?? state.jobs?.values() ?? [])].filter(same).sort((p, q) => q.submitted_unix - p.submitted_unix);
 }
 
 /** The name of an identifier in the manifest of its layer; without one its eight hexadecimal digits. */

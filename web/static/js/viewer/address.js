@@ -8,7 +8,7 @@ export const kOverlays = [["", "None"], ["error", "Error"], ["spp", "Samples"]];
 export const kMostExposure = 16;
 
 export const kPlain = {
-  layer: "rgb", exposure: 0, curve: "srgb", falseColour: false, overlay: "", zoom: null, x: 0, y: 0, other: null, by: "wipe", split: 0.5, region: null, matte: [],
+  layer: "rgb", channel: null, exposure: 0, curve: "srgb", falseColour: false, overlay: "", zoom: null, x: 0, y: 0, other: null, by: "wipe", split: 0.5, region: null, matte: [],
 };
 
 const one = (options, value, otherwise) => (options.some(([name]) => name === value) ? value : otherwise);
@@ -18,9 +18,11 @@ const number = (text, least, most, otherwise) => (text !== null && text !== "" &
 export function viewOf(query) {
   const of = new URLSearchParams(query);
   const region = (of.get("region") ?? "").split(",").map(Number);
+  const channel = of.get("channel");
   const inOrder = region.length === 4 && region.every((v) => Number.isInteger(v) && v >= 0) && region[0] < region[2] && region[1] < region[3];
   return {
-    layer: of.get("layer") ?? kPlain.layer,
+    layer: of.get("layer"), // null: the best picture there is
+    channel: channel === null ? null : number(channel, 0, 2, null),
     exposure: number(of.get("ev"), -kMostExposure, kMostExposure, 0),
     curve: one(kCurves, of.get("curve"), kPlain.curve),
     falseColour: of.get("false") === "1",
@@ -38,10 +40,12 @@ export function viewOf(query) {
 
 const short = (v) => String(Number(v.toFixed(3)));
 
-export function queryOf(view) {
+/** plain: the layer that is shown if the address names none. */
+export function queryOf(view, plain = kPlain.layer) {
   const of = new URLSearchParams();
   const put = (name, value, plain) => (value === plain || value === null ? null : of.set(name, value));
-  put("layer", view.layer, kPlain.layer);
+  put("layer", view.layer, plain);
+  put("channel", view.channel, null);
   put("ev", view.exposure ? short(view.exposure) : 0, 0);
   put("curve", view.curve, kPlain.curve);
   put("false", view.falseColour ? "1" : null, null);

@@ -34,6 +34,8 @@ class FloatView extends HTMLElement {
 
   connectedCallback() {
     this.append(this.#canvas);
+    // keys work from the first moment, unless somebody is typing elsewhere already
+    if (!document.activeElement || document.activeElement === document.body) this.focus({ preventScroll: true });
     this.#watcher.observe(this);
     this.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
     this.addEventListener("pointerdown", (event) => this.#down(event));
@@ -96,6 +98,7 @@ class FloatView extends HTMLElement {
     const complete = this.#drawPictures(context, level, ratio);
     this.#drawMarks(context, ratio);
     if (this.#painted.size > kMostPainted) for (const [key, one] of this.#painted) if (one.used !== this.#frame) this.#painted.delete(key);
+    this.dataset.busy = complete ? "" : this.#model.b && this.#model.by === "flip" ? "Computing FLIP …" : "Loading …";
     this.dataset.level = String(level);
     this.dataset.painted = complete ? `${layer} ${b ? by : "a"}` : "";
     if (complete) this.dataset.pictures = String(Number(this.dataset.pictures ?? 0) + 1);
@@ -164,8 +167,8 @@ class FloatView extends HTMLElement {
   }
 
   get #look() {
-    const { exposure, curve, falseColour, matte } = this.#model.look;
-    return `${exposure} ${curve} ${falseColour} ${[...matte].join()}`;
+    const { exposure, curve, falseColour, channel, range, matte } = this.#model.look;
+    return `${exposure} ${curve} ${falseColour} ${channel} ${range} ${[...matte].join()}`;
   }
 
   #block(which, source, layer, level, bx, by) {
@@ -212,9 +215,27 @@ class FloatView extends HTMLElement {
     if (region) frame(region, [["#000", []], ["#ffe3b3", [6 * ratio, 4 * ratio]]]);
     if (b && by === "wipe") {
       context.fillStyle = "#ffe3b3";
-      context.fillRect(Math.round(split * this.#canvas.width) - ratio, 0, 2 * ratio, this.#canvas.height);
+      const at = Math.round(split * this.#canvas.width);
+      context.fillRect(at - ratio, 0, 2 * ratio, this.#canvas.height);
+      this.#drawSides(context, ratio, at);
     }
   }
+
+  /** Which picture lies on which side of the wipe. */
+  #drawSides(context, ratio, at) {
+    context.font = `${12 * ratio}px system-ui, sans-serif`;
+    for (const [text, x, align] of [[this.#model.sides?.[0] ?? "First", at - 10 * ratio, "right"], [this.#model.sides?.[1] ?? "Second", at + 10 * ratio, "left"]]) {
+      context.textAlign = align;
+      context.lineWidth = 3 * ratio;
+      context.strokeStyle = "rgb(0 0 0 / 75%)";
+      context.fillStyle = "#fff";
+      context.strokeText(text, x, 18 * ratio);
+      context.fillText(text, x, 18 * ratio);
+    }
+  }
+
+  /** What is seen, as a canvas. */
+  get picture() { return this.#canvas; }
 
   // ---- pointers and keys ----
 
@@ -327,7 +348,7 @@ class FloatView extends HTMLElement {
       this.#tell("pointed", [0, 1].map((i) => Math.min(size[i] - 1, Math.floor(next.zoom === null ? size[i] / 2 : i ? next.y : next.x))));
     } else if (kZoomKeys[event.key]) this.#viewed(zoomed(view, size, frame, kZoomKeys[event.key]));
     else if (event.key === "0") this.#viewed({ zoom: null });
-    else if (event.key === "1") this.#viewed(zoomed(view, size, frame, 1 / zoomOf(view, size, frame)));
+    else if (event.key === "z") this.#viewed(zoomed(view, size, frame, 1 / zoomOf(view, size, frame)));
     else if (event.key === "Enter" && this.#pixel(middle)) this.#tell("picked", this.#pixel(middle));
     else if (event.key === "r") this.#tell("framed", this.#model.region ? null : this.#regionOf([0, 0], [frame.width, frame.height]));
     else if (event.key.length === 1) this.#tell("command", event.key);

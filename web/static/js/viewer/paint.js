@@ -14,15 +14,18 @@ function codesOf(curve, exposure) {
   return kept.codes;
 }
 
-/** What a layer shows: "ramp" (error, samples), "matte", "normal", or "colour". */
+/** What a layer shows: "ramp" (error, samples), "matte", "normal", "measure" (a depth, say), or "colour". */
 export function kindOf(layer) {
   if (layer.blocks === "first") return "matte";
   if (layer.name === "error" || layer.name === "spp") return "ramp";
-  return /normal$/.test(layer.name) ? "normal" : "colour";
+  if (/normal$/.test(layer.name)) return "normal";
+  return layer.channels.includes("R") ? "colour" : "measure";
 }
 
 /**
- * look: {exposure, curve, falseColour, matte: Set of picked identifiers}. Returns RGBA, row by row.
+ * look: {exposure, curve, falseColour, channel, range, matte: Set of picked identifiers}; channel: the only one that
+ * is shown, as grey; range: [least, most] of a layer that is no light, which become black and white. Returns RGBA, row
+ * by row.
  */
 export function paint(buffer, layer, look) {
   const kind = kindOf(layer);
@@ -32,11 +35,13 @@ export function paint(buffer, layer, look) {
   // the only channel of a layer is shown as grey
   const picked = [0, 1, 2].map((c) => Math.min(c, layer.channels.length - 1));
   if (layer.channels.length === 2) picked[2] = -1;
+  if (look.channel !== null && look.channel !== undefined && look.channel < layer.channels.length) picked.fill(look.channel);
   if (kind === "normal") return each(halves, layer.channels.length, (v, out, at) => {
     for (let c = 0; c < 3; c += 1) out[at + c] = 127.5 * (v(picked[c]) + 1);
   });
+  if (kind === "measure" && look.range) return each(halves, layer.channels.length, (v, out, at) => measured(picked.map((c) => placed(c < 0 ? 0 : v(c), look.range)), look.falseColour, out, at));
   if (look.falseColour) return each(halves, layer.channels.length, (v, out, at) => {
-    const brightness = layer.channels.length === 3 ? 0.2126 * v(0) + 0.7152 * v(1) + 0.0722 * v(2) : v(0);
+    const brightness = look.channel !== null && look.channel !== undefined ? v(picked[0]) : layer.channels.length === 3 ? 0.2126 * v(0) + 0.7152 * v(1) + 0.0722 * v(2) : v(0);
     falseColour((Math.log2(brightness) + look.exposure + kFalseStops) / (2 * kFalseStops), out, at);
   });
   if (look.curve === "agx") {
@@ -44,6 +49,14 @@ export function paint(buffer, layer, look) {
     return each(halves, layer.channels.length, (v, out, at) => agx(v(picked[0]), v(picked[1]), picked[2] < 0 ? 0 : v(picked[2]), scale, out, at));
   }
   return coded(halves, layer.channels.length, picked, codesOf(look.curve, look.exposure));
+}
+
+/** Where a value lies between the ends of a range, from 0 to 1. */
+const placed = (value, [least, most]) => (most > least ? Math.min(1, Math.max(0, (value - least) / (most - least))) : 0.5);
+
+function measured(parts, colours, out, at) {
+  if (colours) falseColour(parts[0], out, at);
+  else for (let c = 0; c < 3; c += 1) out[at + c] = 255 * parts[c];
 }
 
 function coded(halves, channels, picked, code) {

@@ -2,6 +2,7 @@
 // a picture share one source. If the job still renders, the source is told which areas have changed, and
 // fetches these again.
 import { blockRect } from "./place.js";
+import { pieces } from "./region.js";
 import { floatsOf } from "./half.js";
 
 const kAtOnce = 4; // most requests in progress
@@ -9,6 +10,7 @@ const kMostBytes = 192 * 2 ** 20;
 const kFreshPauseMs = 800; // a changing block is not requested more often
 const kFirstRetryMs = 500;
 const kLongestRetryMs = 15_000;
+const kSurveySide = 256;
 const kProbeSide = 16;
 const kMostProbes = 256;
 
@@ -136,11 +138,39 @@ export class PixelSource {
     return floatsOf(await this.#fetch(name, level, rect), this.layer(name).format);
   }
 
+  /** {least, most, counts}: the ends of all finite values of a layer, and how many lie in each of `bins` equal parts between them (of positive values by their logarithms). Of a picture reduced to kSurveySide pixels. */
+  async survey(name, bins) {
+    const layer = this.layer(name);
+    const level = Math.min(this.maxLevel, Math.max(0, Math.ceil(Math.log2(Math.max(...this.size) / kSurveySide))));
+    const parts = await Promise.all(pieces(this.size, [0, 0, ...this.size], level).map((rect) => this.values(layer.name, level, rect)));
+    return surveyed(parts.flatMap((part) => [...part]), layer.channels.length, bins);
+  }
+
   close() {
     clearTimeout(this.#timer);
     this.#wanted = [];
     this.onChange = () => {};
   }
+}
+
+export function surveyed(values, channels, bins) {
+  let [least, most, positive] = [Infinity, -Infinity, Infinity];
+  for (const value of values) {
+    if (!Number.isFinite(value)) continue;
+    least = Math.min(least, value);
+    most = Math.max(most, value);
+    if (value > 0) positive = Math.min(positive, value);
+  }
+  if (least > most) return null;
+  const logarithmic = least >= 0 && most > positive;
+  const [from, to] = logarithmic ? [Math.log(positive), Math.log(most)] : [least, most];
+  const counts = Array.from({ length: channels }, () => new Array(bins).fill(0));
+  values.forEach((value, i) => {
+    if (!Number.isFinite(value) || (logarithmic && value <= 0)) return;
+    const at = to > from ? ((logarithmic ? Math.log(value) : value) - from) / (to - from) : 0;
+    counts[i % channels][Math.min(bins - 1, Math.floor(at * bins))] += 1;
+  });
+  return { least, most, from: logarithmic ? positive : least, logarithmic, counts };
 }
 
 /** Identifiers as whole numbers, coverages as they are. */

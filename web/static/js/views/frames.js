@@ -1,9 +1,9 @@
 // The frames of a sequence: a strip with a small picture of each, and the means to scrub and play through those
 // that are done and to have a video made of them.
 import { h } from "../dom.js";
-import { doneFrames, mayChange } from "../state.js";
+import { doneFrames, isOver, mayChange } from "../state.js";
 import { downloads } from "../api.js";
-import { bytes, count, percent } from "../format.js";
+import { bytes, count, duration, figure, percent, spp } from "../format.js";
 import { frameHref } from "../route.js";
 import { safeClass, stateWord } from "./pieces.js";
 
@@ -17,6 +17,7 @@ export function framesStrip(state, job, actions) {
   const list = frames.list ?? [];
   const at = Math.max(0, list.findIndex((frame) => (film ? frame.id === film.id : frame.id === state.open.shown)));
   const first = Math.max(0, Math.min(at - kMost / 2, list.length - kMost));
+  const over = isOver(job);
   const some = list.slice(first, first + kMost);
   const shown = list[at];
   return h("nav", { key: "frames", class: "panel frames", "aria-label": "Frames", onkeydown: (event) => onKey(event, job, list, at, actions) },
@@ -26,13 +27,18 @@ export function framesStrip(state, job, actions) {
       step("previous", "‹", "The frame before", job, list[at - 1]),
       step("next", "›", "The next frame", job, list[at + 1]),
       state.route.frame === null
-        ? h("span", { key: "following", class: "dim" }, "following what is rendered")
-        : h("a", { key: "follow", class: "follow", href: frameHref(job.id, null) }, "Follow what is rendered")),
+        ? over ? null : h("span", { key: "following", class: "dim" }, "following what is rendered")
+        : over ? null : h("a", { key: "follow", class: "follow", href: frameHref(job.id, null) }, "Follow what is rendered")),
+    whole(job),
     some.length < list.length ? h("p", { key: "part", class: "help" }, `${count(some.length)} of them, around the one that is shown`) : null,
     h("film-strip", { key: "strip", ".current": shown?.id }, h("ul", null, some.map((frame) => h("li", { key: frame.id }, cell(job, frame, frame === shown))))),
     player(state, job, list, at, actions),
     videoTools(state, job, actions));
 }
+
+/** Figures of all frames together. */
+const whole = (job) => h("p", { key: "whole", class: "frames-whole dim number" }, "Whole sequence: ",
+  [`relMSE ${figure(job.relmse)} on average`, `${spp(job.spp_done)} samples per pixel`, `${duration(job.core_seconds)} of core time`, isOver(job) ? `took ${duration(job.elapsed_seconds)}` : `${duration(job.eta_seconds)} left`].join(" · "));
 
 function tally(frames) {
   const more = ["failed", "cancelled"].filter((state) => frames[state] > 0).map((state) => `, ${count(frames[state])} ${state}`);

@@ -1,6 +1,6 @@
 // The page of one job: its image, the image's error, and the workers that render it.
 import { h } from "../dom.js";
-import { healthComplaints, isOver, ownerOf, seesOthers } from "../state.js";
+import { healthComplaints, isOver, layerOf, ownerOf, seesOthers } from "../state.js";
 import { duration, jobName, moment, percent, plural } from "../format.js";
 import { downloads } from "../api.js";
 import { againButton, againForm } from "./again.js";
@@ -8,6 +8,9 @@ import { jobActions, notice, progressBar, statePill, stateWord } from "./pieces.
 import { imagePanel } from "./job_image.js";
 import { timeSplit } from "./time_split.js";
 import { figures, inFlight } from "./job_figures.js";
+import { goOn } from "./go_on.js";
+import { jobFacts } from "./job_facts.js";
+import { causeFirst } from "../failure.js";
 import { framesStrip } from "./frames.js";
 import { errorPlot } from "./plot.js";
 import { phrases } from "../phrases.js";
@@ -23,6 +26,7 @@ export function jobView(state, actions) {
   return h("article", { key: job.id, class: "job" },
     heading(state, job, actions),
     againForm(state, job, actions),
+    job.error && job.state === "failed" ? h("div", { key: "error" }, notice("bad", phrases.failed, failure(job.error))) : null,
     alerts(job),
     framesStrip(state, job, actions),
     shownJob(state, state.jobs.get(state.open.shown), actions));
@@ -31,11 +35,12 @@ export function jobView(state, actions) {
 /** Image and figures: of the job itself, or of the frame that was chosen. */
 function shownJob(state, job, actions) {
   if (!job || job.frames) return h("p", { class: "waiting", key: "frame" }, "Fetching the frame …");
+  const started = job.state !== "failed" || job.units_done > 0; // of a job that failed at once there are no figures
   return [
-    job.sequence && job.error ? h("div", { key: "frame-error" }, notice("bad", `Frame ${job.frame}`, h("pre", null, job.error))) : null,
+    job.sequence && job.error ? h("div", { key: "frame-error" }, notice("bad", `Frame ${job.frame}`, failure(job.error))) : null,
     h("div", { key: "columns", class: "columns" },
-      h("div", { class: "picture" }, imagePanel(state, job, actions), errorPlot(job, state.open, actions, state.narrow), downloadLinks(job)),
-      h("div", { class: "facts" }, figures(job), timeSplit(job), inFlight(state, job))),
+      h("div", { class: "picture" }, imagePanel(state, job, actions), started ? errorPlot(job, state.open, actions, state.narrow) : null, downloadLinks(job, state.open), logOf(job, state.open, actions)),
+      h("div", { class: "facts" }, started ? figures(job, job.denoised ?? state.open.report?.denoised) : null, started ? timeSplit(job) : null, jobFacts(state, job, actions), inFlight(state, job))),
   ];
 }
 
@@ -46,13 +51,13 @@ function heading(state, job, actions) {
     progressBar(job.progress, `Progress of ${jobName(job)}`, `wide in-${job.state}`),
     // Screen readers announce it when it changes, unlike the numbers
     h("p", { class: "unseen", role: "status" }, stateWord(job)),
-    h("p", { class: "sub" }, sentence(job)));
+    goOn(state, job, actions, sentence(job)));
 }
 
 function sentence(job) {
   if (job.state === "done") return `Done after ${duration(job.elapsed_seconds)}: ${whyStopped(job) ?? "finished"}.`;
-  if (job.state === "running") return `${percent(job.progress)} · ${job.eta_seconds === null ? "time left not known yet" : `${timeLeft(job)} left`} · handed in ${moment(job.submitted_unix)}`;
-  if (job.state === "queued") return "Waiting for a worker that may take it.";
+  if (job.state === "running") return `${percent(job.progress)} · ${job.eta_seconds === null ? "time left not known yet" : `${timeLeft(job)} left`} · submitted ${moment(job.submitted_unix)}`;
+  if (job.state === "queued") return job.waits_for || "Waiting for a worker that may take it.";
   return `${stateWord(job)[0].toUpperCase()}${stateWord(job).slice(1)} at ${percent(job.progress)}, after ${duration(job.elapsed_seconds)}${isOver(job) && whyStopped(job) ? `: ${whyStopped(job)}` : ""}.`;
 }
 
@@ -60,9 +65,9 @@ function alerts(job) {
   const complaints = healthComplaints(job);
   const warnings = job.warnings ?? [];
   return [
-    job.error ? h("div", { key: "error" }, notice("bad", job.state === "failed" ? phrases.failed : phrases.unwell, h("pre", null, job.error))) : null,
+    job.error && job.state !== "failed" ? h("div", { key: "unwell" }, notice("bad", phrases.unwell, failure(job.error))) : null,
     job.fake === true ? h("p", { key: "fake", class: "notice warn" }, "Fake workers (--fake) make up the pixels of this job: it is no picture of the scene.") : null,
-    job.few_hits > 0 ? h("p", { key: "few", class: "notice mild" }, `${plural(job.few_hits, "pixel")} got too few hits for the error to be known there; the error map flags them.`) : null,
+    job.few_hits > 0 ? h("p", { key: "few", class: "notice mild" }, `${plural(job.few_hits, "pixel")} ${job.few_hits === 1 ? "has" : "have"} too few samples that found light for the error to be known there: pink in the map of the error.`) : null,
     job.reference_same_seed === true ? h("p", { key: "seed", class: "notice mild" }, phrases.sameSeed) : null,
     complaints.length ? h("div", { key: "health" }, notice("warn", "The numbers of this image are not clean", h("ul", null, complaints.map(complaint)))) : null,
     warnings.length ? h("div", { key: "warnings" }, h("details", { class: "notice mild" }, h("summary", null, warnings.length === 1 ? "1 warning about the scene" : `${warnings.length} warnings about the scene`), h("pre", null, warnings.join("\n")))) : null,
@@ -73,11 +78,26 @@ const complaint = ({ key, text, place, replay }) => h("li", { key },
   place ? `${text}; ${place}.` : `${text}.`,
   replay ? h("p", { key: "replay", class: "replay" }, "See it again: ", h("code", null, replay)) : null);
 
-function downloadLinks(job) {
+/** The cause, and below it where it happened. */
+function failure(text) {
+  const { cause, where } = causeFirst(text);
+  return [h("pre", { key: "cause" }, cause), where ? h("p", { key: "where", class: "failure-where" }, where) : null];
+}
+
+/** What happened to the job, the latest last; it is fetched when it is opened. */
+const logOf = (job, { log }, actions) => h("details", { key: `log ${job.id}`, class: "panel job-log", ontoggle: (event) => (event.currentTarget.open ? actions.readLog(job.id) : null) },
+  h("summary", null, "Log"),
+  log === null ? h("p", { key: "waiting", class: "help" }, "Fetching the log …") : h("pre", { key: "lines", tabindex: 0, "aria-label": "Log" }, log || "Nothing has happened yet."),
+  log === null ? null : h("button", { key: "again", type: "button", class: "small", onclick: () => actions.readLog(job.id) }, "Read it again"));
+
+function downloadLinks(job, open) {
+  const taken = !isOver(job) || job.units_done > 0; // before the end there may be a picture soon
+  const shown = layerOf(open, job) === "denoised" ? "denoised" : "picture";
   const link = (href, label, hint, name) => h("a", { key: hint, class: "button", href, download: name }, label, h("small", null, hint));
   const stem = jobName(job).replace(/\.xml$/i, "") + (job.sequence ? `.${job.frame}` : "");
   return h("nav", { class: "downloads", "aria-label": "Downloads" },
-    link(downloads.exr(job.id), "EXR", "image", `${stem}.exr`),
+    taken ? link(downloads.exr(job.id), "EXR", "image", `${stem}.exr`) : null,
+    taken ? link(downloads.png(job.id, open.exposure, shown), "PNG", shown === "denoised" ? "denoised" : "as shown", `${stem}.png`) : null,
     h("a", { key: "page", class: "button", href: downloads.page(job.id), target: "_blank", rel: "noopener" }, "Report", h("small", null, "page")),
     link(downloads.report(job.id), "Report", "JSON", `${stem}.report.json`),
     link(downloads.csv(job.id), "Convergence", "CSV", `${stem}.convergence.csv`),

@@ -1,35 +1,45 @@
 // The numbers of one job, and its tiles being rendered.
 import { h } from "../dom.js";
 import { colourOf, healthComplaints, isOver } from "../state.js";
-import { count, duration, figure, given, percent, plural, spp } from "../format.js";
+import { count, duration, figure, given, interval, percent, plural, spp } from "../format.js";
 import { phrases } from "../phrases.js";
-import { atLeast, confidence, denoisedTarget, doubtful, trueFigure } from "../verdict.js";
+import { atLeast, confidence, denoisedTarget, doubtWord, doubtful, trueFigure } from "../verdict.js";
 import { workerMark } from "./pieces.js";
 
 const kListed = 12;
+const kDoubtWords = new Set(["heavy_tail", "early", "bias_floor"].map((kind) => doubtWord({ kind })));
 
-/** What follows each figure has its lines kept free, so that nothing moves when it becomes known. */
-export function figures(job) {
+/** What follows each figure has its lines kept free, so that nothing moves when it becomes known. denoised: the error of the denoised picture, or why there is none; absent until it is known. */
+export function figures(job, denoised) {
   const clean = healthComplaints(job).length === 0;
   return h("dl", { class: "panel figures" },
     fact("relMSE", figure(job.relmse), [confidence(job, job.relmse_ci95) ?? "not known yet", job.target_error > 0 && !denoisedTarget(job) ? target(job) : null], "key"),
-    job.target_error > 0 && denoisedTarget(job) ? fact("relMSE, denoised", figure(job.denoised_check?.relmse), [denoisedNote(job.denoised_check), target(job)], "key") : null,
+    job.denoise || denoisedTarget(job) ? denoisedFact(job, denoised) : null,
     isOver(job) ? fact("Took", duration(job.elapsed_seconds), ["wall clock"], "key") : fact(atLeast(job) ? "Time left, at least" : "Time left", duration(job.eta_seconds), timeNotes(job), "key"),
     fact("Samples per pixel", spp(job.spp_done), samplesAsked(job)),
     fact("RMSE", figure(job.rmse), [confidence(job, job.rmse_ci95)]),
     fact("Core time", duration(job.core_seconds)),
     fact("Efficiency", figure(job.efficiency_per_core), ["1 / (relMSE × core s)"]),
     job.reference ? trueFigures(job.reference, job.reference_same_seed === true) : null,
-    job.class_share && job.class_share.share < 1 ? fact("Can take it", percent(job.class_share.share), [`${count(job.class_share.workers)} of ${plural(job.class_share.of_workers, "worker")}: of its numeric class`]) : null,
-    fact("Units", count(job.units_done), [`of ${count(job.units_total)}`]),
-    fact("Numeric health", clean ? "clean" : "see above", [], clean ? "good" : "bad"));
+    job.class_share && job.class_share.share < 1 ? fact("Can take it", percent(job.class_share.share), [`${count(job.class_share.workers)} of ${plural(job.class_share.of_workers, "worker")}: the others' processors or builds round differently`]) : null,
+    fact("Parts of the work", count(job.units_done), [`of ${count(job.units_total)}`]),
+    fact("Broken numbers", clean ? "none" : "see above", [], clean ? "good" : "bad"));
 }
 
 const target = (job) => `target ${given(job.target_error)}`;
 
+/** The error of the denoised picture: of the finished one, before that as the target was last compared with it. */
+function denoisedFact(job, denoised) {
+  const targeted = job.target_error > 0 && denoisedTarget(job);
+  const check = targeted ? job.denoised_check : null;
+  if (typeof denoised?.relmse !== "number") return fact("relMSE, denoised", figure(check?.relmse), [denoised?.error ?? denoisedNote(check, isOver(job)), targeted ? target(job) : null], "key");
+  const known = interval(denoised.relmse_ci95);
+  return fact("relMSE, denoised", figure(denoised.relmse), [known ? `95 %: ${known}` : "no interval", targeted ? target(job) : null], "key");
+}
+
 /** Of the last comparison with the target. */
-function denoisedNote(check) {
-  if (!check) return "not known yet";
+function denoisedNote(check, over) {
+  if (!check) return over ? "not known" : "known when it is done";
   return check.at_most === null ? "no interval" : `95 %: at most ${figure(check.at_most)}`;
 }
 
@@ -56,13 +66,13 @@ const trueFigures = ({ relmse, rmse, flip, below_noise: below, rmse_below_noise:
   flip === null || flip === undefined ? null : fact("FLIP", figure(flip), [], "true")];
 
 const fact = (name, value, notes = [], className = "") => h("div", { key: name, class: `fact ${className}` }, h("dt", null, name),
-  h("dd", null, h("b", null, value), notes.filter(Boolean).map((note, i) => h("small", { key: i, class: note === phrases.doubt ? "doubt" : null }, note))));
+  h("dd", null, h("b", null, value), notes.filter(Boolean).map((note, i) => h("small", { key: i, class: kDoubtWords.has(note) ? "doubt" : null }, note))));
 
 export function inFlight(state, job) {
   if (isOver(job)) return null;
   const tiles = [...state.open.tiles.values()];
   return h("section", { key: "flight", class: "panel flight" },
-    h("h2", null, "Tiles in flight", tiles.length ? h("span", { class: "count" }, tiles.length) : null),
+    h("h2", null, "Tiles being rendered", tiles.length ? h("span", { class: "count" }, tiles.length) : null),
     tiles.length === 0 ? h("p", { class: "help" }, "None at this moment.") : h("ul", null, tiles.slice(0, kListed).map((tile) => h("li", { key: tile.tile },
       h("span", { class: "number" }, `tile ${tile.tile}`),
       h("span", { class: "number dim" }, `${spp(tile.spp)} spp`),

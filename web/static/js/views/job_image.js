@@ -1,6 +1,6 @@
 // The live image or a map over it, the tiles being rendered, and the exposure slider or the map's legend.
 import { h } from "../dom.js";
-import { colourOf, doneFrames } from "../state.js";
+import { colourOf, doneFrames, isOver, layerOf } from "../state.js";
 import { exposure as exposureText, jobName } from "../format.js";
 import { viewHref } from "../route.js";
 import { choice, safeClass } from "./pieces.js";
@@ -18,26 +18,28 @@ const kMarks = 512; // most marks drawn; a thousand workers would not be legible
 
 export function imagePanel(state, job, actions) {
   const { open } = state;
+  const layer = layerOf(open, job);
   const [width, height] = job.size ?? [16, 9];
   return h("figure", { class: "panel image" },
     h("div", { class: open.film ? "stage films" : "stage", style: { "--ratio": `${width} / ${height}` } },
       job.sequence ? h("frame-film", { key: "film", "aria-hidden": "true", ".model": filmOf(state, job, actions), onturned: (event) => actions.turnFilm(event.detail) }) : null,
       h("live-image", {
-        key: job.id, "aria-label": `${jobName(job)}, ${kNames[open.layer]}`, role: "img",
-        ".size": width * 65536 + height, ".source": actions.image, ".exposure": isPicture(open.layer) ? open.exposure : 0, ".version": `${open.layer} ${open.folds}`,
+        key: job.id, "aria-label": `${jobName(job)}, ${kNames[layer]}`, role: "img",
+        ".size": width * 65536 + height, ".source": actions.image, ".exposure": isPicture(layer) ? open.exposure : 0, ".version": `${layer} ${open.folds}`,
       }),
       open.showTiles && !open.film ? overlay(state, width, height) : null,
       job.units_done ? null : h("p", { class: "stage-text" }, stageText(job))),
     h("figcaption", { class: "image-tools" },
-      choice("layer", "What is shown", job.denoise ? kDenoised : kLayers, open.layer, actions.setLayer),
-      isPicture(open.layer) ? exposureTool(open, actions) : legend(open.layer, job.few_hits),
+      choice("layer", "What is shown", job.denoise ? kDenoised : kLayers, layer, actions.setLayer),
+      isPicture(layer) ? exposureTool(open, actions) : legend(layer, job.few_hits),
       h("a", { key: "viewer", class: "to-viewer", href: viewHref(job.id) }, "Open in the viewer"),
-      h("label", { class: "check" }, h("input", { type: "checkbox", ".checked": open.showTiles, onchange: actions.toggleTiles }), "Tiles in flight")));
+      h("label", { class: "check" }, h("input", { type: "checkbox", ".checked": open.showTiles, onchange: actions.toggleTiles }), "Tiles being rendered")));
 }
 
 /** What <frame-film> shows; the picture of the frame before stays below an image that has not come yet. */
 function filmOf(state, job, actions) {
-  const { film, fps, shown, exposure, layer } = state.open;
+  const { film, fps, shown, exposure } = state.open;
+  const layer = layerOf(state.open, job);
   return {
     ids: doneFrames(state.jobs.get(job.sequence)).map((frame) => frame.id), at: film?.id ?? null, playing: Boolean(film?.playing), fps, shown,
     version: `${layer} ${isPicture(layer) ? exposure : 0}`, load: actions.filmPicture, small: smallPicture,
@@ -58,11 +60,12 @@ export function legend(layer, fewHits = 0) {
   const [least, most, meaning] = kLegends[layer] ?? kFurther[layer];
   return h("span", { key: "legend", class: "image-tool legend", title: meaning },
     h("span", { class: "unseen" }, `${meaning}, from `), least, h("i", { "aria-hidden": "true" }), h("span", { class: "unseen" }, " to "), most,
-    layer === "error" && fewHits > 0 ? h("span", { key: "few", class: "few-hits" }, "too few hits") : null);
+    layer === "error" && fewHits > 0 ? h("span", { key: "few", class: "few-hits" }, "too few samples found light") : null);
 }
 
 function stageText(job) {
-  if (job.state === "failed" || job.state === "cancelled") return "No sample was taken.";
+  if (isOver(job)) return "No sample was taken.";
+  if (job.state === "paused") return "Paused before the first tile";
   return job.state === "queued" ? "Waiting for a worker" : "The first tiles are being rendered";
 }
 

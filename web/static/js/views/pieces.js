@@ -29,17 +29,19 @@ export const choice = (name, label, options, chosen, onChoose) =>
   h("fieldset", { class: "choice" }, h("legend", { class: "unseen" }, label), options.map(([value, text]) => h("label", { key: value },
     h("input", { type: "radio", name, value, ".checked": value === chosen, onchange: () => onChoose(value) }), h("span", null, text))));
 
-/** Pause or resume, and cancel, which asks once more. */
+/** Pause or resume, and cancel; on the page of a job that has ended, remove. What can't be undone asks once more. */
 export function jobActions(state, job, actions, large = false) {
-  if (isOver(job) || !mayChange(state)) return null;
+  const over = isOver(job);
+  if ((over && !large) || !mayChange(state)) return null;
   const busy = state.ui.busy === job.id;
   const button = (key, label, onclick, className = "") =>
-    h("button", { key, type: "button", class: `${large ? "" : "small "}${className}`, disabled: busy, onclick, "aria-label": `${label}: ${job.name || job.id}` }, label);
+    h("button", { key, type: "button", class: `${large ? "" : "small "}${className}`, disabled: busy, onclick, "aria-label": `${label}: ${[job.name, job.id].filter(Boolean).join(", ")}` }, label);
   if (state.ui.confirming === job.id) {
     return h("span", { class: "actions" },
-      button("yes", "Really cancel", () => actions.cancel(job.id), "danger"),
+      over ? button("gone", "Really remove, with its images", () => actions.remove(job.id), "danger") : button("yes", "Really cancel", () => actions.cancel(job.id), "danger"),
       button("no", "Keep", () => actions.confirm(null), "quiet"));
   }
+  if (over) return h("span", { class: "actions" }, button("remove", "Remove", () => actions.confirm(job.id), "quiet"));
   return h("span", { class: "actions" },
     job.state === "paused"
       ? button("resume", "Resume", () => actions.setState(job.id, "running"), "quiet")

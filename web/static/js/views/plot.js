@@ -4,7 +4,7 @@ import { h } from "../dom.js";
 import { aheadOf, drawable } from "../plot_scale.js";
 import { duration, figure, given, interval, spp } from "../format.js";
 import { phrases } from "../phrases.js";
-import { denoisedTarget, doubtful, trueFigure, verdictOf } from "../verdict.js";
+import { denoisedTarget, doubtWord, doubtful, trueFigure, verdictOf } from "../verdict.js";
 import { choice } from "./pieces.js";
 import { boxOf, drawing, frameOf } from "./plot_drawing.js";
 
@@ -16,7 +16,7 @@ export function errorPlot(job, { clock, picked, report }, actions, narrow) {
   const points = drawable(report?.convergence, clock);
   const plot = { points, key: clock, target: denoisedTarget(job) ? null : job.target_error ?? report?.target_error ?? null, ahead: aheadOf(job, report, clock), narrow };
   const verdict = verdictOf(job, report);
-  plot.doubt = doubtful(verdict);
+  plot.doubt = doubtful(verdict) ? doubtWord(verdict) : null;
   if (plot.doubt) withoutIntervals(plot);
   plot.chosen = points[picked] ? picked : points.length - 1;
   return h("section", { key: "plot", class: "panel plot", "aria-labelledby": "plot-title" },
@@ -73,7 +73,7 @@ const spoken = (point, key) => `relMSE ${figure(point.relmse)} after ${duration(
 
 function reading(point, { key, doubt }) {
   const ci = interval(point.relmse_ci95);
-  const within = doubt ? ` (${phrases.doubt})` : ci ? ` (95 %: ${ci})` : null;
+  const within = doubt ? ` (${doubt})` : ci ? ` (95 %: ${ci})` : null;
   return [
     h("span", { key: "t" }, h("b", null, duration(point[key])), ` ${kSince[key]}`),
     h("span", { key: "e" }, "relMSE ", h("b", null, figure(point.relmse)), within),

@@ -10,6 +10,7 @@ import { mark } from "./pieces.js";
 import { mayChange } from "../state.js";
 
 const kViews = { jobs: jobsView, job: jobView, workers: workersView, submit: submitView, view: viewerView };
+const kRoles = { admin: "may do everything", submit: "sees and changes jobs of its own", read: "may look" };
 const kLinkWords = { connecting: "connecting …", live: "live", lost: "connection lost, trying again …" };
 
 /** The whole page as a function of state. */
@@ -47,6 +48,7 @@ function header(state, actions) {
     h("a", { class: "brand", href: "#/jobs", "aria-label": "Lightshaft, all jobs" }, mark(), h("span", null, "Lightshaft")),
     h("nav", { "aria-label": "Main" }, link("jobs", "Jobs"), link("workers", workersLabel(state)), mayChange(state) ? link("submit", "New job") : null),
     h("span", { class: `link ${state.link}`, role: "status" }, h("i", { "aria-hidden": "true" }), h("span", null, kLinkWords[state.link])),
+    state.session === "in" ? h("span", { key: "me", class: "me", title: kRoles[state.me.role] ?? state.me.role }, state.me.user || state.me.role) : null,
     h("button", { type: "button", class: "small quiet", onclick: actions.signOut }, "Sign out"));
 }
 

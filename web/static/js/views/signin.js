@@ -13,6 +13,6 @@ export function signInView(state, actions) {
     h("input", { id: "token", name: "token", type: "password", required: true, autofocus: true, autocomplete: "current-password", spellcheck: "false", "aria-describedby": "token-help", "aria-invalid": state.ui.signInError ? "true" : null }),
     state.ui.signInError ? h("p", { key: "error", class: "field-error", role: "alert" }, state.ui.signInError) : null,
     h("button", { type: "submit", class: "primary", disabled: state.ui.signingIn }, state.ui.signingIn ? "Signing in …" : "Sign in"),
-    h("p", { id: "token-help", class: "help" }, "The coordinator wrote its first token to the file ", h("code", null, "token"), " in its data folder:"),
+    h("p", { id: "token-help", class: "help" }, "Whoever runs the farm gives you a token. The first one, an administrator’s, is in the file ", h("code", null, "token"), " in the coordinator’s data folder:"),
     h("pre", null, "cat DATA/token"));
 }

@@ -1,12 +1,12 @@
 // The page for a new job: drop a scene with its files, choose settings, send.
 import { h } from "../dom.js";
 import { bytes, plural } from "../format.js";
-import { scenesAmong } from "../bundle.js";
+import { kSceneEndings, noScene, scenesAmong } from "../bundle.js";
 import { diagnostics, notice, progressBar } from "./pieces.js";
 import { mayChange } from "../state.js";
 
 export function submitView(state, actions) {
-  if (!mayChange(state)) return notice("mild", "This token may look, and hand in nothing", h("p", null, h("a", { href: "#/jobs" }, "All jobs")));
+  if (!mayChange(state)) return notice("mild", "This token may look, and submit nothing", h("p", null, h("a", { href: "#/jobs" }, "All jobs")));
   const { submit } = state;
   const busy = submit.phase === "hashing" || submit.phase === "sending";
   return h("section", { key: "submit", class: "submit" },
@@ -19,12 +19,12 @@ export function submitView(state, actions) {
 }
 
 function dropZone(submit, actions, busy) {
-  return h("div", { key: "drop", class: submit.files.length ? "drop slim" : "drop", ondragover: actions.onDragOver, ondragleave: actions.onDragLeave, ondrop: actions.onDrop },
+  return h("div", { key: "drop", class: submit.files.length ? "drop slim" : "drop" },
     submit.files.length ? null : h("p", { key: "lead", class: "lead" }, "Drop a scene here, with its meshes, textures and volumes"),
     h("div", { class: "choices" },
       chooser("files", submit.files.length ? "Add files" : "Choose files", { multiple: true }, actions, busy),
       chooser("folder", "Choose a folder", { webkitdirectory: true }, actions, busy)),
-    submit.files.length ? null : h("p", { key: "help", class: "help" }, "Mitsuba XML. Only the files that the scene names are sent, and none that the farm has already."));
+    submit.files.length ? null : h("p", { key: "help", class: "help" }, `A scene is ${kSceneEndings}. Only the files that it names are sent, and none that the farm has already. Files may be dropped anywhere on any page.`));
 }
 
 // A file input on top of its button, but invisible, so that keyboard and screen reader use a real file input.
@@ -40,7 +40,7 @@ function bundle(submit, actions, busy) {
     h("div", { key: "head", class: "bundle-head" },
       h("h2", null, plan ? plan.main.name : submit.main?.split("/").at(-1) ?? "No scene yet"),
       h("button", { type: "button", class: "small quiet", disabled: busy, onclick: actions.clearFiles }, "Start over")),
-    scenes.length === 0 ? h("p", { class: "field-error", role: "alert" }, "There is no .xml scene among these files. Add it.") : null,
+    scenes.length === 0 ? h("p", { class: "field-error", role: "alert" }, noScene(submit.files)) : null,
     scenes.length > 1
       ? h("p", null, h("label", { for: "main-scene" }, "Scene "), h("select", { id: "main-scene", disabled: busy, onchange: actions.onMain }, scenes.map((path) => h("option", { key: path, value: path, ".selected": path === submit.main }, path))))
       : null,
@@ -50,16 +50,16 @@ function bundle(submit, actions, busy) {
 function planned(plan) {
   const total = plan.assets.reduce((sum, { file }) => sum + file.size, plan.main.size);
   return [
-    h("p", { key: "sum", class: "sub" }, plan.assets.length ? `with ${plural(plan.assets.length, "file")}, ${bytes(total)} in all` : `on its own, ${bytes(total)}`),
+    h("p", { key: "sum", class: "sub" }, plan.archive ? `an archive with a scene and its files, ${bytes(total)}` : plan.assets.length ? `with ${plural(plan.assets.length, "file")}, ${bytes(total)} in all` : `on its own, ${bytes(total)}`),
     h("ul", { key: "files", class: "files" },
-      plan.assets.map(({ name, file }) => h("li", { key: `a${name}` }, h("code", null, name), h("span", { class: "number dim" }, bytes(file.size)))),
       plan.missing.map((name) => h("li", { key: `m${name}`, class: "missing" }, h("code", null, name), h("span", null, "missing: add this file"))),
+      plan.assets.map(({ name, file }) => h("li", { key: `a${name}` }, h("code", null, name), h("span", { class: "number dim" }, bytes(file.size)))),
       plan.unused.map((path) => h("li", { key: `u${path}`, class: "unused" }, h("code", null, path), h("span", null, "not named by the scene, stays here")))),
   ];
 }
 
 function settingsForm(submit, actions, busy) {
-  const ready = submit.plan && submit.plan.missing.length === 0 && !busy;
+  const why = reason(submit, busy);
   const field = (name, label, hint, attributes = {}) => h("div", { key: name, class: "field" },
     h("label", { for: `set-${name}` }, label),
     h("input", { id: `set-${name}`, name, inputmode: "decimal", autocomplete: "off", placeholder: hint, disabled: busy, ".value": submit.settings[name], oninput: actions.onSetting, ...attributes }));
@@ -69,8 +69,23 @@ function settingsForm(submit, actions, busy) {
     field("time", "Stop after seconds", "no limit"),
     field("width", "Width", "the scene’s"),
     field("height", "Height", "the scene’s"),
-    field("frames", "Frames", "one image; or 1-10", { inputmode: "text" }),
-    h("button", { key: "go", type: "submit", class: "primary", disabled: !ready }, "Render"));
+    field("frames", "Frames", "one image", { inputmode: "text", title: "1-10, or 1-10x2 for every second one" }),
+    h("label", { key: "denoise", class: "check field-check" }, h("input", { type: "checkbox", name: "denoise", id: "set-denoise", disabled: busy, ".checked": submit.settings.denoise, onchange: actions.onSetting }), "Denoise"),
+    h("details", { key: "more", class: "more-settings" }, h("summary", null, "More settings"), h("div", { class: "settings" },
+      submit.plan?.archive ? null : field("name", "Name", "the scene file’s", { inputmode: "text" }),
+      field("aov", "Further layers", "depth, normal", { inputmode: "text" }),
+      field("seed", "Seed", "0"),
+      field("priority", "Priority", "0; higher comes first"),
+      field("tags", "Tags of workers", "any worker", { inputmode: "text" }))),
+    h("p", { key: "go", class: "go" }, h("button", { type: "submit", class: "primary", disabled: why !== null, "aria-describedby": "why-not" }, "Render"), h("span", { id: "why-not", class: "dim", role: "status" }, why)));
+}
+
+/** Why the job can't be submitted yet; null if it can. */
+function reason({ files, plan, phase }, busy) {
+  if (busy) return phase === "hashing" ? "The files are being read." : "The job is being submitted.";
+  if (scenesAmong(files).length === 0) return "A scene is missing.";
+  if (!plan) return "The scene is being read.";
+  return plan.missing.length ? `${plural(plan.missing.length, "file is missing", "files are missing")}: add ${plan.missing.length === 1 ? "it" : "them"}.` : null;
 }
 
 function refusal({ message, diagnostics: list }) {

@@ -1,19 +1,20 @@
 // The viewer: a picture as numbers, with its layers and errors, and optionally a second one for comparison.
 import { h } from "../dom.js";
-import { exposure as exposureText, figure, jobName, kAbsent, spp } from "../format.js";
+import { exposure as exposureText, figure, interval, jobName, kAbsent, moment, spp } from "../format.js";
 import { jobHref } from "../route.js";
 import { kCompared, kMostExposure, kOverlays } from "../viewer/address.js";
 import { kindOf } from "../viewer/paint.js";
 import { kCurves } from "../viewer/tone.js";
 import { isOver, mayChange } from "../state.js";
-import { identifiersOf, nameOf } from "../viewer_actions.js";
+import { doubtWord, doubtful } from "../verdict.js";
+import { comparable, identifiersOf, nameOf } from "../viewer_actions.js";
 import { legend } from "./job_image.js";
 import { choice, notice } from "./pieces.js";
 
 const kLayerNames = { rgb: "Picture", denoised: "Denoised", stderr: "Standard error", error: "Relative error", spp: "Samples", crypto_object: "Objects", crypto_material: "Materials" };
 const kKeys = [
-  ["arrows", "move; with Shift by one pixel"], ["+ −", "zoom"], ["0", "fit"], ["1", "one to one"], ["e E", "brighter, darker"], ["c", "tone curve"], ["l L", "layer"],
-  ["o", "overlay"], ["f", "false colours"], ["r", "region: what is seen, or none"], ["p", "render the region first, or all alike"], ["Enter", "pick the object in the middle"], ["b", "way to compare"], ["x", "first, second"], ["[ ]", "wipe"],
+  ["arrows", "move; with Shift by one pixel"], ["+ −", "zoom"], ["0", "fit"], ["z", "one to one"], ["1 – 9", "first picture, others of the list to compare"], ["k", "single channels"], ["h", "histogram"], ["e E", "brighter, darker"], ["c", "tone curve"], ["l L", "layer"],
+  ["o", "overlay"], ["f", "false colours"], ["r", "region: what is seen, or none"], ["p", "render the region first, or none first"], ["Enter", "select the object in the middle"], ["b", "way to compare"], ["x", "first, second"], ["[ ]", "wipe"],
 ];
 
 export const layerName = (layer) => kLayerNames[layer.name] ?? layer.name.replaceAll("_", " ");
@@ -27,27 +28,46 @@ export function viewerView(state, actions) {
   const layer = a.layer(view.layer);
   const fits = b && b.size[0] === a.size[0] && b.size[1] === a.size[1];
   const second = fits && b.layer(layer.name).name === layer.name ? b : null;
-  const parts = [tools(viewer, layer, actions), compareTools(state, viewer, fits, second, actions), focusTools(state, viewer, job, actions)];
-  const picture = [stage(viewer, layer, second, job ?? { id: viewer.id }, actions), reading(viewer, layer, second)];
+  const parts = [tools(viewer, layer, actions), compareTools(state, viewer, fits, second, actions)];
+  // What comes and goes stands below the picture: it must not move while somebody drags in it.
+  const picture = [
+    stage(state, viewer, layer, second, job ?? { id: viewer.id }, actions),
+    viewer.problem ? h("p", { key: "problem", class: "toast", role: "alert" }, viewer.problem) : null,
+    focusTools(state, viewer, job, actions), reading(viewer, layer, second), viewer.histogram ? histogram(viewer.survey, layer) : null];
   return h("article", { key: "viewer", class: "viewer" },
     h("div", { class: "viewer-head" },
       h("h1", null, jobName(job ?? { id: viewer.id })),
       h("a", { href: jobHref(viewer.id) }, "Job"),
-      h("span", { class: "dim number" }, `${a.size[0]} × ${a.size[1]}`)),
-    viewer.problem ? h("p", { key: "problem", class: "toast", role: "alert" }, viewer.problem) : null,
+      h("span", { class: "dim number" }, `${a.size[0]} × ${a.size[1]}`),
+      errorText(job, viewer.report, layer),
+      h("button", { key: "save", type: "button", class: "small", onclick: () => actions.savePicture(`${jobName(job ?? { id: viewer.id }).replace(/\.xml$/i, "")}-${layer.name}.png`) }, "Save as PNG")),
     state.narrow ? [picture, parts] : [parts, picture], // on a phone the picture comes first
     h("details", { key: "keys", class: "viewer-keys" }, h("summary", null, "Keys"), h("dl", null, kKeys.map(([key, what]) => h("div", { key }, h("dt", null, h("kbd", null, key)), h("dd", null, what))))));
 }
 
-function stage(viewer, layer, second, job, actions) {
+/** The error of the picture that is shown. */
+function errorText(job, report, layer) {
+  const denoised = job?.denoised ?? report?.denoised;
+  if (layer.name === "denoised" && typeof denoised?.relmse === "number") return relMse(denoised.relmse, interval(denoised.relmse_ci95));
+  if (layer.name !== "rgb" || typeof job?.relmse !== "number") return null;
+  return relMse(job.relmse, doubtful(job.verdict) ? null : interval(job.relmse_ci95), doubtful(job.verdict) ? doubtWord(job.verdict) : null);
+}
+const relMse = (value, known, doubt = null) => h("span", { key: "error", class: "dim number viewer-error" }, `relMSE ${figure(value)}${known ? ` (95 %: ${known})` : ""}${doubt ? ` (${doubt})` : ""}`);
+
+const describe = (job) => [jobName(job), job.spp_done > 0 ? `${spp(job.spp_done)} spp` : null].filter(Boolean).join(", ");
+
+function stage(state, viewer, layer, second, job, actions) {
   const { a, view } = viewer;
   const name = jobName(job);
   const focus = job.focus && !isOver(job) ? job.focus : null;
-  const { exposure, curve, falseColour, by, split, overlay, region } = view;
+  const { exposure, curve, falseColour, channel, by, split, overlay, region } = view;
+  const range = viewer.survey?.layer === layer.name ? [viewer.survey.least, viewer.survey.most] : null;
+  const other = viewer.file ? { name: viewer.file } : [...(viewer.others ?? []), ...(state.jobs?.values() ?? [])].find(({ id }) => id === view.other) ?? { id: view.other ?? "" };
+  const sides = [`First: ${describe(job)}`, `Second: ${describe(other)}`];
   const matte = kindOf(layer) === "matte" ? identifiersOf(layer, view.matte) : new Set();
   return h("figure", { key: "stage", class: "panel viewer-stage" }, h("float-view", {
     key: "view", tabindex: 0, role: "application", "aria-label": `${layerName(layer)} of ${name}. ${kKeys.map(([key, what]) => `${key}: ${what}`).join("; ")}`,
-    ".model": { a, b: second, layer: layer.name, look: { exposure, curve, falseColour, matte }, view, by, split, overlay, region, focus, tool: viewer.tool, changed: viewer.changed },
+    ".model": { a, b: second, layer: layer.name, look: { exposure, curve, falseColour, channel, range, matte }, view, sides, by, split, overlay, region, focus, tool: viewer.tool, changed: viewer.changed },
     onviewed: (event) => actions.look(event.detail), onpointed: (event) => actions.point(event.detail), onpicked: (event) => actions.pick(event.detail),
     onframed: (event) => actions.frame(event.detail), onsplit: (event) => actions.look({ split: event.detail }), onflipped: (event) => actions.flipped(event.detail), oncommand: (event) => actions.command(event.detail),
   }));
@@ -63,11 +83,13 @@ function tools(viewer, layer, actions) {
         oninput: (event) => actions.look({ exposure: Number(event.currentTarget.value) }), ondblclick: () => actions.look({ exposure: 0 }) }),
       h("output", { for: "ev", class: "number" }, exposureText(view.exposure))),
     pick("curve", "Curve", kCurves, view.curve, (curve) => actions.look({ curve }), !coloured || view.falseColour),
-    h("label", { key: "false", class: "check" }, h("input", { type: "checkbox", id: "false", disabled: !coloured, ".checked": view.falseColour, onchange: () => actions.look({ falseColour: !view.falseColour }) }), "False colours"),
+    h("label", { key: "false", class: "check" }, h("input", { type: "checkbox", id: "false", disabled: !coloured && kindOf(layer) !== "measure", ".checked": view.falseColour, onchange: () => actions.look({ falseColour: !view.falseColour }) }), "False colours"),
+    layer.channels.length > 1 && kindOf(layer) !== "matte" ? pick("channel", "Channels", [["", "all"], ...layer.channels.slice(0, 3).map((name, i) => [String(i), name])], view.channel === null ? "" : String(view.channel), (value) => actions.look({ channel: value === "" ? null : Number(value) })) : null,
     pick("overlay", "Overlay", kOverlays, view.overlay, (overlay) => actions.look({ overlay })),
     choice("tool", "What dragging does", [["pan", "Move"], ["region", "Region"]], viewer.tool, actions.setTool),
     h("span", { key: "zoom", class: "viewer-zoom" },
-      zoomButton("−", "Zoom out", "-"), zoomButton("+", "Zoom in", "+"), zoomButton("Fit", "Fit into the window", "0"), zoomButton("1:1", "One pixel to one", "1")));
+      zoomButton("−", "Zoom out", "-"), zoomButton("+", "Zoom in", "+"), zoomButton("Fit", "Fit into the window", "0"), zoomButton("1:1", "1:1, one pixel to one", "z")),
+    h("label", { key: "histogram", class: "check" }, h("input", { type: "checkbox", id: "histogram", ".checked": viewer.histogram, onchange: actions.toggleHistogram }), "Histogram"));
 }
 
 const zoomButton = (text, label, key) => h("button", { key, type: "button", class: "small", "aria-label": label, onclick: () => document.querySelector("float-view")?.press(key) }, text);
@@ -76,12 +98,10 @@ const pick = (id, label, options, chosen, onChoose, disabled = false) => h("span
   h("label", { for: `view-${id}` }, label),
   h("select", { id: `view-${id}`, disabled, ".value": chosen, onchange: (event) => onChoose(event.currentTarget.value) }, options.map(([value, text]) => h("option", { key: value, value, selected: value === chosen }, text))));
 
-/** Jobs whose pictures have the same size, the newest first. */
 function others(state, viewer) {
-  const same = (job) => job.id !== viewer.id && !job.frames && job.size?.[0] === viewer.a.size[0] && job.size?.[1] === viewer.a.size[1];
-  const jobs = [...(viewer.others ?? state.jobs?.values() ?? [])].filter(same).sort((p, q) => q.submitted_unix - p.submitted_unix);
+  const jobs = comparable(state, viewer);
   const known = jobs.some((job) => job.id === viewer.view.other);
-  return [["", "nothing"], ...(viewer.view.other && !known ? [[viewer.view.other, viewer.view.other]] : []), ...jobs.map((job) => [job.id, jobName(job) === `job ${job.id}` ? job.id : `${jobName(job)} (${job.id})`])];
+  return [["", "nothing"], ...(viewer.view.other && !known ? [[viewer.view.other, viewer.view.other]] : []), ...jobs.map((job, i) => [job.id, [`${i < 8 ? `${i + 2}: ` : ""}${describe(job)}`, moment(job.submitted_unix), job.id].join(" · ")])];
 }
 
 function compareTools(state, viewer, fits, second, actions) {
@@ -104,7 +124,7 @@ function focusTools(state, viewer, job, actions) {
   return h("p", { key: "focus", class: "viewer-tools viewer-focus", role: "status" },
     job.focus ? h("span", { key: "now" }, h("i", { "aria-hidden": "true" }), `Rendered first: ${job.focus[0]}, ${job.focus[1]} to ${job.focus[2]}, ${job.focus[3]}`) : null,
     fresh && mayChange(state) ? button("first", "Render the region first", region) : null,
-    job.focus && mayChange(state) ? button("alike", "Render all alike", null) : null);
+    job.focus && mayChange(state) ? button("alike", "Render no part first", null) : null);
 }
 
 const listed = (values, digits = 4) => (values ? values.map((v) => (Number.isNaN(v) ? kAbsent : figure(v, digits))).join("  ") : kAbsent);
@@ -115,10 +135,23 @@ function reading(viewer, layer, second) {
   return h("div", { key: "reading", class: "viewer-reading number", "aria-live": "polite" },
     h("p", { key: "pixel" }, probe?.pixel ? `Pixel ${probe.pixel[0]}, ${probe.pixel[1]}` : "Point at a pixel to read its values."),
     probe?.values && probe.layer === layer.name ? values(probe, layer, second) : null,
-    view.matte.length && kindOf(layer) === "matte" ? h("p", { key: "matte" }, "Picked: ", h("b", null, view.matte.join(", "))) : null,
+    view.matte.length && kindOf(layer) === "matte" ? h("p", { key: "matte" }, "Selected: ", h("b", null, view.matte.join(", "))) : null,
     second && view.by === "flip" && viewer.flip !== null ? h("p", { key: "flip" }, "FLIP ", h("b", null, figure(viewer.flip)), " of what is seen") : null,
     colours ? h("p", { key: "colours", class: "viewer-legend" }, legend(colours)) : null,
     view.region ? regionText(view.region, figures) : null);
+}
+
+/** How often which values occur in the layer. */
+function histogram(survey, layer) {
+  if (survey?.layer !== layer.name) return h("p", { key: "histogram", class: "help" }, kindOf(layer) === "matte" ? "Objects have no histogram." : "Computing the histogram …");
+  const { counts, least, most, from, logarithmic } = survey;
+  const bins = counts[0].length;
+  const highest = Math.max(1, ...counts.flat());
+  const line = (row) => row.map((n, i) => `${i},${(40 - (40 * n) / highest).toFixed(2)}`).join(" ");
+  return h("figure", { key: "histogram", class: "viewer-histogram" },
+    h("svg", { viewBox: `0 0 ${bins - 1} 40`, preserveAspectRatio: "none", role: "img", "aria-label": `Histogram of ${layerName(layer)}, values from ${figure(least)} to ${figure(most)}` },
+      counts.map((row, c) => h("polyline", { key: c, class: counts.length === 3 ? `channel-${c}` : "channel", points: line(row) }))),
+    h("figcaption", { class: "dim number" }, h("span", null, figure(from)), h("span", null, logarithmic ? "values of the whole picture, logarithmic" : "values of the whole picture"), h("span", null, figure(most))));
 }
 
 /** What the colours mean, if they stand for numbers. */

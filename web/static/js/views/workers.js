@@ -1,56 +1,110 @@
-// The list of workers.
+// The list of workers, and how to add one.
 import { h } from "../dom.js";
-import { colourOf } from "../state.js";
+import { colourOf, mayChange } from "../state.js";
 import { bytes, count, duration, jobName, plural } from "../format.js";
 import { frameOf, jobHref } from "../route.js";
 import { safeClass, workerMark } from "./pieces.js";
 
-export function workersView(state) {
+const kSearchFrom = 8; // workers from which there is a field to search them
+
+/** Columns: name, what they are ordered by, and whether the first press puts the largest first. */
+const kColumns = [
+  ["Worker", (worker) => worker.name], ["Doing", (worker) => worker.activity ?? ""], ["Threads", (worker) => worker.threads, true], ["Done", (worker) => worker.units_done, true],
+  ["CPU time", (worker) => worker.cpu_seconds, true], ["Memory", (worker) => worker.rss_bytes ?? 0, true], ["Last seen", (worker) => worker.last_seen_seconds, true], ["Class", (worker) => worker.numeric_class ?? ""]];
+
+export function workersView(state, actions) {
   if (state.workers === null) return h("p", { class: "waiting", key: "waiting" }, "Fetching the workers …");
-  const workers = [...state.workers.values()].sort((a, b) => a.name.localeCompare(b.name, "en", { numeric: true }));
-  if (workers.length === 0) return noWorkers();
+  const workers = [...state.workers.values()];
+  if (workers.length === 0) return noWorkers(state);
   const threads = workers.filter(alive).reduce((sum, worker) => sum + (worker.threads || 0), 0);
+  const shown = ordered(workers.filter((worker) => matches(state, worker)), state.workerList);
   return h("section", { key: "workers", class: "workers" },
     h("div", { class: "heading" }, h("h1", null, "Workers"), h("p", { class: "sub" }, `${plural(workers.length, "worker")} · ${plural(threads, "thread")} connected`)),
     classesApart(workers),
-    h("ul", { class: "cards" }, workers.map((worker) => card(state, worker))));
+    workers.length < kSearchFrom && !state.workerList.search ? null : h("search", { key: "search", class: "list-tools" },
+      h("input", { id: "worker-search", type: "search", placeholder: "Search: all words in name, tags, doing", "aria-label": "Search workers; all words must be there", ".value": state.workerList.search, oninput: (event) => actions.searchWorkers(event.currentTarget.value) })),
+    shown.length === 0 ? h("p", { key: "nothing", class: "waiting" }, "No worker is like this.") : h("table", { key: "list", class: "list worker-list" },
+      h("thead", null, h("tr", null, kColumns.map((column) => head(column, state.workerList, actions)), mayDrain(state) ? h("th", { key: "actions", scope: "col" }, h("span", { class: "unseen" }, "Actions")) : null)),
+      h("tbody", null, shown.map((worker) => row(state, worker, actions)))),
+    mayChange(state) ? h("details", { key: "add", class: "panel add-worker" }, h("summary", null, "Add a worker"), howToJoin(state)) : null);
 }
 
 const alive = (worker) => worker.state === "connected" || worker.state === "draining";
+/** Workers serve everybody: only an admin sends them away. */
+const mayDrain = (state) => state.me.role === "admin";
+
+function matches({ workerList }, worker) {
+  const text = [worker.name, worker.id, worker.state, worker.activity, worker.numeric_class, worker.platform, ...(worker.tags ?? [])].join("\n").toLowerCase();
+  return workerList.search.toLowerCase().split(/\s+/).every((word) => text.includes(word));
+}
+
+function ordered(workers, { sort, descending }) {
+  const [, value] = kColumns.find(([name]) => name === sort) ?? kColumns[0];
+  const compare = (p, q) => (typeof p === "number" || typeof q === "number" ? (p ?? 0) - (q ?? 0) : String(p).localeCompare(String(q), "en", { numeric: true }));
+  return workers.sort((p, q) => (descending ? -1 : 1) * compare(value(p), value(q)) || compare(p.name, q.name) || compare(p.id, q.id));
+}
+
+function head([name, , largest = false], { sort, descending }, actions) {
+  const way = sort === name ? (descending ? "descending" : "ascending") : null;
+  return h("th", { key: name, scope: "col", "aria-sort": way }, h("button", { type: "button", class: "sort", onclick: () => actions.sortWorkers(name, sort === name ? !descending : largest) }, name, h("i", { "aria-hidden": "true" }, way ? (descending ? " ↓" : " ↑") : "")));
+}
 
 /** A job stays within one numeric class, so it matters to know when there are several. */
 function classesApart(workers) {
   const classes = new Set(workers.filter(alive).map((worker) => worker.numeric_class).filter(Boolean));
   return classes.size > 1
-    ? h("p", { key: "classes", class: "notice mild" }, `These workers are of ${classes.size} numeric classes (another processor or build rounds differently). A job is rendered by the class that took it first, so that its pixels are reproducible.`)
+    ? h("p", { key: "classes", class: "notice mild" }, `The processors or builds of these workers round numbers in ${classes.size} different ways (numeric classes). A job is rendered by workers of one class, that of the first that took it, so that the same job always gives the same pixels; workers of the other classes take other jobs.`)
     : null;
 }
 
-function card(state, worker) {
+function row(state, worker, actions) {
   const frame = frameOf(worker.job);
   const job = state.jobs?.get(frame ? frame.sequence : worker.job);
   const name = job ? jobName(job) + (frame ? `, frame ${frame.frame}` : "") : worker.job;
-  return h("li", { key: worker.id, class: `panel worker is-${safeClass(worker.state)}`, "data-worker": worker.id },
-    h("h2", null, workerMark(colourOf(state, worker.name), worker.name), worker.state === "connected" ? null : h("span", { key: "state", class: "pill" }, worker.state),
-      worker.fake === true ? h("span", { key: "fake", class: "pill", title: "It makes pixels up instead of rendering, for tests" }, "fake") : null),
-    h("p", { class: "doing" }, alive(worker) ? worker.activity || "idle" : "not connected", worker.job ? [" · ", h("a", { key: "job", href: jobHref(worker.job) }, name)] : null),
-    h("dl", null,
-      pair("Threads", count(worker.threads)),
-      pair("Units done", count(worker.units_done)),
-      pair("CPU time", duration(worker.cpu_seconds)),
-      pair("Memory", bytes(worker.rss_bytes)),
-      pair("Last seen", alive(worker) && worker.last_seen_seconds < 5 ? "now" : `${duration(worker.last_seen_seconds)} ago`),
-      pair("Class", h("code", { title: worker.platform || null }, String(worker.numeric_class ?? "–").slice(0, 8)))),
-    worker.tags?.length ? h("p", { class: "tags" }, worker.tags.map((tag) => h("span", { key: tag, class: "tag" }, tag))) : null);
+  const cell = (label, text) => h("td", { key: label, class: "number", "data-label": label }, text);
+  return h("tr", { key: worker.id, class: `worker is-${safeClass(worker.state)}`, "data-worker": worker.id },
+    h("td", { class: "name" },
+      h("b", null, workerMark(colourOf(state, worker.name), worker.name)), worker.state === "connected" ? null : h("span", { key: "state", class: "pill" }, worker.state),
+      worker.fake === true ? h("span", { key: "fake", class: "pill", title: "It makes pixels up instead of rendering, for tests" }, "fake") : null,
+      worker.tags?.length ? h("p", { class: "tags" }, worker.tags.map((tag) => h("span", { key: tag, class: "tag" }, tag))) : null),
+    h("td", { class: "doing" }, alive(worker) ? worker.activity || "idle" : "not connected", worker.job ? [" · ", h("a", { key: "job", href: jobHref(worker.job) }, name)] : null),
+    cell("Threads", count(worker.threads)),
+    cell("Done", count(worker.units_done)),
+    cell("CPU time", duration(worker.cpu_seconds)),
+    cell("Memory", bytes(worker.rss_bytes)),
+    cell("Last seen", alive(worker) && worker.last_seen_seconds < 5 ? "now" : `${duration(worker.last_seen_seconds)} ago`),
+    cell("Class", h("code", { title: worker.platform || null }, String(worker.numeric_class ?? "–").slice(0, 8))),
+    mayDrain(state) ? h("td", { key: "acts", class: "acts" }, drain(state, worker, actions)) : null);
 }
 
-const pair = (name, value) => h("div", { key: name }, h("dt", null, name), h("dd", { class: "number" }, value));
-
-function noWorkers() {
-  const host = globalThis.location?.hostname || "COORDINATOR";
-  return h("section", { key: "empty", class: "empty" },
-    h("h1", null, "No worker is connected"),
-    h("p", null, "Start one on any machine that reaches this coordinator. It renders on all its cores, and may come and go at any time:"),
-    h("pre", null, `lightshaft-worker --coordinator ${host}:50051`),
-    h("p", { class: "help" }, "It asks for the join token, which the coordinator keeps in its data folder."));
+/** It can't be taken back, so it asks once more. */
+function drain(state, worker, actions) {
+  if (worker.state !== "connected") return null;
+  const busy = state.ui.busy === `worker ${worker.id}`;
+  const button = (key, label, onclick, className) => h("button", { key, type: "button", class: `small ${className}`, disabled: busy, "aria-label": `${label}: ${worker.name}`, onclick }, label);
+  if (state.ui.confirming !== `worker ${worker.id}`) return button("drain", "Drain", () => actions.confirm(`worker ${worker.id}`), "quiet");
+  return h("span", { key: "sure", class: "actions" },
+    button("yes", "Really finish and end", () => actions.drainWorker(worker.id), "danger"), button("no", "Keep", () => actions.confirm(null), "quiet"));
 }
+
+const kEverywhere = new Set(["0.0.0.0", "[::]", "*"]);
+const isLoopback = (host) => /^(127\.|localhost$|\[::1\]$)/.test(host);
+
+/** The command that starts a worker, for the address at which this coordinator takes them. */
+export function joinCommand(join, page) {
+  const [, host, port] = /^(.*):(\d+)$/.exec(join?.address ?? "") ?? [null, "0.0.0.0", "50051"];
+  const files = (join?.tls ? " --tls-ca ca.pem" : "");
+  return `lightshaft-worker --coordinator ${kEverywhere.has(host) ? page : host}:${port}${files} --token-file join-token`;
+}
+
+function howToJoin({ join }) {
+  const host = (join?.address ?? "").replace(/:\d+$/, "");
+  const port = /\d+$/.exec(join?.address ?? "")?.[0] ?? "50051";
+  return [
+    h("p", { key: "how" }, "Start one on any machine that reaches this coordinator. It renders on all its cores, and may come and go at any time:"),
+    h("pre", { key: "command" }, joinCommand(join, globalThis.location?.hostname || "COORDINATOR")),
+    h("p", { key: "token", class: "help" }, "The file ", h("code", null, "join-token"), " is a copy of ", h("code", null, join?.token_file ?? "join-token"), join?.token_file ? " of the coordinator's machine" : " in the coordinator's data folder", join?.tls ? [", and ", h("code", { key: "ca" }, "ca.pem"), " one of the certificate in its folder tls."] : ".", " The worker must be of the same version as the coordinator."),
+    isLoopback(host) ? h("p", { key: "near", class: "help" }, "This coordinator takes workers of its own machine alone. For others start it with ", h("code", null, `--grpc 0.0.0.0:${port}`), " and let the port through the firewall.") : null];
+}
+
+const noWorkers = (state) => h("section", { key: "empty", class: "empty" }, h("h1", null, "No worker is connected"), howToJoin(state));

@@ -1,0 +1,166 @@
+"""What the page of a job says first and offers next: the best picture, rendering on, the cause of a failure."""
+import json
+
+import pytest
+
+from local_farm import wait_until
+from stub_farm import job, png
+
+HEAVY = {"kind": "heavy_tail", "words": "don't trust yet: few pixels carry the error", "trusted": False}
+PIXEL = "(() => { const c = document.querySelector('.stage live-image canvas'); return [...c.getContext('2d').getImageData(3, 3, 1, 1).data.slice(0, 3)]; })()"
+
+
+def button(page, name):
+    """Presses the button of this name in the page's content."""
+    page.wait(f"[...document.querySelectorAll('main button')].some(b => b.innerText === {json.dumps(name)})")
+    page.evaluate(f"[...document.querySelectorAll('main button')].find(b => b.innerText === {json.dumps(name)}).click()")
+
+
+def test_a_finished_denoised_job_opens_on_the_denoised_picture_with_its_error(farm, dashboard):
+    farm.jobs["j-1"] = job(state="done", denoise=True, progress=1)
+    farm.denoised = png(64, 48, (10, 220, 10))
+    farm.report = {"convergence": [], "denoised": {"by": "OIDN", "relmse": 0.00175, "relmse_ci95": [0.00117, 0.00234]}}
+    page = dashboard("#/jobs/j-1")
+
+    page.wait(f"JSON.stringify({PIXEL}) === '[10,220,10]'")
+
+    assert page.evaluate("document.querySelector('.image-tools [value=denoised]').checked")
+    page.wait("document.querySelector('.figures').innerText.includes('0.00117')")
+    assert "relMSE, denoised 0.00175 95 %: 0.00117 – 0.00234" in page.text(".figures")
+    assert "layer=denoised" in page.evaluate("[...document.querySelectorAll('.downloads a')].find(a => a.innerText.startsWith('PNG')).href")
+    page.click(".image-tools [value=picture]")
+    page.wait(f"JSON.stringify({PIXEL}) === '[200,120,40]'")
+
+
+def test_where_denoising_failed_the_picture_is_shown_and_the_reason(farm, dashboard):
+    farm.jobs["j-1"] = job(state="done", denoise=True)
+    farm.report = {"convergence": [], "denoised": {"error": "the denoiser ran out of memory"}}
+    page = dashboard("#/jobs/j-1")
+
+    page.wait("document.querySelector('.figures')?.innerText.includes('ran out of memory')")
+    page.wait("document.querySelector('.image-tools [value=picture]').checked")
+
+
+@pytest.mark.parametrize("fields, label, changes", [
+    ({"spp_asked": 64}, "Render on (128 samples)", {"spp": 128}),
+    ({"spp_asked": None, "spp": 65536, "spp_done": 36.4, "stopped": "time"}, "Render on (74 samples)", {"spp": 74}),
+    ({"spp_asked": None, "spp": 65536, "target_error": 0.001, "stopped": "error"}, "Render on (to relMSE 0.0005)", {"target_error": 0.0005})])
+def test_a_noisy_job_says_so_plainly_and_renders_on(farm, dashboard, fields, label, changes):
+    farm.jobs["j-1"] = job(**{"state": "done", "spp": 64, "spp_done": 64, "verdict": HEAVY, **fields})
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('.noisy b')")
+    assert page.text(".noisy b") == "Still noisy: a few bright pixels carry the error"
+
+    button(page, label)
+
+    wait_until(lambda: farm.changes, "the farm is asked")
+    assert farm.changes == [("j-1", changes)]
+
+
+def test_the_coordinators_own_advice_comes_before_the_pages(farm, dashboard):
+    farm.jobs["j-1"] = job(state="done", verdict={**HEAVY, "advice": "Render it with four times the samples."})
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('.noisy')?.innerText.includes('four times the samples')")
+
+
+def test_a_job_that_waits_for_others_says_for_which(farm, dashboard):
+    why = "It waits for j-7, which is rendering."
+    farm.jobs["j-1"] = job(state="queued", units_done=0, waits_for=why, after=[{"id": "j-7", "state": "running"}, {"id": "j-8", "state": None}])
+    page = dashboard()
+    assert page.text("[data-job=j-1] .reason") == why
+    page.evaluate("void (location.hash = '#/jobs/j-1')")
+    assert page.text(".job-head .sub") == why
+    assert "After j-7 (rendering), j-8 (removed)" in " ".join(page.text(".job-facts").split())
+    assert page.evaluate("document.querySelector('.job-facts a').getAttribute('href')") == "#/jobs/j-7"
+
+
+def test_the_error_of_the_denoised_picture_comes_with_the_job(farm, dashboard):
+    farm.jobs["j-1"] = job(denoise=True, denoised={"relmse": 0.002, "relmse_ci95": None})
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('.figures')")
+    assert "relMSE, denoised 0.00200 no interval" in page.text(".figures")
+
+
+def test_who_may_only_look_is_not_offered_to_render_on(farm, dashboard):
+    farm.role = "read"
+    farm.jobs["j-1"] = job(state="done", verdict=HEAVY)
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('.noisy b')")
+    assert page.count(".go-on button") == 0 and page.count("#priority") == 0
+
+
+FAILED = ("tile 0 (pixels 0,0 to 32,32), round 0 (samples 0 to 4) failed in 2 attempts; on demo-2: shape 12: 'leaf.ply': the file is cut short"
+          "; on demo-1: shape 12: 'leaf.ply': the file is cut short")
+
+
+def test_the_cause_of_a_failure_comes_first_and_once(farm, dashboard):
+    farm.jobs["j-1"] = job(state="failed", units_done=0, spp_done=0, relmse=None, error=FAILED)
+    page = dashboard("#/jobs/j-1")
+
+    assert page.text(".notice.bad pre") == "shape 12: 'leaf.ply': the file is cut short"
+    assert page.text(".failure-where") == "tile 0 (pixels 0,0 to 32,32), round 0 (samples 0 to 4) failed in 2 attempts on demo-2, demo-1."
+    assert page.text("main").count("cut short") == 1
+    assert page.count(".figures") == 0 and page.count(".plot") == 0, "there are no figures of a job that failed at once"
+
+
+@pytest.mark.parametrize("text, cause, where", [
+    ("the disk is full", "the disk is full", ""),
+    ("the scene cannot be rendered: tile 3 (pixels 0,0 to 8,8), round 1 (samples 4 to 8) failed in 1 attempt; on a: crash at pixel 1,2. Replay it with: lightshaft render x.xml", "crash at pixel 1,2",
+     "the scene cannot be rendered: tile 3 (pixels 0,0 to 8,8), round 1 (samples 4 to 8) failed in 1 attempt on a.\nSee it again: lightshaft render x.xml"),
+    ("tile 3 (pixels 0,0 to 8,8), round 1 (samples 4 to 8) failed in 2 attempts; on a: this; on b: that", "this (on a)\nthat (on b)",
+     "tile 3 (pixels 0,0 to 8,8), round 1 (samples 4 to 8) failed in 2 attempts on a, b.")])
+def test_the_causes_of_a_failure_are_told_apart(open_page, farm, text, cause, where):
+    page = open_page(f"{farm.url}/demo.html")
+    assert page.evaluate(f"import('/js/failure.js').then(({{ causeFirst }}) => causeFirst({json.dumps(text)}))") == {"cause": cause, "where": where}
+
+
+@pytest.mark.parametrize("state, words", [("paused", "Paused before the first tile"), ("cancelled", "No sample was taken."), ("running", "The first tiles are being rendered")])
+def test_an_empty_picture_says_why_it_is_empty(farm, dashboard, state, words):
+    farm.jobs["j-1"] = job(state=state, units_done=0, spp_done=0)
+    page = dashboard("#/jobs/j-1")
+    assert page.text(".stage-text") == words
+
+
+def test_the_log_is_read_on_the_page(farm, dashboard):
+    farm.jobs["j-1"] = job()
+    farm.log = "12:00:01 submitted\n12:00:02 <b>lab-01</b> took it\n"
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('.job-log')")
+    assert farm.asked("GET", "/api/v1/jobs/j-1/log") == 0
+
+    page.click(".job-log summary")
+
+    page.wait("document.querySelector('.job-log pre')?.textContent.endsWith('<b>lab-01</b> took it\\n')")
+    farm.log += "12:00:09 done\n"
+    page.click(".job-log button")
+    page.wait("document.querySelector('.job-log pre').textContent.includes('12:00:09 done')")
+
+
+def test_what_has_no_sample_is_not_offered_as_a_picture(farm, dashboard):
+    farm.jobs["j-1"] = job(state="failed", units_done=0, error="no")
+    page = dashboard("#/jobs/j-1")
+    assert "EXR" not in page.text(".downloads") and "Report" in page.text(".downloads")
+
+
+def test_priority_is_set_on_the_page_of_a_job(farm, dashboard):
+    farm.jobs["j-1"] = job(priority=2)
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.getElementById('priority')?.value === '2'")
+
+    page.click("#priority")
+    page.evaluate("document.getElementById('priority').select()")
+    page.type("7")
+    page.key("Enter", virtual=13, text="\r")
+
+    wait_until(lambda: farm.changes, "the farm is asked")
+    assert farm.changes == [("j-1", {"priority": 7})]
+
+
+def test_a_job_that_has_ended_is_removed_from_its_page_after_one_more_question(farm, dashboard):
+    farm.jobs["j-1"] = job(state="done")
+    page = dashboard("#/jobs/j-1")
+    button(page, "Remove")
+    button(page, "Really remove, with its images")
+
+    page.wait("location.hash === '#/jobs'")
+    assert farm.jobs == {}

@@ -1,0 +1,95 @@
+"""The list of workers: order, search, how to add one, and sending one away."""
+import json
+
+import pytest
+
+from local_farm import LocalFarm, bin_dir, wait_until
+from stub_farm import worker
+
+NAMES = "[...document.querySelectorAll('.worker-list .worker-name')].map(e => e.innerText)"
+
+
+@pytest.fixture
+def some(farm):
+    farm.workers = {f"w-{n}": worker(f"w-{n}", f"lab-{n}", threads=n % 4 + 1, tags=["gpu"] if n % 3 == 0 else [], units_done=100 - n) for n in range(1, 13)}
+    return farm
+
+
+def shows(page, names):
+    page.wait(f"JSON.stringify({NAMES}) === {json.dumps(json.dumps(names, separators=(',', ':')))}")
+
+
+def head(page, name):
+    page.evaluate(f"[...document.querySelectorAll('.worker-list .sort')].find(b => b.innerText.startsWith({json.dumps(name)})).click()")
+
+
+def test_workers_are_ordered_by_their_columns(some, dashboard):
+    page = dashboard("#/workers")
+    shows(page, [f"lab-{n}" for n in range(1, 13)])
+    head(page, "Threads")
+    shows(page, [f"lab-{n}" for n in (3, 7, 11, 2, 6, 10, 1, 5, 9, 4, 8, 12)])
+    head(page, "Done")
+    shows(page, [f"lab-{n}" for n in range(1, 13)])
+    head(page, "Done")
+    shows(page, [f"lab-{n}" for n in range(12, 0, -1)])
+
+
+def test_workers_are_searched_by_all_words(some, dashboard):
+    page = dashboard("#/workers")
+    page.click("#worker-search")
+    page.type("GPU lab-1")
+    shows(page, ["lab-12"])
+    page.type("x")
+    page.wait("document.querySelector('main').innerText.includes('No worker is like this.')")
+
+
+def test_a_worker_is_sent_away_after_one_more_question(some, dashboard):
+    page = dashboard("#/workers")
+    page.click("[data-worker=w-3] .acts button")
+    page.click("[data-worker=w-3] .acts .danger")
+    page.wait("document.querySelector('[data-worker=w-3] .pill')?.innerText === 'draining'")
+    assert some.changes == [("w-3", {"state": "draining"})]
+    assert page.count("[data-worker=w-3] .acts button") == 0
+
+
+@pytest.mark.parametrize("role", ["submit", "read"])
+def test_only_an_admin_sends_workers_away(some, dashboard, role):
+    some.role = role
+    page = dashboard("#/workers")
+    page.wait("document.querySelector('[data-worker]')")
+    assert page.count(".acts") == 0
+    assert (page.count(".add-worker") == 1) == (role == "submit")
+
+
+@pytest.mark.parametrize("join, command, more", [
+    ({"address": "0.0.0.0:15151", "tls": False, "token_file": "/srv/join-token"}, "lightshaft-worker --coordinator 127.0.0.1:15151 --token-file join-token", "/srv/join-token"),
+    ({"address": "farm.example:6000", "tls": True}, "lightshaft-worker --coordinator farm.example:6000 --tls-ca ca.pem --token-file join-token", "certificate"),
+    ({"address": "127.0.0.1:15151", "tls": False}, "lightshaft-worker --coordinator 127.0.0.1:15151 --token-file join-token", "--grpc 0.0.0.0:15151")])
+def test_the_command_that_adds_a_worker_has_this_coordinators_address(farm, dashboard, join, command, more):
+    farm.join = join
+    page = dashboard("#/workers")
+    page.wait("document.querySelector('.empty h1')?.innerText === 'No worker is connected'")
+    assert page.text(".empty pre") == command
+    assert more in page.text(".empty")
+
+
+def test_a_real_worker_ends_when_it_is_sent_away_and_the_command_is_right(tmp_path, open_page):
+    try:
+        bin = bin_dir()
+    except FileNotFoundError as missing:
+        pytest.skip(str(missing))
+    with LocalFarm(tmp_path, bin) as farm:
+        page = open_page(f"{farm.url()}/#token={farm.token}")
+        page.wait("document.querySelector('.link.live')")
+        page.evaluate("void (location.hash = '#/workers')")
+        page.wait("document.querySelector('.empty h1')?.innerText === 'No worker is connected'")
+        command = page.text(".empty pre")
+        assert f"--coordinator 127.0.0.1:{farm.grpc} " in command
+
+        one = farm.add_worker()
+        page.click("[data-worker].is-connected .acts button")
+        page.click("[data-worker] .acts .danger")
+
+        wait_until(lambda: one.popen.poll() is not None, "the worker ends")
+        assert one.popen.returncode == 0
+        page.wait("!document.querySelector('[data-worker].is-connected')")
