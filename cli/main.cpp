@@ -63,6 +63,7 @@ int main(int argc, char** argv) {
   app.footer("LIGHTSHAFT_LOG=warn, info or debug shows what coordinator and worker do inside `render`.");
   app.option_defaults()->always_capture_default(false);
   Action action;
+  add_python_commands(app, action);
   add_render(app, action);
   add_inspect(app, action);
   add_convert(app, action);
