@@ -50,6 +50,9 @@ def run(words: list[str]) -> int:
     except Problem as problem:
         print(f"error: {problem}", file=sys.stderr)
         return 1
+    except OSError as error:  # a full disk, a folder of another user
+        print(f"error: {error.filename or args.data}: {error.strerror or error}", file=sys.stderr)
+        return 1
     except (KeyboardInterrupt, EOFError):
         say("")
         return 1

@@ -1,6 +1,7 @@
 """`lightshaft up`: a coordinator and a worker on this machine, until Ctrl-C."""
 
 import argparse
+import contextlib
 import json
 import os
 import pathlib
@@ -43,7 +44,8 @@ def start_coordinator(children: Children, args: argparse.Namespace, data: pathli
     wanted = (free_port(host, HTTP, args.port), free_port(host, WORKERS, None))
     # Another program may take a port that was free just now.
     for http, workers in (wanted, (args.port or 0, 0)):
-        (home / "ports.json").unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # of a coordinator that was killed
+            (home / "ports.json").unlink()
         child = Child("coordinator", words(http, workers), data / "coordinator.log")
         children.kept = [child]
         if wait_for_file(children, child, home / "ports.json"):
