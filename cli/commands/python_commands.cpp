@@ -21,8 +21,8 @@ Error missing(std::string text) { return {Errc::failed_precondition, std::move(t
 int run_in_python(const char* command, const std::vector<std::string>& arguments) {
   const PythonFacts python = find_python();
   if (python.interpreter.empty())
-    return print_error(missing(fmt::format(
-        "`lightshaft {}` needs Python 3.11 or later, and there is no python3 in PATH", command)));
+    return print_error(missing(
+        fmt::format("`lightshaft {}` needs Python 3.11 or later, and there is no python3 in PATH", command)));
   if (python.part.empty())
     return print_error(missing(
         fmt::format("`lightshaft {}` is written in Python, and its part of this program is missing: there is "

@@ -23,7 +23,7 @@ struct FolderFacts {
 // What runs `lightshaft up` and `lightshaft join`, which are written in Python.
 struct PythonFacts {
   std::filesystem::path interpreter;  // empty: there is no python3 in PATH
-  std::filesystem::path part;         // the folder lightshaft_command; empty: it is not where this program looks
+  std::filesystem::path part;  // the folder lightshaft_command; empty: it is not where this program looks
 };
 PythonFacts find_python();
 

@@ -39,11 +39,10 @@ def processes_that_name(folder):
 class Command:
     """A `lightshaft up` or `join` at work."""
 
-    def __init__(self, program, *words, output, environment=None):
+    def __init__(self, program, *words, output):
         self.output = output
         with output.open("wb") as out:
-            self.process = subprocess.Popen([program, *map(str, words)], stdin=subprocess.DEVNULL, stdout=out, stderr=out,
-                                            env={**os.environ, **(environment or {})}, start_new_session=True)  # fmt: skip
+            self.process = subprocess.Popen([program, *map(str, words)], stdin=subprocess.DEVNULL, stdout=out, stderr=out, start_new_session=True)
 
     def text(self):
         return self.output.read_text(errors="replace")
@@ -66,12 +65,13 @@ class Command:
 
 
 class Up(Command):
-    def __init__(self, folder, *words, program=None, environment=None):
+    def __init__(self, folder, *words, program=None, scene=None):
         self.data = folder / "state"
-        scene = folder / "scene.xml"
-        scene.write_text(SCENE)
+        if scene is None:
+            scene = folder / "scene.xml"
+            scene.write_text(SCENE)
         super().__init__(program or bin_dir() / "lightshaft", "up", "--data", self.data, "--threads", 1, "--no-browser", "--first-scene", scene, *words,
-                         output=folder / "up.txt", environment=environment)  # fmt: skip
+                         output=folder / "up.txt")  # fmt: skip
         self.url, self.token = self.said(r"dashboard: *(\S+)/#token=(\w+)").groups()
 
     def ask(self, path):
@@ -117,9 +117,9 @@ def join(folder, code, host="127.0.0.1", program=None):
     return Command(program or bin_dir() / "lightshaft", "join", host, "--data", folder / "other", "--threads", 1, "--code", code, output=folder / "join.txt")
 
 
-def check_a_farm_of_two_machines(folder, program=None, environment=None):
+def check_a_farm_of_two_machines(folder, program=None, scene=None):
     """From the first start to the first picture, a second machine, the end, and a second start."""
-    up = Up(folder, "--lan", program=program, environment=environment)
+    up = Up(folder, "--lan", program=program, scene=scene)
     up.said("first picture, .* after the start")
     other = join(folder, up.code(), program=program)
     wait_until(lambda: len(up.connected()) == 2, "a second worker has joined")
@@ -134,7 +134,7 @@ def check_a_farm_of_two_machines(folder, program=None, environment=None):
     up.ends()
     assert processes_that_name(folder) == []
 
-    again = Up(folder, "--lan", program=program, environment=environment)
+    again = Up(folder, "--lan", program=program, scene=scene)
     assert (again.token, again.code()) == (up.token, up.code())
     wait_until(again.connected, "the worker is there")
     assert [job["state"] for job in again.jobs()] == ["done"], "the state stayed, and no second picture is rendered"

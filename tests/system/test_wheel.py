@@ -9,11 +9,14 @@ import zipfile
 
 import pytest
 from local_farm import ROOT, bin_dir
-from test_up import SCENE, check_a_farm_of_two_machines, leaves_nothing  # noqa: F401
+from test_up import check_a_farm_of_two_machines, leaves_nothing  # noqa: F401
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(bin_dir() != ROOT / "build" / "release" / "bin", reason="wheels are made of the release build")]
 # What a wheel for manylinux may expect of every system: the C and C++ runtime.
 SYSTEM = re.compile(r"linux-vdso\.so|ld-linux-x86-64\.so|lib(c|m|dl|rt|pthread|resolv|stdc\+\+|gcc_s)\.so")
+
+# Libraries that the programs need and Python does not, which runs with those of this machine.
+NOT_OF_PYTHON = ("libopenvdb", "libembree", "libgrpc", "libabsl", "libprotobuf", "libfmt", "libtbb", "libImath", "libblosc", "libboost")
 
 
 @pytest.fixture(scope="module")
@@ -68,14 +71,26 @@ def test_licences_and_bill_of_materials_cover_every_library(wheel):
     assert owners <= licensed == listed
 
 
-def test_it_renders_the_pixels_of_its_build(installed, tmp_path):
-    (tmp_path / "scene.xml").write_text(SCENE)
-    subprocess.run(["/usr/bin/python3", ROOT / "scenes/bath/make_bath.py", tmp_path / "bath", "--setting", "sketch"], check=True, capture_output=True)
+@pytest.fixture(scope="module")
+def bath(tmp_path_factory):
+    """A scene with a volume, which a program of its own reads, with libraries of its own."""
+    folder = tmp_path_factory.mktemp("bath")
+    subprocess.run(["/usr/bin/python3", ROOT / "scenes/bath/make_bath.py", folder, "--setting", "sketch"], check=True, capture_output=True)
+    return folder / "bath.xml"
 
-    for scene in (tmp_path / "scene.xml", tmp_path / "bath" / "bath.xml"):  # the bath: with a volume, which a program beside it reads
-        assert pixels(installed / "lightshaft", scene, tmp_path) == pixels(bin_dir() / "lightshaft", scene, tmp_path)
+
+def test_it_renders_the_pixels_of_its_build(installed, bath, tmp_path):
+    assert pixels(installed / "lightshaft", bath, tmp_path) == pixels(bin_dir() / "lightshaft", bath, tmp_path)
 
 
-def test_a_farm_of_two_machines(installed, tmp_path, leaves_nothing):  # noqa: F811
-    # No other program of Lightshaft can be found.
-    check_a_farm_of_two_machines(tmp_path, program=installed / "lightshaft", environment={"PATH": "/nonexistent"})
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can hide this machine's libraries from a program")
+def test_a_farm_of_two_machines_where_its_libraries_are_not_installed(installed, bath, tmp_path, leaves_nothing):  # noqa: F811
+    names = [file.name for file in (programs(installed) / "lightshaft-libraries").iterdir() if file.name.startswith(NOT_OF_PYTHON)]
+    hidden = [f"/usr/lib/x86_64-linux-gnu/{name}" for name in names]
+    program = tmp_path / "lightshaft"
+    program.write_text(f"""#!/bin/sh
+exec unshare -m sh -c 'for file in {" ".join(hidden)}; do mount --bind /dev/null $file; done; exec env PATH=/nonexistent {installed}/lightshaft "$@"' sh "$@"
+""")
+    program.chmod(0o755)
+
+    check_a_farm_of_two_machines(tmp_path, program=program, scene=bath)

@@ -7,7 +7,7 @@ import sys
 
 from lightshaft_command import join, up
 from lightshaft_command.children import say
-from lightshaft_command.programs import Problem, folder
+from lightshaft_command.programs import Problem
 from lightshaft_command.state import usual
 
 COMMANDS = ("up", "join")
@@ -45,7 +45,6 @@ def run(words: list[str]) -> int:
     args.data = args.data.expanduser().absolute()
     os.umask(0o077)
     try:
-        folder()
         return up.run(args) if args.command == "up" else join.run(args)
     except Problem as problem:
         print(f"error: {problem}", file=sys.stderr)

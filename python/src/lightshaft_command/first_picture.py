@@ -11,7 +11,7 @@ import urllib.request
 from collections.abc import Iterator
 
 from lightshaft_command.children import Children, how_it_ended, say, start
-from lightshaft_command.programs import PACKAGE, folder
+from lightshaft_command.programs import PACKAGE, find
 
 BUNDLED_SCENE = PACKAGE / "bath" / "bath.xml"  # in a wheel
 BATH = ["--size", "640x480", "--spp", "16"]  # with the denoiser it looks finished, after some 45 s of one core
@@ -37,12 +37,13 @@ class FirstPicture:
         if running is not None and running.returncode != 0:
             say(f"there is no first picture: a step of it ended {how_it_ended(running.returncode)}")
             self._steps = iter(())
+            (self.home / "job").unlink(missing_ok=True)  # the next start tries again
         self.children.extra = next(self._steps, None)
 
     def steps(self) -> Iterator[subprocess.Popen[bytes]]:
         self.home.mkdir(exist_ok=True)
         job = self.home / "job"
-        lightshaft = str(folder() / "lightshaft")
+        lightshaft = find("lightshaft")
         environment = {**os.environ, **self.farm}
         if not job.exists():
             scene, options = self.scene or BUNDLED_SCENE, [] if self.scene else BATH

@@ -3,6 +3,7 @@
 import importlib.util
 import os
 import pathlib
+import shutil
 import sys
 from typing import NoReturn
 
@@ -14,12 +15,12 @@ class Problem(Exception):
     """What is wrong, and what to do: shown to the user without a traceback."""
 
 
-def folder() -> pathlib.Path:
-    """The folder of the programs: of the `lightshaft` that started this, or of the wheel."""
-    named = os.environ.get("LIGHTSHAFT_PROGRAMS")
-    found = pathlib.Path(named) if named else BUNDLED
-    if not (found / "lightshaft-coordinator").exists():
-        raise Problem(f"there is no lightshaft-coordinator in {found}: build it, or install its package or Lightshaft's wheel")
+def find(name: str) -> str:
+    """A program: beside the `lightshaft` that started this, in the wheel, or in the PATH (Debian's packages)."""
+    beside = pathlib.Path(os.environ.get("LIGHTSHAFT_PROGRAMS") or BUNDLED) / name
+    found = str(beside) if beside.exists() else shutil.which(name)
+    if not found:
+        raise Problem(f"there is no {name} in {beside.parent} and none in the PATH: build it, or install its package or Lightshaft's wheel")
     return found
 
 

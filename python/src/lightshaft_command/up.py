@@ -11,7 +11,7 @@ import time
 from lightshaft_command import browser, enrolment
 from lightshaft_command.children import Child, Children, say
 from lightshaft_command.first_picture import FirstPicture
-from lightshaft_command.programs import Problem, folder
+from lightshaft_command.programs import Problem, find
 from lightshaft_command.state import claim
 
 HTTP, WORKERS, JOINING = 8080, 50051, 50052  # ports, if they are free
@@ -39,7 +39,7 @@ def start_coordinator(children: Children, args: argparse.Namespace, data: pathli
     tls = ["--tls", "--tls-names", ",".join(names)] if args.lan else []
 
     def words(http: int, workers: int) -> list[str]:
-        return [str(folder() / "lightshaft-coordinator"), "--http", f"{host}:{http}", "--grpc", f"{host}:{workers}", "--data", str(home), *tls]
+        return [find("lightshaft-coordinator"), "--http", f"{host}:{http}", "--grpc", f"{host}:{workers}", "--data", str(home), *tls]
 
     wanted = (free_port(host, HTTP, args.port), free_port(host, WORKERS, None))
     # Another program may take a port that was free just now.
@@ -79,7 +79,7 @@ def farm_variables(args: argparse.Namespace, home: pathlib.Path, ports: dict[str
 
 
 def start_worker(children: Children, args: argparse.Namespace, data: pathlib.Path, coordinator: str, token: str, tls: pathlib.Path | None) -> None:
-    words = [str(folder() / "lightshaft-worker"), "--coordinator", coordinator, "--cache", str(data / "cache")]
+    words = [find("lightshaft-worker"), "--coordinator", coordinator, "--cache", str(data / "cache")]
     if args.threads:
         words += ["--threads", str(args.threads)]
     if tls:
