@@ -65,6 +65,7 @@ class FirstPicture:
                 yield start([lightshaft, "submit", str(scene), *options, *denoise, "--quiet"], output, environment)
             unfinished.replace(job)
         identity = job.read_text().split()[0]
+        say("rendering the first picture; the dashboard shows how it comes")
         yield start([lightshaft, "watch", identity], None, environment)
         self.fetch(identity)
 
