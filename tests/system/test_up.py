@@ -1,6 +1,7 @@
 """`lightshaft up` and `lightshaft join`: a farm that one command starts, and that ends with it."""
 
 import base64
+import http.client
 import json
 import os
 import pathlib
@@ -9,6 +10,7 @@ import signal
 import socket
 import ssl
 import subprocess
+import urllib.parse
 import urllib.request
 
 import pytest
@@ -39,10 +41,11 @@ def processes_that_name(folder):
 class Command:
     """A `lightshaft up` or `join` at work."""
 
-    def __init__(self, program, *words, output):
+    def __init__(self, program, *words, output, environment=None):
         self.output = output
         with output.open("wb") as out:
-            self.process = subprocess.Popen([program, *map(str, words)], stdin=subprocess.DEVNULL, stdout=out, stderr=out, start_new_session=True)
+            self.process = subprocess.Popen([program, *map(str, words)], stdin=subprocess.DEVNULL, stdout=out, stderr=out,
+                                            env={**os.environ, **(environment or {})}, start_new_session=True)  # fmt: skip
 
     def text(self):
         return self.output.read_text(errors="replace")
@@ -65,13 +68,14 @@ class Command:
 
 
 class Up(Command):
-    def __init__(self, folder, *words, program=None, scene=None):
+    def __init__(self, folder, *words, program=None, scene=None, browser=None):
         self.data = folder / "state"
         if scene is None:
             scene = folder / "scene.xml"
             scene.write_text(SCENE)
-        super().__init__(program or bin_dir() / "lightshaft", "up", "--data", self.data, "--threads", 1, "--no-browser", "--first-scene", scene, *words,
-                         output=folder / "up.txt")  # fmt: skip
+        super().__init__(program or bin_dir() / "lightshaft", "up", "--data", self.data, "--threads", 1, "--first-scene", scene, *words,
+                         *([] if browser else ["--no-browser"]), output=folder / "up.txt",
+                         environment={"BROWSER": f"{browser} %s", "DISPLAY": ":0"} if browser else None)  # fmt: skip
         self.url, self.token = self.said(r"dashboard: *(\S+)/#token=(\w+)").groups()
 
     def ask(self, path):
@@ -183,6 +187,29 @@ def test_a_second_interrupt_ends_what_does_not_end(tmp_path, leaves_nothing):
 
     up.ends()
     assert processes_that_name(tmp_path) == []
+
+
+def test_a_browser_is_led_to_the_dashboard_once_and_its_arguments_hold_no_token(tmp_path, leaves_nothing):
+    browser, seen = tmp_path / "browser", tmp_path / "seen"
+    browser.write_text(f'#!/bin/sh\necho "$1" > {seen}.unfinished; mv {seen}.unfinished {seen}\n')
+    browser.chmod(0o755)
+    up = Up(tmp_path, browser=browser)
+    address = urllib.parse.urlsplit(wait_until(lambda: seen.exists() and seen.read_text().strip(), "the browser is started"))
+
+    answers = []
+    for _ in range(2):
+        connection = http.client.HTTPConnection(address.hostname, address.port, timeout=PATIENCE)
+        try:
+            connection.request("GET", address.path)
+            answer = connection.getresponse()
+            answers.append((answer.status, answer.getheader("Location")))
+        except OSError:
+            answers.append("closed")
+
+    assert up.token not in address.geturl()
+    assert answers[0] == (302, f"{up.url}/#token={up.token}") and answers[1] in ((404, None), "closed")
+    up.interrupt()
+    up.ends()
 
 
 def failure(*words):
