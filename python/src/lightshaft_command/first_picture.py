@@ -14,7 +14,7 @@ from lightshaft_command.children import Children, how_it_ended, say, start
 from lightshaft_command.programs import PACKAGE, find
 
 BUNDLED_SCENE = PACKAGE / "bath" / "bath.xml"  # in a wheel
-BATH = ["--size", "640x480", "--spp", "16"]  # with the denoiser it looks finished, after some 45 s of one core
+BATH = ["--spp", "16"]  # some 25 s of one core; with the denoiser it looks finished
 BATH_EXPOSURE = 0.8
 PATIENCE = 60.0  # seconds for one answer of the coordinator
 
