@@ -14,10 +14,11 @@ load=$(cut -d" " -f1 /proc/loadavg) begun=$(date +%s%N)'
 lightshaft='
 python3 -m venv /v && /v/bin/pip install -q --no-cache-dir /wheel/*.whl
 installed=$(date +%s%N)
-/v/bin/lightshaft up --no-browser --data /state >/up.txt 2>&1 &
-until grep -q "^first picture" /up.txt 2>/dev/null; do kill -0 $!; sleep 0.2; done
+touch /up.txt
+/v/bin/lightshaft up --no-browser --data /state >/up.txt 2>&1 & up=$!
+grep -q "^first picture," < <(tail -n +1 -f --pid=$up /up.txt)
 ended=$(date +%s%N)
-kill -INT $!; wait $!
+kill -INT $up; wait $up
 bath=$(echo /v/lib/python3*/site-packages/lightshaft_command/bath/bath.xml)
 facts="$(sed -n "s/numeric class *//p" /up.txt), $(/v/bin/lightshaft render "$bath" --size 160x120 --spp 8 -o /x.exr 2>&1 | grep pixels_sha256)"'
 # Mitsuba needs this, and these systems do not have it from the start; that is not counted.
