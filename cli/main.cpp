@@ -64,6 +64,7 @@ int main(int argc, char** argv) {
   ls::use_plain_help(app);
   app.option_defaults()->always_capture_default(false);
   Action action;
+  add_python_commands(app, action);
   add_render(app, action);
   add_inspect(app, action);
   add_convert(app, action);

@@ -5,18 +5,21 @@
 #   deploy/demo.sh --detach   leaves the farm running
 #   deploy/demo.sh --stop     ends a farm left running
 #   deploy/demo.sh --full     the large setting: more pixels, more samples, a finer grid
-#   deploy/demo.sh --denoise  installs Open Image Denoise into build/oidn, and denoises the picture
+#   deploy/demo.sh --raw      does not fetch Open Image Denoise, and shows the picture as it is rendered
+#   deploy/demo.sh --denoise  ends with an error where Open Image Denoise cannot be fetched
+# The picture is denoised unless told otherwise: Open Image Denoise is fetched into build/oidn, if that can be.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-detach=0 setting=small denoise=() layer=""
+detach=0 setting=small denoise=wanted
 for arg in "$@"; do
   case "$arg" in
     --detach) detach=1 ;;
     --stop) setting=stop ;;
     --full) setting=full ;;
-    --denoise) denoise=(--denoise) layer="&layer=denoised" ;;
-    *) echo "usage: deploy/demo.sh [--detach | --stop] [--full] [--denoise]" >&2; exit 2 ;;
+    --raw) denoise=no ;;
+    --denoise) denoise=needed ;;
+    *) echo "usage: deploy/demo.sh [--detach | --stop] [--full] [--raw | --denoise]" >&2; exit 2 ;;
   esac
 done
 
@@ -46,7 +49,15 @@ fi
 
 started=$SECONDS
 deploy/install-deps.sh
-[ "${#denoise[@]}" = 0 ] || deploy/install-denoiser.sh
+options=() layer=""
+if [ "$denoise" != no ]; then
+  if deploy/install-denoiser.sh; then options=(--denoise) layer="&layer=denoised"
+  elif [ "$denoise" = needed ]; then exit 1
+  else echo "Open Image Denoise could not be fetched, so the picture is shown as it is rendered, with its grain"
+  fi
+fi
+# Denoised, so few samples look finished.
+[ "$setting" = full ] || options+=(--size 640x480 --spp 16)
 echo "building, which takes minutes (log: build/demo/build.log)"
 mkdir -p "$home"
 if ! { cmake --preset release -DLIGHTSHAFT_TESTS=OFF && cmake --build --preset release --target lightshaft lightshaft-coordinator lightshaft-worker; } >"$home/build.log" 2>&1; then
@@ -86,7 +97,7 @@ done
 
 token=$(cat "$home/data/token")
 echo "dashboard: $url/#token=$token"
-LIGHTSHAFT_URL="$url" LIGHTSHAFT_TOKEN="$token" "$bin/lightshaft" submit "$home/bath/bath.xml" "${denoise[@]}" --wait -o "$home/bath.exr" | tee "$home/job"
+LIGHTSHAFT_URL="$url" LIGHTSHAFT_TOKEN="$token" "$bin/lightshaft" submit "$home/bath/bath.xml" "${options[@]}" --wait -o "$home/bath.exr" | tee "$home/job"
 job=$(head -n 1 "$home/job")
 curl -fsS -H "Authorization: Bearer $token" "$url/api/v1/jobs/$job/image.png?exposure=0.8$layer" -o "$home/bath.png"
 

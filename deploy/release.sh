@@ -2,7 +2,7 @@
 # Makes the artefacts of a release, signs them, or verifies signed ones.
 #   deploy/release.sh --key KEY [--out FOLDER] [--prebuilt] [--draft]   makes them, in build/release-artefacts unless told otherwise
 #   deploy/release.sh --verify FOLDER --public-key KEY.pub              is every file in FOLDER what was signed?
-# Made are the Debian packages, the Python wheel, Blender's add-on, the sources, the bill of materials (CycloneDX), SHA256SUMS of all
+# Made are the Debian packages, the wheel with the programs and that of Python alone, Blender's add-on, the sources, the bill of materials (CycloneDX), SHA256SUMS of all
 # of them and SHA256SUMS.minisig, its signature by minisign. KEY is a secret key of `minisign -G`, kept away from here; it may have
 # no password (`minisign -G -W`) where nobody can type one. A release is made of a commit that has its version's tag and section in
 # CHANGELOG.md, without changes on top; --draft makes the same of any commit, to try it, and then
@@ -71,6 +71,7 @@ cp build/packages/*.deb "$out"
 cp "$(blender/package.py)" "$out/lightshaft-blender-$version.zip"
 # A folder of the sources alone: a wheel is made of what lies there.
 git archive HEAD python | tar -x -C "$work"
+deploy/wheel.sh --prebuilt --out "$out" >"$work/log" 2>&1 || { tail -n 20 "$work/log" >&2; die "the wheel with the programs was not made"; }
 python3 -m venv "$work/venv" && "$work/venv/bin/pip" --disable-pip-version-check -q wheel --no-deps -w "$out" "$work/python"
 git archive --prefix="lightshaft-$version/" HEAD | gzip -9n >"$out/lightshaft-$version.tar.gz"
 deploy/sbom.py "$out" --build build/release --version "$version" --commit "$commit" --time "$SOURCE_DATE_EPOCH" >"$work/sbom"

@@ -22,6 +22,7 @@ import time
 import tomllib
 import urllib.parse
 import uuid
+import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
@@ -37,7 +38,7 @@ SPDX = {
 }
 # Licences of what the wheel requires: the Python Package Index tells them to people, not in one form to programs.
 PYTHON = {"httpx": "BSD-3-Clause", "numpy": "BSD-3-Clause", "openexr": "BSD-3-Clause", "ipython": "BSD-3-Clause",
-          "usd-core": "TOST-1.0", "pillow": "MIT-CMU", "mapbox-earcut": "ISC"}  # fmt: skip
+          "usd-core": "TOST-1.0", "pillow": "MIT-CMU", "mapbox-earcut": "ISC", "pyoidn": "Apache-2.0"}  # fmt: skip
 NAMED_ONLY = {"TOST-1.0"}  # not in the SPDX list that the format's version 1.6 knows
 
 
@@ -76,6 +77,10 @@ class Packages:
 
     def of_files(self, paths, use):
         """The references of the packages that own these files, which are noted as used."""
+        return {self.note(owner, use) for owner in self.owners(paths)}
+
+    def owners(self, paths):
+        """The names of the packages that own these files."""
         paths = sorted({str(path) for path in paths})
         # A file of /lib is /usr/lib's where the two are one folder, and dpkg knows it by the name that its package gives.
         names = paths + [path.removeprefix("/usr") for path in paths if path.startswith("/usr/lib")]
@@ -89,7 +94,7 @@ class Packages:
         lost = [path for path in paths if path not in found]
         if lost:
             sys.exit(f"error: no Debian package owns {', '.join(lost[:5])}: the bill of materials would lack it")
-        return {self.note(owner, use) for owner in owners}
+        return owners
 
     def note(self, package, use):
         if package not in self.used:
@@ -161,10 +166,22 @@ def wheel(path, version):
         components.append({"type": "library", "bom-ref": reference, "name": name, "scope": scope, "purl": reference,
                            "licenses": [licence(PYTHON[name.lower()])],
                            "properties": [{"name": "lightshaft:versions", "value": versions}]})  # fmt: skip
-    reference = f"pkg:pypi/lightshaft@{version}"
+    reference = f"pkg:pypi/lightshaft@{version}" + (f"?file_name={path.name}" if is_bundled(path) else "")
     own = {"type": "library", "bom-ref": reference, "name": "lightshaft (Python)", "version": version, "purl": reference,
            "hashes": digest(path), "licenses": [licence("Apache-2.0")]}  # fmt: skip
     return own, components
+
+
+def is_bundled(path):
+    """Of deploy/wheel.sh: with programs and libraries."""
+    return not path.name.endswith("-any.whl")
+
+
+def bundled_packages(path, packages):
+    """The references of the Debian packages of which a wheel brings libraries or compiled headers, from its licences."""
+    with zipfile.ZipFile(path) as archive:
+        names = {name.split("/licenses/")[1].split("/")[0] for name in archive.namelist() if name.endswith("/copyright")}
+    return {packages.note(name, "in the wheel") for name in sorted(names)}
 
 
 def denoiser():
@@ -185,8 +202,10 @@ def bill(folder, build, version, commit, seconds):
                 depends = depends | {others[0]["bom-ref"]}
         elif path.suffix == ".whl":
             component, required = wheel(path, version)
-            others += required
+            others += [each for each in required if each not in others]
             depends = {each["bom-ref"] for each in required}
+            if is_bundled(path):
+                depends |= bundled_packages(path, packages)
         elif path.name.endswith((".zip", ".tar.gz")):
             component = {"type": "file", "bom-ref": f"file:{path.name}", "name": path.name, "version": version, "hashes": digest(path),
                          "licenses": [licence("Apache-2.0")]}  # fmt: skip
@@ -197,9 +216,23 @@ def bill(folder, build, version, commit, seconds):
         needs[component["bom-ref"]] = sorted(depends)
     root = {"type": "application", "bom-ref": f"lightshaft@{version}", "name": "lightshaft", "version": version,
             "licenses": [licence("Apache-2.0")], "properties": [{"name": "lightshaft:commit", "value": commit}]}  # fmt: skip
-    components = [*artefacts, *packages.components(), *others]
+    return document(root, artefacts, [*packages.components(), *others], needs, seconds)
+
+
+def wheel_bill(names, packages, version, seconds):
+    """The bill of materials that a wheel of deploy/wheel.sh brings: `names` are the Debian packages in it."""
+    needs = sorted(packages.note(name, "in the wheel") for name in names)
+    reference = f"pkg:pypi/lightshaft@{version}"
+    own = {"type": "application", "bom-ref": f"{reference}#programs", "name": "lightshaft", "version": version, "licenses": [licence("Apache-2.0")]}
+    root = {"type": "application", "bom-ref": reference, "name": "lightshaft", "version": version, "licenses": [licence("Apache-2.0")]}
+    return document(root, [own], list(packages.components()), {own["bom-ref"]: needs}, seconds)
+
+
+def document(root, parts, others, needs, seconds):
+    """`parts` of the root, whose `needs` are among the `others`."""
+    components = [*parts, *others]
     listed = json.dumps([root, components], sort_keys=True).encode()
-    edges = {root["bom-ref"]: [each["bom-ref"] for each in artefacts], **needs}
+    edges = {root["bom-ref"]: [each["bom-ref"] for each in parts], **needs}
     return {
         "$schema": "http://cyclonedx.org/schema/bom-1.6.schema.json", "bomFormat": "CycloneDX", "specVersion": "1.6",
         "serialNumber": f"urn:uuid:{uuid.uuid5(uuid.NAMESPACE_URL, hashlib.sha256(listed).hexdigest())}", "version": 1,

@@ -41,6 +41,8 @@ void add_validate(CLI::App& app, Action& action);
 void add_verify(CLI::App& app, Action& action);
 void add_compare(CLI::App& app, Action& action);
 void add_doctor(CLI::App& app, Action& action);
+// Adds the commands up and join.
+void add_python_commands(CLI::App& app, Action& action);
 
 // Returns the version and the build, such as "lightshaft 0.2.0, build ...".
 inline std::string version_text() {

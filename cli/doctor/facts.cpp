@@ -176,6 +176,18 @@ int run_sandbox_probe() {
   return kProbed | (held.calls ? kCalls : 0) | (held.files ? kFiles : 0);
 }
 
+PythonFacts find_python() {
+  PythonFacts facts;
+  facts.interpreter = in_path("python3");
+  // In a build, where `cmake --install` puts it, and in a wheel.
+  for (const char* folder : {"../../../python/src/lightshaft_command",
+                             "../../share/lightshaft/lightshaft_command", "../../../lightshaft_command"}) {
+    const fs::path part = program_beside_us(folder).lexically_normal();
+    if (facts.part.empty() && fs::exists(part / "__main__.py")) facts.part = part;
+  }
+  return facts;
+}
+
 MachineFacts observe_machine(const fs::path& cache, const fs::path& data) {
   MachineFacts facts;
   facts.processor_target = LIGHTSHAFT_ARCH;
@@ -193,6 +205,7 @@ MachineFacts observe_machine(const fs::path& cache, const fs::path& data) {
   if (denoiser) facts.denoiser = denoiser->name();
   if (!denoiser) facts.denoiser_trouble = denoiser.error().message;
   facts.redis_server = in_path("redis-server");
+  facts.python = find_python();
   facts.folders.push_back(observe_folder("cache", cache.empty() ? worker::default_cache() : cache));
   if (!data.empty()) facts.folders.push_back(observe_folder("data", data));
   return facts;

@@ -20,6 +20,13 @@ struct FolderFacts {
   std::uint64_t free_bytes = 0;
 };
 
+// What runs `lightshaft up` and `lightshaft join`, which are written in Python.
+struct PythonFacts {
+  std::filesystem::path interpreter;  // empty: there is no python3 in PATH
+  std::filesystem::path part;  // the folder lightshaft_command; empty: it is not where this program looks
+};
+PythonFacts find_python();
+
 struct MachineFacts {
   std::string processor_target;  // processor for which the program was compiled, such as "x86-64-v3"
   bool processor_fits = false;
@@ -36,6 +43,7 @@ struct MachineFacts {
   bool vdb_found = false;
   std::string denoiser, denoiser_trouble;  // the denoiser's name, or why there is no denoiser
   std::filesystem::path redis_server;      // path of redis-server; empty: not in PATH
+  PythonFacts python;
   std::vector<FolderFacts> folders;
 };
 

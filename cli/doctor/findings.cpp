@@ -80,6 +80,16 @@ Finding of_sandbox(const MachineFacts& facts) {
                  "use Linux 5.13 or later with Landlock, or render trusted scenes only");
 }
 
+Finding of_python(const PythonFacts& facts) {
+  if (facts.interpreter.empty())
+    return warning("python", "there is no python3 in PATH",
+                   "only `lightshaft up` and `lightshaft join` need it: install Python 3.11 or later");
+  if (facts.part.empty())
+    return warning("python", "lightshaft_command, a part of this program, is not where it should be",
+                   "only `lightshaft up` and `lightshaft join` need it: install Lightshaft again");
+  return ok("python", facts.interpreter.string());
+}
+
 Finding of_folder(const FolderFacts& folder) {
   Finding found{folder.name,
                 folder.path.string(),
@@ -281,11 +291,13 @@ std::vector<Finding> judge_machine(const MachineFacts& facts) {
                                 "install the package lightshaft-vdb, or build the target lightshaft-vdb"),
       !facts.denoiser.empty() ? ok("denoiser", facts.denoiser)
                               : warning("denoiser", facts.denoiser_trouble,
-                                        "only --denoise needs it: run deploy/install-denoiser.sh"),
+                                        "only --denoise needs it: pip install 'lightshaft[denoise]', or run "
+                                        "deploy/install-denoiser.sh"),
       ok("redis", facts.redis_server.empty()
                       ? "no redis-server in PATH; only a coordinator with --store redis:// needs one, on any "
                         "machine"
-                      : facts.redis_server.string())};
+                      : facts.redis_server.string()),
+      of_python(facts.python)};
   for (const FolderFacts& folder : facts.folders) all.push_back(of_folder(folder));
   return all;
 }

@@ -69,6 +69,8 @@ bool bound_files(const std::vector<std::filesystem::path>& readable) {
   // This program and the OpenVDB reader beside it are allowed, but not the folder that contains them.
   done &= allow(rules.fd, own, kRun);
   done &= allow(rules.fd, own.parent_path() / "lightshaft-vdb", kRun);
+  // In a wheel (deploy/wheel.sh) the reader's libraries lie in this folder.
+  done &= allow(rules.fd, own.parent_path() / "lightshaft-libraries", kRun);
   // The dynamic loader and the thread library read these files and folders. Nothing in /proc about other
   // processes is among them.
   for (const char* path : {"/etc/ld.so.cache", "/etc/ld.so.preload", "/sys", "/proc/self", "/proc/cpuinfo",

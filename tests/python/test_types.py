@@ -22,8 +22,10 @@ def mypy(*arguments):
     return done.returncode, done.stdout
 
 
-def test_the_package_keeps_its_types():
-    assert mypy("-p", "lightshaft")[0] == 0, mypy("-p", "lightshaft")[1]
+@pytest.mark.parametrize("package", ["lightshaft", "lightshaft_command"])
+def test_the_package_keeps_its_types(package):
+    code, complaints = mypy("-p", package)
+    assert code == 0, complaints
 
 
 @pytest.mark.parametrize(

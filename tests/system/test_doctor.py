@@ -51,7 +51,7 @@ def test_this_machine_is_checked_without_a_farm(tmp_path):
 
     found = doctor("--cache", cache, code=0)
 
-    assert {"processor", "memory", "cores", "open-files", "sandbox", "openvdb", "denoiser", "redis", "cache", "farm"} == set(found)
+    assert {"processor", "memory", "cores", "open-files", "sandbox", "openvdb", "denoiser", "redis", "python", "cache", "farm"} == set(found)
     assert statuses(found, "openvdb") == ["ok"] and found["cache"][0]["subject"] == str(cache)
     assert list(tmp_path.iterdir()) == [], "looking changes nothing"
 

@@ -2,28 +2,31 @@
 
 Every ```sh block is run as it stands, one after the other in one shell as a reader would, in a folder that looks like a
 checkout with the demo's farm running: build/demo/data is the data of a farm of this test, build/release/bin the programs under
-test. One block is not run: the one of deploy/demo.sh and tests/run.sh, which install packages, build for minutes and run this
-very test. Of those two only this is checked: the scripts are there, may be executed, and their own list of flags (the comment
-at their top, and the usage that an unknown flag prints) has each flag that README names.
+test. Two blocks are not run: the one of deploy/demo.sh and tests/run.sh, which install packages, build for minutes and run this
+very test, and the one that installs a wheel, which fetches others (test_wheel.py installs it without them). Of those two scripts
+only this is checked: they are there, may be executed, and their own list of flags (the comment at their top, and the usage that
+an unknown flag prints) has each flag that README names.
 """
 
 import os
 import re
 import subprocess
+import tomllib
 
 import exr_layers
 import pytest
-from local_farm import PATIENCE, ROOT
+from local_farm import PATIENCE, ROOT, bin_dir
 
 README = (ROOT / "README.md").read_text()
 SCRIPTS = ("deploy/demo.sh", "tests/run.sh")  # not run here
+WHEEL = "bin/pip install"  # not run here either
 BLOCKS = re.findall(r"^```sh\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
-RUN = [block for block in BLOCKS if not any(script in block for script in SCRIPTS)]
+RUN = [block for block in BLOCKS if not any(part in block for part in (*SCRIPTS, WHEEL))]
 
 
 def test_every_block_is_marked_as_one_of_the_shell():
     assert README.count("\n```") == 2 * len(BLOCKS), "a block of README is not marked ```sh, so that nobody runs it"
-    assert len(RUN) == len(BLOCKS) - 1, "only the block of the two scripts is not run"
+    assert len(RUN) == len(BLOCKS) - 2, "only the block of the two scripts and that of the wheel are not run"
 
 
 @pytest.mark.parametrize("script", SCRIPTS)
@@ -38,6 +41,17 @@ def test_the_scripts_are_there_and_know_their_flags(script):
     described = "\n".join(line for line in path.read_text().splitlines()[:12] if line.startswith("#"))
     for flag in named:
         assert flag in usage.stderr and flag in described, f"README names {script} {flag}"
+
+
+def test_the_block_of_the_wheel_names_what_there_is():
+    block = next(block for block in BLOCKS if WHEEL in block)
+    project = tomllib.loads((ROOT / "python/pyproject.toml").read_text())["project"]
+
+    assert set(re.findall(r"\[(\w+)\]", block)) == {"denoise"} <= set(project["optional-dependencies"])
+    usage = subprocess.run([bin_dir() / "lightshaft", "up", "--help"], capture_output=True, text=True)
+    assert usage.returncode == 0
+    for flag in re.findall(r"lightshaft up (--[a-z-]+)", README):
+        assert flag in usage.stdout
 
 
 @pytest.mark.slow
@@ -55,8 +69,8 @@ def test_the_blocks_run_as_they_stand(farm, tmp_path):
                          capture_output=True, text=True, timeout=PATIENCE)
 
     assert run.returncode == 0, run.stdout + run.stderr
-    assert (checkout / "ball.png").read_bytes().startswith(b"\x89PNG")
-    of_the_farm, of_one_process = (exr_layers.read(checkout / name)[0] for name in ("ball.exr", "alone.exr"))
+    assert (checkout / "fog.png").read_bytes().startswith(b"\x89PNG")
+    of_the_farm, of_one_process = (exr_layers.read(checkout / name)[0] for name in ("fog.exr", "alone.exr"))
     assert of_the_farm == of_one_process, "README: to the same pixels"
     assert any(value > 0 for row in of_the_farm["R"] for value in row)
 

@@ -21,6 +21,7 @@ MachineFacts good_machine() {
   facts.vdb_found = true;
   facts.denoiser = "Open Image Denoise 2.3.0";
   facts.redis_server = "/usr/bin/redis-server";
+  facts.python = {"/usr/bin/python3", "/usr/share/lightshaft/lightshaft_command"};
   facts.folders = {{"cache", "/var/cache/lightshaft", true, std::uint64_t{100} << 30}};
   return facts;
 }
@@ -90,6 +91,8 @@ INSTANTIATE_TEST_SUITE_P(
         MachineFault{"openvdb", Status::problem, [](MachineFacts& f) { f.vdb_found = false; }},
         MachineFault{"denoiser", Status::warning,
                      [](MachineFacts& f) { f.denoiser = "", f.denoiser_trouble = "none"; }},
+        MachineFault{"python", Status::warning, [](MachineFacts& f) { f.python.interpreter.clear(); }},
+        MachineFault{"python", Status::warning, [](MachineFacts& f) { f.python.part.clear(); }},
         MachineFault{"cache", Status::problem, [](MachineFacts& f) { f.folders[0].usable = false; }},
         MachineFault{"cache", Status::warning,
                      [](MachineFacts& f) { f.folders[0].free_bytes = (1ull << 30) - 1; }},

@@ -1,0 +1,113 @@
+"""Programs that run as long as this one does: started again when they end by themselves, and ended with it."""
+
+import contextlib
+import ctypes
+import os
+import pathlib
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from typing import IO
+
+from lightshaft_command.programs import Problem
+
+ENDS = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+WAKES = ENDS | {signal.SIGCHLD}
+QUICK_END = 5.0  # seconds: a program that runs for less has not started well
+MOST_QUICK_ENDS = 5  # in a row; after these it is not started again
+MOST_PAUSE = 16.0  # seconds between such starts
+PR_SET_PDEATHSIG = 1
+_libc = ctypes.CDLL(None)
+
+
+def say(text: str) -> None:
+    print(text, flush=True)
+
+
+def _begin() -> None:
+    """In a child: signals are not blocked, and the kernel ends it if this program is killed."""
+    signal.pthread_sigmask(signal.SIG_SETMASK, set())
+    _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+def start(args: list[str], output: "int | IO[bytes] | None" = None, environment: dict[str, str] | None = None) -> subprocess.Popen[bytes]:
+    """In a session of its own, so that Ctrl-C reaches only this program, which then ends the others in their order."""
+    return subprocess.Popen(args, stdin=subprocess.DEVNULL, stdout=output, stderr=None if output is None else subprocess.STDOUT,
+                            env=environment, start_new_session=True, preexec_fn=_begin)  # fmt: skip
+
+
+def how_it_ended(code: int) -> str:
+    return f"by signal {-code} ({signal.Signals(-code).name})" if code < 0 else f"with exit code {code}"
+
+
+class Child:
+    """A program that is started again when it ends by itself."""
+
+    def __init__(self, name: str, args: list[str], log: pathlib.Path, environment: dict[str, str] | None = None):
+        self.name, self.args, self.log, self.environment = name, args, log, environment
+        self._quick_ends = 0
+        self._next_start: float | None = None
+        self.log.write_bytes(b"")
+        self.start()
+
+    def start(self) -> None:
+        self._next_start = None
+        self._started = time.monotonic()
+        with self.log.open("ab") as output:
+            self.process = start(self.args, output, self.environment)
+
+    def last_lines(self) -> str:
+        return "\n".join("  " + line for line in self.log.read_text(errors="replace").splitlines()[-8:])
+
+    def look(self) -> None:
+        """Starts it again if it has ended. Problem: it ends again and again."""
+        if self._next_start is not None:
+            if time.monotonic() >= self._next_start:
+                self.start()
+            return
+        code = self.process.poll()
+        if code is None:
+            return
+        quick = time.monotonic() - self._started < QUICK_END
+        self._quick_ends = self._quick_ends + 1 if quick else 0
+        if self._quick_ends >= MOST_QUICK_ENDS:
+            raise Problem(f"the {self.name} ended {how_it_ended(code)}, {MOST_QUICK_ENDS} times in a row; its log, {self.log}, ends:\n{self.last_lines()}")
+        pause = min(2.0**self._quick_ends, MOST_PAUSE) if quick else 0.0
+        say(f"the {self.name} ended {how_it_ended(code)} and is started again (log: {self.log})")
+        self._next_start = time.monotonic() + pause
+
+
+class Children:
+    """All of them, in the order of their start. Signals are blocked from its making on, and waited for in run()."""
+
+    def __init__(self) -> None:
+        signal.pthread_sigmask(signal.SIG_BLOCK, WAKES)
+        self.kept: list[Child] = []
+        self.extra: subprocess.Popen[bytes] | None = None  # a program that runs once, beside them
+
+    def wait(self, seconds: float) -> bool:
+        """Until something ends or the time is over; true if the user asks for the end."""
+        woken = signal.sigtimedwait(WAKES, seconds)
+        return woken is not None and woken.si_signo in ENDS
+
+    def run(self, each_time: Callable[[], None]) -> None:
+        """Until the user asks for the end."""
+        while not self.wait(1.0):
+            for child in self.kept:
+                child.look()
+            each_time()
+
+    def end(self) -> None:
+        """The last one first, each after it has finished what it must; a signal of the user meanwhile ends all at once."""
+        at_once = False
+        running = [process for process in [*(child.process for child in self.kept), self.extra] if process]
+        for process in reversed(running):
+            if process.poll() is None:
+                process.terminate()
+            while process.poll() is None and not at_once:
+                at_once = self.wait(0.5)
+        for process in running:  # also what is left of a program that was killed
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()

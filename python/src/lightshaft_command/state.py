@@ -1,0 +1,46 @@
+"""The folder in which `lightshaft up` and `lightshaft join` keep what stays."""
+
+import contextlib
+import fcntl
+import os
+import pathlib
+from collections.abc import Iterator
+from typing import IO
+
+from lightshaft_command.programs import Problem
+
+
+def usual() -> pathlib.Path:
+    named = os.environ.get("XDG_DATA_HOME")
+    return (pathlib.Path(named) if named else pathlib.Path.home() / ".local" / "share") / "lightshaft"
+
+
+class Claim:
+    def __init__(self, file: IO[str]):
+        self._file = file
+
+    def tell(self, where: str) -> None:
+        """Says to who comes second where the first one is."""
+        self._file.seek(0)
+        self._file.truncate()
+        self._file.write(f"process {os.getpid()}" + (f", {where.split('#')[0]}" if where else ""))
+        self._file.flush()
+
+
+@contextlib.contextmanager
+def claim(folder: pathlib.Path) -> Iterator[Claim]:
+    """Makes the folder, readable by this user only, and keeps others out of it. Problem: another one has it, or it cannot be used."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        file = (folder / "in-use").open("a+")
+    except OSError as error:
+        raise Problem(f"{folder} cannot be used ({error.strerror}): choose another folder with --data") from error
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            file.seek(0)
+            raise Problem(f"{folder} is in use ({file.read() or 'by a process that is starting'}): choose another folder with --data, or end that one") from None
+        claimed = Claim(file)
+        claimed.tell("")
+        yield claimed

@@ -1,0 +1,136 @@
+"""`lightshaft up`: a coordinator and a worker on this machine, until Ctrl-C."""
+
+import argparse
+import contextlib
+import json
+import os
+import pathlib
+import socket
+import time
+
+from lightshaft_command import browser, enrolment
+from lightshaft_command.children import Child, Children, say
+from lightshaft_command.first_picture import FirstPicture
+from lightshaft_command.programs import Problem, find
+from lightshaft_command.state import claim
+
+HTTP, WORKERS, JOINING = 8080, 50051, 50052  # ports, if they are free
+PATIENCE = 60.0  # seconds for the coordinator to start
+
+
+def free_port(host: str, wanted: int, given: int | None) -> int:
+    """The port to use: the given one, or the wanted one, or 0 for any if that is taken."""
+    port = wanted if given is None else given
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            if given is not None:
+                raise Problem(f"port {port} cannot be used ({error.strerror}): choose another with --port, or leave it out") from error
+            return 0
+    return port
+
+
+def start_coordinator(children: Children, args: argparse.Namespace, data: pathlib.Path, names: list[str]) -> dict[str, int]:
+    """Its ports, `http` and `grpc`."""
+    host = "0.0.0.0" if args.lan else "127.0.0.1"
+    home = data / "coordinator"
+    tls = ["--tls", "--tls-names", ",".join(names)] if args.lan else []
+
+    def words(http: int, workers: int) -> list[str]:
+        return [find("lightshaft-coordinator"), "--http", f"{host}:{http}", "--grpc", f"{host}:{workers}", "--data", str(home), *tls]
+
+    wanted = (free_port(host, HTTP, args.port), free_port(host, WORKERS, None))
+    # Another program may take a port that was free just now.
+    for http, workers in (wanted, (args.port or 0, 0)):
+        with contextlib.suppress(OSError):  # of a coordinator that was killed
+            (home / "ports.json").unlink()
+        child = Child("coordinator", words(http, workers), data / "coordinator.log")
+        children.kept = [child]
+        if wait_for_file(children, child, home / "ports.json"):
+            break
+    else:
+        raise Problem(f"the coordinator did not start; its log, {child.log}, ends:\n{child.last_lines()}")
+    ports: dict[str, int] = json.loads((home / "ports.json").read_text())
+    # When it is started again, workers and browsers find it where it was.
+    child.args = words(ports["http"], ports["grpc"])
+    return ports
+
+
+def wait_for_file(children: Children, child: Child, file: pathlib.Path) -> bool:
+    """False if the program has ended, or was ended, without it."""
+    deadline = time.monotonic() + PATIENCE
+    while not file.exists():
+        if children.wait(0.1):
+            raise KeyboardInterrupt
+        if child.process.poll() is not None:
+            return False
+        if time.monotonic() > deadline:
+            children.end()
+            return False
+    return True
+
+
+def farm_variables(args: argparse.Namespace, home: pathlib.Path, ports: dict[str, int]) -> dict[str, str]:
+    """By which the command `lightshaft` on this machine finds the farm."""
+    found = {"LIGHTSHAFT_URL": f"{'https' if args.lan else 'http'}://127.0.0.1:{ports['http']}", "LIGHTSHAFT_TOKEN": (home / "token").read_text().strip()}
+    return {**found, "LIGHTSHAFT_CA": str(home / "tls" / "ca.pem")} if args.lan else found
+
+
+def start_worker(children: Children, args: argparse.Namespace, data: pathlib.Path, coordinator: str, token: str, tls: pathlib.Path | None) -> None:
+    words = [find("lightshaft-worker"), "--coordinator", coordinator, "--cache", str(data / "cache")]
+    if args.threads:
+        words += ["--threads", str(args.threads)]
+    if tls:
+        words += ["--tls-ca", str(tls / "ca.pem"), "--tls-cert", str(tls / "worker.pem"), "--tls-key", str(tls / "worker.key")]
+    children.kept.append(Child("worker", words, data / "worker.log", {**os.environ, "LIGHTSHAFT_JOIN_TOKEN": token}))
+
+
+def show(args: argparse.Namespace, data: pathlib.Path, farm: dict[str, str]) -> str:
+    """Prints where the farm is; the address that signs in by itself."""
+    home = data / "coordinator"
+    address = f"{farm['LIGHTSHAFT_URL']}/#token={farm['LIGHTSHAFT_TOKEN']}"
+    say(f"dashboard:        {address}")
+    say(f"token:            {farm['LIGHTSHAFT_TOKEN']}   (admin; in {home / 'token'})")
+    authority = f" LIGHTSHAFT_CA={farm['LIGHTSHAFT_CA']}" if args.lan else ""
+    say(f"other terminals:  export LIGHTSHAFT_URL={farm['LIGHTSHAFT_URL']} LIGHTSHAFT_TOKEN=$(cat {home / 'token'}){authority}")
+    return address
+
+
+def invite(data: pathlib.Path, names: list[str], ports: dict[str, int]) -> None:
+    """Lets other machines join, and prints the line that they type."""
+    home = data / "coordinator"
+    port = free_port("0.0.0.0", JOINING, None)
+    answering = enrolment.Enrolment(port, home / "tls", (home / "join-token").read_text().strip(), ports["grpc"])
+    say(f"add a machine:    lightshaft join {names[0]} --code {answering.code()}")
+    fingerprint = enrolment.digest_of((home / "tls" / "server.pem").read_text()).hex(":").upper()
+    say(f"                  ports {ports['http']} (dashboard), {ports['grpc']} and {answering.server_port} (workers) must pass this machine's firewall")
+    say(f"                  a browser warns once of the farm's own certificate; its SHA-256: {fingerprint}")
+
+
+def run(args: argparse.Namespace) -> int:
+    data = args.data
+    children = Children()
+    names = [*args.name, *enrolment.own_addresses()] or ["127.0.0.1"]
+    try:
+        with claim(data) as claimed:
+            ports = start_coordinator(children, args, data, names)
+            home = data / "coordinator"
+            farm = farm_variables(args, home, ports)
+            start_worker(children, args, data, f"127.0.0.1:{ports['grpc']}", (home / "join-token").read_text().strip(), home / "tls" if args.lan else None)
+            address = show(args, data, farm)
+            claimed.tell(address)
+            if args.lan:
+                invite(data, names, ports)
+            say(f"Ctrl-C ends the farm. What it has rendered stays in {data}, and `lightshaft up` goes on with it.")
+            if not args.no_browser and (why := browser.open_address(address)):
+                say(f"open the dashboard's address in a browser yourself: {why}")
+            picture = FirstPicture(children, data / "first", args.first_scene, farm)
+            children.run(picture.go_on)
+            say("ending: the worker hands in what it has (Ctrl-C again ends everything at once)")
+            children.end()
+            say(f"the farm has ended; its state is in {data}")
+    finally:
+        children.end()
+    return 0

@@ -1,0 +1,280 @@
+"""`lightshaft up` and `lightshaft join`: a farm that one command starts, and that ends with it."""
+
+import base64
+import http.client
+import json
+import os
+import pathlib
+import re
+import signal
+import socket
+import ssl
+import subprocess
+import urllib.parse
+import urllib.request
+
+import pytest
+from local_farm import PATIENCE, bin_dir, wait_until
+
+SCENE = """<scene version="3.0.0">
+  <integrator type="volpath"/>
+  <shape type="sphere"><bsdf type="diffuse"/></shape>
+  <emitter type="point"><point name="position" x="2" y="2" z="-2"/><rgb name="intensity" value="30"/></emitter>
+  <sensor type="perspective"><transform name="to_world"><lookat origin="0, 1, -7" target="0, 0, 0" up="0, 1, 0"/></transform>
+    <sampler type="independent"><integer name="sample_count" value="2"/></sampler>
+    <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="24"/></film></sensor>
+</scene>"""
+
+
+def processes_that_name(folder):
+    """The ids of all processes whose arguments name the folder."""
+    found = []
+    for entry in pathlib.Path("/proc").iterdir():
+        try:
+            if entry.name.isdigit() and str(folder).encode() in (entry / "cmdline").read_bytes():
+                found.append(int(entry.name))
+        except OSError:
+            pass  # it has ended meanwhile
+    return found
+
+
+class Command:
+    """A `lightshaft up` or `join` at work."""
+
+    def __init__(self, program, *words, output, environment=None):
+        self.output = output
+        with output.open("wb") as out:
+            self.process = subprocess.Popen([program, *map(str, words)], stdin=subprocess.DEVNULL, stdout=out, stderr=out,
+                                            env={**os.environ, **(environment or {})}, start_new_session=True)  # fmt: skip
+
+    def text(self):
+        return self.output.read_text(errors="replace")
+
+    def said(self, pattern):
+        """What it prints that matches, once it does."""
+
+        def look():
+            found = re.search(pattern, self.text())
+            assert found or self.process.poll() is None, f"it ended without {pattern!r}:\n{self.text()}"
+            return found
+
+        return wait_until(look, f"{pattern!r} is printed")
+
+    def interrupt(self):
+        self.process.send_signal(signal.SIGINT)
+
+    def ends(self, code=0):
+        assert self.process.wait(timeout=PATIENCE) == code, self.text()
+
+
+class Up(Command):
+    def __init__(self, folder, *words, program=None, scene=None, browser=None):
+        self.data = folder / "state"
+        if scene is None:
+            scene = folder / "scene.xml"
+            scene.write_text(SCENE)
+        super().__init__(program or bin_dir() / "lightshaft", "up", "--data", self.data, "--threads", 1, "--first-scene", scene, *words,
+                         *([] if browser else ["--no-browser"]), output=folder / "up.txt",
+                         environment={"BROWSER": f"{browser} %s", "DISPLAY": ":0"} if browser else None)  # fmt: skip
+        self.url, self.token = self.said(r"dashboard: *(\S+)/#token=(\w+)").groups()
+
+    def ask(self, path):
+        request = urllib.request.Request(self.url + path, headers={"Authorization": f"Bearer {self.token}"})
+        authority = self.data / "coordinator" / "tls" / "ca.pem"
+        trust = ssl.create_default_context(cafile=authority) if self.url.startswith("https") else None
+        with urllib.request.urlopen(request, context=trust, timeout=PATIENCE) as answer:
+            return json.loads(answer.read())
+
+    def connected(self):
+        try:
+            return [worker for worker in self.ask("/api/v1/workers")["workers"] if worker["state"] == "connected"]
+        except OSError:
+            return []  # the coordinator is being started again
+
+    def jobs(self):
+        return self.ask("/api/v1/jobs")["jobs"]
+
+    def child(self, program):
+        """The id of the process that it runs now."""
+        for pid in processes_that_name(self.data):
+            try:
+                if pathlib.Path(f"/proc/{pid}/exe").readlink().name == program:
+                    return pid
+            except OSError:
+                pass
+        return None
+
+    def code(self):
+        return self.said(r"--code (\S+)")[1]
+
+
+@pytest.fixture
+def leaves_nothing(tmp_path):
+    """Ends what a failed test leaves behind."""
+    yield
+    for pid in processes_that_name(tmp_path):
+        if pid != os.getpid():
+            os.kill(pid, signal.SIGKILL)
+
+
+def join(folder, code, host="127.0.0.1", program=None):
+    return Command(program or bin_dir() / "lightshaft", "join", host, "--data", folder / "other", "--threads", 1, "--code", code, output=folder / "join.txt")
+
+
+def check_a_farm_of_two_machines(folder, program=None, scene=None):
+    """From the first start to the first picture, a second machine, the end, and a second start."""
+    up = Up(folder, "--lan", program=program, scene=scene)
+    up.said("first picture, .* after the start")
+    other = join(folder, up.code(), program=program)
+    wait_until(lambda: len(up.connected()) == 2, "a second worker has joined")
+    assert (up.data / "first" / "picture.png").read_bytes().startswith(b"\x89PNG")
+    assert [job["state"] for job in up.jobs()] == ["done"]
+    assert up.code().encode() not in pathlib.Path(f"/proc/{other.process.pid}/cmdline").read_bytes()
+
+    other.interrupt()
+    other.ends()
+    wait_until(lambda: len(up.connected()) == 1, "the second worker has left")
+    up.interrupt()
+    up.ends()
+    assert processes_that_name(folder) == []
+
+    again = Up(folder, "--lan", program=program, scene=scene)
+    assert (again.token, again.code()) == (up.token, up.code())
+    wait_until(again.connected, "the worker is there")
+    assert [job["state"] for job in again.jobs()] == ["done"], "the state stayed, and no second picture is rendered"
+    again.interrupt()
+    again.ends()
+    assert processes_that_name(folder) == []
+
+
+def test_a_farm_of_two_machines(tmp_path, leaves_nothing):
+    check_a_farm_of_two_machines(tmp_path)
+
+
+def test_killed_programs_are_started_again_where_they_were(tmp_path, leaves_nothing):
+    up = Up(tmp_path)
+    wait_until(up.connected, "the worker has joined")
+
+    for program in ("worker", "coordinator"):
+        old = up.child(f"lightshaft-{program}")
+        os.kill(old, signal.SIGKILL)
+        up.said(f"the {program} ended by signal 9 .SIGKILL. and is started again")
+        wait_until(lambda: up.child(f"lightshaft-{program}") not in (None, old), f"there is a new {program}")
+        wait_until(up.connected, f"a worker is connected, at the same address, after the {program} was killed")
+
+    up.interrupt()
+    up.ends()
+    assert processes_that_name(tmp_path) == []
+
+
+def test_nothing_is_left_when_it_is_killed_itself(tmp_path, leaves_nothing):
+    up = Up(tmp_path)
+    wait_until(up.connected, "the worker has joined")
+
+    up.process.kill()
+
+    wait_until(lambda: processes_that_name(tmp_path) == [], "all its processes have ended")
+
+
+def test_a_second_interrupt_ends_what_does_not_end(tmp_path, leaves_nothing):
+    up = Up(tmp_path)
+    wait_until(up.connected, "the worker has joined")
+    os.kill(up.child("lightshaft-worker"), signal.SIGSTOP)
+
+    up.interrupt()
+    up.said("ending")
+    up.interrupt()
+
+    up.ends()
+    assert processes_that_name(tmp_path) == []
+
+
+def test_a_browser_is_led_to_the_dashboard_once_and_its_arguments_hold_no_token(tmp_path, leaves_nothing):
+    browser, seen = tmp_path / "browser", tmp_path / "seen"
+    browser.write_text(f'#!/bin/sh\necho "$1" > {seen}.unfinished; mv {seen}.unfinished {seen}\n')
+    browser.chmod(0o755)
+    up = Up(tmp_path, browser=browser)
+    address = urllib.parse.urlsplit(wait_until(lambda: seen.exists() and seen.read_text().strip(), "the browser is started"))
+
+    answers = []
+    for _ in range(2):
+        connection = http.client.HTTPConnection(address.hostname, address.port, timeout=PATIENCE)
+        try:
+            connection.request("GET", address.path)
+            answer = connection.getresponse()
+            answers.append((answer.status, answer.getheader("Location")))
+        except OSError:
+            answers.append("closed")
+
+    assert up.token not in address.geturl()
+    assert answers[0] == (302, f"{up.url}/#token={up.token}") and answers[1] in ((404, None), "closed")
+    up.interrupt()
+    up.ends()
+
+
+def failure(*words):
+    done = subprocess.run([bin_dir() / "lightshaft", *map(str, words)], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE)
+    assert done.returncode == 1 and "Traceback" not in done.stderr, done.stdout + done.stderr
+    return done.stderr
+
+
+def test_a_folder_in_use_is_refused_with_who_has_it(tmp_path, leaves_nothing):
+    up = Up(tmp_path)
+
+    said = failure("up", "--data", up.data, "--no-browser")
+
+    assert f"{up.data} is in use (process {up.process.pid}, {up.url}/)" in said and "--data" in said
+    up.interrupt()
+    up.ends()
+
+
+def test_a_port_that_was_asked_for_and_is_taken_is_named(tmp_path, leaves_nothing):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+
+        said = failure("up", "--data", tmp_path / "state", "--no-browser", "--port", port)
+
+    assert f"port {port} cannot be used" in said and "--port" in said
+    assert processes_that_name(tmp_path) == []
+
+
+def test_a_coordinator_that_cannot_start_is_shown_with_its_words(tmp_path, leaves_nothing):
+    (tmp_path / "state").mkdir()
+    (tmp_path / "state" / "coordinator").write_text("no folder")
+
+    said = failure("up", "--data", tmp_path / "state", "--no-browser")
+
+    assert "the coordinator did not start" in said and str(tmp_path / "state" / "coordinator") in said
+    assert processes_that_name(tmp_path) == []
+
+
+def changed(code, byte):
+    raw = bytearray(base64.urlsafe_b64decode(code + "=" * (-len(code) % 4)))
+    raw[byte] ^= 1
+    return base64.urlsafe_b64encode(bytes(raw)).decode().rstrip("=")
+
+
+def test_a_wrong_code_is_refused_before_the_token_is_shown(tmp_path, leaves_nothing):
+    up = Up(tmp_path, "--lan")
+    wait_until(up.connected, "the worker has joined")
+    code = up.code()
+
+    said = {name: failure("join", "127.0.0.1", "--data", tmp_path / "other", "--code", wrong)
+            for name, wrong in (("cut", code[:-4]), ("other farm", changed(code, 2)), ("other token", changed(code, -1)))}  # fmt: skip
+
+    assert "copy the whole line" in said["cut"]
+    assert "is not the one that printed this code" in said["other farm"]
+    assert "does not know this code" in said["other token"]
+    assert len(up.connected()) == 1
+    up.interrupt()
+    up.ends()
+    assert "no farm answers at 127.0.0.1" in failure("join", "127.0.0.1", "--data", tmp_path / "other", "--code", code)
+
+
+def test_the_doctor_says_where_python_is_missing(tmp_path):
+    done = subprocess.run([bin_dir() / "lightshaft", "doctor", "--json"], env={**os.environ, "PATH": str(tmp_path)}, capture_output=True, text=True)
+    checks = {check["name"]: check for check in json.loads(done.stdout)["checks"]}
+    assert checks["python"]["status"] == "warning" and "Python 3.11" in checks["python"]["advice"]
+
+    refused = subprocess.run([bin_dir() / "lightshaft", "up"], env={**os.environ, "PATH": str(tmp_path)}, capture_output=True, text=True)
+    assert refused.returncode == 1 and "Python 3.11" in refused.stderr
