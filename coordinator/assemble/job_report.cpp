@@ -188,7 +188,7 @@ void put_areas(json& j, const ReportFacts& facts) {
   for (std::size_t c = 0; facts.areas && c < 3; ++c) {
     const double value = facts.areas->mean[c], half = facts.areas->half_width[c];
     mean.push_back(number(value));
-    if (trusted) mean_interval.push_back(interval(value - half, value + half));
+    if (trusted && facts.error->settled) mean_interval.push_back(interval(value - half, value + half));
   }
   const AreaError areas = facts.areas.value_or(AreaError{});
   j["mean"] = std::move(mean);

@@ -144,7 +144,8 @@ void measure_areas(const std::vector<Stages>& all, std::size_t k, RenderedCell& 
     const Stage& stage = all[j][k];
     if (!stage.trusted) continue;
     const double right = (green - all[j].back().areas.mean[1]) / (n - 1);
-    cell.mean += std::abs(stage.areas.mean[1] - right) <= stage.areas.half_width[1];
+    cell.mean_known += stage.error.settled;
+    cell.mean += stage.error.settled && std::abs(stage.areas.mean[1] - right) <= stage.areas.half_width[1];
     const std::vector<double> means = square_means(stage.image);
     double relmse = 0;
     for (std::size_t i = 0; i < squares; ++i) {
@@ -211,12 +212,14 @@ std::string rendered_line(const RenderedJobs& jobs, const RenderedCell& c) {
     return of == 0 ? std::string("-") : fmt::format("{:.0f} %", 100.0 * held / of);
   };
   return fmt::format(
-      "| {} | {} x {} | {} | {:.2g} | {} of {} | {} of {} | {} | {} | {} of {} | {:.3f} +- {:.3f} | {:.3f} "
+      "| {} | {} x {} | {} | {:.2g} | {} of {} | {} of {} | {} | {} of {} | {} of {} | {:.3f} +- {:.3f} | "
+      "{:.3f} "
       "+- {:.3f} |",
       std::filesystem::path(jobs.scene).stem().string(), jobs.size.width, jobs.size.height, c.spp,
       c.true_relmse, c.trusted, c.images, share(c.rmse, c.rmse_known), c.rmse_known,
-      share(c.relmse, c.trusted), share(c.mean, c.trusted), share(c.squares, c.squares_known),
-      c.squares_known, c.mse_ratio.value, c.mse_ratio.sigma, c.relmse_ratio.value, c.relmse_ratio.sigma);
+      share(c.relmse, c.trusted), share(c.mean, c.mean_known), c.mean_known,
+      share(c.squares, c.squares_known), c.squares_known, c.mse_ratio.value, c.mse_ratio.sigma,
+      c.relmse_ratio.value, c.relmse_ratio.sigma);
 }
 
 }  // namespace ls::test

@@ -36,9 +36,9 @@ struct RenderedCell {
   // of the trusted ones, those whose interval holds the mean of green over the image, and the relMSE of means
   // over squares of 16 x 16 pixels
   int mean = 0, squares = 0;
-  int squares_known = 0;          // of the trusted ones, those with an interval of the latter
-  double true_relmse = 0;         // mean over all images
-  Ratio mse_ratio, relmse_ratio;  // mean estimated / mean true, over all images
+  int mean_known = 0, squares_known = 0;  // of the trusted ones, those with these intervals
+  double true_relmse = 0;                 // mean over all images
+  Ratio mse_ratio, relmse_ratio;          // mean estimated / mean true, over all images
 };
 
 // Throws std::runtime_error if the scene cannot be read or rendered.

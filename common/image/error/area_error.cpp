@@ -12,9 +12,8 @@ namespace {
 // The same of Student's distribution with one and with two degrees of freedom: tan(0.95 pi / 2), and 0.95
 // sqrt(2 / (1 - 0.95^2)).
 constexpr double kOneDegree = 12.706204736432095, kTwoDegrees = 4.302652729911275;
-// The interval of squares is known if at least this many carry their error; Gaussian noise alike in all
-// squares counts as a third of them.
-constexpr double kFewestSquares = 8;
+// The interval of squares is known if at least this many carry their error.
+constexpr double kFewestSquares = 4;
 // The number of samples that use one set of light vertices in each half (LightVertexCache::kEpoch).
 constexpr std::uint64_t kSetSamples = 16;
 
@@ -40,7 +39,8 @@ void AreaSums::add(const AreaSums& o) {
     fourths[c] += o.fourths[c];
   }
   relative += o.relative;
-  relative_squares += o.relative_squares;
+  spread += o.spread;
+  spread_squares += o.spread_squares;
   pixels += o.pixels;
   count += o.count;
 }
@@ -48,31 +48,39 @@ void AreaSums::add(const AreaSums& o) {
 AreaSums area_sums(const HalfMeans& h, std::uint64_t spp, const EarlierMeans* earlier) {
   const auto width = static_cast<std::size_t>(h.width), height = static_cast<std::size_t>(h.height);
   AreaSums out{.pixels = h.pixels()};
-  const std::size_t across = (width + kCorrelatedSide - 1) / kCorrelatedSide, down = (height + kCorrelatedSide - 1) / kCorrelatedSide;
+  const std::size_t across = (width + kCorrelatedSide - 1) / kCorrelatedSide,
+                    down = (height + kCorrelatedSide - 1) / kCorrelatedSide;
   out.count = across * down;
-  std::vector<double> of_squares(out.count);  // pixels * y
+  std::vector<double> spreads(out.count);  // u of each square
   for (std::size_t c = 0; c < 3; ++c) {
-    std::vector<double> values(out.count), noise(out.count);
+    std::vector<double> values(out.count), noise(out.count), powers(out.count);
     for (std::size_t y = 0; y < height; ++y)
       for (std::size_t square = 0; square < across; ++square) {
-        const std::size_t row = (c * height + y) * width, end = std::min(width, (square + 1) * kCorrelatedSide);
-        double value = 0, difference = 0;
+        const std::size_t row = (c * height + y) * width,
+                          end = std::min(width, (square + 1) * kCorrelatedSide);
+        double value = 0, difference = 0, power = 0;
         for (std::size_t x = square * kCorrelatedSide; x < end; ++x) {
           value += h.a[row + x] + h.b[row + x];
-          difference += h.a[row + x] - h.b[row + x];
+          const double d = h.a[row + x] - h.b[row + x];
+          difference += d;
+          power += d * d;
         }
         values[y / kCorrelatedSide * across + square] += value / 2;
         noise[y / kCorrelatedSide * across + square] += difference / 2;
+        powers[y / kCorrelatedSide * across + square] += power / 4;
       }
     for (std::size_t i = 0; i < out.count; ++i) {
-      const auto pixels = static_cast<double>(std::min(kCorrelatedSide, width - i % across * kCorrelatedSide) *
-                                              std::min(kCorrelatedSide, height - i / across * kCorrelatedSide));
+      const auto pixels =
+          static_cast<double>(std::min(kCorrelatedSide, width - i % across * kCorrelatedSide) *
+                              std::min(kCorrelatedSide, height - i / across * kCorrelatedSide));
       const double mean = values[i] / pixels;
       out.values[c] += values[i];
       out.noise[c] += noise[i];
       out.squares[c] += noise[i] * noise[i];
       out.fourths[c] += fourth(noise[i]);
-      of_squares[i] += noise[i] * noise[i] / pixels / (mean * mean + kRelMseDenominator);
+      const double weight = 1 / (mean * mean + kRelMseDenominator);
+      out.relative += noise[i] * noise[i] / pixels * weight;
+      spreads[i] += powers[i] * weight;
     }
     if (!earlier) continue;
     double before = 0;
@@ -80,9 +88,9 @@ AreaSums area_sums(const HalfMeans& h, std::uint64_t spp, const EarlierMeans* ea
       before += earlier->halves.a[i] - earlier->halves.b[i];
     out.last[c] = out.noise[c] - before / 2 * static_cast<double>(earlier->spp) / static_cast<double>(spp);
   }
-  for (const double y : of_squares) {
-    out.relative += y;
-    out.relative_squares += y * y;
+  for (const double u : spreads) {
+    out.spread += u;
+    out.spread_squares += u * u;
   }
   if (earlier) out.fewest_before = out.most_before = earlier->spp;
   return out;
@@ -108,10 +116,10 @@ AreaError area_error(const AreaSums& s, bool common) {
   }
   out.relmse = s.relative / (3 * pixels);
   if (!(s.relative > 0)) return out;
-  const double effective = s.relative * s.relative / s.relative_squares;
+  const double effective = s.spread * s.spread / s.spread_squares;
   if (effective < kFewestSquares) return out;
-  const double spread = std::sqrt(4 / (3 * effective) + (common ? 4 * correlation * correlation : 0));
-  const double relative = student(effective / 2) * spread;
+  const double spread = std::sqrt(4 / effective + (common ? 4 * correlation * correlation : 0));
+  const double relative = student(effective) * spread;
   out.relmse_lo = out.relmse * std::exp(-relative);
   out.relmse_hi = out.relmse * std::exp(relative);
   return out;

@@ -17,10 +17,12 @@
 //
 // Squares: relMSE of their means is the mean over squares and channels, weighted by pixels, of
 //   E^2 / (S^2 + 0.01),   E: the mean of D over the square, S: its mean value.
-// The noise of S is neglected. The relative variance of the difference from the realised relMSE is estimated
-// from fourth powers, as for pixels: 4/3 sum of y^2 / (sum of y)^2, y being a square's term. If all pixels
-// have errors in common, two squares have the correlation r of their errors, and 4 r^2 is added; r follows
-// from the variance of the image's mean.
+// The noise of S is neglected. The relative variance of the difference from the realised relMSE is
+//   4 sum of v^2 / (sum of v)^2,   v: the expectation of a square's term,
+// as for pixels (error_estimate.h). A square's own term says little of v: it has one degree of freedom. The
+// sum of D^2 over its pixels is proportional to v if pixels are independent, or equally correlated in all
+// squares, and has many. If all pixels have errors in common, two squares have the correlation r of their
+// errors, and 4 r^2 is added; r follows from the variance of the image's mean.
 #pragma once
 
 #include <array>
@@ -50,8 +52,10 @@ struct AreaSums {
   // be computed from the tile's present samples alone.
   std::uint64_t fewest_before = 0, most_before = 0;
   ChannelSums squares{}, fourths{};  // sums over squares of the 2nd and 4th power of (sum of D)
-  double relative = 0, relative_squares = 0;  // sums over squares of pixels * y and of (pixels * y)^2
-  std::uint64_t pixels = 0, count = 0;        // numbers of pixels and of squares
+  double relative = 0;               // sum over squares of pixels * E^2 / (S^2 + 0.01), all channels
+  // Sums over squares of u and u^2, where u is the sum over pixels and channels of D^2 / (S^2 + 0.01)
+  double spread = 0, spread_squares = 0;
+  std::uint64_t pixels = 0, count = 0;  // numbers of pixels and of squares
   void add(const AreaSums& other);
   bool operator==(const AreaSums&) const = default;
 };
@@ -59,10 +63,10 @@ struct AreaSums {
 AreaSums area_sums(const HalfMeans& halves, std::uint64_t spp, const EarlierMeans* earlier);
 
 struct AreaError {
-  ChannelSums mean{};      // mean of the image in each channel
+  ChannelSums mean{};        // mean of the image in each channel
   ChannelSums half_width{};  // half the width of its 95 % interval
-  // relMSE of the means over squares, and the 95 % interval of this image's realised error; both ends are 0 if
-  // too few squares carry the error for an interval
+  // relMSE of the means over squares, and the 95 % interval of this image's realised error; both ends are 0
+  // if too few squares carry the error for an interval
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;
 };
 // `common`: all pixels have errors in common (light vertices). All figures are 0 without pixels.

@@ -399,7 +399,8 @@ ImageError image_error(const TileError& sums) {
   out.effective_pixels = effective_pixels(sums.relative);
   if (out.effective_pixels > 0) out.top_share = sums.relative.largest / sums.relative.squares;
   judge(out, sums.relative, pixels, sums.lit > 0);
-  if (!out.trusted || (!carried_by_few(sums.plain, pixels) && !has_outliers(sums.plain))) {
+  out.settled = settled(sums.plain);
+  if (!out.trusted || (out.settled && !carried_by_few(sums.plain, pixels))) {
     const double plain = half_width(sums.plain, pixels, out.trusted);
     out.rmse_lo = out.rmse * std::exp(-plain / 2);
     out.rmse_hi = out.rmse * std::exp(plain / 2);

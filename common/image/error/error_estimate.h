@@ -194,6 +194,9 @@ struct ImageError {
   double rmse = 0, rmse_lo = 0, rmse_hi = 0;
   // the interval contains what is unknown of the weights, too
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;
+  // True if the pixels with the largest error, not weighed, have light in both halves. Otherwise rare light
+  // may be missing from the mean of the image, too.
+  bool settled = false;
   double spp = 0;  // samples per pixel, averaged over all pixels
   // The number of pixels that carry the error: (sum of x)^2 / (sum of x^2), where x is the squared relative
   // error of a pixel.

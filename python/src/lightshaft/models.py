@@ -502,7 +502,8 @@ class Report(TypedDict):
     mean: NotRequired[Union[list[float], None]]
     """Mean of the image in R, G and B."""
     mean_ci95: NotRequired[Union[list[list[float]], None]]
-    """95 % interval [low, high] of the right mean in R, G and B; null while the error is not trusted."""
+    """95 % interval [low, high] of the right mean in R, G and B; null while the error is not trusted, and
+    where rare bright light may be missing."""
     relmse_16: NotRequired[Union[float, None]]
     """relMSE of the means over squares of 16 x 16 pixels."""
     relmse_16_ci95: NotRequired[Union[list[float], None]]

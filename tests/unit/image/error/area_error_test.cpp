@@ -47,13 +47,13 @@ AreaCoverage held_areas(int images, double pixel, double square, double image, b
   std::mt19937_64 random(21);
   AreaCoverage out;
   for (int n = 0; n < images; ++n) {
-    const AreaHalves before = noisy_halves(pixel, square, image, random), last = noisy_halves(pixel, square, image, random);
+    const AreaHalves before = noisy_halves(pixel, square, image, random),
+                     last = noisy_halves(pixel, square, image, random);
     AreaHalves now = before;
     for (std::size_t h = 0; h < 2; ++h)
       for (std::size_t i = 0; i < now[h].size(); ++i) now[h][i] = (before[h][i] + last[h][i]) / 2;
     const EarlierMeans earlier{{kAreaSide, kAreaSide, before[0], before[1]}, 32};
-    const AreaError e =
-        area_error(area_sums({kAreaSide, kAreaSide, now[0], now[1]}, 64, &earlier), common);
+    const AreaError e = area_error(area_sums({kAreaSide, kAreaSide, now[0], now[1]}, 64, &earlier), common);
     double sum = 0, relmse = 0;
     std::vector<double> errors(kAreaPixels / 256);
     for (std::size_t i = 0; i < kAreaPixels; ++i) {
@@ -100,9 +100,8 @@ TEST(AreaError, SumsOfTilesAreThoseOfTheImage) {
         for (std::size_t c = 0; c < 3; ++c)
           for (int y = 0; y < 32; ++y)
             for (int x = 0; x < 32; ++x)
-              tile[h].push_back(
-                  whole[h][(c * kAreaSide + static_cast<std::size_t>(ty * 32 + y)) * kAreaSide +
-                           static_cast<std::size_t>(tx * 32 + x)]);
+              tile[h].push_back(whole[h][(c * kAreaSide + static_cast<std::size_t>(ty * 32 + y)) * kAreaSide +
+                                         static_cast<std::size_t>(tx * 32 + x)]);
       sum.add(area_sums({32, 32, tile[0], tile[1]}, 8, nullptr));
     }
   EXPECT_EQ(sum.count, expected.count);
