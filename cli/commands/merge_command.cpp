@@ -51,6 +51,12 @@ Result<std::vector<fs::path>> files_of(const std::vector<std::string>& arguments
   return files;
 }
 
+// Null: few bright pixels carry the error.
+nlohmann::ordered_json rmse_interval(const ImageError& error) {
+  if (error.rmse > 0 && error.rmse_hi == 0) return nullptr;
+  return {error.rmse_lo, error.rmse_hi};
+}
+
 Result<void> write_report(const MergeFlags& flags, const Merged& merged, const std::string& digest,
                           std::uint64_t clamped) {
   const FrameSize size = merged.film.grid().frame;
@@ -60,7 +66,7 @@ Result<void> write_report(const MergeFlags& flags, const Merged& merged, const s
                                  {"spp", error.spp},
                                  {"samples", merged.film.samples()},
                                  {"rmse", error.rmse},
-                                 {"rmse_ci95", {error.rmse_lo, error.rmse_hi}},
+                                 {"rmse_ci95", rmse_interval(error)},
                                  {"relmse", error.relmse},
                                  {"relmse_ci95", {error.relmse_lo, error.relmse_hi}},
                                  {"trusted", error.trusted},

@@ -181,20 +181,21 @@ std::vector<ErrorPoint> error_points(const std::vector<ConvergencePoint>& points
 
 namespace {
 
-// The errors of means over areas. Their intervals are unknown if the image's error is not trusted.
+// The errors of means over areas. Their intervals are unknown if the image's error is not trusted, and if
+// rare bright light may be missing (ImageError::settled).
 void put_areas(json& j, const ReportFacts& facts) {
-  const bool trusted = facts.error && convergence_status_of(facts).trusted;
+  const bool known = facts.error && facts.error->settled && convergence_status_of(facts).trusted;
   json mean, mean_interval;
   for (std::size_t c = 0; facts.areas && c < 3; ++c) {
     const double value = facts.areas->mean[c], half = facts.areas->half_width[c];
     mean.push_back(number(value));
-    if (trusted && facts.error->settled) mean_interval.push_back(interval(value - half, value + half));
+    if (known) mean_interval.push_back(interval(value - half, value + half));
   }
   const AreaError areas = facts.areas.value_or(AreaError{});
   j["mean"] = std::move(mean);
   j["mean_ci95"] = std::move(mean_interval);
   j["relmse_16"] = facts.areas ? number(areas.relmse) : json();
-  j["relmse_16_ci95"] = trusted && areas.relmse_hi > 0 ? interval(areas.relmse_lo, areas.relmse_hi) : json();
+  j["relmse_16_ci95"] = known && areas.relmse_hi > 0 ? interval(areas.relmse_lo, areas.relmse_hi) : json();
 }
 
 }  // namespace

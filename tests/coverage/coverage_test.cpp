@@ -89,18 +89,20 @@ TEST(ShortCoverage, HoldsForJobsThatStopAtATarget) {
 
 // Whole images of few samples whose pixels share their paths: single pixels carry much of the noise, weights
 // are uncertain, and errors are correlated. Intervals that ignore this hold for about half of such images.
-// The share that holds may be .95 - (.02 + five standard errors), .69 of 20 trusted images.
+// 600 images give some 400 that are trusted, of which the share that holds has a standard deviation of 1.1 %
+// if it is 95 %. So the bound is 0.9, and an estimator that covers 88 % is below it in six of seven cases.
 TEST(ShortCoverage, HoldsForWholeImagesOfFewSamplesThatSharePaths) {
   const double level = Tests("coverage/rendered").level(2);
   const auto file = std::filesystem::path(testing::TempDir()) / "shared.xml";
   std::ofstream(file) << scene_of("fog, lit from within", 8).xml;
-  const auto cells = measure_rendered({.scene = file, .spp = 8, .images = 50});
+  const auto cells = measure_rendered({.scene = file, .size = {32, 32}, .spp = 8, .images = 600});
   ASSERT_EQ(cells.size(), 2u);
   for (const RenderedCell& cell : cells) {
-    fmt::print("{}\n", rendered_line({.scene = file}, cell));
-    ASSERT_GT(cell.trusted, 10) << cell.spp << " samples";
-    EXPECT_GE(cell.relmse, cell.trusted * (kCovered - share_slack(cell.trusted, level)))
-        << cell.spp << " samples";
+    fmt::print("{}\n", rendered_line({.scene = file, .size = {32, 32}}, cell));
+    ASSERT_GT(cell.trusted, 300) << cell.spp << " samples";
+    const double bound = kCovered - share_slack(cell.trusted, level) + kMayBeOff;
+    EXPECT_GE(cell.relmse, cell.trusted * bound) << cell.spp << " samples";
+    EXPECT_GT(bound, .89) << "what covers 88 % would pass too often";
   }
 }
 

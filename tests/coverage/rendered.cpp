@@ -142,10 +142,10 @@ void measure_areas(const std::vector<Stages>& all, std::size_t k, RenderedCell& 
   for (const Stages& s : all) green += s.back().areas.mean[1];
   for (std::size_t j = 0; j < all.size(); ++j) {
     const Stage& stage = all[j][k];
-    if (!stage.trusted) continue;
+    if (!stage.trusted || !stage.error.settled) continue;
     const double right = (green - all[j].back().areas.mean[1]) / (n - 1);
-    cell.mean_known += stage.error.settled;
-    cell.mean += stage.error.settled && std::abs(stage.areas.mean[1] - right) <= stage.areas.half_width[1];
+    ++cell.mean_known;
+    cell.mean += std::abs(stage.areas.mean[1] - right) <= stage.areas.half_width[1];
     const std::vector<double> means = square_means(stage.image);
     double relmse = 0;
     for (std::size_t i = 0; i < squares; ++i) {

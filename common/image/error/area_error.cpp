@@ -17,10 +17,17 @@ constexpr double kFewestSquares = 4;
 // The number of samples that use one set of light vertices in each half (LightVertexCache::kEpoch).
 constexpr std::uint64_t kSetSamples = 16;
 
-// Student's quantile to second order in 1 / degrees of freedom (Abramowitz and Stegun 26.7.5).
+// The two-sided 95 % point of Student's distribution, to third order in 1 / degrees of freedom (Abramowitz and
+// Stegun 26.7.5). That is too small for fewer than two degrees; between one and two the logarithm is
+// interpolated over 1 / freedom, which is at most 3 % too large.
 double student(double freedom) {
-  const double z2 = kNormal95 * kNormal95;
-  return kNormal95 * (1 + (z2 + 1) / (4 * freedom) + ((5 * z2 + 16) * z2 + 3) / (96 * freedom * freedom));
+  if (freedom < 2) {
+    const double one = 2 / std::max(freedom, 1.) - 1;  // 1 at one degree, 0 at two
+    return kTwoDegrees * std::pow(kOneDegree / kTwoDegrees, one);
+  }
+  const double z = kNormal95 * kNormal95, f = 1 / freedom;
+  return kNormal95 * (1 + f * ((z + 1) / 4 + f * (((5 * z + 16) * z + 3) / 96 +
+                                                  f * (((3 * z + 19) * z + 17) * z - 15) / 384)));
 }
 
 double fourth(double x) { return x * x * x * x; }
@@ -41,13 +48,14 @@ void AreaSums::add(const AreaSums& o) {
   relative += o.relative;
   spread += o.spread;
   spread_squares += o.spread_squares;
+  samples += o.samples;
   pixels += o.pixels;
   count += o.count;
 }
 
 AreaSums area_sums(const HalfMeans& h, std::uint64_t spp, const EarlierMeans* earlier) {
   const auto width = static_cast<std::size_t>(h.width), height = static_cast<std::size_t>(h.height);
-  AreaSums out{.pixels = h.pixels()};
+  AreaSums out{.samples = spp * h.pixels(), .pixels = h.pixels()};
   const std::size_t across = (width + kCorrelatedSide - 1) / kCorrelatedSide,
                     down = (height + kCorrelatedSide - 1) / kCorrelatedSide;
   out.count = across * down;
@@ -101,14 +109,18 @@ AreaError area_error(const AreaSums& s, bool common) {
   if (s.pixels == 0) return out;
   const auto pixels = static_cast<double>(s.pixels), count = static_cast<double>(s.count);
   const bool two_parts = s.fewest_before == s.most_before && s.fewest_before >= kSetSamples;
+  // The variances of the two parts are in proportion to their samples (Satterthwaite 1946).
+  const double before_share = static_cast<double>(s.fewest_before) * pixels / static_cast<double>(s.samples),
+               last_share = 1 - before_share,
+               degrees = two_parts ? 1 / (before_share * before_share + last_share * last_share) : 1;
   double correlation = 0;
   for (std::size_t c = 0; c < 3; ++c) {
     out.mean[c] = s.values[c] / pixels;
     const double before = s.noise[c] - s.last[c],
                  alike = two_parts ? s.last[c] * s.last[c] + before * before : s.noise[c] * s.noise[c];
     if (!(s.squares[c] > 0)) continue;
-    const double freedom = 3 * s.squares[c] * s.squares[c] / s.fourths[c];
-    out.half_width[c] = (common ? (two_parts ? kTwoDegrees : kOneDegree) * std::sqrt(alike)
+    const double freedom = 3 * s.squares[c] * s.squares[c] / s.fourths[c] - 2;
+    out.half_width[c] = (common ? student(degrees) * std::sqrt(alike)
                                 : student(freedom) * std::sqrt(s.squares[c])) /
                         pixels;
     if (count > 1)

@@ -507,8 +507,8 @@ class Report(TypedDict):
     relmse_16: NotRequired[Union[float, None]]
     """relMSE of the means over squares of 16 x 16 pixels."""
     relmse_16_ci95: NotRequired[Union[list[float], None]]
-    """[low, high] for the error of this very image; null while the error is not trusted, and where few
-    squares carry it."""
+    """[low, high] for the error of this very image; null where mean_ci95 is, and where few squares carry
+    the error."""
     pixels_without_samples: NotRequired[int]
     """The figures of the error are of the other pixels."""
     slope: NotRequired[Union[float, None]]

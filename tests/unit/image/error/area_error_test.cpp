@@ -88,6 +88,31 @@ TEST(AreaError, TheIntervalOfTheMeanHoldsForErrorsThatAllPixelsHaveInCommonIfItI
   EXPECT_LT(held_areas(50, .1, 0, .01, false).mean, .5);
 }
 
+// With 1,024 samples the last round has 64: its part is far smaller than that of the samples before it.
+TEST(AreaError, TheIntervalOfTheMeanHoldsForErrorsInCommonAlsoIfTheLastRoundIsSmall) {
+  std::mt19937_64 random(23);
+  std::normal_distribution<double> normal;
+  constexpr std::uint64_t kSamples = 1024, kLast = 64, kBefore = kSamples - kLast;
+  constexpr std::size_t kValues = std::size_t{3} * 32 * 32;
+  int held = 0;
+  for (int n = 0; n < 2000; ++n) {
+    std::array<std::vector<double>, 2> before, now;
+    double error = 0;
+    for (std::size_t h = 0; h < 2; ++h) {
+      const double first = normal(random) / std::sqrt(double{kBefore}),
+                   last = normal(random) / std::sqrt(double{kLast}),
+                   all = (first * kBefore + last * kLast) / kSamples;
+      before[h].assign(kValues, 1 + first);
+      now[h].assign(kValues, 1 + all);
+      error += all / 2;
+    }
+    const EarlierMeans earlier{{32, 32, before[0], before[1]}, kBefore};
+    const AreaError e = area_error(area_sums({32, 32, now[0], now[1]}, kSamples, &earlier), true);
+    held += std::abs(error) <= e.half_width[0];
+  }
+  EXPECT_GT(held, 2000 * .93);  // .95 of 2,000 has the standard deviation .005
+}
+
 TEST(AreaError, SumsOfTilesAreThoseOfTheImage) {
   std::mt19937_64 random(22);
   const AreaHalves whole = noisy_halves(.1, .02, 0, random);
