@@ -179,9 +179,10 @@ int run_sandbox_probe() {
 PythonFacts find_python() {
   PythonFacts facts;
   facts.interpreter = in_path("python3");
-  // In a build, where `cmake --install` puts it, and in a wheel.
-  for (const char* folder : {"../../../python/src/lightshaft_command",
-                             "../../share/lightshaft/lightshaft_command", "../../../lightshaft_command"}) {
+  // Where `cmake --install` puts it, in a wheel, and in a build. That of a build comes last: beside a package
+  // that is unpacked somewhere it is a folder of others.
+  for (const char* folder : {"../../share/lightshaft/lightshaft_command", "../../../lightshaft_command",
+                             "../../../python/src/lightshaft_command"}) {
     const fs::path part = program_beside_us(folder).lexically_normal();
     if (facts.part.empty() && fs::exists(part / "__main__.py")) facts.part = part;
   }
@@ -214,7 +215,7 @@ MachineFacts observe_machine(const fs::path& cache, const fs::path& data) {
 Result<std::vector<FarmFacts>> observe_farm(const HttpClient::Options& connection) {
   std::vector<FarmFacts> all;
   HttpClient::Options one = connection;
-  for (const std::string& url : addresses_in(connection.url)) {
+  for (const std::string& url : addresses_in(connection.url, !connection.ca.empty())) {
     one.url = url;
     const std::string shown = without_password(url);
     auto facts = observe_one(one);

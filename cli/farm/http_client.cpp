@@ -142,21 +142,32 @@ struct HttpClient::State {
   }
 };
 
-std::vector<std::string> addresses_in(const std::string& url) {
+namespace {
+
+// Returns the beginning of an address that was given without one. The token must not cross a network in
+// clear text unless the user asks for it, so http:// is only for this machine.
+const char* scheme_of(std::string_view address, bool has_ca) {
+  const bool local = address.starts_with("localhost") || address.starts_with("127.") || address.starts_with("[::1]");
+  return local && !has_ca ? "http://" : "https://";
+}
+
+}  // namespace
+
+std::vector<std::string> addresses_in(const std::string& url, bool has_ca) {
   std::vector<std::string> addresses;
   for (std::size_t at = 0; at <= url.size();) {
     const std::size_t comma = std::min(url.find(',', at), url.size());
     addresses.push_back(url.substr(at, comma - at));
     while (addresses.back().ends_with('/')) addresses.back().pop_back();
     if (!addresses.back().empty() && addresses.back().find("://") == std::string::npos)
-      addresses.back().insert(0, "http://");
+      addresses.back().insert(0, scheme_of(addresses.back(), has_ca));
     at = comma + 1;
   }
   return addresses;
 }
 
 Result<HttpClient> HttpClient::open(Options options) {
-  std::vector<std::string> urls = addresses_in(options.url);
+  std::vector<std::string> urls = addresses_in(options.url, !options.ca.empty());
   for (const std::string& url : urls)
     if (auto ok = check_url(url); !ok) return tl::unexpected(ok.error());
   if (std::any_of(options.token.begin(), options.token.end(),

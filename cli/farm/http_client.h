@@ -65,8 +65,9 @@ class HttpClient {
   std::unique_ptr<State> state_;
 };
 
-// Returns the addresses in Options::url, without slashes at their ends.
-std::vector<std::string> addresses_in(const std::string& url);
+// Returns the addresses in Options::url, without slashes at their ends. One without http:// or https:// gets
+// https://, unless it is of this machine and there is no file of CA certificates (`has_ca`).
+std::vector<std::string> addresses_in(const std::string& url, bool has_ca);
 
 // Decides whether to repeat a failed request: a restart, a proxy in between, or too many requests may make a
 // coordinator unreachable for a while.

@@ -76,7 +76,7 @@ def test_the_labels_of_the_axes_are_inside_of_the_picture():
 
 
 def test_an_address_may_leave_out_its_scheme():
-    assert repr(lightshaft.Farm("farm:8080/", "token")) == "<Farm http://farm:8080>"
+    assert repr(lightshaft.Farm("farm:8080/", "token")) == "<Farm https://farm:8080>"
     with pytest.raises(lightshaft.RequestRejected, match="must begin with http"):
         lightshaft.Farm("ftp://farm", "token")
 

@@ -28,11 +28,11 @@ class Address:
             raise RequestRejected(
                 "where is the farm? Give Farm(url) or set LIGHTSHAFT_URL, http://localhost:8080 say"
             )
-        self.urls = [_checked_url(part) for part in given.split(",")]
+        self._ca = ca or os.environ.get("LIGHTSHAFT_CA") or None
+        self.urls = [_checked_url(part, self._ca is not None) for part in given.split(",")]
         self.token = os.environ.get("LIGHTSHAFT_TOKEN", "") if token is None else token.strip()
         if any(not "!" <= character <= "~" for character in self.token):
             raise RequestRejected("the token has characters that a token cannot have")
-        self._ca = ca or os.environ.get("LIGHTSHAFT_CA") or None
 
     @property
     def url(self) -> str:
@@ -74,10 +74,13 @@ class Address:
             yield self.request(call)
 
 
-def _checked_url(text: str) -> str:
+def _checked_url(text: str, has_ca: bool) -> str:
+    """The address, whose beginning may be missing. Without it the token crosses no network in clear text:
+    http:// is for this machine only."""
     url = text.strip().rstrip("/")
     if url and "://" not in url:
-        url = f"http://{url}"
+        local = url.startswith(("localhost", "127.", "[::1]"))
+        url = f"http://{url}" if local and not has_ca else f"https://{url}"
     if not url.startswith(("http://", "https://")):
         raise RequestRejected(f"the farm's address {url!r} must begin with http:// or https://")
     if any(character <= " " or character == "\x7f" for character in url):

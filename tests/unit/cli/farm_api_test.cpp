@@ -33,8 +33,11 @@ TEST(Problem, KeepsTheDiagnosticsWithTheirPlace) {
 }
 
 TEST(Addresses, MayLeaveOutTheirScheme) {
-  EXPECT_EQ(addresses_in("farm:8080"), std::vector<std::string>{"http://farm:8080"});
-  EXPECT_EQ(addresses_in("https://a/,b:1/"), (std::vector<std::string>{"https://a", "http://b:1"}));
+  EXPECT_EQ(addresses_in("127.0.0.1:8080", false), std::vector<std::string>{"http://127.0.0.1:8080"});
+  EXPECT_EQ(addresses_in("localhost:8080", true), std::vector<std::string>{"https://localhost:8080"});
+  EXPECT_EQ(addresses_in("farm:8080", false), std::vector<std::string>{"https://farm:8080"})
+      << "no token in clear text across a network unless asked for";
+  EXPECT_EQ(addresses_in("https://a/,b:1/", false), (std::vector<std::string>{"https://a", "https://b:1"}));
   EXPECT_FALSE(HttpClient::open({.url = "ftp://farm"}));
 }
 
