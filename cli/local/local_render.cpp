@@ -19,6 +19,7 @@
 #include "cli/output/interrupt.h"
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
+#include "common/base/safe_text.h"
 #include "common/image/reference/reference.h"
 #include "common/report/job_page.h"
 #include "coordinator/service/coordinator.h"

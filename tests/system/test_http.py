@@ -7,6 +7,7 @@ here waits for more than a second or two, and nothing sleeps.
 import hashlib
 import json
 import os
+import re
 import signal
 import socket
 import stat
@@ -69,7 +70,15 @@ def test_the_pages_are_those_of_this_checkout(farm):
     pages = Path(__file__).resolve().parents[2] / "web" / "static"
     names = [str(file.relative_to(pages)) for file in pages.rglob("*") if file.is_file()]
     assert "index.html" in names and "js/main.js" in names
-    assert [name for name in names if farm.get(f"/{name}", token=None).body != (pages / name).read_bytes()] == []
+    served = {name: farm.get(f"/{name}", token=None).body for name in names}
+    assert [name for name in names if served[name] != (pages / name).read_bytes()] == ["index.html"]
+    # The page names one script that has all modules, and one style.
+    page = served["index.html"].decode()
+    joined = {kind: re.search(rf'"([^"]+\.{kind})"', page).group(1) for kind in ("js", "css")}
+    assert page.count(".js") == page.count(".css") == 1
+    script, style = (farm.get(f"/{joined[kind]}", token=None).body.decode() for kind in ("js", "css"))
+    assert len(script) > (pages / "js" / "main.js").stat().st_size and script != served["js/main.js"].decode()
+    assert all(served[name].decode().strip() in style for name in re.findall(r'css/\w+\.css', (pages / "index.html").read_text()))
 
 
 @pytest.mark.parametrize("path", ["/api/v1/jobs", "/api/v1/workers", "/api/v1/events", "/metrics", "/api/v1/nothing"])
