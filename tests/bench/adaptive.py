@@ -6,7 +6,7 @@ DIR holds NAME.xml; without, the bench scenes are made, and measured against the
 independent references: NAME.0.exr and NAME.1.exr of --references, means of N x N of their pixels (whose size divided by N is rendered;
 the scenes' films have box filters), or else two renders of --reference-spp samples by seeds of their own. The true relMSE is
 (x - ref0)(x - ref1) / (ref^2 + 0.01): free of the references' noise in the mean; what chance is left of it stands behind +-.
-Core seconds are CPU time of the units: only their ratio means something. Prints rows of docs/measurements/stopping.md.
+Core seconds are CPU time of the units: only their ratio means something. Prints rows of a table.
 Needs numpy and the OpenEXR package of PyPI.
 """
 import argparse

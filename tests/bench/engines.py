@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What an engine adds to a job: the table of docs/measurements/engines.md.
+"""What an engine adds to a job: a table.
 
     tests/bench/engines.py [ENGINE...]      a row for each of local, slurm, ssh, docker, kubernetes, openjd, or of those that are named
 

@@ -2,8 +2,8 @@
 """Animated glTF by others at some seconds: where our corners stand, and where Blender's import puts them.
 
 usage: gltf_poses.py FOLDER --blender PYTHON [--times T,...] [SCENE...]
-FOLDER holds the folder Models of KhronosGroup/glTF-Sample-Assets (see docs/measurements/gltf-scenes.md); SCENE is a path in it, by default the
-skins and morph targets of that page. PYTHON has bpy 5 (tests/blender/venv.sh). For each scene and second: the largest distance of a corner of
+FOLDER holds the folder Models of KhronosGroup/glTF-Sample-Assets ; SCENE is a path in it, by default the
+skins and morph targets of SCENES. PYTHON has bpy 5 (tests/blender/venv.sh). For each scene and second: the largest distance of a corner of
 one to the nearest corner of the other, over the diagonal of the box around Blender's. Nothing is rendered. A bench, not a test: needs numpy and scipy.
 """
 import argparse

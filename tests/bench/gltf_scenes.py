@@ -2,8 +2,8 @@
 """Scenes of glTF by others, by ours and by Cycles: one picture of both, and how bright they are.
 
 usage: gltf_scenes.py FOLDER --blender PYTHON [--out DIR] [--size WxH] [--spp N] [SCENE...]
-FOLDER holds the folder Models of KhronosGroup/glTF-Sample-Assets (see docs/measurements/gltf-scenes.md); SCENE is a path in it, by
-default the five of that page. PYTHON has bpy 5 (tests/venv.sh blender). For each scene: the seconds of each, our mean over Cycles' and our
+FOLDER holds the folder Models of KhronosGroup/glTF-Sample-Assets ; SCENE is a path in it, by
+default the five of SCENES. PYTHON has bpy 5 (tests/venv.sh blender). For each scene: the seconds of each, our mean over Cycles' and our
 median over theirs, by channel, of the pixels in which Cycles shows something else than the sky, and OUT/gltf-NAME.jpg, ours on the left. A bench, not a test: needs numpy, Pillow
 and the OpenEXR package of PyPI.
 """

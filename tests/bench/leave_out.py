@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a scene does not need, measured: writes docs/measurements/leave-out.md.
+"""What a scene does not need, measured: writes a page of tables.
 
 usage: leave_out.py [--out FILE.md] [--jobs N] [--only NAME,...] [--bytes-alone] [--bits SCENE...]
 N = 0: with what was built before, which must be of these sources.
@@ -63,7 +63,7 @@ WORKS = {"vacuum": {"shadow_rays"}, "textured": {"shadow_rays", "texels"},
          "grid": {"shadow_rays", "phase", "density", "macro_cells", "boundary_rays"}}
 WORKS["delta"] = WORKS["homogeneous"]
 
-TAKEN_OUT = "What is left out, and how: [design/leave-out.md](../design/leave-out.md).\n"
+TAKEN_OUT = "What is left out, and how: `docs/design/leave-out.md`.\n"
 
 
 def scene_text(name):
@@ -289,7 +289,7 @@ def page(rows, bytes_alone, bits):
 
 def main():
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--out", type=pathlib.Path, default=ROOT / "docs" / "measurements" / "leave-out.md")
+    options.add_argument("--out", type=pathlib.Path, default=ROOT / "build" / "leave-out.md", help="build/leave-out.md unless told otherwise")
     options.add_argument("--jobs", type=int, default=2)
     options.add_argument("--only", default=",".join(SCENES))
     options.add_argument("--bytes-alone", action="store_true")

@@ -2,7 +2,7 @@
 """Scenes of pbrt by others, by ours and by another renderer: one picture of both, and how bright they are.
 
 usage: pbrt_scenes.py FOLDER [SCENE...] (--pbrt PROGRAM | --mitsuba PYTHON) [--out DIR] [--size N] [--spp N] [--threads N]
-FOLDER holds the scenes of docs/measurements/pbrt-scenes.md, and SCENE is a path in it, by default those with pictures there. The larger side of a picture has --size pixels.
+FOLDER holds scenes of pbrt, and SCENE is a path in it, by default those of SCENES (github.com/gonsolo/bitterli in the folder bitterli). The larger side of a picture has --size pixels.
 PROGRAM is pbrt-v4. It is given a copy of the scene's main file in the scene's own folder, which must be writable: with another size, as pbrt has no option
 for that, and without `maxcomponentvalue`, by which pbrt clamps samples and we do not. The copy is removed afterwards.
 PYTHON has mitsuba 3, which is given what `lightshaft convert` writes: it checks light and surfaces, not how the file is read.

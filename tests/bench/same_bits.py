@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Whether each instantiation of the integrator that covers a scene gives the same bits: a section of docs/measurements/leave-out.md.
+"""Whether each instantiation of the integrator that covers a scene gives the same bits: a section of the page of leave_out.py.
 
 usage: same_bits.py SCENE.xml...        with build/release; ends with 1 if one does not
 """

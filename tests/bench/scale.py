@@ -5,7 +5,7 @@ film, and the time of a restart with a million units.
 usage: scale.py [--json OUT] [growth|peak|film|saturated|restart ...]      all of them unless told otherwise
 Workers are streams of one process (scale_load), which hands in partials of 32 x 32 pixels, 25 KB each, in the time that units
 shall take; the coordinator is the real one on a disk. Build first: lightshaft-coordinator lightshaft-worker scale_load.
-A bench, not a test; docs/measurements/scale.md has its figures.
+A bench, not a test.
 """
 import argparse
 import json

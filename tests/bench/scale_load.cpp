@@ -4,7 +4,7 @@
 //   (LIGHTSHAFT_JOIN_TOKEN)
 // Prints JSON: units handed in and acknowledged, how long it took until they were durable and acknowledged
 // (ack), from the result that made room until another lease came (dispatch), and how long workers stood
-// without a unit (gap). docs/measurements/scale.md is made with it by tests/bench/scale.py.
+// without a unit (gap). tests/bench/scale.py makes its tables with it.
 #include <fmt/format.h>
 #include <sys/resource.h>
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Puts the faults of table.py into a copy of the sources, one at a time, and asks the named tests whether they find them.
 
-usage: run.py [--only NUMBER,...] [--area NAME,...] [--jobs N] [--build-only] [--table docs/measurements/mutants.md]
+usage: run.py [--only NUMBER,...] [--area NAME,...] [--jobs N] [--build-only] [--table PAGE.md]
 
 All faults are compiled into one build of the copy, beside the right code, and chosen by LIGHTSHAFT_MUTANT (mutant.h): a run
 of sixty costs one build of some forty files. The checkout itself is not touched: the copy and its build are in build/mutation,
@@ -182,7 +182,7 @@ def main():
         return
     results = run(mutants, given.jobs)
     if given.table:
-        head = given.table.read_text().partition("## The mutants")[0]
+        head = given.table.read_text().partition("## The mutants")[0] if given.table.exists() else "# Mutants"
         given.table.write_text(page(results, head))
 
 

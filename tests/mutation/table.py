@@ -4,7 +4,7 @@ A row: number, file, the place with the text that is replaced between « and »,
 the tests that should find it, in the order in which they are asked. Expressions are replaced by expressions of their type,
 statements (with their semicolon) by statements. The first 60 are five areas of twelve; they were chosen by reading the code
 alone, before the tests. From 101 on each drops or bends one term of the light: the quick table of `lightshaft validate` must
-turn red for it (docs/measurements/validation.md).
+turn red for it.
 """
 import collections
 

@@ -9,7 +9,7 @@ constexpr int kHours = 12;
 constexpr int kHours = 96;
 #endif
 
-// Thirty days: docs/measurements/soak.md, by tests/bench/month.cpp. The sizes are read every hour. Sizes of
+// Thirty days: tests/bench/month.cpp. The sizes are read every hour. Sizes of
 // what is in flight scatter, by less than half of the largest value of many hours.
 TEST(Month, FourDaysKeepEveryInvariantAndNothingGrows) {
   Month month(1);
