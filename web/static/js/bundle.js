@@ -1,5 +1,5 @@
 // Turns dropped files into a job: finds the scene among them, the files that it names, missing and unused
-// files. Only files that the scene names are sent.
+// files. Only files that the scene names are sent, or all where it can't be read here.
 
 const kIncludeDepth = 15; // the same limits as in the coordinator's reader
 const kIncludes = 256;
@@ -54,10 +54,10 @@ export function noScene(files) {
 }
 
 /**
- * {main, assets: [{name, file}], missing: [name], unused: [path], frames, archive}: `name` is where the coordinator looks for the file
+ * {main, assets: [{name, file}], missing: [name], unused: [path], frames, archive, allSent}: `name` is where the coordinator looks for the file
  * first among the places that have it. A file is found by its path relative to the scene, or else by its base name if
  * that is unique (files dropped without their folders). A scene that can't be read, or names that hold $parameters,
- * take all files along. frames: the numbers of the files that stand for frames, as the form of a job says them; "" if
+ * take all files along: allSent. frames: the numbers of the files that stand for frames, as the form of a job says them; "" if
  * there are none. archive: the type of an archive, which has all files in itself; null of a scene.
  */
 export async function plan(files, main) {
@@ -65,12 +65,12 @@ export async function plan(files, main) {
   const others = files.filter((file) => file !== scene);
   const found = await planned(scene, others, main);
   return {
-    main: scene.file, frames: "", archive: null, ...found,
+    main: scene.file, frames: "", archive: null, allSent: false, ...found,
     assets: [...found.assets].sort((a, b) => byName(a.name, b.name)), missing: [...found.missing].sort(byName), unused: [...found.unused].sort(byName),
   };
 }
 
-const everything = (others, main) => ({ assets: others.map(({ path, file }) => ({ name: relative(path, main), file })), missing: [], unused: [] });
+const everything = (others, main) => ({ assets: others.map(({ path, file }) => ({ name: relative(path, main), file })), missing: [], unused: [], allSent: true });
 
 async function planned(scene, others, main) {
   if (/\.(zip|tar|tgz|tar\.gz)$/i.test(main)) return { archive: /\.zip$/i.test(main) ? "application/zip" : "application/x-tar", assets: [], missing: [], unused: others.map(({ path }) => path) };
