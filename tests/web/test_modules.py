@@ -78,6 +78,14 @@ def plan(modules, files, main="main.xml"):
     }})()""")
 
 
+@pytest.mark.parametrize("files, uri, sent, missing", [
+    ({"100%.png": "p"}, "100%.png", {"100%.png": "p"}, []), ({}, "100%.png", {}, ["100%.png"]), ({"a b.png": "p"}, "a%20b.png", {"a b.png": "p"}, [])])
+def test_a_name_in_a_gltf_that_can_not_be_decoded_is_kept(modules, files, uri, sent, missing):
+    planned = plan(modules, {"main.gltf": json.dumps({"images": [{"uri": uri}]}), **files}, main="main.gltf")
+
+    assert planned == {"assets": sent, "missing": missing, "unused": []}
+
+
 def scene(*children):
     return f"<scene version='3.0.0'>{''.join(children)}</scene>"
 

@@ -93,6 +93,15 @@ async function planned(scene, others, main) {
 const kGlbHead = 20; // bytes: magic, version, length; then length and type of the first chunk, which is JSON
 
 /** What a glTF names: its buffers and images, unless they are within it. */
+/** Of a broken name the coordinator says what is wrong with it. */
+function decoded(uri) {
+  try {
+    return decodeURIComponent(uri);
+  } catch {
+    return uri;
+  }
+}
+
 async function planOfGltf(scene, others, main) {
   let described;
   try {
@@ -104,7 +113,7 @@ async function planOfGltf(scene, others, main) {
   } catch {
     return everything(others, main); // the coordinator says what is wrong with it
   }
-  const names = [...(described.buffers ?? []), ...(described.images ?? [])].map(({ uri }) => uri).filter((uri) => typeof uri === "string" && !uri.startsWith("data:")).map(decodeURIComponent);
+  const names = [...(described.buffers ?? []), ...(described.images ?? [])].map(({ uri }) => uri).filter((uri) => typeof uri === "string" && !uri.startsWith("data:")).map(decoded);
   const found = new Map([...new Set(names)].map((name) => [joined("", name), others.find(({ path }) => relative(path, main) === joined("", name)) ?? only(others, name)]));
   const used = new Set(found.values());
   return {
