@@ -33,14 +33,15 @@ const baseOf = (path) => path.split("/").pop();
 
 const kScenes = [/\.xml$/i, /\.gltf$/i, /\.glb$/i, /\.pbrt$/i, /\.zip$/i, /\.(tar|tar\.gz|tgz)$/i]; // the most likely first
 export const kSceneEndings = ".xml, .gltf, .glb, .pbrt, .zip, .tar or .tar.gz";
+const kArchive = /\.(zip|tar|tgz|tar\.gz)$/i;
 const kindOf = (path) => kScenes.findIndex((ending) => ending.test(path));
 
-/** Scene files among them, and archives with a scene in them: the least nested first. */
+/** Scene files among them, the least nested first, and then archives, which may hold anything. */
 export function scenesAmong(files) {
   return files
     .map(({ path }) => path)
     .filter((path) => kindOf(path) >= 0)
-    .sort((a, b) => folderOf(a).length - folderOf(b).length || kindOf(a) - kindOf(b) || byName(a, b));
+    .sort((a, b) => kArchive.test(a) - kArchive.test(b) || folderOf(a).length - folderOf(b).length || kindOf(a) - kindOf(b) || byName(a, b));
 }
 
 /** smoke.2 before smoke.10. */
@@ -73,7 +74,7 @@ export async function plan(files, main) {
 const everything = (others, main) => ({ assets: others.map(({ path, file }) => ({ name: relative(path, main), file })), missing: [], unused: [], allSent: true });
 
 async function planned(scene, others, main) {
-  if (/\.(zip|tar|tgz|tar\.gz)$/i.test(main)) return { archive: /\.zip$/i.test(main) ? "application/zip" : "application/x-tar", assets: [], missing: [], unused: others.map(({ path }) => path) };
+  if (kArchive.test(main)) return { archive: /\.zip$/i.test(main) ? "application/zip" : "application/x-tar", assets: [], missing: [], unused: others.map(({ path }) => path) };
   if (/\.pbrt$/i.test(main)) return everything(others, main);
   if (/\.gl(tf|b)$/i.test(main)) return planOfGltf(scene, others, main);
   const survey = new Survey(others, main);
@@ -92,7 +93,6 @@ async function planned(scene, others, main) {
 
 const kGlbHead = 20; // bytes: magic, version, length; then length and type of the first chunk, which is JSON
 
-/** What a glTF names: its buffers and images, unless they are within it. */
 /** Of a broken name the coordinator says what is wrong with it. */
 function decoded(uri) {
   try {
@@ -102,6 +102,7 @@ function decoded(uri) {
   }
 }
 
+/** What a glTF names: its buffers and images, unless they are within it. */
 async function planOfGltf(scene, others, main) {
   let described;
   try {
