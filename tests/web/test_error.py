@@ -105,7 +105,7 @@ HEAVY = {"kind": "heavy_tail", "words": "don't trust yet: few pixels carry the e
 EARLY = {"kind": "early", "words": "no sample has found light", "trusted": False}
 
 
-@pytest.mark.parametrize("verdict", [HEAVY, EARLY, {"kind": "bias_floor", "words": "bias floor"}])
+@pytest.mark.parametrize("verdict", [HEAVY, EARLY, {"kind": "bias_floor", "words": "bias floor"}, {"kind": "of a newer coordinator", "words": "odd", "trusted": False}])
 def test_a_job_in_doubt_shows_no_interval(farm, dashboard, verdict):
     farm.jobs["j-1"] = job(**WITH_TARGET, verdict=verdict, rmse_ci95=[0.04, 0.06])
     farm.report = report(1, 2, 4, 8)
@@ -114,7 +114,9 @@ def test_a_job_in_doubt_shows_no_interval(farm, dashboard, verdict):
 
     facts, plot = page.text(".figures"), page.text(".plot figure") + page.text(".plot-verdict")
 
-    word = {"heavy_tail": "still noisy", "early": "too early to tell"}.get(verdict["kind"], "don't trust yet")
+    word = {"heavy_tail": "still noisy", "early": "too early to tell", "bias_floor": "not falling as it should"}.get(verdict["kind"], "not known well yet")
+    assert "don't trust" not in facts + page.text(".plot figure") and page.count(".figures .doubt") == 2
+    assert f"({word})" in page.text(".plot-reading")
     assert facts.count(word) == 2 and "95 %" not in facts and "0.0400" not in facts
     assert "Time left, at least" in facts and "at least 60 s left" in page.text(".job-head .sub")
     assert "95 %" not in plot and "not before" in plot and page.count(".plot-fan") == 0
@@ -138,12 +140,21 @@ def test_bands_that_are_not_shown_take_no_room(farm, dashboard):
     assert max(heights) - min(heights) > 200, "eight times the error over the height of the drawing"
 
 
-def test_a_target_reached_by_an_estimate_in_doubt_is_not_said_to_be_reached(farm, dashboard):
-    farm.jobs["j-1"] = job(state="done", stopped="error", verdict=HEAVY, target_error=0.001)
+@pytest.mark.parametrize("verdict, words", [(HEAVY, "still noisy"), (EARLY, "too early to tell"), ({"kind": "bias_floor", "words": "bias floor"}, "not falling as it should")])
+def test_a_target_reached_by_an_estimate_in_doubt_is_not_said_to_be_reached(farm, dashboard, verdict, words):
+    farm.jobs["j-1"] = job(state="done", stopped="error", verdict=verdict, target_error=0.001)
     page = dashboard("#/jobs/j-1")
     page.wait("document.querySelector('.job-head .sub')")
 
-    assert "the target error is reached by its own estimate: don't trust yet." in page.text(".job-head .sub")
+    assert f"the target error is reached by its own estimate: {words}." in page.text(".job-head .sub")
+
+
+def test_under_the_plot_a_verdict_without_words_gets_the_pages_own(farm, dashboard):
+    farm.jobs["j-1"] = job(verdict={**HEAVY, "words": ""})
+    farm.report = report(1, 2)
+    page = dashboard("#/jobs/j-1")
+
+    assert page.wait("document.querySelector('.plot-verdict .doubt')?.innerText") == "Still noisy: a few bright pixels carry the error"
 
 
 def test_samples_that_are_counted_take_what_they_take(farm, dashboard):

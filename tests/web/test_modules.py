@@ -78,6 +78,22 @@ def plan(modules, files, main="main.xml"):
     }})()""")
 
 
+@pytest.mark.parametrize("paths, sorted_paths", [
+    (["shot/assets.zip", "shot/scenes/main.xml"], ["shot/scenes/main.xml", "shot/assets.zip"]),
+    (["a.tar.gz", "deep/er/s.pbrt", "deep/s.gltf"], ["deep/s.gltf", "deep/er/s.pbrt", "a.tar.gz"]),
+    (["b/all.zip", "all.zip", "notes.txt"], ["all.zip", "b/all.zip"])])
+def test_a_scene_comes_before_archives_however_deep_it_lies(modules, paths, sorted_paths):
+    assert modules.evaluate(f"import('/js/bundle.js').then(({{ scenesAmong }}) => scenesAmong({json.dumps(paths)}.map((path) => ({{ path }}))))") == sorted_paths
+
+
+@pytest.mark.parametrize("files, uri, sent, missing", [
+    ({"100%.png": "p"}, "100%.png", {"100%.png": "p"}, []), ({}, "100%.png", {}, ["100%.png"]), ({"a b.png": "p"}, "a%20b.png", {"a b.png": "p"}, [])])
+def test_a_name_in_a_gltf_that_can_not_be_decoded_is_kept(modules, files, uri, sent, missing):
+    planned = plan(modules, {"main.gltf": json.dumps({"images": [{"uri": uri}]}), **files}, main="main.gltf")
+
+    assert planned == {"assets": sent, "missing": missing, "unused": []}
+
+
 def scene(*children):
     return f"<scene version='3.0.0'>{''.join(children)}</scene>"
 

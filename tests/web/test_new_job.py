@@ -150,6 +150,31 @@ def test_a_gltf_takes_the_files_that_it_names(farm, dashboard, tmp_path, name, p
     assert farm.submitted[0]["name"] == name and sorted(farm.submitted[0]["assets"]) == ["sail.png", "ship hull.bin"]
 
 
+ALL_SENT = "This page can't tell which of these files the scene names, so all of them are sent."
+
+
+@pytest.mark.parametrize("name, text, all_sent", [
+    ("s.pbrt", "WorldBegin", True), ("s.gltf", "no JSON", True), ("s.xml", SMOKE.replace("smoke", "$what"), True), ("s.gltf", "{}", False), ("s.xml", "<scene version='3.0.0'/>", False)])
+def test_where_all_dropped_files_are_sent_the_page_says_so(farm, dashboard, tmp_path, name, text, all_sent):
+    page = dashboard("#/submit")
+    page.wait("document.querySelector('.drop .help')?.innerText.includes('beside a .pbrt all of them')")
+    choose(page, tmp_path, {name: text, "diary.txt": "private"})
+    page.wait("document.querySelector('.go button:not([disabled])')")
+
+    assert (ALL_SENT in page.text(".bundle")) == all_sent
+    assert ("stays here" in page.text(".files")) != all_sent
+    page.click(".go button")
+    page.wait("location.hash === '#/jobs/j-new'")
+    assert list(farm.submitted[0]["assets"]) == (["diary.txt"] if all_sent else [])
+
+
+def test_a_scene_alone_says_nothing_of_other_files(farm, dashboard, tmp_path):
+    page = dashboard("#/submit")
+    choose(page, tmp_path, {"s.pbrt": "WorldBegin"})
+    page.wait("document.querySelector('.go button:not([disabled])')")
+    assert ALL_SENT not in page.text(".bundle")
+
+
 @pytest.mark.parametrize("files, words", [({"a.png": "p"}, "There is no scene among these files."), ({"shot.usda": "#usda"}, "python -m lightshaft.usd shot.usda -o shot")])
 def test_files_without_a_scene_say_what_to_add(farm, dashboard, tmp_path, files, words):
     page = dashboard("#/submit")

@@ -61,9 +61,13 @@ def test_only_an_admin_sends_workers_away(some, dashboard, role):
     assert (page.count(".add-worker") == 1) == (role == "submit")
 
 
+TLS = " --tls-ca ca.pem --tls-cert worker.pem --tls-key worker.key"
+
+
 @pytest.mark.parametrize("join, command, more", [
-    ({"address": "0.0.0.0:15151", "tls": False, "token_file": "/srv/join-token"}, "lightshaft-worker --coordinator 127.0.0.1:15151 --token-file join-token", "/srv/join-token"),
-    ({"address": "farm.example:6000", "tls": True}, "lightshaft-worker --coordinator farm.example:6000 --tls-ca ca.pem --token-file join-token", "certificate"),
+    ({"address": "0.0.0.0:15151", "tls": False, "token_file": "/srv/join-token"}, "lightshaft-worker --coordinator HOST:15151 --token-file join-token", "/srv/join-token"),
+    ({"address": "farm.example:6000", "tls": True}, f"lightshaft-worker --coordinator farm.example:6000{TLS} --token-file join-token", "worker.key"),
+    ({"address": "0.0.0.0:50051", "tls": True}, f"lightshaft-worker --coordinator HOST:50051{TLS} --token-file join-token", "HOST is the name or address of the coordinator's machine."),
     ({"address": "127.0.0.1:15151", "tls": False}, "lightshaft-worker --coordinator 127.0.0.1:15151 --token-file join-token", "--grpc 0.0.0.0:15151")])
 def test_the_command_that_adds_a_worker_has_this_coordinators_address(farm, dashboard, join, command, more):
     farm.join = join
@@ -71,6 +75,22 @@ def test_the_command_that_adds_a_worker_has_this_coordinators_address(farm, dash
     page.wait("document.querySelector('.empty h1')?.innerText === 'No worker is connected'")
     assert page.text(".empty pre") == command
     assert more in page.text(".empty")
+
+
+@pytest.mark.parametrize("join", [{"address": "0.0.0.0:50051", "tls": True}, {"address": "127.0.0.1:50051", "tls": False}])
+def test_the_short_way_to_add_a_machine_comes_before_the_long_one(farm, dashboard, join):
+    """Both kinds of `lightshaft up`: with --lan, and on one machine."""
+    farm.join = join
+    page = dashboard("#/workers")
+    page.wait("document.querySelector('.empty h1')?.innerText === 'No worker is connected'")
+    short = page.text(".empty").split("lightshaft-worker")[0]
+    assert "lightshaft up --lan" in short and "lightshaft join HOST --code CODE" in short
+
+
+def test_the_address_by_which_a_page_was_opened_is_the_workers_too(farm, open_page):
+    page = open_page(f"{farm.url}/demo.html")
+    command = page.evaluate("""import("/js/views/workers.js").then(({ joinCommand }) => joinCommand({ address: "[::]:50051", tls: false }, "farm.example"))""")
+    assert command == "lightshaft-worker --coordinator farm.example:50051 --token-file join-token"
 
 
 def test_a_real_worker_ends_when_it_is_sent_away_and_the_command_is_right(tmp_path, open_page):

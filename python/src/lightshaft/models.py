@@ -708,7 +708,7 @@ class ListWorkersAnswerJoin(TypedDict):
     address: NotRequired[str]
     """HOST:PORT of the workers' port: as the coordinator listens, or as its operator says."""
     tls: NotRequired[bool]
-    """Workers need the authority's certificate, too."""
+    """Workers need the authority's certificate, and a certificate of their own with its key."""
     token_file: NotRequired[str]
     """On the coordinator's machine; for admins."""
 

@@ -1,5 +1,5 @@
 // Turns dropped files into a job: finds the scene among them, the files that it names, missing and unused
-// files. Only files that the scene names are sent.
+// files. Only files that the scene names are sent, or all where it can't be read here.
 
 const kIncludeDepth = 15; // the same limits as in the coordinator's reader
 const kIncludes = 256;
@@ -33,14 +33,15 @@ const baseOf = (path) => path.split("/").pop();
 
 const kScenes = [/\.xml$/i, /\.gltf$/i, /\.glb$/i, /\.pbrt$/i, /\.zip$/i, /\.(tar|tar\.gz|tgz)$/i]; // the most likely first
 export const kSceneEndings = ".xml, .gltf, .glb, .pbrt, .zip, .tar or .tar.gz";
+const kArchive = /\.(zip|tar|tgz|tar\.gz)$/i;
 const kindOf = (path) => kScenes.findIndex((ending) => ending.test(path));
 
-/** Scene files among them, and archives with a scene in them: the least nested first. */
+/** Scene files among them, the least nested first, and then archives, which may hold anything. */
 export function scenesAmong(files) {
   return files
     .map(({ path }) => path)
     .filter((path) => kindOf(path) >= 0)
-    .sort((a, b) => folderOf(a).length - folderOf(b).length || kindOf(a) - kindOf(b) || byName(a, b));
+    .sort((a, b) => kArchive.test(a) - kArchive.test(b) || folderOf(a).length - folderOf(b).length || kindOf(a) - kindOf(b) || byName(a, b));
 }
 
 /** smoke.2 before smoke.10. */
@@ -54,10 +55,10 @@ export function noScene(files) {
 }
 
 /**
- * {main, assets: [{name, file}], missing: [name], unused: [path], frames, archive}: `name` is where the coordinator looks for the file
+ * {main, assets: [{name, file}], missing: [name], unused: [path], frames, archive, allSent}: `name` is where the coordinator looks for the file
  * first among the places that have it. A file is found by its path relative to the scene, or else by its base name if
  * that is unique (files dropped without their folders). A scene that can't be read, or names that hold $parameters,
- * take all files along. frames: the numbers of the files that stand for frames, as the form of a job says them; "" if
+ * take all files along: allSent. frames: the numbers of the files that stand for frames, as the form of a job says them; "" if
  * there are none. archive: the type of an archive, which has all files in itself; null of a scene.
  */
 export async function plan(files, main) {
@@ -65,15 +66,15 @@ export async function plan(files, main) {
   const others = files.filter((file) => file !== scene);
   const found = await planned(scene, others, main);
   return {
-    main: scene.file, frames: "", archive: null, ...found,
+    main: scene.file, frames: "", archive: null, allSent: false, ...found,
     assets: [...found.assets].sort((a, b) => byName(a.name, b.name)), missing: [...found.missing].sort(byName), unused: [...found.unused].sort(byName),
   };
 }
 
-const everything = (others, main) => ({ assets: others.map(({ path, file }) => ({ name: relative(path, main), file })), missing: [], unused: [] });
+const everything = (others, main) => ({ assets: others.map(({ path, file }) => ({ name: relative(path, main), file })), missing: [], unused: [], allSent: true });
 
 async function planned(scene, others, main) {
-  if (/\.(zip|tar|tgz|tar\.gz)$/i.test(main)) return { archive: /\.zip$/i.test(main) ? "application/zip" : "application/x-tar", assets: [], missing: [], unused: others.map(({ path }) => path) };
+  if (kArchive.test(main)) return { archive: /\.zip$/i.test(main) ? "application/zip" : "application/x-tar", assets: [], missing: [], unused: others.map(({ path }) => path) };
   if (/\.pbrt$/i.test(main)) return everything(others, main);
   if (/\.gl(tf|b)$/i.test(main)) return planOfGltf(scene, others, main);
   const survey = new Survey(others, main);
@@ -92,6 +93,15 @@ async function planned(scene, others, main) {
 
 const kGlbHead = 20; // bytes: magic, version, length; then length and type of the first chunk, which is JSON
 
+/** Of a broken name the coordinator says what is wrong with it. */
+function decoded(uri) {
+  try {
+    return decodeURIComponent(uri);
+  } catch {
+    return uri;
+  }
+}
+
 /** What a glTF names: its buffers and images, unless they are within it. */
 async function planOfGltf(scene, others, main) {
   let described;
@@ -104,7 +114,7 @@ async function planOfGltf(scene, others, main) {
   } catch {
     return everything(others, main); // the coordinator says what is wrong with it
   }
-  const names = [...(described.buffers ?? []), ...(described.images ?? [])].map(({ uri }) => uri).filter((uri) => typeof uri === "string" && !uri.startsWith("data:")).map(decodeURIComponent);
+  const names = [...(described.buffers ?? []), ...(described.images ?? [])].map(({ uri }) => uri).filter((uri) => typeof uri === "string" && !uri.startsWith("data:")).map(decoded);
   const found = new Map([...new Set(names)].map((name) => [joined("", name), others.find(({ path }) => relative(path, main) === joined("", name)) ?? only(others, name)]));
   const used = new Set(found.values());
   return {

@@ -5,8 +5,10 @@ import { phrases } from "./phrases.js";
 /** Why an error can't be trusted, in a few words: of a job's verdict. */
 export const kDoubts = { heavy_tail: "Still noisy: a few bright pixels carry the error", bias_floor: "The error does not fall as it should", early: "Too early to tell the error" };
 export const kUnsure = "The error is not known well yet";
-const kShortDoubts = { heavy_tail: "still noisy", early: "too early to tell" };
-export const doubtWord = (verdict) => kShortDoubts[verdict?.kind] ?? phrases.doubt;
+const kShortDoubts = { heavy_tail: "still noisy", bias_floor: "not falling as it should", early: "too early to tell" };
+const kShortUnsure = "not known well yet";
+export const kDoubtWords = new Set([...Object.values(kShortDoubts), kShortUnsure]);
+export const doubtWord = (verdict) => kShortDoubts[verdict?.kind] ?? kShortUnsure;
 
 const kDoubtful = new Set(["heavy_tail", "bias_floor"]);
 

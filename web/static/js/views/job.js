@@ -14,10 +14,10 @@ import { causeFirst } from "../failure.js";
 import { framesStrip } from "./frames.js";
 import { errorPlot } from "./plot.js";
 import { phrases } from "../phrases.js";
-import { doubtful, timeLeft } from "../verdict.js";
+import { doubtWord, doubtful, timeLeft } from "../verdict.js";
 
 const kStopped = { spp: phrases.stoppedSpp, error: phrases.stoppedError, time: phrases.stoppedTime, user: phrases.stoppedUser };
-const whyStopped = (job) => (job.stopped === "error" && doubtful(job.verdict) ? phrases.stoppedErrorInDoubt : kStopped[job.stopped]);
+const whyStopped = (job) => (job.stopped === "error" && doubtful(job.verdict) ? `${phrases.stoppedError} by its own estimate: ${doubtWord(job.verdict)}` : kStopped[job.stopped]);
 
 export function jobView(state, actions) {
   const job = state.jobs?.get(state.route.id);

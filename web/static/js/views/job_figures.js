@@ -3,11 +3,10 @@ import { h } from "../dom.js";
 import { colourOf, healthComplaints, isOver } from "../state.js";
 import { count, duration, figure, given, interval, percent, plural, spp } from "../format.js";
 import { phrases } from "../phrases.js";
-import { atLeast, confidence, denoisedTarget, doubtWord, doubtful, trueFigure } from "../verdict.js";
+import { atLeast, confidence, denoisedTarget, doubtful, kDoubtWords, trueFigure } from "../verdict.js";
 import { workerMark } from "./pieces.js";
 
 const kListed = 12;
-const kDoubtWords = new Set(["heavy_tail", "early", "bias_floor"].map((kind) => doubtWord({ kind })));
 
 /** What follows each figure has its lines kept free, so that nothing moves when it becomes known. denoised: the error of the denoised picture, or why there is none; absent until it is known. */
 export function figures(job, denoised) {

@@ -4,7 +4,7 @@ import { h } from "../dom.js";
 import { aheadOf, drawable } from "../plot_scale.js";
 import { duration, figure, given, interval, spp } from "../format.js";
 import { phrases } from "../phrases.js";
-import { denoisedTarget, doubtWord, doubtful, trueFigure, verdictOf } from "../verdict.js";
+import { denoisedTarget, doubtWord, doubtful, kDoubts, kUnsure, trueFigure, verdictOf } from "../verdict.js";
 import { choice } from "./pieces.js";
 import { boxOf, drawing, frameOf } from "./plot_drawing.js";
 
@@ -96,7 +96,7 @@ function verdictWords(report, verdict) {
   return [
     typeof report.slope === "number" ? h("span", { key: "slope", title: `Of log error over log time; ${phrases.independentSamples}` }, "slope ", h("b", null, signed(report.slope)), ci) : null,
     doubtful(verdict)
-      ? h("span", { key: "words", class: "doubt" }, verdict.words || phrases.estimateInDoubt)
+      ? h("span", { key: "words", class: "doubt" }, verdict.words || (kDoubts[verdict.kind] ?? kUnsure))
       : h("span", { key: "words" }, verdict.words)];
 }
 

@@ -24,7 +24,7 @@ function dropZone(submit, actions, busy) {
     h("div", { class: "choices" },
       chooser("files", submit.files.length ? "Add files" : "Choose files", { multiple: true }, actions, busy),
       chooser("folder", "Choose a folder", { webkitdirectory: true }, actions, busy)),
-    submit.files.length ? null : h("p", { key: "help", class: "help" }, `A scene is ${kSceneEndings}. Only the files that it names are sent, and none that the farm has already. Files may be dropped anywhere on any page.`));
+    submit.files.length ? null : h("p", { key: "help", class: "help" }, `A scene is ${kSceneEndings}. Only the files that it names are sent (beside a .pbrt all of them, since this page can't read that), and none that the farm has already. Files may be dropped anywhere on any page.`));
 }
 
 // A file input on top of its button, but invisible, so that keyboard and screen reader use a real file input.
@@ -51,6 +51,7 @@ function planned(plan) {
   const total = plan.assets.reduce((sum, { file }) => sum + file.size, plan.main.size);
   return [
     h("p", { key: "sum", class: "sub" }, plan.archive ? `an archive with a scene and its files, ${bytes(total)}` : plan.assets.length ? `with ${plural(plan.assets.length, "file")}, ${bytes(total)} in all` : `on its own, ${bytes(total)}`),
+    plan.allSent && plan.assets.length ? h("p", { key: "all", class: "notice mild" }, "This page can't tell which of these files the scene names, so all of them are sent.") : null,
     h("ul", { key: "files", class: "files" },
       plan.missing.map((name) => h("li", { key: `m${name}`, class: "missing" }, h("code", null, name), h("span", null, "missing: add this file"))),
       plan.assets.map(({ name, file }) => h("li", { key: `a${name}` }, h("code", null, name), h("span", { class: "number dim" }, bytes(file.size)))),

@@ -90,21 +90,43 @@ function drain(state, worker, actions) {
 const kEverywhere = new Set(["0.0.0.0", "[::]", "*"]);
 const isLoopback = (host) => /^(127\.|localhost$|\[::1\]$)/.test(host);
 
-/** The command that starts a worker, for the address at which this coordinator takes them. */
-export function joinCommand(join, page) {
+const kHost = "HOST"; // in place of a name that this page does not know
+
+function addressOf(join) {
   const [, host, port] = /^(.*):(\d+)$/.exec(join?.address ?? "") ?? [null, "0.0.0.0", "50051"];
-  const files = (join?.tls ? " --tls-ca ca.pem" : "");
-  return `lightshaft-worker --coordinator ${kEverywhere.has(host) ? page : host}:${port}${files} --token-file join-token`;
+  return { host, port };
+}
+
+/** The command that starts a worker, for the address at which this coordinator takes them. `page`: the host at which the page was opened; a loopback one means another machine elsewhere. */
+export function joinCommand(join, page) {
+  const { host, port } = addressOf(join);
+  const place = !kEverywhere.has(host) ? host : isLoopback(page) ? kHost : page;
+  const files = join?.tls ? " --tls-ca ca.pem --tls-cert worker.pem --tls-key worker.key" : "";
+  return `lightshaft-worker --coordinator ${place}:${port}${files} --token-file join-token`;
+}
+
+const code = (text) => h("code", { key: text }, text);
+
+/** `lightshaft up` takes workers of its own machine alone; with --lan it always has TLS. */
+function shortWay(join) {
+  const { host, port } = addressOf(join);
+  const line = ["prints the line for other machines, which brings all that they need: ", code("lightshaft join HOST --code CODE"), "."];
+  if (isLoopback(host)) return h("p", { key: "short" }, "This coordinator takes workers of its own machine alone. Start it as ", code("lightshaft up --lan"), " instead, and it ", ...line, " One that was started without ", code("lightshaft up"), " needs ", code(`--grpc 0.0.0.0:${port}`), ", and a firewall that lets the port through.");
+  return join?.tls ? h("p", { key: "short" }, code("lightshaft up --lan"), " ", ...line) : null;
 }
 
 function howToJoin({ join }) {
-  const host = (join?.address ?? "").replace(/:\d+$/, "");
-  const port = /\d+$/.exec(join?.address ?? "")?.[0] ?? "50051";
+  const short = shortWay(join);
+  const command = joinCommand(join, globalThis.location?.hostname || kHost);
   return [
-    h("p", { key: "how" }, "Start one on any machine that reaches this coordinator. It renders on all its cores, and may come and go at any time:"),
-    h("pre", { key: "command" }, joinCommand(join, globalThis.location?.hostname || "COORDINATOR")),
-    h("p", { key: "token", class: "help" }, "The file ", h("code", null, "join-token"), " is a copy of ", h("code", null, join?.token_file ?? "join-token"), join?.token_file ? " of the coordinator's machine" : " in the coordinator's data folder", join?.tls ? [", and ", h("code", { key: "ca" }, "ca.pem"), " one of the certificate in its folder tls."] : ".", " The worker must be of the same version as the coordinator."),
-    isLoopback(host) ? h("p", { key: "near", class: "help" }, "This coordinator takes workers of its own machine alone. For others start it with ", h("code", null, `--grpc 0.0.0.0:${port}`), " and let the port through the firewall.") : null];
+    short,
+    h("p", { key: "how" }, `${short ? "Without that line, start" : "Start"} one on ${isLoopback(addressOf(join).host) ? "the coordinator’s machine" : "any machine that reaches this coordinator"}. It renders on all its cores, and may come and go at any time:`),
+    h("pre", { key: "command" }, command),
+    h("p", { key: "token", class: "help" },
+      command.includes(kHost) ? [code(kHost), " is the name or address of the coordinator's machine. "] : null,
+      "The file ", code("join-token"), " is a copy of ", h("code", { key: "file" }, join?.token_file ?? "join-token"), join?.token_file ? " of the coordinator's machine" : " in the coordinator's data folder",
+      join?.tls ? ["; ", code("ca.pem"), ", ", code("worker.pem"), " and ", code("worker.key"), " are copies of those in the folder ", code("tls"), " beside it, or of your own authority."] : ".",
+      " The worker must be of the same version as the coordinator.")];
 }
 
 const noWorkers = (state) => h("section", { key: "empty", class: "empty" }, h("h1", null, "No worker is connected"), howToJoin(state));
