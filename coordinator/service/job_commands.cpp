@@ -266,7 +266,10 @@ Result<void> JobCommands::edit_all(Core& core, const Entries& jobs, Edit edit) c
   const auto put = store_.put_jobs(edited);
   core.records.note(put);
   if (!put) return put;
-  for (const EntryPtr& job : jobs) edit(job->stored);
+  for (const EntryPtr& job : jobs) {
+    edit(job->stored);
+    core.jobs.count_state(*job);
+  }
   return {};
 }
 
@@ -392,6 +395,7 @@ void JobCommands::drop(Core& core, const EntryPtr& entry) const {
 Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Sequence& sequence,
                                           const JobChange& change) const {
   const Farm& farm = core.driver.farm();
+  core.jobs.count_state(entry);
   // `sound`: frames that could be restored at the start; `open`: those of them that have not ended;
   // `retargeted` and `extended`: frames that get the new target error, or more samples
   Entries sound, open, retargeted, extended;
@@ -474,3 +478,4 @@ Result<void> JobCommands::remove_sequence(Core& core, const JobId& id, const Seq
 }
 
 }  // namespace ls::coordinator
+  core.driver.notify_jobs_after(id);

@@ -2,6 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <condition_variable>
+#include <map>
+#include <mutex>
+
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -39,6 +43,37 @@ std::string refusal(Coordinator& coordinator, JobSpec spec) {
   const auto taken = coordinator.submit(request);
   return taken ? "" : taken.error().error.message;
 }
+
+// Counts the events of each job.
+class Events {
+ public:
+  explicit Events(Coordinator& coordinator)
+      : coordinator_(coordinator),
+        last_(coordinator.last_event_id()),
+        listening_(coordinator.subscribe(last_, [this](const StreamEvent& e) {
+          const std::lock_guard lock(mutex_);
+          if (e.type == "job") ++of_[e.job];
+          last_ = e.id;
+          heard_.notify_all();
+        })) {}
+  // The number of events of the frames 1 to `frames` of this sequence that were published so far
+  int of_frames(const JobId& sequence, std::uint32_t frames) {
+    std::unique_lock lock(mutex_);
+    EXPECT_TRUE(heard_.wait_for(lock, std::chrono::minutes(1),
+                                [&, until = coordinator_.last_event_id()] { return last_ >= until; }));
+    int sum = 0;
+    for (std::uint32_t frame = 1; frame <= frames; ++frame) sum += of_[frame_job(sequence, frame).value];
+    return sum;
+  }
+
+ private:
+  Coordinator& coordinator_;
+  std::mutex mutex_;
+  std::condition_variable heard_;
+  std::map<std::string, int> of_;
+  std::uint64_t last_;  // id of the latest event heard
+  std::shared_ptr<void> listening_;
+};
 
 TEST(After, AJobBeginsWhenTheOneBeforeItIsDone) {
   TempFolder dir;
@@ -165,6 +200,54 @@ TEST(After, ARestartKeepsTheWaitAndNoticesWhatWasDoneBeforeIt) {
                 coordinator->job(second)->state == JobState::done);
     return coordinator->job(third)->state == JobState::done;
   }));
+}
+
+TEST(After, FramesThatWaitForAWholeSequenceHearOnceOfEachOfItsEnds) {
+  auto coordinator = open_at({});
+  const JobId first = submit(*coordinator, frames("1-6"));
+  const JobId second = submit(*coordinator, after({first}, "1-5"));
+  Events events(*coordinator);
+
+  ASSERT_TRUE(coordinator->remove(first));
+  EXPECT_EQ(events.of_frames(second, 5), 5);
+  EXPECT_THAT(coordinator->job(second)->waits_for, HasSubstr("was cancelled"));
+
+  ASSERT_TRUE(coordinator->remove(first));
+  EXPECT_EQ(events.of_frames(second, 5), 10);
+  EXPECT_THAT(coordinator->job(second)->waits_for, HasSubstr("is not here any more"));
+}
+
+TEST(After, FramesThatWaitForAWholeSequenceHearNothingOfItsSingleFrames) {
+  auto coordinator = open_at({});
+  const JobId first = submit(*coordinator, frames("1-6"));
+  const JobId second = submit(*coordinator, after({first}, "1-5"));
+  Events events(*coordinator);
+  FakeFarm farm(*coordinator, 1);
+  farm.tamper = [&](UnitResult r) {
+    return r.unit.job == frame_job(first, 6) ? std::vector<UnitResult>() : std::vector{std::move(r)};
+  };
+
+  ASSERT_TRUE(farm.run([&] { return coordinator->job(first)->frames->done == 5; }));
+  EXPECT_EQ(events.of_frames(second, 5), 0);
+}
+
+TEST(After, ASequenceThatIsExtendedAndDoneAgainEndsTheWaitOfThoseThatCameSince) {
+  auto coordinator = open_at({});
+  const JobId first = submit(*coordinator, frames("1-2"));
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.run([&] { return coordinator->job(first)->state == JobState::done; }));
+  ASSERT_TRUE(extend(*coordinator, first, 64));
+  const JobId second = submit(*coordinator, after({first}));
+  EXPECT_EQ(waits(*coordinator, second), std::vector{first.value});
+
+  ASSERT_TRUE(farm.run([&] { return coordinator->job(second)->state == JobState::done; }));
+}
+
+TEST(After, AJobThatIsNamedTwiceIsWaitedForOnce) {
+  auto coordinator = open_at({});
+  const JobId first = submit(*coordinator);
+
+  EXPECT_EQ(waits(*coordinator, submit(*coordinator, after({first, first}))), std::vector{first.value});
 }
 
 TEST(After, AJobThatIsSubmittedAgainWaitsForNobody) {
