@@ -47,7 +47,7 @@ class FarmDriver {
   // they waited for. Called when a job has ended or was removed, outside of run() if it is done. After a
   // frame, those that wait for its whole sequence hear of it if that changes the sequence's state for them.
   void notify_jobs_after(const JobId& ended);
-  // Sets what the job waits for (JobSpec::after), in the farm and in its record.
+  // Sets what the job waits for (JobSpec::after), in the farm and in its record in memory.
   void set_after(const EntryPtr& entry, std::vector<std::string> after);
   void forget_done_prerequisites(const EntryPtr& entry);
 

@@ -62,7 +62,6 @@ void FarmDriver::unload(JobEntry& entry) {
 void FarmDriver::set_after(const EntryPtr& entry, std::vector<std::string> after) {
   const bool held = !after.empty();
   core_.jobs.set_after(*entry, std::move(after));
-  core_.records.put(entry);
   if (!entry->unloaded) run(JobHeld{entry->stored.id, held});
   core_.publisher.job(*entry);
 }
@@ -75,6 +74,7 @@ void FarmDriver::forget_done_prerequisites(const EntryPtr& entry) {
   if (std::erase_if(left, done) == 0) return;
   if (left.empty()) core_.records.log(entry->stored.id, "the jobs for which it waited are done");
   set_after(entry, std::move(left));
+  core_.records.put(entry);
 }
 
 void FarmDriver::notify_jobs_after(const JobId& ended) {

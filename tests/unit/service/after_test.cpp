@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "tests/unit/service/fake_farm.h"
+#include "tests/unit/service/moving_store.h"
 #include "tests/unit/store/temp_folder.h"
 
 namespace ls::coordinator {
@@ -73,6 +74,14 @@ class Events {
   std::map<std::string, int> of_;
   std::uint64_t last_;  // id of the latest event heard
   std::shared_ptr<void> listening_;
+};
+
+// A store that takes no records while `full` is set.
+struct FullStore final : MovingStore {
+  Result<void> put_jobs(std::span<const StoredJob> jobs) override {
+    return full ? fail(Errc::unavailable, "the disk is full") : MovingStore::put_jobs(jobs);
+  }
+  std::atomic<bool> full{false};
 };
 
 TEST(After, AJobBeginsWhenTheOneBeforeItIsDone) {
@@ -248,6 +257,62 @@ TEST(After, AJobThatIsNamedTwiceIsWaitedForOnce) {
   const JobId first = submit(*coordinator);
 
   EXPECT_EQ(waits(*coordinator, submit(*coordinator, after({first, first}))), std::vector{first.value});
+}
+
+TEST(After, AJobThatHasBegunIsNotHeldAnyMore) {
+  auto coordinator = open_at({});
+  const JobId begun = submit(*coordinator), shot = submit(*coordinator, frames("1-2"));
+  const JobId other = submit(*coordinator);
+  FakeFarm farm(*coordinator, 1);
+  farm.tamper = [&](UnitResult r) {
+    return farm.results_sent == 0 ? std::vector{std::move(r)} : std::vector<UnitResult>();
+  };
+  ASSERT_TRUE(farm.run([&] { return coordinator->job(begun)->units_done > 0; }));
+
+  const auto refused = set_after(*coordinator, begun, {other});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message,
+            "job " + begun.value +
+                " has begun: it can no longer wait for others; pause it instead, and resume it when they are "
+                "done");
+  EXPECT_TRUE(set_after(*coordinator, begun, {}));
+  ASSERT_TRUE(pause(*coordinator, begun));
+  EXPECT_FALSE(set_after(*coordinator, begun, {other}));
+
+  ASSERT_TRUE(pause(*coordinator, frame_job(shot, 2)));
+  FakeFarm more(*coordinator, 1);
+  ASSERT_TRUE(more.run([&] { return coordinator->job(frame_job(shot, 1))->state == JobState::running; }));
+  ASSERT_TRUE(set_after(*coordinator, shot, {other}));
+  EXPECT_EQ(waits(*coordinator, frame_job(shot, 1)), std::vector<std::string>());
+  EXPECT_EQ(waits(*coordinator, frame_job(shot, 2)), std::vector{other.value});
+}
+
+TEST(After, ARefusedWaitLeavesTheOtherPartsOfTheChangeUndone) {
+  auto coordinator = open_at({});
+  for (const JobId& job : {submit(*coordinator), submit(*coordinator, frames("1-2"))}) {
+    JobChange change{.priority = 5, .spp = 64};
+    change.after = {job.value};
+    const std::uint64_t before = coordinator->job(job)->spp;
+
+    EXPECT_FALSE(coordinator->change(job, change));
+
+    EXPECT_EQ(coordinator->job(job)->priority, 0);
+    EXPECT_EQ(coordinator->job(job)->spp, before);
+  }
+}
+
+TEST(After, AWaitThatCannotBeStoredIsRefusedAndHasNoEffect) {
+  const auto store = std::make_shared<FullStore>();
+  const auto coordinator = std::move(*Coordinator::open({.jobs = store}));
+  const JobId first = submit(*coordinator), second = submit(*coordinator, after({first}));
+  store->full = true;
+
+  EXPECT_FALSE(set_after(*coordinator, second, {}));
+
+  EXPECT_EQ(waits(*coordinator, second), std::vector{first.value});
+  store->full = false;
+  EXPECT_TRUE(set_after(*coordinator, second, {}));
+  EXPECT_EQ(waits(*coordinator, second), std::vector<std::string>());
 }
 
 TEST(After, AJobThatIsSubmittedAgainWaitsForNobody) {
