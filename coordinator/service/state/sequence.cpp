@@ -63,16 +63,16 @@ FramesView count(std::span<const JobView> frames, const FrameRange& range) {
   return v;
 }
 
-// Returns the error of the first failed frame. If no frame failed, returns why the first frame that has not
-// ended waits; empty if it does not wait.
+// Returns the error of the first failed frame. If no frame failed, returns the error of the first
+// frame that has not ended and has one; empty if none has.
 std::string trouble_of(std::span<const JobView> frames) {
   const JobView* found = nullptr;
   for (const JobView& f : frames)
     if (!found && f.state == JobState::failed && !f.error.empty()) found = &f;
-  const auto waits = [](const JobView& f) { return !is_terminal(f.state); };
+  const auto in_trouble = [](const JobView& f) { return !is_terminal(f.state) && !f.error.empty(); };
   if (!found) {
-    const auto first = std::find_if(frames.begin(), frames.end(), waits);
-    if (first != frames.end() && !first->error.empty()) found = &*first;
+    const auto first = std::find_if(frames.begin(), frames.end(), in_trouble);
+    if (first != frames.end()) found = &*first;
   }
   if (!found) return "";
   const auto id = frame_of(found->id);
