@@ -377,6 +377,7 @@ void FarmDriver::on(const Checkpoint& e) {
   entry->assembly->checkpoint_taken(e.rounds);
   entry->stored.totals.doubt = error.verdict;
   entry->stored.totals.few_hits = error.few_hits;
+  entry->stored.totals.lit = error.lit;
   // If the curve has this checkpoint already, from before a restart, no point is added. The point may still
   // lack the comparison with the reference image; then the comparison is made now.
   if (!entry->points.empty() && entry->points.back().spp >= error.spp) {
@@ -409,6 +410,7 @@ void FarmDriver::end_curve(const EntryPtr& entry) {
   if (!entry->points.empty() && entry->points.back().spp >= error.spp) return;
   entry->stored.totals.doubt = error.verdict;
   entry->stored.totals.few_hits = error.few_hits;
+  entry->stored.totals.lit = error.lit;
   core_.records.add_point(
       entry, {entry->fold_seconds, entry->stored.totals.core_seconds, error.spp, figures_of(error)});
 }
