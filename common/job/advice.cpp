@@ -25,12 +25,13 @@ std::string advice_on(const ConvergenceStatus& status, const Advised& job) {
     return "image and reference disagree, and more samples will not help: check that the reference shows "
            "this "
            "scene with this camera and these settings";
-  const bool dark = !(job.relmse > 0);
-  const std::string what = dark ? "no light found yet: check that a light reaches what the camera sees"
-                                : "still noisy: a few bright pixels carry the error";
+  const std::string what = !job.lit ? "no light found yet: check that a light reaches what the camera sees"
+                           : job.relmse > 0 ? "still noisy: a few bright pixels carry the error"
+                                            : "too few samples so far to tell the error";
   if (job.goes_on) return what + "; more samples are on their way";
-  if (!job.can_extend) return what;
-  return fmt::format("{}; render on: lightshaft extend {} --spp {}", what, job.job, next_spp(job.spp_done));
+  const std::uint64_t next = next_spp(job.spp_done);
+  if (!job.can_extend || static_cast<double>(next) <= job.spp_done) return what;
+  return fmt::format("{}; render on: lightshaft extend {} --spp {}", what, job.job, next);
 }
 
 }  // namespace ls

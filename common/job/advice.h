@@ -9,10 +9,11 @@ namespace ls {
 
 struct Advised {
   std::string job;         // id of the job; a command that goes on with it is named
-  double relmse = 0;       // of the image so far; 0: no light was found, or there is no sample
+  double relmse = 0;       // of the image so far; 0: none is known yet
+  bool lit = true;         // some sample has found light
   double spp_done = 0;     // samples per pixel so far
-  bool goes_on = false;    // the job is not over: it gets more samples by itself
-  bool can_extend = true;  // false for jobs that have failed or were cancelled
+  bool goes_on = false;    // the job gets more samples by itself: it is not over, paused or held
+  bool can_extend = true;  // the job is done
 };
 
 // Empty: the figures are trusted.

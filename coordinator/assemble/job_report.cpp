@@ -347,11 +347,13 @@ std::string report_json(const ReportFacts& facts) {
   j["trusted"] = convergence_status.trusted;
   j["verdict"] = convergence_status.words;
   j["verdict_kind"] = to_string(convergence_status.kind);
+  const bool open = job.state == JobState::running || job.state == JobState::queued;
   j["advice"] = text_or_null(advice_on(convergence_status, {.job = job.id.value,
                                                             .relmse = e ? e->relmse : 0,
+                                                            .lit = !e || e->lit,
                                                             .spp_done = totals.spp_done,
-                                                            .goes_on = !is_terminal(job.state),
-                                                            .can_extend = !is_closed(job.state)}));
+                                                            .goes_on = open && job.spec.after.empty(),
+                                                            .can_extend = job.state == JobState::done}));
   const Efficiency efficiency = efficiency_of(facts);
   j["efficiency"] = number(efficiency.wall);
   j["efficiency_per_core"] = number(efficiency.per_core);

@@ -44,9 +44,10 @@ class FarmDriver {
   // farm; only its files and its record remain. Results that still arrive for it are dropped.
   void unload(JobEntry& entry);
   // Lets the jobs that wait for this job, frame or sequence begin if it is done and was the last one that
-  // they waited for. Called when a job has ended or was removed, outside of run() if it is done.
+  // they waited for. Called when a job has ended or was removed, outside of run() if it is done. After a
+  // frame, those that wait for its whole sequence hear of it if that changes the sequence's state for them.
   void notify_jobs_after(const JobId& ended);
-  // Sets what the job waits for (JobSpec::after), in the farm and in its record.
+  // Sets what the job waits for (JobSpec::after), in the farm and in its record in memory.
   void set_after(const EntryPtr& entry, std::vector<std::string> after);
   void forget_done_prerequisites(const EntryPtr& entry);
 
@@ -72,6 +73,7 @@ class FarmDriver {
   void on(const WorkerFoundFaulty& e);
   void on(const TileDiscarded& e);
   void on(const WorkerForgotten& e);
+  void notify_waiting_for(const JobId& id);
   Result<WaitingPartial> partial_for(JobEntry& entry, const Fold& e) const;
   void note_leased(const Lease& lease, const WorkerId& worker);
   void end_image(const EntryPtr& entry);

@@ -62,7 +62,6 @@ void FarmDriver::unload(JobEntry& entry) {
 void FarmDriver::set_after(const EntryPtr& entry, std::vector<std::string> after) {
   const bool held = !after.empty();
   core_.jobs.set_after(*entry, std::move(after));
-  core_.records.put(entry);
   if (!entry->unloaded) run(JobHeld{entry->stored.id, held});
   core_.publisher.job(*entry);
 }
@@ -75,21 +74,30 @@ void FarmDriver::forget_done_prerequisites(const EntryPtr& entry) {
   if (std::erase_if(left, done) == 0) return;
   if (left.empty()) core_.records.log(entry->stored.id, "the jobs for which it waited are done");
   set_after(entry, std::move(left));
+  core_.records.put(entry);
 }
 
 void FarmDriver::notify_jobs_after(const JobId& ended) {
-  std::vector<EntryPtr> waiting = core_.jobs.waiting_for(ended);
-  if (const auto frame = frame_of(ended)) {
-    const auto of_all = core_.jobs.waiting_for(frame->sequence);
-    waiting.insert(waiting.end(), of_all.begin(), of_all.end());
+  notify_waiting_for(ended);
+  const auto frame = frame_of(ended);
+  Sequence* sequence = frame ? core_.jobs.sequence(frame->sequence) : nullptr;
+  if (!sequence) return;
+  const JobState state = sequence->for_others();
+  if (std::exchange(sequence->notified, state) != state) notify_waiting_for(frame->sequence);
+}
+
+void FarmDriver::notify_waiting_for(const JobId& id) {
+  const std::vector<EntryPtr> waiting = core_.jobs.waiting_for(id);
+  if (waiting.empty()) return;
+  if (prerequisite_state(core_.jobs, id) != JobState::done) {
+    for (const EntryPtr& entry : waiting) core_.publisher.job(*entry);
+    return;
   }
-  for (const EntryPtr& entry : waiting) {
-    const auto state = prerequisite_state(core_.jobs, ended);
-    if (state == JobState::done)
-      forget_done_prerequisites(entry);
-    else
-      core_.publisher.job(*entry);
-  }
+  const auto release = [&] {
+    for (const EntryPtr& entry : waiting) forget_done_prerequisites(entry);
+  };
+  // One transaction stores them all, unless one that is under way already does
+  core_.records.puts_together() ? release() : core_.records.put_together(release);
 }
 
 // Effects that concern leases
@@ -293,6 +301,7 @@ void FarmDriver::on(const JobStateChanged& e) {
   // coordinator.
   if (!entry || entry->removed || e.to == JobState::done) return;
   entry->stored.state = e.to;
+  core_.jobs.count_state(*entry);
   entry->stored.stopped.reset();
   if (e.to != JobState::paused) entry->stored.missing_blobs.clear();
   log_info(fmt::format("job={} state={}", e.job.value, to_string(e.to)), entry->stored.name);
@@ -368,6 +377,7 @@ void FarmDriver::on(const Checkpoint& e) {
   entry->assembly->checkpoint_taken(e.rounds);
   entry->stored.totals.doubt = error.verdict;
   entry->stored.totals.few_hits = error.few_hits;
+  entry->stored.totals.lit = error.lit;
   // If the curve has this checkpoint already, from before a restart, no point is added. The point may still
   // lack the comparison with the reference image; then the comparison is made now.
   if (!entry->points.empty() && entry->points.back().spp >= error.spp) {
@@ -400,6 +410,7 @@ void FarmDriver::end_curve(const EntryPtr& entry) {
   if (!entry->points.empty() && entry->points.back().spp >= error.spp) return;
   entry->stored.totals.doubt = error.verdict;
   entry->stored.totals.few_hits = error.few_hits;
+  entry->stored.totals.lit = error.lit;
   core_.records.add_point(
       entry, {entry->fold_seconds, entry->stored.totals.core_seconds, error.spp, figures_of(error)});
 }

@@ -233,6 +233,7 @@ void ImageWriter::write_final(const EntryPtr& entry, std::uint64_t number) {
   entry->finishing = 0;
   entry->trouble.clear();
   entry->stored.state = JobState::done;
+  core->jobs.count_state(*entry);
   entry->stored.totals.ended_unix = entry->ended_unix;
   entry->stored.totals.spp_done = facts.job.totals.spp_done;
   entry->stored.totals.units = facts.job.totals.units;

@@ -131,6 +131,41 @@ Result<std::vector<EntryPtr>> may_extend(const Farm& farm, const Sequence& seque
   return chosen;
 }
 
+// True if a unit of the job is leased or done.
+bool has_begun(const JobEntry& entry) {
+  return entry.stored.state == JobState::running || entry.clock_zero || !entry.leased.empty() ||
+         entry.stored.totals.began_unix > 0;
+}
+
+// Returns what each of the jobs is to wait for, or an error if that is not possible. `id`: the job, or the
+// sequence of which `jobs` are the frames; the frames that have ended are left out, and those that have begun
+// are if there is something to wait for.
+Result<std::vector<JobWait>> may_wait(const JobTable& table, const JobId& id,
+                                      const std::vector<EntryPtr>& jobs,
+                                      const std::vector<std::string>& after) {
+  const auto ended = [](const EntryPtr& job) { return is_terminal(job->stored.state) || job->finishing; };
+  const auto left_out = [&](const EntryPtr& job) {
+    return after.empty() ? is_terminal(job->stored.state) : ended(job) || has_begun(*job);
+  };
+  if (std::ranges::all_of(jobs, left_out))
+    return fail(Errc::failed_precondition,
+                std::ranges::all_of(jobs, ended)
+                    ? fmt::format("job {} has ended: it can no longer wait for others", id.value)
+                    : fmt::format("job {} has begun: it can no longer wait for others; pause it instead, and "
+                                  "resume it when they are done",
+                                  id.value));
+  if (auto ok = check_no_cycle(table, id, after); !ok) return tl::unexpected(ok.error());
+  std::vector<std::uint32_t> frames;
+  if (table.sequence(id))
+    for (const EntryPtr& job : jobs) frames.push_back(frame_of(job->stored.id)->frame);
+  auto lists = prerequisites_of(table, after, frames);
+  if (!lists) return tl::unexpected(lists.error());
+  std::vector<JobWait> waits;
+  for (std::size_t i = 0; i < jobs.size(); ++i)
+    if (!left_out(jobs[i])) waits.push_back({jobs[i], std::move((*lists)[i])});
+  return waits;
+}
+
 }  // namespace
 
 // Carries out a command on a job or on the frames of a sequence, and waits until coordinators that may take
@@ -195,6 +230,12 @@ Result<void> JobCommands::change_job(Core& core, const EntryPtr& entry, const Jo
   if (change.state)
     if (auto ok = may_become(*entry, *change.state, change.spp || change.target_error); !ok) return ok;
   if (auto ok = check_focus(change, {entry}); !ok) return ok;
+  std::vector<JobWait> waits;
+  if (change.after) {
+    auto possible = may_wait(core.jobs, entry->stored.id, {entry}, *change.after);
+    if (!possible) return tl::unexpected(possible.error());
+    waits = std::move(*possible);
+  }
   // The checks come first, so that a failed check leaves the job unchanged.
   if (change.spp)
     if (auto done = extend(core, *entry, *change.spp); !done) return done;
@@ -207,7 +248,7 @@ Result<void> JobCommands::change_job(Core& core, const EntryPtr& entry, const Jo
   if (change.focus)
     if (auto done = set_focus(core, {entry}, *change.focus); !done) return done;
   if (change.after)
-    if (auto done = set_after(core, entry->stored.id, {entry}, *change.after); !done) return done;
+    if (auto done = set_after(core, waits); !done) return done;
   return change.state ? become(core, {entry}, *change.state) : Result<void>{};
 }
 
@@ -266,7 +307,10 @@ Result<void> JobCommands::edit_all(Core& core, const Entries& jobs, Edit edit) c
   const auto put = store_.put_jobs(edited);
   core.records.note(put);
   if (!put) return put;
-  for (const EntryPtr& job : jobs) edit(job->stored);
+  for (const EntryPtr& job : jobs) {
+    edit(job->stored);
+    core.jobs.count_state(*job);
+  }
   return {};
 }
 
@@ -278,21 +322,15 @@ Result<void> JobCommands::set_priority(Core& core, const Entries& jobs, int prio
   return {};
 }
 
-Result<void> JobCommands::set_after(Core& core, const JobId& id, const Entries& jobs,
-                                    const std::vector<std::string>& after) const {
-  const auto ended = [](const EntryPtr& job) { return is_terminal(job->stored.state); };
-  if (std::ranges::all_of(jobs, ended))
-    return fail(Errc::failed_precondition,
-                fmt::format("job {} has ended: it can no longer wait for others", id.value));
-  if (auto ok = check_no_cycle(core.jobs, id, after); !ok) return ok;
-  std::vector<std::uint32_t> frames;
-  if (core.jobs.sequence(id))
-    for (const EntryPtr& job : jobs) frames.push_back(frame_of(job->stored.id)->frame);
-  auto lists = prerequisites_of(core.jobs, after, frames);
-  if (!lists) return tl::unexpected(lists.error());
+Result<void> JobCommands::set_after(Core& core, const std::vector<JobWait>& waits) const {
+  // Stored before the farm acts on it, as in become(): what could not be stored has not happened
+  std::vector<StoredJob> edited;
+  for (const JobWait& one : waits) edited.emplace_back(one.job->stored).spec.after = one.after;
+  const auto put = store_.put_jobs(edited);
+  core.records.note(put);
+  if (!put) return put;
   core.records.put_together([&] {
-    for (std::size_t i = 0; i < jobs.size(); ++i)
-      if (!ended(jobs[i])) core.driver.set_after(jobs[i], std::move((*lists)[i]));
+    for (const JobWait& one : waits) core.driver.set_after(one.job, one.after);
   });
   return {};
 }
@@ -357,6 +395,7 @@ Result<void> JobCommands::go_on(Core& core, JobEntry& entry, const Result<JobPla
   core.records.note(put);
   if (!put) return refuse(put.error());
   entry.stored = std::move(next);
+  core.jobs.count_state(entry);
   if (entry.finishing != 0 || state == JobState::done)
     entry.clock_zero = clock_.now() - from_seconds(entry.stored.totals.render_seconds);
   entry.finishing = 0;
@@ -412,6 +451,12 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
     extended = std::move(*chosen);
   }
   if (auto ok = check_focus(change, sound); !ok) return ok;
+  std::vector<JobWait> waits;
+  if (change.after) {
+    auto possible = may_wait(core.jobs, id, sequence.frames, *change.after);
+    if (!possible) return tl::unexpected(possible.error());
+    waits = std::move(*possible);
+  }
   if (change.state && open.empty() && !change.spp) {
     const JobState state = core.views.sequence(id, sequence, false).state;
     if (state != *change.state)
@@ -441,7 +486,7 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
   if (change.focus)
     if (auto done = set_focus(core, sound, *change.focus); !done) return done;
   if (change.after)
-    if (auto done = set_after(core, id, sequence.frames, *change.after); !done) return done;
+    if (auto done = set_after(core, waits); !done) return done;
   if (change.state) {
     open.insert(open.end(), extended.begin(), extended.end());
     if (auto done = become(core, open, *change.state); !done) return done;
@@ -470,6 +515,7 @@ Result<void> JobCommands::remove_sequence(Core& core, const JobId& id, const Seq
   for (const EntryPtr& frame : frames) drop(core, frame);
   core.publisher.job_removed(id, frames.front()->stored.owner);
   for (const EntryPtr& frame : frames) core.driver.notify_jobs_after(frame->stored.id);
+  core.driver.notify_jobs_after(id);
   return {};
 }
 

@@ -13,6 +13,12 @@
 
 namespace ls::coordinator {
 
+// What a job is to wait for (JobSpec::after)
+struct JobWait {
+  EntryPtr job;
+  std::vector<std::string> after;
+};
+
 class JobCommands {
  public:
   JobCommands(Guarded<Core>& core, JobStore& store, const JobFiles& files, const Restore& restore,
@@ -45,9 +51,7 @@ class JobCommands {
   template <class Edit>
   Result<void> edit_all(Core& core, const Entries& jobs, Edit edit) const;
   Result<void> set_priority(Core& core, const Entries& jobs, int priority) const;
-  // `jobs`: the job `id`, or all frames of the sequence `id`; those that have ended are not changed
-  Result<void> set_after(Core& core, const JobId& id, const Entries& jobs,
-                         const std::vector<std::string>& after) const;
+  Result<void> set_after(Core& core, const std::vector<JobWait>& waits) const;
   Result<void> set_focus(Core& core, const Entries& jobs, const std::optional<PixelRect>& focus) const;
   Result<void> extend(Core& core, JobEntry& entry, std::uint64_t spp) const;
   Result<void> set_target(Core& core, JobEntry& entry, double target_error) const;

@@ -89,6 +89,7 @@ EntryPtr Restore::add(Core& core, StoredJob job, const Result<std::vector<BlobRe
     set_aside(*entry, {Errc::internal, entry->stored.error});
   else if (auto taken = take_up(core, *entry, missing); !taken)
     set_aside(*entry, taken.error());
+  core.jobs.count_state(*entry);
   return entry;
 }
 

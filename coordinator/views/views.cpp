@@ -82,11 +82,15 @@ json to_value(const std::vector<AfterView>& after) {
 }
 
 std::string advice_of(const JobView& v) {
+  // In a sequence that is running, frames that wait do not hold up the others
+  const bool goes_on = v.state == JobState::running ? v.after.empty() || v.frames
+                                                    : v.state == JobState::queued && v.after.empty();
   return advice_on(*v.convergence_status, {.job = v.id.value,
                                            .relmse = v.error_now ? v.error_now->relmse : 0,
+                                           .lit = v.lit,
                                            .spp_done = v.spp_done,
-                                           .goes_on = !is_terminal(v.state),
-                                           .can_extend = !is_closed(v.state)});
+                                           .goes_on = goes_on,
+                                           .can_extend = v.state == JobState::done});
 }
 
 json to_value(const JobView& v) {

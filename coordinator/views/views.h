@@ -162,8 +162,9 @@ struct JobView {
   // Number of pixels in which too few samples found light for a reliable error estimate (error_estimate.h),
   // at the last checkpoint; nullopt: no checkpoint yet
   std::optional<std::uint64_t> few_hits;
-  std::optional<Trend> trend;                           // nullopt: too few checkpoints
-  std::optional<double> efficiency;                     // 1 / (relMSE * core seconds) at the last checkpoint
+  bool lit = true;                   // false: no sample had found light at the last checkpoint
+  std::optional<Trend> trend;        // nullopt: too few checkpoints
+  std::optional<double> efficiency;  // 1 / (relMSE * core seconds) at the last checkpoint
   std::optional<std::uint64_t> pixels_without_samples;  // nullopt: unknown
   std::optional<double> eta_seconds;  // predicted seconds until the job is done; nullopt: unknown
   // 95 % interval of eta_seconds; nullopt unless the target error is predicted to end the job

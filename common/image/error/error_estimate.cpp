@@ -175,8 +175,8 @@ bool has_outliers(const NoiseSums& s) {
   return flat > kPart * s.pixel_fourth && flat / 3 > kHeavy * s.flat_pairs;
 }
 
-void judge(ImageError& out, const NoiseSums& sums, double pixels, bool lit) {
-  if (!lit) {
+void judge(ImageError& out, const NoiseSums& sums, double pixels) {
+  if (!out.lit) {
     out.verdict =
         "don't trust yet: no sample has found any light: either the camera sees none, or it is too hard to "
         "find for so "
@@ -398,7 +398,8 @@ ImageError image_error(const TileError& sums) {
   out.few_hits = sums.few_hits;
   out.effective_pixels = effective_pixels(sums.relative);
   if (out.effective_pixels > 0) out.top_share = sums.relative.largest / sums.relative.squares;
-  judge(out, sums.relative, pixels, sums.lit > 0);
+  out.lit = sums.lit > 0;
+  judge(out, sums.relative, pixels);
   out.settled = settled(sums.plain);
   if (!out.trusted || (out.settled && !carried_by_few(sums.plain, pixels))) {
     const double plain = half_width(sums.plain, pixels, out.trusted);

@@ -208,6 +208,7 @@ struct ImageError {
   // single pixels have far more noise than their neighbours. The last two are no reason if the noise is that
   // of pixels with light in both halves, such as those at the edge of a lamp (NoiseSums::one_sided).
   bool trusted = false;
+  bool lit = false;     // some sample has found light
   std::string verdict;  // why the figures are not trusted, in words; empty when trusted
 };
 ImageError image_error(const TileError& sums);

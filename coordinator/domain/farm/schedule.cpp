@@ -165,7 +165,8 @@ bool Farm::State::awaits_return(const Job& job, const Worker& worker) const {
 Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
   if (!may_serve(job, worker, ticked) || !may_pin(job, worker)) return Takes::nothing;
   if (audit_for(job, worker)) return Takes::now;
-  if (awaits_return(job, worker)) return Takes::nothing;
+  // The results of a held job are checked; only new units wait
+  if (job.plan.held || awaits_return(job, worker)) return Takes::nothing;
   const auto code = room(job, worker) > 0 ? next_for(job, worker) : std::nullopt;
   if (!code) return Takes::nothing;
   return too_early(job, worker, *code, 0, 0) ? Takes::later : Takes::now;

@@ -64,6 +64,15 @@ FrameRange Sequence::range() const {
   return {frame_of(first.id)->frame, frame_of(last.id)->frame, 1};  // if both frames' records are damaged
 }
 
+JobState Sequence::for_others() const {
+  const auto in = [&](JobState state) { return in_state[static_cast<std::size_t>(state)]; };
+  if (in(JobState::failed) > 0) return JobState::failed;
+  if (in(JobState::cancelled) > 0) return JobState::cancelled;
+  if (in(JobState::done) == frames.size()) return JobState::done;
+  if (in(JobState::queued) == frames.size()) return JobState::queued;
+  return in(JobState::running) > 0 || in(JobState::done) > 0 ? JobState::running : JobState::paused;
+}
+
 ReportFacts facts_of(const JobEntry& entry, TimePoint now) {
   ReportFacts facts;
   facts.job = entry.stored;
@@ -234,11 +243,24 @@ void JobTable::add(const EntryPtr& entry) {
       frames.begin(), frames.end(), frame->frame,
       [](std::uint32_t number, const EntryPtr& e) { return number < frame_of(e->stored.id)->frame; });
   frames.insert(place, entry);
+  entry->counted = entry->stored.state;
+  ++found->second.in_state[static_cast<std::size_t>(entry->counted)];
   auto& warnings = found->second.warnings;
   for (const std::string& warning : entry->stored.warnings)
     if (warnings.size() < limits::kMaxWarnings &&
         std::find(warnings.begin(), warnings.end(), warning) == warnings.end())
       warnings.push_back(warning);
+}
+
+void JobTable::count_state(JobEntry& entry) {
+  const auto frame = frame_of(entry.stored.id);
+  Sequence* all = frame && entry.counted != entry.stored.state ? sequence(frame->sequence) : nullptr;
+  if (!all) return;
+  --all->in_state[static_cast<std::size_t>(entry.counted)];
+  entry.counted = entry.stored.state;
+  ++all->in_state[static_cast<std::size_t>(entry.counted)];
+  // If the sequence goes on, its next end is news again
+  if (const JobState state = all->for_others(); !is_terminal(state)) all->notified = state;
 }
 
 void JobTable::unlist(const JobId& id) {
@@ -254,7 +276,8 @@ std::optional<JobId> JobTable::remove(const EntryPtr& entry) {
     listed = frame->sequence;
     const auto found = sequences_.find(listed);
     if (found == sequences_.end()) return std::nullopt;
-    std::erase(found->second.frames, entry);
+    if (std::erase(found->second.frames, entry) > 0)
+      --found->second.in_state[static_cast<std::size_t>(entry->counted)];
     if (!found->second.frames.empty()) return std::nullopt;
   }
   unlist(listed);

@@ -2,6 +2,7 @@
 // (service/core.h).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -71,6 +72,7 @@ struct JobEntry {
   TimePoint last_snapshot{}, last_progress{};
   bool progress_due = false;
   JobState last_state = JobState::queued;  // the state in the last event about the job that was published
+  JobState counted = JobState::queued;     // the state with which Sequence::in_state counts it
   // Time at which the job's clock stood at 0: the time of the first ray, plus the length of all pauses that
   // have ended. nullopt: no result has arrived yet, or the job's rendering has ended.
   std::optional<TimePoint> clock_zero;
@@ -96,8 +98,15 @@ struct Sequence {
   std::vector<std::string> warnings;  // the warnings of all frames, each text once
   TimePoint last_progress{};
   bool progress_due = false;
+  // Number of frames in each state, kept by JobTable: a job that waits for a sequence may be one of
+  // thousands, and looking at all frames for each of them would take long.
+  std::array<std::size_t, static_cast<std::size_t>(JobState::cancelled) + 1> in_state{};
+  // The state (for_others()) of which the jobs that wait for the whole sequence know
+  std::optional<JobState> notified;
 
   FrameRange range() const;
+  // The state as others wait for it: `failed` or `cancelled` as soon as one frame is
+  JobState for_others() const;
 };
 
 // All jobs in memory. A frame of a sequence is a job of its own, named by frame_job(). A sequence is defined
@@ -132,6 +141,8 @@ class JobTable {
   Result<void> film_room_for(std::span<const StoredJob> more, std::uint64_t in_all) const;
   // Adds a job. If it is a frame, it joins its sequence, which is listed at the place of its first frame.
   void add(const EntryPtr& entry);
+  // Must be called after each change of the state in the job's record.
+  void count_state(JobEntry& entry);
   // Removes the id of a job or a sequence from order(). The job, or the sequence's frames, stay in the table
   // until remove().
   void unlist(const JobId& id);

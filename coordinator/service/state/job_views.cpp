@@ -176,6 +176,7 @@ JobView JobViews::job(const JobEntry& entry) const {
   v.reference_error = last_reference_error(entry.points);
   v.reference_same_seed = job.reference_same_seed;
   v.few_hits = job.totals.few_hits;
+  v.lit = job.totals.lit;
   if (v.few_hits) put_curve(v, entry.points, job.totals.doubt);
   if (entry.assembly) v.pixels_without_samples = entry.assembly->film().pixels_without_samples();
   if (entry.assembly)

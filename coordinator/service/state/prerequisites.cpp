@@ -22,17 +22,9 @@ std::vector<std::uint32_t> numbers_of(const Sequence& sequence) {
 }  // namespace
 
 std::optional<JobState> prerequisite_state(const JobTable& jobs, const JobId& id) {
-  const auto entries = jobs.job_or_frames(id);
-  if (!entries) return std::nullopt;
-  const auto any = [&](auto holds) { return std::ranges::any_of(*entries, holds); };
-  const auto in = [](JobState state) {
-    return [state](const EntryPtr& e) { return e->stored.state == state; };
-  };
-  if (any(in(JobState::failed))) return JobState::failed;
-  if (any(in(JobState::cancelled))) return JobState::cancelled;
-  if (std::ranges::all_of(*entries, in(JobState::done))) return JobState::done;
-  if (std::ranges::all_of(*entries, in(JobState::queued))) return JobState::queued;
-  return any(in(JobState::running)) || any(in(JobState::done)) ? JobState::running : JobState::paused;
+  if (const Sequence* sequence = jobs.sequence(id)) return sequence->for_others();
+  const EntryPtr entry = jobs.find(id);
+  return entry ? std::optional(entry->stored.state) : std::nullopt;
 }
 
 Result<std::vector<std::vector<std::string>>> prerequisites_of(const JobTable& jobs,
@@ -52,7 +44,8 @@ Result<std::vector<std::vector<std::string>>> prerequisites_of(const JobTable& j
     const bool paired = sequence && !frames.empty() && std::ranges::equal(numbers_of(*sequence), frames);
     for (std::size_t i = 0; i < lists.size(); ++i) {
       const JobId one = paired ? frame_job(id, frames[i]) : id;
-      if ((paired ? prerequisite_state(jobs, one) : state) != JobState::done) lists[i].push_back(one.value);
+      if ((paired ? prerequisite_state(jobs, one) : state) == JobState::done) continue;
+      if (std::ranges::find(lists[i], one.value) == lists[i].end()) lists[i].push_back(one.value);
     }
   }
   return lists;

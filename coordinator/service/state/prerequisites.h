@@ -18,8 +18,8 @@ std::optional<JobState> prerequisite_state(const JobTable& jobs, const JobId& id
 
 // Returns what a new job, or one that is changed, has to wait for; prerequisites that are done are left out.
 // `frames`: the numbers of its frames, for each of which the result has a list; empty: a single image, with
-// one list. A frame waits for the frame of its number in sequences of the same frames, and for the whole of
-// others. Unknown jobs, and those that have failed or were cancelled, are errors.
+// one list. Each is named once. A frame waits for the frame of its number in sequences of the same frames,
+// and for the whole of others. Unknown jobs, and those that have failed or were cancelled, are errors.
 Result<std::vector<std::vector<std::string>>> prerequisites_of(const JobTable& jobs,
                                                                std::span<const std::string> after,
                                                                std::span<const std::uint32_t> frames);

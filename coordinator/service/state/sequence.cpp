@@ -30,17 +30,17 @@ std::optional<ErrorFigures> error_of(std::span<const JobView> frames) {
   return ErrorFigures{std::sqrt(square), relmse, relmse - std::sqrt(below), relmse + std::sqrt(above)};
 }
 
-// Returns the worst convergence status of the frames. A mean would hide a single frame that cannot be
+// Sets the convergence status to the worst one of the frames. A mean would hide a single frame that cannot be
 // trusted.
-std::optional<ConvergenceStatus> worst_of(std::span<const JobView> frames) {
-  std::optional<ConvergenceStatus> worst;
+void put_worst(JobView& v, std::span<const JobView> frames) {
+  std::optional<ConvergenceStatus>& worst = v.convergence_status;
   for (const JobView& f : frames) {
     if (!f.convergence_status || (worst && (!worst->trusted || f.convergence_status->trusted))) continue;
     worst = f.convergence_status;
+    v.lit = f.lit;
     if (const auto id = frame_of(f.id); id && !worst->trusted)
       worst->words = fmt::format("frame {}: {}", id->frame, worst->words);
   }
-  return worst;
 }
 
 FramesView count(std::span<const JobView> frames, const FrameRange& range) {
@@ -63,16 +63,16 @@ FramesView count(std::span<const JobView> frames, const FrameRange& range) {
   return v;
 }
 
-// Returns the error of the first failed frame. If no frame failed, returns why the first frame that has not
-// ended waits; empty if it does not wait.
+// Returns the error of the first failed frame. If no frame failed, returns the error of the first
+// frame that has not ended and has one; empty if none has.
 std::string trouble_of(std::span<const JobView> frames) {
   const JobView* found = nullptr;
   for (const JobView& f : frames)
     if (!found && f.state == JobState::failed && !f.error.empty()) found = &f;
-  const auto waits = [](const JobView& f) { return !is_terminal(f.state); };
+  const auto in_trouble = [](const JobView& f) { return !is_terminal(f.state) && !f.error.empty(); };
   if (!found) {
-    const auto first = std::find_if(frames.begin(), frames.end(), waits);
-    if (first != frames.end() && !first->error.empty()) found = &*first;
+    const auto first = std::find_if(frames.begin(), frames.end(), in_trouble);
+    if (first != frames.end()) found = &*first;
   }
   if (!found) return "";
   const auto id = frame_of(found->id);
@@ -198,7 +198,7 @@ JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frame
   v.target_layer = first.target_layer;
   v.spp_asked = first.spp_asked;
   v.error_now = error_of(frames);
-  v.convergence_status = worst_of(frames);
+  put_worst(v, frames);
   for (const JobView& f : frames)
     if (f.few_hits) v.few_hits = v.few_hits.value_or(0) + *f.few_hits;
   v.error = trouble_of(frames);

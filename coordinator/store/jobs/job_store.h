@@ -60,6 +60,7 @@ struct JobTotals {
   // Number of pixels in which too few samples had found light for a reliable error estimate at the last
   // checkpoint (ImageError::few_hits); nullopt: there was no checkpoint yet
   std::optional<std::uint64_t> few_hits;
+  bool lit = true;  // false: no sample had found light at the last checkpoint (ImageError::lit)
   bool operator==(const JobTotals&) const = default;
 };
 

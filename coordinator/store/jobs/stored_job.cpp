@@ -50,6 +50,7 @@ constexpr std::pair<const char*, std::uint64_t JobTotals::*> kCounts[] = {
 json to_value(const JobTotals& t) {
   json j{{"health", json::parse(canonical_json(t.health))},
          {"doubt", t.doubt},
+         {"lit", t.lit},
          {"few_hits", t.few_hits ? json(*t.few_hits) : json()}};
   for (const auto& [name, member] : kReals) j[name] = finite(t.*member);
   for (const auto& [name, member] : kCounts) j[name] = t.*member;
@@ -76,6 +77,7 @@ JobTotals totals_of(const json& j) {
   for (const TimePart& part : kTimeParts) t.time.*part.seconds = number_of(j.at("time").at(part.name));
   t.health = required(parse_health(j.at("health").dump()));
   t.doubt = j.at("doubt");
+  t.lit = j.value("lit", true);  // records of older versions have none
   if (const json& few = j.at("few_hits"); !few.is_null()) t.few_hits = count_of(few);
   return t;
 }

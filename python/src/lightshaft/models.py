@@ -136,7 +136,8 @@ class JobChange(TypedDict):
     smaller one from the first. Not together with `spp`."""
     after: NotRequired[list[str]]
     """The jobs that it waits for from now on, instead of those before; []: for none. A job that would wait
-    for itself, directly or by way of others, is refused with 400."""
+    for itself, directly or by way of others, is refused with 400. One that has begun is refused with 409:
+    pause it instead. Of a sequence, the frames that have begun go on, and the others wait."""
     focus: NotRequired[Union[list[int], None]]
     """[x0, y0, x1, y1] in pixels, x1 and y1 excluded: the tiles that these pixels lie in get the next
     samples before all others. null: all tiles are treated alike again. It changes the order of the work

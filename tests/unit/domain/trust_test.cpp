@@ -134,6 +134,22 @@ TEST(Audit, IsGoneOnWithAfterARestart) {
   EXPECT_EQ(rig.farm.audits().equal, 1u);
 }
 
+TEST(Audit, OfAHeldJobIsRenderedAndNothingElseOfIt) {
+  Rig rig(audited_farm(0));
+  rig.send(restored(kRight, {0, 0, std::nullopt}));
+  rig.send(JobHeld{{"j"}, true});
+  rig.join("a", 1);
+  rig.join("b", 1);
+
+  ASSERT_EQ(rig.held[{"b"}].size(), 1u);
+  EXPECT_EQ(rig.held[{"b"}].front().key(), (UnitKey{{"j"}, 0, 0}));
+  EXPECT_TRUE(rig.held[{"a"}].empty());
+
+  rig.send(JobHeld{{"j"}, false});
+  rig.render_all();
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
 TEST(Audit, SaysThatItsLeaseEndedWhenItsWorkerIsLost) {
   Rig rig(audited_farm(0));
   rig.send(restored(kRight, {0, 0, std::nullopt}));

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "common/image/frame/render_limits.h"
+
 namespace ls {
 namespace {
 
@@ -32,9 +34,19 @@ TEST(Advice, NamesNoCommandForAJobThatCannotGoOn) {
 
 TEST(Advice, TellsToLookForALightIfNoneWasFound) {
   EXPECT_EQ(
-      advice_on(kHeavy, {.job = "j-1", .relmse = 0, .spp_done = 64}),
+      advice_on(kHeavy, {.job = "j-1", .lit = false, .spp_done = 64}),
       "no light found yet: check that a light reaches what the camera sees; render on: lightshaft extend "
       "j-1 --spp 256");
+}
+
+TEST(Advice, DoesNotMissTheLightOfAnImageWhoseHalvesAreEqual) {
+  EXPECT_EQ(advice_on(kHeavy, {.job = "j-1", .relmse = 0, .spp_done = 16}),
+            "too few samples so far to tell the error; render on: lightshaft extend j-1 --spp 64");
+}
+
+TEST(Advice, NamesNoCommandAtTheLargestNumberOfSamples) {
+  EXPECT_EQ(advice_on(kHeavy, {.job = "j-1", .relmse = .1, .spp_done = static_cast<double>(kMaxSpp)}),
+            "still noisy: a few bright pixels carry the error");
 }
 
 TEST(Advice, TellsToCheckAReferenceThatDisagrees) {

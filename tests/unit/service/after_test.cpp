@@ -2,7 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <condition_variable>
+#include <map>
+#include <mutex>
+
 #include "tests/unit/service/fake_farm.h"
+#include "tests/unit/service/moving_store.h"
 #include "tests/unit/store/temp_folder.h"
 
 namespace ls::coordinator {
@@ -39,6 +44,45 @@ std::string refusal(Coordinator& coordinator, JobSpec spec) {
   const auto taken = coordinator.submit(request);
   return taken ? "" : taken.error().error.message;
 }
+
+// Counts the events of each job.
+class Events {
+ public:
+  explicit Events(Coordinator& coordinator)
+      : coordinator_(coordinator),
+        last_(coordinator.last_event_id()),
+        listening_(coordinator.subscribe(last_, [this](const StreamEvent& e) {
+          const std::lock_guard lock(mutex_);
+          if (e.type == "job") ++of_[e.job];
+          last_ = e.id;
+          heard_.notify_all();
+        })) {}
+  // The number of events of the frames 1 to `frames` of this sequence that were published so far
+  int of_frames(const JobId& sequence, std::uint32_t frames) {
+    std::unique_lock lock(mutex_);
+    EXPECT_TRUE(heard_.wait_for(lock, std::chrono::minutes(1),
+                                [&, until = coordinator_.last_event_id()] { return last_ >= until; }));
+    int sum = 0;
+    for (std::uint32_t frame = 1; frame <= frames; ++frame) sum += of_[frame_job(sequence, frame).value];
+    return sum;
+  }
+
+ private:
+  Coordinator& coordinator_;
+  std::mutex mutex_;
+  std::condition_variable heard_;
+  std::map<std::string, int> of_;
+  std::uint64_t last_;  // id of the latest event heard
+  std::shared_ptr<void> listening_;
+};
+
+// A store that takes no records while `full` is set.
+struct FullStore final : MovingStore {
+  Result<void> put_jobs(std::span<const StoredJob> jobs) override {
+    return full ? fail(Errc::unavailable, "the disk is full") : MovingStore::put_jobs(jobs);
+  }
+  std::atomic<bool> full{false};
+};
 
 TEST(After, AJobBeginsWhenTheOneBeforeItIsDone) {
   TempFolder dir;
@@ -165,6 +209,110 @@ TEST(After, ARestartKeepsTheWaitAndNoticesWhatWasDoneBeforeIt) {
                 coordinator->job(second)->state == JobState::done);
     return coordinator->job(third)->state == JobState::done;
   }));
+}
+
+TEST(After, FramesThatWaitForAWholeSequenceHearOnceOfEachOfItsEnds) {
+  auto coordinator = open_at({});
+  const JobId first = submit(*coordinator, frames("1-6"));
+  const JobId second = submit(*coordinator, after({first}, "1-5"));
+  Events events(*coordinator);
+
+  ASSERT_TRUE(coordinator->remove(first));
+  EXPECT_EQ(events.of_frames(second, 5), 5);
+  EXPECT_THAT(coordinator->job(second)->waits_for, HasSubstr("was cancelled"));
+
+  ASSERT_TRUE(coordinator->remove(first));
+  EXPECT_EQ(events.of_frames(second, 5), 10);
+  EXPECT_THAT(coordinator->job(second)->waits_for, HasSubstr("is not here any more"));
+}
+
+TEST(After, FramesThatWaitForAWholeSequenceHearNothingOfItsSingleFrames) {
+  auto coordinator = open_at({});
+  const JobId first = submit(*coordinator, frames("1-6"));
+  const JobId second = submit(*coordinator, after({first}, "1-5"));
+  Events events(*coordinator);
+  FakeFarm farm(*coordinator, 1);
+  farm.tamper = [&](UnitResult r) {
+    return r.unit.job == frame_job(first, 6) ? std::vector<UnitResult>() : std::vector{std::move(r)};
+  };
+
+  ASSERT_TRUE(farm.run([&] { return coordinator->job(first)->frames->done == 5; }));
+  EXPECT_EQ(events.of_frames(second, 5), 0);
+}
+
+TEST(After, ASequenceThatIsExtendedAndDoneAgainEndsTheWaitOfThoseThatCameSince) {
+  auto coordinator = open_at({});
+  const JobId first = submit(*coordinator, frames("1-2"));
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.run([&] { return coordinator->job(first)->state == JobState::done; }));
+  ASSERT_TRUE(extend(*coordinator, first, 64));
+  const JobId second = submit(*coordinator, after({first}));
+  EXPECT_EQ(waits(*coordinator, second), std::vector{first.value});
+
+  ASSERT_TRUE(farm.run([&] { return coordinator->job(second)->state == JobState::done; }));
+}
+
+TEST(After, AJobThatIsNamedTwiceIsWaitedForOnce) {
+  auto coordinator = open_at({});
+  const JobId first = submit(*coordinator);
+
+  EXPECT_EQ(waits(*coordinator, submit(*coordinator, after({first, first}))), std::vector{first.value});
+}
+
+TEST(After, AJobThatHasBegunIsNotHeldAnyMore) {
+  auto coordinator = open_at({});
+  const JobId begun = submit(*coordinator), shot = submit(*coordinator, frames("1-2"));
+  const JobId other = submit(*coordinator);
+  FakeFarm farm(*coordinator, 1);
+  farm.tamper = [&](UnitResult r) {
+    return farm.results_sent == 0 ? std::vector{std::move(r)} : std::vector<UnitResult>();
+  };
+  ASSERT_TRUE(farm.run([&] { return coordinator->job(begun)->units_done > 0; }));
+
+  const auto refused = set_after(*coordinator, begun, {other});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message,
+            "job " + begun.value +
+                " has begun: it can no longer wait for others; pause it instead, and resume it when they are "
+                "done");
+  EXPECT_TRUE(set_after(*coordinator, begun, {}));
+  ASSERT_TRUE(pause(*coordinator, begun));
+  EXPECT_FALSE(set_after(*coordinator, begun, {other}));
+
+  ASSERT_TRUE(pause(*coordinator, frame_job(shot, 2)));
+  FakeFarm more(*coordinator, 1);
+  ASSERT_TRUE(more.run([&] { return coordinator->job(frame_job(shot, 1))->state == JobState::running; }));
+  ASSERT_TRUE(set_after(*coordinator, shot, {other}));
+  EXPECT_EQ(waits(*coordinator, frame_job(shot, 1)), std::vector<std::string>());
+  EXPECT_EQ(waits(*coordinator, frame_job(shot, 2)), std::vector{other.value});
+}
+
+TEST(After, ARefusedWaitLeavesTheOtherPartsOfTheChangeUndone) {
+  auto coordinator = open_at({});
+  for (const JobId& job : {submit(*coordinator), submit(*coordinator, frames("1-2"))}) {
+    JobChange change{.priority = 5, .spp = 64};
+    change.after = {job.value};
+    const std::uint64_t before = coordinator->job(job)->spp;
+
+    EXPECT_FALSE(coordinator->change(job, change));
+
+    EXPECT_EQ(coordinator->job(job)->priority, 0);
+    EXPECT_EQ(coordinator->job(job)->spp, before);
+  }
+}
+
+TEST(After, AWaitThatCannotBeStoredIsRefusedAndHasNoEffect) {
+  const auto store = std::make_shared<FullStore>();
+  const auto coordinator = std::move(*Coordinator::open({.jobs = store}));
+  const JobId first = submit(*coordinator), second = submit(*coordinator, after({first}));
+  store->full = true;
+
+  EXPECT_FALSE(set_after(*coordinator, second, {}));
+
+  EXPECT_EQ(waits(*coordinator, second), std::vector{first.value});
+  store->full = false;
+  EXPECT_TRUE(set_after(*coordinator, second, {}));
+  EXPECT_EQ(waits(*coordinator, second), std::vector<std::string>());
 }
 
 TEST(After, AJobThatIsSubmittedAgainWaitsForNobody) {

@@ -168,5 +168,11 @@ TEST(SequenceView, NamesTheFrameThatFailedBeforeOneThatWaits) {
   EXPECT_EQ(whole(frames).error, "frame 3: unit 3 crashed");
 }
 
+TEST(SequenceView, NamesTheFirstFrameThatHasAnErrorEvenIfAnotherOneBeforeItIsOpen) {
+  auto frames = with({JobState::running, JobState::queued, JobState::queued});
+  frames[1].error = "job j-0, for which it waits, failed";
+  EXPECT_EQ(whole(frames).error, "frame 2: job j-0, for which it waits, failed");
+}
+
 }  // namespace
 }  // namespace ls::coordinator

@@ -32,6 +32,7 @@ inline StoredJob sample_job(std::string id) {
   job.fake = true;
   job.missing_blobs = {sha256("gone")};
   job.totals.core_seconds = 12.125;
+  job.totals.lit = false;
   job.totals.health.add(HealthCause::infinite, 3, {4, 5, 6});
   return job;
 }
