@@ -1,7 +1,9 @@
 """`lightshaft up` and `lightshaft join`: a farm that one command starts, and that ends with it."""
 
 import base64
+import hashlib
 import http.client
+import http.server
 import json
 import os
 import pathlib
@@ -10,6 +12,7 @@ import signal
 import socket
 import ssl
 import subprocess
+import threading
 import urllib.parse
 import urllib.request
 
@@ -269,6 +272,67 @@ def test_a_wrong_code_is_refused_before_the_token_is_shown(tmp_path, leaves_noth
     up.interrupt()
     up.ends()
     assert "no farm answers at 127.0.0.1" in failure("join", "127.0.0.1", "--data", tmp_path / "other", "--code", code)
+
+
+def openssl(*words):
+    subprocess.run(["openssl", *map(str, words)], check=True, capture_output=True)
+
+
+def authority(folder, padded):
+    """A certificate that signs others, whose base64 ends with padding if asked: then lenient readers stop at its end."""
+    for length in range(1, 4):
+        openssl("req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-subj", "/CN=" + length * "a", "-days", 2,
+                "-keyout", folder / "ca.key", "-out", folder / "ca.pem")  # fmt: skip
+        if ("=" in (folder / "ca.pem").read_text()) == padded:
+            return (folder / "ca.pem").read_text()
+    raise AssertionError("no name gives such a length")
+
+
+class ManInTheMiddle(http.server.ThreadingHTTPServer):
+    """Answers as a farm, with a certificate of its own authority, and shows that one behind the farm's."""
+
+    def __init__(self, folder, farms):
+        own = authority(folder, padded=False)
+        openssl("req", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-subj", "/CN=x", "-keyout", folder / "key.pem", "-out", folder / "asked.pem")
+        (folder / "names").write_text("subjectAltName=IP:127.0.0.1")
+        openssl("x509", "-req", "-in", folder / "asked.pem", "-CA", folder / "ca.pem", "-CAkey", folder / "ca.key", "-set_serial", 7, "-days", 2,
+                "-extfile", folder / "names", "-out", folder / "cert.pem")  # fmt: skip
+        self.tokens = tokens = []
+
+        class Answer(http.server.BaseHTTPRequestHandler):
+            def do_GET(self):
+                tokens.extend(self.headers.get_all("Authorization", []))
+                body = (farms + own).encode() if self.path == "/authority" else b'{"port": 1, "certificate": "", "key": ""}'
+                self.send_response(200)
+                self.send_header("Content-Length", str(len(body)))
+                self.end_headers()
+                self.wfile.write(body)
+
+            def log_message(self, *words):
+                pass
+
+        super().__init__(("127.0.0.1", 0), Answer)
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.load_cert_chain(folder / "cert.pem", folder / "key.pem")
+        self.socket = context.wrap_socket(self.socket, server_side=True)
+        threading.Thread(target=self.serve_forever, daemon=True).start()
+
+    def handle_error(self, *words):
+        pass  # a client that does not trust it goes away
+
+
+def test_who_shows_the_farms_authority_and_its_own_behind_it_gets_no_token(tmp_path):
+    (tmp_path / "middle").mkdir()
+    farms = authority(tmp_path, padded=True)
+    with ManInTheMiddle(tmp_path / "middle", farms) as middle:
+        digest = hashlib.sha256(ssl.PEM_cert_to_DER_cert(farms)).digest()
+        code = base64.urlsafe_b64encode(middle.server_port.to_bytes(2, "big") + digest + bytes(32)).decode().rstrip("=")
+
+        said = failure("join", "127.0.0.1", "--data", tmp_path / "other", "--code", code)
+
+        middle.shutdown()
+    assert middle.tokens == []
+    assert "certificate does not fit" in said
 
 
 def test_the_doctor_says_where_python_is_missing(tmp_path):

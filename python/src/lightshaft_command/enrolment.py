@@ -47,8 +47,9 @@ class Code:
         return Code(int.from_bytes(raw[:2], "big"), raw[2 : 2 + DIGEST], raw[2 + DIGEST :].hex())
 
 
-def digest_of(certificate: str) -> bytes:
-    return hashlib.sha256(ssl.PEM_cert_to_DER_cert(certificate)).digest()
+def digest_of(certificate: bytes) -> bytes:
+    """Of a certificate as DER: PEM may hold more than the one certificate that is looked at."""
+    return hashlib.sha256(certificate).digest()
 
 
 class Enrolment(http.server.ThreadingHTTPServer):
@@ -63,7 +64,7 @@ class Enrolment(http.server.ThreadingHTTPServer):
         threading.Thread(target=self.serve_forever, daemon=True).start()
 
     def code(self) -> Code:
-        return Code(self.server_port, digest_of((self.tls / "ca.pem").read_text()), self.token)
+        return Code(self.server_port, digest_of(ssl.PEM_cert_to_DER_cert((self.tls / "ca.pem").read_text())), self.token)
 
     def process_request_thread(self, request, client_address) -> None:  # type: ignore[no-untyped-def]
         """In a thread: a machine that says nothing holds up nobody else."""
@@ -139,12 +140,14 @@ def join(host: str, code: Code) -> Joined:
     stranger = ssl.create_default_context()
     stranger.check_hostname, stranger.verify_mode = False, ssl.CERT_NONE
     try:
-        authority = _ask(host, code, "/authority", stranger, {}).decode()
-        same = hmac.compare_digest(digest_of(authority), code.authority)
+        certificate = ssl.PEM_cert_to_DER_cert(_ask(host, code, "/authority", stranger, {}).decode())
+        same = hmac.compare_digest(digest_of(certificate), code.authority)
     except ValueError:
         same = False
     if not same:
         raise Problem(f"the farm at {host} is not the one that printed this code: its certificate is another")
+    # Nothing but what was compared is trusted: the answer may go on with the authority of whoever sent it.
+    authority = ssl.DER_cert_to_PEM_cert(certificate)
     known = ssl.create_default_context(cadata=authority)
     answer = json.loads(_ask(host, code, "/worker", known, {"Authorization": f"Bearer {code.token}"}))
     shown = f"[{host}]" if ":" in host else host

@@ -6,6 +6,7 @@ import json
 import os
 import pathlib
 import socket
+import ssl
 import time
 
 from lightshaft_command import browser, enrolment
@@ -104,7 +105,7 @@ def invite(data: pathlib.Path, names: list[str], ports: dict[str, int]) -> None:
     port = free_port("0.0.0.0", JOINING, None)
     answering = enrolment.Enrolment(port, home / "tls", (home / "join-token").read_text().strip(), ports["grpc"])
     say(f"add a machine:    lightshaft join {names[0]} --code {answering.code()}")
-    fingerprint = enrolment.digest_of((home / "tls" / "server.pem").read_text()).hex(":").upper()
+    fingerprint = enrolment.digest_of(ssl.PEM_cert_to_DER_cert((home / "tls" / "server.pem").read_text())).hex(":").upper()
     say(f"                  ports {ports['http']} (dashboard), {ports['grpc']} and {answering.server_port} (workers) must pass this machine's firewall")
     say(f"                  a browser warns once of the farm's own certificate; its SHA-256: {fingerprint}")
 
