@@ -44,10 +44,10 @@ def processes_that_name(folder):
 class Command:
     """A `lightshaft up` or `join` at work."""
 
-    def __init__(self, program, *words, output, environment=None):
+    def __init__(self, program, *words, output, environment=None, folder=None):
         self.output = output
         with output.open("wb") as out:
-            self.process = subprocess.Popen([program, *map(str, words)], stdin=subprocess.DEVNULL, stdout=out, stderr=out,
+            self.process = subprocess.Popen([program, *map(str, words)], stdin=subprocess.DEVNULL, stdout=out, stderr=out, cwd=folder,
                                             env={**os.environ, **(environment or {})}, start_new_session=True)  # fmt: skip
 
     def text(self):
@@ -77,7 +77,7 @@ class Up(Command):
             scene = folder / "scene.xml"
             scene.write_text(SCENE)
         super().__init__(program or bin_dir() / "lightshaft", "up", "--data", self.data, "--threads", 1, "--first-scene", scene, *words,
-                         *([] if browser else ["--no-browser"]), output=folder / "up.txt",
+                         *([] if browser else ["--no-browser"]), output=folder / "up.txt", folder=folder,
                          environment={"BROWSER": f"{browser} %s", "DISPLAY": ":0"} if browser else None)  # fmt: skip
         self.url, self.token = self.said(r"dashboard: *(\S+)/#token=(\w+)").groups()
 
@@ -192,12 +192,17 @@ def test_a_second_interrupt_ends_what_does_not_end(tmp_path, leaves_nothing):
     assert processes_that_name(tmp_path) == []
 
 
-def test_a_browser_is_led_to_the_dashboard_once_and_its_arguments_hold_no_token(tmp_path, leaves_nothing):
-    browser, seen = tmp_path / "browser", tmp_path / "seen"
+def opened(folder):
+    """A farm whose browser is a script, and the address that this was started with."""
+    browser, seen = folder / "browser", folder / "seen"
     browser.write_text(f'#!/bin/sh\necho "$1" > {seen}.unfinished; mv {seen}.unfinished {seen}\n')
     browser.chmod(0o755)
-    up = Up(tmp_path, browser=browser)
-    address = urllib.parse.urlsplit(wait_until(lambda: seen.exists() and seen.read_text().strip(), "the browser is started"))
+    up = Up(folder, browser=browser)
+    return up, urllib.parse.urlsplit(wait_until(lambda: seen.exists() and seen.read_text().strip(), "the browser is started"))
+
+
+def test_a_browser_is_led_to_the_dashboard_once_and_its_arguments_hold_no_token(tmp_path, leaves_nothing):
+    up, address = opened(tmp_path)
 
     answers = []
     for _ in range(2):
@@ -211,6 +216,35 @@ def test_a_browser_is_led_to_the_dashboard_once_and_its_arguments_hold_no_token(
 
     assert up.token not in address.geturl()
     assert answers[0] == (302, f"{up.url}/#token={up.token}") and answers[1] in ((404, None), "closed")
+    up.interrupt()
+    up.ends()
+
+
+def test_no_python_file_of_the_current_folder_is_run(tmp_path, leaves_nothing):
+    for name in ("webbrowser", "subprocess", "argparse", "http"):
+        (tmp_path / f"{name}.py").write_text(f"import pathlib\npathlib.Path({str(tmp_path / 'run')!r}).touch()\nraise SystemExit(1)\n")
+    (tmp_path / "browser").write_text(f'#!/bin/sh\n: > {tmp_path / "started"}\n')
+    (tmp_path / "browser").chmod(0o755)
+
+    up = Up(tmp_path, browser=tmp_path / "browser")
+
+    wait_until(lambda: (tmp_path / "started").exists() or (tmp_path / "run").exists(), "something is started")
+    assert not (tmp_path / "run").exists()
+    up.interrupt()
+    up.ends()
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can ask as another user")
+def test_only_the_user_whose_browser_it_is_is_led_to_the_dashboard(tmp_path, leaves_nothing):
+    up, address = opened(tmp_path)
+    ask = f"import http.client as c; a = c.HTTPConnection('{address.hostname}', {address.port}); a.request('GET', '{address.path}'); print(a.getresponse().headers)"
+
+    other = subprocess.run(["/usr/bin/python3", "-c", ask], user=65534, group=65534, extra_groups=[], capture_output=True, text=True, timeout=PATIENCE)
+    with socket.create_connection((address.hostname, address.port), timeout=PATIENCE):  # and one that says nothing
+        own = subprocess.run(["/usr/bin/python3", "-c", ask], capture_output=True, text=True, timeout=PATIENCE)
+
+    assert up.token not in other.stdout and ("RemoteDisconnected" in other.stderr or "ConnectionReset" in other.stderr)
+    assert up.token in own.stdout
     up.interrupt()
     up.ends()
 
