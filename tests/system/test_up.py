@@ -81,12 +81,15 @@ class Up(Command):
                          environment={"BROWSER": f"{browser} %s", "DISPLAY": ":0"} if browser else None)  # fmt: skip
         self.url, self.token = self.said(r"dashboard: *(\S+)/#token=(\w+)").groups()
 
-    def ask(self, path):
+    def ask(self, path, change=None):
         request = urllib.request.Request(self.url + path, headers={"Authorization": f"Bearer {self.token}"})
+        if change:
+            request.method, request.data = "PATCH", json.dumps(change).encode()
+            request.add_header("Content-Type", "application/json")
         authority = self.data / "coordinator" / "tls" / "ca.pem"
         trust = ssl.create_default_context(cafile=authority) if self.url.startswith("https") else None
         with urllib.request.urlopen(request, context=trust, timeout=PATIENCE) as answer:
-            return json.loads(answer.read())
+            return json.loads(answer.read() or "null")
 
     def connected(self):
         try:
@@ -168,6 +171,28 @@ def test_killed_programs_are_started_again_where_they_were(tmp_path, leaves_noth
     up.interrupt()
     up.ends()
     assert processes_that_name(tmp_path) == []
+
+
+def test_drained_workers_stay_away(tmp_path, leaves_nothing):
+    up = Up(tmp_path, "--lan")
+    own = wait_until(up.connected, "the worker has joined")[0]
+    other = join(tmp_path, up.code())
+    wait_until(lambda: len(up.connected()) == 2, "a second worker has joined")
+
+    for worker in up.connected():
+        up.ask(f"/api/v1/workers/{worker['id']}", {"state": "draining"})
+
+    up.said("the worker was drained and has left")
+    other.said("the worker was drained by the farm")
+    other.ends()
+    up.interrupt()
+    up.ends()
+    assert "is started again" not in up.text() + other.text()
+
+    again = Up(tmp_path, "--lan")
+    assert wait_until(again.connected, "a new start has a worker")[0]["id"] != own["id"]
+    again.interrupt()
+    again.ends()
 
 
 def test_nothing_is_left_when_it_is_killed_itself(tmp_path, leaves_nothing):

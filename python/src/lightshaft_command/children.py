@@ -1,4 +1,4 @@
-"""Programs that run as long as this one does: started again when they end by themselves, and ended with it."""
+"""Programs that run as long as this one does: started again when they fail, and ended with it."""
 
 import contextlib
 import ctypes
@@ -42,10 +42,11 @@ def how_it_ended(code: int) -> str:
 
 
 class Child:
-    """A program that is started again when it ends by itself."""
+    """A program that is started again when it ends by itself; with `leaves` (what that means) not after it has ended well."""
 
-    def __init__(self, name: str, args: list[str], log: pathlib.Path, environment: dict[str, str] | None = None):
-        self.name, self.args, self.log, self.environment = name, args, log, environment
+    def __init__(self, name: str, args: list[str], log: pathlib.Path, environment: dict[str, str] | None = None, leaves: str = ""):
+        self.name, self.args, self.log, self.environment, self.leaves = name, args, log, environment, leaves
+        self.has_left = False
         self._quick_ends = 0
         self._next_start: float | None = None
         self.log.write_bytes(b"")
@@ -62,12 +63,18 @@ class Child:
 
     def look(self) -> None:
         """Starts it again if it has ended. Problem: it ends again and again."""
+        if self.has_left:
+            return
         if self._next_start is not None:
             if time.monotonic() >= self._next_start:
                 self.start()
             return
         code = self.process.poll()
         if code is None:
+            return
+        if code == 0 and self.leaves:
+            self.has_left = True
+            say(f"the {self.name} {self.leaves}")
             return
         quick = time.monotonic() - self._started < QUICK_END
         self._quick_ends = self._quick_ends + 1 if quick else 0
@@ -92,8 +99,8 @@ class Children:
         return woken is not None and woken.si_signo in ENDS
 
     def run(self, each_time: Callable[[], None]) -> None:
-        """Until the user asks for the end."""
-        while not self.wait(1.0):
+        """Until the user asks for the end, or all have left."""
+        while not all(child.has_left for child in self.kept) and not self.wait(1.0):
             for child in self.kept:
                 child.look()
             each_time()

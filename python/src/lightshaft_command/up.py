@@ -79,13 +79,13 @@ def farm_variables(args: argparse.Namespace, home: pathlib.Path, ports: dict[str
     return {**found, "LIGHTSHAFT_CA": str(home / "tls" / "ca.pem")} if args.lan else found
 
 
-def start_worker(children: Children, args: argparse.Namespace, data: pathlib.Path, coordinator: str, token: str, tls: pathlib.Path | None) -> None:
+def start_worker(children: Children, args: argparse.Namespace, data: pathlib.Path, coordinator: str, token: str, tls: pathlib.Path | None, leaves: str) -> None:
     words = [find("lightshaft-worker"), "--coordinator", coordinator, "--cache", str(data / "cache")]
     if args.threads:
         words += ["--threads", str(args.threads)]
     if tls:
         words += ["--tls-ca", str(tls / "ca.pem"), "--tls-cert", str(tls / "worker.pem"), "--tls-key", str(tls / "worker.key")]
-    children.kept.append(Child("worker", words, data / "worker.log", {**os.environ, "LIGHTSHAFT_JOIN_TOKEN": token}))
+    children.kept.append(Child("worker", words, data / "worker.log", {**os.environ, "LIGHTSHAFT_JOIN_TOKEN": token}, leaves))
 
 
 def show(args: argparse.Namespace, data: pathlib.Path, farm: dict[str, str]) -> str:
@@ -119,7 +119,8 @@ def run(args: argparse.Namespace) -> int:
             ports = start_coordinator(children, args, data, names)
             home = data / "coordinator"
             farm = farm_variables(args, home, ports)
-            start_worker(children, args, data, f"127.0.0.1:{ports['grpc']}", (home / "join-token").read_text().strip(), home / "tls" if args.lan else None)
+            start_worker(children, args, data, f"127.0.0.1:{ports['grpc']}", (home / "join-token").read_text().strip(), home / "tls" if args.lan else None,
+                         "was drained and has left; the farm goes on, and has a worker of its own again at the next `lightshaft up`")  # fmt: skip
             address = show(args, data, farm)
             claimed.tell(address)
             if args.lan:
