@@ -1,6 +1,7 @@
 """`lightshaft up` and `lightshaft join`: a farm that one command starts, and that ends with it."""
 
 import base64
+import contextlib
 import hashlib
 import http.client
 import http.server
@@ -8,16 +9,21 @@ import json
 import os
 import pathlib
 import re
+import select
 import signal
 import socket
 import ssl
 import subprocess
+import sys
 import threading
 import urllib.parse
 import urllib.request
 
 import pytest
-from local_farm import PATIENCE, bin_dir, wait_until
+from local_farm import PATIENCE, ROOT, bin_dir, wait_until
+
+sys.path.insert(0, str(ROOT / "python" / "src"))
+from lightshaft_command import enrolment  # noqa: E402
 
 SCENE = """<scene version="3.0.0">
   <integrator type="volpath"/>
@@ -392,6 +398,57 @@ def test_who_shows_the_farms_authority_and_its_own_behind_it_gets_no_token(tmp_p
         middle.shutdown()
     assert middle.tokens == []
     assert "certificate does not fit" in said
+
+
+def closed(call):
+    """Whether the other side has ended the call, which sends it one more byte."""
+    try:
+        call.send(b"x")
+        return call.recv(1) == b""
+    except ssl.SSLWantReadError:
+        return False
+    except OSError:
+        return True
+
+
+def test_strangers_who_hold_the_joining_port_do_not_keep_a_machine_away_for_ever(tmp_path, leaves_nothing):
+    up = Up(tmp_path, "--lan")
+    wait_until(up.connected, "the worker has joined")
+    raw = base64.urlsafe_b64decode(up.code() + "==")
+    trusting = ssl.create_default_context()
+    trusting.check_hostname, trusting.verify_mode = False, ssl.CERT_NONE
+    with contextlib.ExitStack() as open_calls:
+
+        def call():
+            stranger = socket.create_connection(("127.0.0.1", int.from_bytes(raw[:2], "big")), timeout=PATIENCE)
+            return open_calls.enter_context(trusting.wrap_socket(stranger))
+
+        calls = [call() for _ in range(enrolment.MOST_CALLS)]
+
+        with pytest.raises(OSError):  # sent away
+            call()
+        for stranger in calls:
+            stranger.settimeout(0)
+        drips = 0
+        while not any(map(closed, calls)):
+            # Each goes on and on with a byte, sooner than an answer's patience ends.
+            select.select(calls, [], [], enrolment.PATIENCE / 4)
+            drips += 1
+            assert drips < 30, "a call may go on as long as it sends something"
+        wait_until(lambda: join_once(tmp_path, up.code()), "a machine can join again")
+    up.interrupt()
+    up.ends()
+
+
+def join_once(folder, code):
+    """Whether a machine could join just now; it leaves again."""
+    other = join(folder, code)
+    wait_until(lambda: other.process.poll() is not None or "this machine renders for" in other.text(), "it joins or gives up")
+    if other.process.poll() is not None:
+        return False
+    other.interrupt()
+    other.ends()
+    return True
 
 
 def test_the_doctor_says_where_python_is_missing(tmp_path):

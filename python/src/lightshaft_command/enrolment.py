@@ -18,11 +18,13 @@ import pathlib
 import socket
 import ssl
 import threading
+import time
+from typing import Any
 
 from lightshaft_command.programs import Problem
 
 PATIENCE = 10.0  # seconds for one answer
-MOST_CALLS = 16  # answered at once
+MOST_CALLS = 16  # answered at once; others are sent away
 MOST_BYTES = 1 << 20
 DIGEST = 32  # bytes
 
@@ -52,6 +54,19 @@ def digest_of(certificate: bytes) -> bytes:
     return hashlib.sha256(certificate).digest()
 
 
+class _Hurried(ssl.SSLSocket):
+    """Hears a call until PATIENCE is over: who sends a byte now and then gets no more time than others."""
+
+    deadline = 0.0
+
+    def recv_into(self, buffer: Any, nbytes: int | None = None, flags: int = 0) -> int:
+        left = self.deadline - time.monotonic()
+        if left <= 0:
+            raise TimeoutError
+        self.settimeout(left)
+        return super().recv_into(buffer, nbytes, flags)
+
+
 class Enrolment(http.server.ThreadingHTTPServer):
     """Answers joining machines in threads of its own, until this program ends."""
 
@@ -66,20 +81,34 @@ class Enrolment(http.server.ThreadingHTTPServer):
     def code(self) -> Code:
         return Code(self.server_port, digest_of(ssl.PEM_cert_to_DER_cert((self.tls / "ca.pem").read_text())), self.token)
 
+    def process_request(self, request, client_address) -> None:  # type: ignore[no-untyped-def]
+        """Strangers can call as well, and each call that waited would hold an open file and a thread of this program."""
+        if not self._free.acquire(blocking=False):
+            self.shutdown_request(request)
+            return
+        try:
+            super().process_request(request, client_address)
+        except BaseException:  # there is no thread that gives it back
+            self._free.release()
+            raise
+
     def process_request_thread(self, request, client_address) -> None:  # type: ignore[no-untyped-def]
         """In a thread: a machine that says nothing holds up nobody else."""
-        with self._free:
-            try:
-                request.settimeout(PATIENCE)
-                context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-                # Read each time: the coordinator makes this certificate anew when it starts.
-                context.load_cert_chain(self.tls / "server.pem", self.tls / "server.key")
-                with context.wrap_socket(request, server_side=True) as secured:
-                    self.finish_request(secured, client_address)
-            except OSError:
-                pass  # of TLS, or of a machine that went away
-            finally:
-                self.shutdown_request(request)
+        try:
+            request.settimeout(PATIENCE)
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.sslsocket_class = _Hurried
+            # Read each time: the coordinator makes this certificate anew when it starts.
+            context.load_cert_chain(self.tls / "server.pem", self.tls / "server.key")
+            with context.wrap_socket(request, server_side=True) as secured:
+                assert isinstance(secured, _Hurried)
+                secured.deadline = time.monotonic() + PATIENCE
+                self.finish_request(secured, client_address)
+        except OSError:
+            pass  # of TLS, or of a machine that went away
+        finally:
+            self.shutdown_request(request)
+            self._free.release()
 
 
 class _Handler(http.server.BaseHTTPRequestHandler):
