@@ -77,14 +77,14 @@ class Command:
 
 
 class Up(Command):
-    def __init__(self, folder, *words, program=None, scene=None, browser=None):
+    def __init__(self, folder, *words, program=None, scene=None, browser=None, environment=None):
         self.data = folder / "state"
         if scene is None:
             scene = folder / "scene.xml"
             scene.write_text(SCENE)
         super().__init__(program or bin_dir() / "lightshaft", "up", "--data", self.data, "--threads", 1, "--first-scene", scene, *words,
                          *([] if browser else ["--no-browser"]), output=folder / "up.txt", folder=folder,
-                         environment={"BROWSER": f"{browser} %s", "DISPLAY": ":0"} if browser else None)  # fmt: skip
+                         environment={**({"BROWSER": f"{browser} %s", "DISPLAY": ":0"} if browser else {}), **(environment or {})})  # fmt: skip
         self.url, self.token = self.said(r"dashboard: *(\S+)/#token=(\w+)").groups()
 
     def ask(self, path, change=None):
@@ -247,6 +247,22 @@ def test_a_browser_is_led_to_the_dashboard_once_and_its_arguments_hold_no_token(
 
     assert up.token not in address.geturl()
     assert answers[0] == (302, f"{up.url}/#token={up.token}") and answers[1] in ((404, None), "closed")
+    up.interrupt()
+    up.ends()
+
+
+def test_no_proxy_sees_the_farms_token(tmp_path, leaves_nothing):
+    with socket.create_server(("127.0.0.1", 0)) as proxy:
+        address = f"http://127.0.0.1:{proxy.getsockname()[1]}"
+        up = Up(tmp_path, environment={"http_proxy": address, "no_proxy": "farm.example", "NO_PROXY": ""})
+
+        said = up.said("(?m)^(there is no )?first picture")
+
+        assert not said[1], up.text()
+        assert "no_proxy=farm.example,127.0.0.1" in up.said("export .*")[0]
+        proxy.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            proxy.accept()
     up.interrupt()
     up.ends()
 

@@ -5,6 +5,7 @@ import contextlib
 import json
 import os
 import pathlib
+import shlex
 import socket
 import ssl
 import time
@@ -16,6 +17,7 @@ from lightshaft_command.programs import Problem, find
 from lightshaft_command.state import claim
 
 HTTP, WORKERS, JOINING = 8080, 50051, 50052  # ports, if they are free
+PROXIES = ("http_proxy", "https_proxy", "all_proxy")
 PATIENCE = 60.0  # seconds for the coordinator to start
 
 
@@ -76,7 +78,15 @@ def wait_for_file(children: Children, child: Child, file: pathlib.Path) -> bool:
 def farm_variables(args: argparse.Namespace, home: pathlib.Path, ports: dict[str, int]) -> dict[str, str]:
     """By which the command `lightshaft` on this machine finds the farm."""
     found = {"LIGHTSHAFT_URL": f"{'https' if args.lan else 'http'}://127.0.0.1:{ports['http']}", "LIGHTSHAFT_TOKEN": (home / "token").read_text().strip()}
-    return {**found, "LIGHTSHAFT_CA": str(home / "tls" / "ca.pem")} if args.lan else found
+    if args.lan:
+        found["LIGHTSHAFT_CA"] = str(home / "tls" / "ca.pem")
+    # The token is not for a proxy, which could not reach this machine's own address either.
+    if any(os.environ.get(name) for proxy in PROXIES for name in (proxy, proxy.upper())):
+        exempt = os.environ.get("no_proxy") or os.environ.get("NO_PROXY") or ""
+        if exempt != "*":  # all hosts; the star counts only if it stands alone
+            exempt = ",".join(filter(None, [exempt, "127.0.0.1"]))
+        found.update(no_proxy=exempt, NO_PROXY=exempt)  # programs differ in which of the two they read
+    return found
 
 
 def start_worker(children: Children, args: argparse.Namespace, data: pathlib.Path, coordinator: str, token: str, tls: pathlib.Path | None, leaves: str) -> None:
@@ -94,8 +104,8 @@ def show(args: argparse.Namespace, data: pathlib.Path, farm: dict[str, str]) -> 
     address = f"{farm['LIGHTSHAFT_URL']}/#token={farm['LIGHTSHAFT_TOKEN']}"
     say(f"dashboard:        {address}")
     say(f"token:            {farm['LIGHTSHAFT_TOKEN']}   (admin; in {home / 'token'})")
-    authority = f" LIGHTSHAFT_CA={farm['LIGHTSHAFT_CA']}" if args.lan else ""
-    say(f"other terminals:  export LIGHTSHAFT_URL={farm['LIGHTSHAFT_URL']} LIGHTSHAFT_TOKEN=$(cat {home / 'token'}){authority}")
+    others = "".join(f" {name}={shlex.quote(farm[name])}" for name in ("LIGHTSHAFT_CA", "no_proxy", "NO_PROXY") if name in farm)
+    say(f"other terminals:  export LIGHTSHAFT_URL={farm['LIGHTSHAFT_URL']} LIGHTSHAFT_TOKEN=$(cat {home / 'token'}){others}")
     return address
 
 
