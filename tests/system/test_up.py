@@ -163,6 +163,29 @@ def test_a_farm_of_two_machines(tmp_path, leaves_nothing):
     check_a_farm_of_two_machines(tmp_path)
 
 
+def test_a_first_scene_with_warnings_is_rendered(tmp_path, leaves_nothing):
+    scene = tmp_path / "warned.xml"
+    scene.write_text(SCENE.replace("volpath", "bdpt"))
+
+    up = Up(tmp_path, scene=scene)
+
+    assert not up.said("(?m)^(there is no )?first picture")[1], up.text()
+    assert len(up.jobs()) == 1
+    up.interrupt()
+    up.ends()
+
+
+def test_a_first_scene_that_is_refused_is_shown_with_the_reason(tmp_path, leaves_nothing):
+    scene = tmp_path / "broken.xml"
+    scene.write_text("<scene")
+
+    up = Up(tmp_path, scene=scene)
+
+    up.said(r"(?m)^there is no first picture: .*\n.*broken\.xml")
+    up.interrupt()
+    up.ends()
+
+
 def test_killed_programs_are_started_again_where_they_were(tmp_path, leaves_nothing):
     up = Up(tmp_path)
     wait_until(up.connected, "the worker has joined")

@@ -31,9 +31,13 @@ def _begin() -> None:
     _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
-def start(args: list[str], output: "int | IO[bytes] | None" = None, environment: dict[str, str] | None = None) -> subprocess.Popen[bytes]:
-    """In a session of its own, so that Ctrl-C reaches only this program, which then ends the others in their order."""
-    return subprocess.Popen(args, stdin=subprocess.DEVNULL, stdout=output, stderr=None if output is None else subprocess.STDOUT,
+def start(args: list[str], output: "int | IO[bytes] | None" = None, environment: dict[str, str] | None = None,
+          errors: "IO[bytes] | None" = None) -> subprocess.Popen[bytes]:  # fmt: skip
+    """In a session of its own, so that Ctrl-C reaches only this program, which then ends the others in their order.
+
+    Errors go where the output goes, unless they have a file of their own.
+    """
+    return subprocess.Popen(args, stdin=subprocess.DEVNULL, stdout=output, stderr=errors or (None if output is None else subprocess.STDOUT),
                             env=environment, start_new_session=True, preexec_fn=_begin)  # fmt: skip
 
 
