@@ -233,6 +233,21 @@ def test_nothing_is_left_when_it_is_killed_itself(tmp_path, leaves_nothing):
     wait_until(lambda: processes_that_name(tmp_path) == [], "all its processes have ended")
 
 
+def test_nohup_keeps_it_when_the_terminal_closes(tmp_path, leaves_nothing):
+    kept = tmp_path / "kept"
+    kept.write_text(f'#!/bin/sh\nexec nohup {bin_dir() / "lightshaft"} "$@"\n')
+    kept.chmod(0o755)
+    up = Up(tmp_path, program=kept)
+    wait_until(up.connected, "the worker has joined")
+
+    up.process.send_signal(signal.SIGHUP)
+    os.kill(up.child("lightshaft-worker"), signal.SIGKILL)
+
+    up.said("the worker ended by signal 9 .SIGKILL. and is started again")
+    up.interrupt()
+    up.ends()
+
+
 def test_a_second_interrupt_ends_what_does_not_end(tmp_path, leaves_nothing):
     up = Up(tmp_path)
     wait_until(up.connected, "the worker has joined")

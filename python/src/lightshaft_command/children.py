@@ -12,7 +12,9 @@ from typing import IO
 
 from lightshaft_command.programs import Problem
 
-ENDS = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+# A signal that is ignored from the start, as nohup has it, would still be waited for. SIGINT is ignored in all programs that a
+# script starts in the background, and it is by this signal that scripts end them.
+ENDS = {s for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if s == signal.SIGINT or signal.getsignal(s) != signal.SIG_IGN}
 WAKES = ENDS | {signal.SIGCHLD}
 QUICK_END = 5.0  # seconds: a program that runs for less has not started well
 MOST_QUICK_ENDS = 5  # in a row; after these it is not started again
