@@ -233,6 +233,23 @@ def test_nothing_is_left_when_it_is_killed_itself(tmp_path, leaves_nothing):
     wait_until(lambda: processes_that_name(tmp_path) == [], "all its processes have ended")
 
 
+def test_what_cannot_be_written_on_a_full_disk_does_not_keep_it_from_starting(tmp_path, leaves_nothing):
+    home = tmp_path / "state" / "coordinator"
+    home.mkdir(parents=True)
+    (tmp_path / "state" / "in-use").symlink_to("/dev/full")
+    (home / "ports.json.new").mkdir()  # so that the coordinator cannot write ports.json
+    (tmp_path / "state" / "first").mkdir()
+    (tmp_path / "state" / "first" / "doctor.json").mkdir()
+
+    up = Up(tmp_path)
+
+    up.said("there is no first picture: .*doctor.json")
+    wait_until(up.connected, "the worker has joined")
+    assert not (home / "ports.json").exists()
+    up.interrupt()
+    up.ends()
+
+
 def test_nohup_keeps_it_when_the_terminal_closes(tmp_path, leaves_nothing):
     kept = tmp_path / "kept"
     kept.write_text(f'#!/bin/sh\nexec nohup {bin_dir() / "lightshaft"} "$@"\n')

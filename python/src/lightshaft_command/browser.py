@@ -2,37 +2,17 @@
 
 import http.server
 import os
-import pathlib
 import secrets
-import socket
 import subprocess
 import sys
 import threading
 import webbrowser
 
 from lightshaft_command.children import start
+from lightshaft_command.connections import user_of
 
 PATIENCE = 60.0  # seconds within which the browser must have asked
 SILENCE = 10.0  # seconds after which a connection that says nothing is closed
-ESTABLISHED = "01"  # of a connection that was closed the kernel no longer says whose it was
-
-
-def user_of(here: tuple[str, int], there: tuple[str, int]) -> int | None:
-    """The user on this machine whose end of a TCP connection `here` is."""
-
-    def shown(address: tuple[str, int]) -> str:
-        return f"{int.from_bytes(socket.inet_aton(address[0]), sys.byteorder):08X}:{address[1]:04X}"
-
-    mapped = f"{0:016X}{int.from_bytes(bytes([0, 0, 255, 255]), sys.byteorder):08X}"  # a socket of IPv6 that uses IPv4
-    for table, before in (("tcp", ""), ("tcp6", mapped)):
-        try:
-            rows = [line.split() for line in pathlib.Path("/proc/net", table).read_text().splitlines()[1:]]
-        except OSError:
-            continue
-        for row in rows:
-            if row[1:4] == [before + shown(here), before + shown(there), ESTABLISHED]:
-                return int(row[7])
-    return None
 
 
 class _Server(http.server.ThreadingHTTPServer):

@@ -39,7 +39,11 @@ class FirstPicture:
             say(f"there is no first picture: a step of it ended {how_it_ended(running.returncode)}" + (f"\n{why}" if why else ""))
             self._steps = iter(())
             (self.home / "job").unlink(missing_ok=True)  # the next start tries again
-        self.children.extra = next(self._steps, None)
+        try:
+            self.children.extra = next(self._steps, None)
+        except OSError as error:  # a full disk; the farm goes on, so that jobs can be removed
+            say(f"there is no first picture: {error.filename or self.home}: {error.strerror or error}")
+            self._steps = iter(())
 
     def steps(self) -> Iterator[subprocess.Popen[bytes]]:
         self.home.mkdir(exist_ok=True)

@@ -2,7 +2,7 @@
 
 import argparse
 import contextlib
-import json
+import http.client
 import os
 import pathlib
 import shlex
@@ -12,17 +12,18 @@ import time
 
 from lightshaft_command import browser, enrolment
 from lightshaft_command.children import Child, Children, say
+from lightshaft_command.connections import listens
 from lightshaft_command.first_picture import FirstPicture
 from lightshaft_command.programs import Problem, find
 from lightshaft_command.state import claim
 
 HTTP, WORKERS, JOINING = 8080, 50051, 50052  # ports, if they are free
 PROXIES = ("http_proxy", "https_proxy", "all_proxy")
-PATIENCE = 60.0  # seconds for the coordinator to start
+PATIENCE = 60.0  # seconds, after which it is said that the coordinator is still starting
 
 
 def free_port(host: str, wanted: int, given: int | None) -> int:
-    """The port to use: the given one, or the wanted one, or 0 for any if that is taken."""
+    """The port to use: the given one, or the wanted one, or any if that is taken."""
     port = wanted if given is None else given
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -31,8 +32,9 @@ def free_port(host: str, wanted: int, given: int | None) -> int:
         except OSError as error:
             if given is not None:
                 raise Problem(f"port {port} cannot be used ({error.strerror}): choose another with --port, or leave it out") from error
-            return 0
-    return port
+            probe.bind((host, 0))
+        found: int = probe.getsockname()[1]
+    return found
 
 
 def start_coordinator(children: Children, args: argparse.Namespace, data: pathlib.Path, names: list[str]) -> dict[str, int]:
@@ -41,37 +43,51 @@ def start_coordinator(children: Children, args: argparse.Namespace, data: pathli
     home = data / "coordinator"
     tls = ["--tls", "--tls-names", ",".join(names)] if args.lan else []
 
-    def words(http: int, workers: int) -> list[str]:
-        return [find("lightshaft-coordinator"), "--http", f"{host}:{http}", "--grpc", f"{host}:{workers}", "--data", str(home), *tls]
+    def words(web: int, workers: int) -> list[str]:
+        return [find("lightshaft-coordinator"), "--http", f"{host}:{web}", "--grpc", f"{host}:{workers}", "--data", str(home), *tls]
 
-    wanted = (free_port(host, HTTP, args.port), free_port(host, WORKERS, None))
     # Another program may take a port that was free just now.
-    for http, workers in (wanted, (args.port or 0, 0)):
+    for wanted_http, wanted_workers in ((HTTP, WORKERS), (0, 0)):
+        ports = {"http": free_port(host, wanted_http, args.port), "grpc": free_port(host, wanted_workers, None)}
         with contextlib.suppress(OSError):  # of a coordinator that was killed
             (home / "ports.json").unlink()
-        child = Child("coordinator", words(http, workers), data / "coordinator.log")
+        # When it is started again, workers and browsers find it where it was.
+        child = Child("coordinator", words(ports["http"], ports["grpc"]), data / "coordinator.log")
         children.kept = [child]
-        if wait_for_file(children, child, home / "ports.json"):
-            break
-    else:
-        raise Problem(f"the coordinator did not start; its log, {child.log}, ends:\n{child.last_lines()}")
-    ports: dict[str, int] = json.loads((home / "ports.json").read_text())
-    # When it is started again, workers and browsers find it where it was.
-    child.args = words(ports["http"], ports["grpc"])
-    return ports
+        if has_started(children, child, home / "ports.json", ports["http"], bool(tls)):
+            return ports
+    raise Problem(f"the coordinator did not start; its log, {child.log}, ends:\n{child.last_lines()}")
 
 
-def wait_for_file(children: Children, child: Child, file: pathlib.Path) -> bool:
-    """False if the program has ended, or was ended, without it."""
-    deadline = time.monotonic() + PATIENCE
-    while not file.exists():
+def answers(port: int, tls: bool) -> bool:
+    # Whoever answers is this user's own program, so its certificate does not matter.
+    unsigned = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    unsigned.check_hostname, unsigned.verify_mode = False, ssl.CERT_NONE
+    host, limit = "127.0.0.1", 1.0
+    connection = http.client.HTTPSConnection(host, port, timeout=limit, context=unsigned) if tls else http.client.HTTPConnection(host, port, timeout=limit)
+    try:
+        connection.request("GET", "/healthz")
+        return connection.getresponse().status == 200
+    except (OSError, http.client.HTTPException):
+        return False
+    finally:
+        connection.close()
+
+
+def has_started(children: Children, child: Child, file: pathlib.Path, port: int, tls: bool) -> bool:
+    """False if the program has ended instead. As long as it lives it may be reading what it had stored.
+
+    On a full disk it cannot write the file that tells of its start.
+    """
+    patient_until = time.monotonic() + PATIENCE
+    while not file.exists() and not (listens(child.process.pid, port) and answers(port, tls)):
         if children.wait(0.1):
             raise KeyboardInterrupt
         if child.process.poll() is not None:
             return False
-        if time.monotonic() > deadline:
-            children.end()
-            return False
+        if time.monotonic() > patient_until:
+            say(f"the coordinator is still starting (log: {child.log})")
+            patient_until += PATIENCE
     return True
 
 
