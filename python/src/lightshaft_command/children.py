@@ -47,6 +47,19 @@ def how_it_ended(code: int) -> str:
     return f"by signal {-code} ({signal.Signals(-code).name})" if code < 0 else f"with exit code {code}"
 
 
+def has_ended(process: subprocess.Popen[bytes]) -> bool:
+    """Without waiting for it, so that its id stays its own."""
+    return process.returncode is not None or os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+
+
+def finish(process: subprocess.Popen[bytes]) -> int:
+    """Ends it, if it has not ended, and what is left of its session; its exit code."""
+    if process.returncode is None:  # afterwards the id may be another program's
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+    return process.wait()
+
+
 class Child:
     """A program that is started again when it ends by itself; with `leaves` (what that means) not after it has ended well."""
 
@@ -75,9 +88,9 @@ class Child:
             if time.monotonic() >= self._next_start:
                 self.start()
             return
-        code = self.process.poll()
-        if code is None:
+        if not has_ended(self.process):
             return
+        code = finish(self.process)
         if code == 0 and self.leaves:
             self.has_left = True
             say(f"the {self.name} {self.leaves}")
@@ -116,11 +129,9 @@ class Children:
         at_once = False
         running = [process for process in [*(child.process for child in self.kept), self.extra] if process]
         for process in reversed(running):
-            if process.poll() is None:
+            if not has_ended(process):
                 process.terminate()
-            while process.poll() is None and not at_once:
+            while not has_ended(process) and not at_once:
                 at_once = self.wait(0.5)
-        for process in running:  # also what is left of a program that was killed
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+        for process in running:
+            finish(process)

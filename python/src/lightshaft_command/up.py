@@ -11,7 +11,7 @@ import ssl
 import time
 
 from lightshaft_command import browser, enrolment
-from lightshaft_command.children import Child, Children, say
+from lightshaft_command.children import Child, Children, has_ended, say
 from lightshaft_command.connections import listens
 from lightshaft_command.first_picture import FirstPicture
 from lightshaft_command.programs import Problem, find
@@ -83,7 +83,7 @@ def has_started(children: Children, child: Child, file: pathlib.Path, port: int,
     while not file.exists() and not (listens(child.process.pid, port) and answers(port, tls)):
         if children.wait(0.1):
             raise KeyboardInterrupt
-        if child.process.poll() is not None:
+        if has_ended(child.process):
             return False
         if time.monotonic() > patient_until:
             say(f"the coordinator is still starting (log: {child.log})")
