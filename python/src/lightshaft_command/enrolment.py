@@ -27,6 +27,7 @@ PATIENCE = 10.0  # seconds for one answer
 MOST_CALLS = 16  # answered at once; others are sent away
 MOST_BYTES = 1 << 20
 DIGEST = 32  # bytes
+NOT_YET_VALID, EXPIRED = 9, 10  # X509_V_ERR_CERT_... of OpenSSL
 
 
 @dataclasses.dataclass(frozen=True)
@@ -151,9 +152,11 @@ def _ask(host: str, code: Code, path: str, context: ssl.SSLContext, headers: dic
         answer = connection.getresponse()
         body = answer.read(MOST_BYTES)
     except ssl.SSLCertVerificationError as error:
+        if error.verify_code in (NOT_YET_VALID, EXPIRED):
+            raise Problem(f"the farm's certificate is not valid now ({error.verify_message}): compare the clocks of the two machines") from error
         raise Problem(f"the farm's certificate does not fit {host}: {error.verify_message}; call the machine by a name or address that "
                       f"`lightshaft up --lan` printed, or start that with --name {host}") from error  # fmt: skip
-    except (OSError, http.client.HTTPException) as error:
+    except (OSError, http.client.HTTPException, UnicodeError) as error:  # UnicodeError: of a host's name that cannot be one
         raise Problem(f"no farm answers at {host}, port {code.port} ({error}): does `lightshaft up --lan` run there, and does its "
                       "firewall let this port and the one for workers through?") from error  # fmt: skip
     finally:
@@ -168,8 +171,9 @@ def _ask(host: str, code: Code, path: str, context: ssl.SSLContext, headers: dic
 def join(host: str, code: Code) -> Joined:
     stranger = ssl.create_default_context()
     stranger.check_hostname, stranger.verify_mode = False, ssl.CERT_NONE
+    shown = _ask(host, code, "/authority", stranger, {})
     try:
-        certificate = ssl.PEM_cert_to_DER_cert(_ask(host, code, "/authority", stranger, {}).decode())
+        certificate = ssl.PEM_cert_to_DER_cert(shown.decode())
         same = hmac.compare_digest(digest_of(certificate), code.authority)
     except ValueError:
         same = False
@@ -179,8 +183,8 @@ def join(host: str, code: Code) -> Joined:
     authority = ssl.DER_cert_to_PEM_cert(certificate)
     known = ssl.create_default_context(cadata=authority)
     answer = json.loads(_ask(host, code, "/worker", known, {"Authorization": f"Bearer {code.token}"}))
-    shown = f"[{host}]" if ":" in host else host
-    return Joined(f"{shown}:{answer['port']}", authority, answer["certificate"], answer["key"])
+    name = f"[{host}]" if ":" in host else host
+    return Joined(f"{name}:{answer['port']}", authority, answer["certificate"], answer["key"])
 
 
 def own_addresses() -> list[str]:
