@@ -351,10 +351,25 @@ def test_only_the_user_whose_browser_it_is_is_led_to_the_dashboard(tmp_path, lea
     up.ends()
 
 
-def failure(*words):
+def failure(*words, code=1):
     done = subprocess.run([bin_dir() / "lightshaft", *map(str, words)], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE)
-    assert done.returncode == 1 and "Traceback" not in done.stderr, done.stdout + done.stderr
+    assert done.returncode == code and "Traceback" not in done.stderr, done.stdout + done.stderr
     return done.stderr
+
+
+@pytest.mark.parametrize("words, complaint", [
+    (("--port", 99999), "99999"), (("--threads", -3), "threads"), (("--threads", 0), "threads"), (("--name", "farm.example"), "--lan")])  # fmt: skip
+def test_options_that_cannot_be_are_refused(tmp_path, words, complaint):
+    assert complaint in failure("up", "--data", tmp_path / "state", "--no-browser", *words, code=2)
+    assert not (tmp_path / "state").exists()
+
+
+def test_a_name_that_no_host_can_have_is_refused_as_such(tmp_path):
+    code = str(enrolment.Code(1, bytes(32), "00" * 32))
+
+    said = failure("join", "a" * 64 + ".example", "--data", tmp_path / "other", "--code", code)
+
+    assert "no farm answers at" in said
 
 
 def test_a_folder_in_use_is_refused_with_who_has_it(tmp_path, leaves_nothing):
@@ -416,12 +431,12 @@ def openssl(*words):
 
 def authority(folder, padded):
     """A certificate that signs others, whose base64 ends with padding if asked: then lenient readers stop at its end."""
-    for length in range(1, 4):
-        openssl("req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-subj", "/CN=" + length * "a", "-days", 2,
+    for k in range(200):  # signatures, and so certificates, are of several lengths
+        openssl("req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-subj", "/CN=" + k % 3 * "a" + "b", "-days", 2,
                 "-keyout", folder / "ca.key", "-out", folder / "ca.pem")  # fmt: skip
         if ("=" in (folder / "ca.pem").read_text()) == padded:
             return (folder / "ca.pem").read_text()
-    raise AssertionError("no name gives such a length")
+    raise AssertionError("no certificate has such a length")
 
 
 class ManInTheMiddle(http.server.ThreadingHTTPServer):
