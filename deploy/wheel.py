@@ -119,7 +119,7 @@ def add_licences(folder, travels):
     shutil.copyfile(ROOT / "LICENSE", folder / "LICENSE")
     # The LGPL and the MPL ask that whoever gets a library learns where its source is.
     listed = run("dpkg-query", "-W", "-f", "https://snapshot.debian.org/package/${source:Package}/${source:Version}/\\n", *travels).splitlines()
-    notice = [(ROOT / "NOTICE").read_text(), "The libraries in this wheel are those of Debian, unchanged but for where they look for each other. Their sources:\n", *sorted(set(listed)), ""]
+    notice = [(ROOT / "NOTICE").read_text(), "The libraries in this wheel are those of Debian, unchanged. Their sources:\n", *sorted(set(listed)), ""]
     (folder / "NOTICE").write_text("\n".join(notice))
 
 
