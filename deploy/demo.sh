@@ -99,7 +99,8 @@ token=$(cat "$home/data/token")
 echo "dashboard: $url/#token=$token"
 LIGHTSHAFT_URL="$url" LIGHTSHAFT_TOKEN="$token" "$bin/lightshaft" submit "$home/bath/bath.xml" "${options[@]}" --wait -o "$home/bath.exr" | tee "$home/job"
 job=$(head -n 1 "$home/job")
-curl -fsS -H "Authorization: Bearer $token" "$url/api/v1/jobs/$job/image.png?exposure=0.8$layer" -o "$home/bath.png"
+# The token is not among curl's arguments, which every user of this machine can see.
+curl -fsS -H @- "$url/api/v1/jobs/$job/image.png?exposure=0.8$layer" -o "$home/bath.png" <<<"Authorization: Bearer $token"
 
 cat <<EOF
 

@@ -116,8 +116,11 @@ def add_licences(folder, travels):
         whole = pathlib.Path("/usr/share/common-licenses") / name
         if whole.exists():
             shutil.copyfile(whole, folder / name)
-    for name in ("LICENSE", "NOTICE"):
-        shutil.copyfile(ROOT / name, folder / name)
+    shutil.copyfile(ROOT / "LICENSE", folder / "LICENSE")
+    # The LGPL and the MPL ask that whoever gets a library learns where its source is.
+    listed = run("dpkg-query", "-W", "-f", "https://snapshot.debian.org/package/${source:Package}/${source:Version}/\\n", *travels).splitlines()
+    notice = [(ROOT / "NOTICE").read_text(), "The libraries in this wheel are those of Debian, unchanged. Their sources:\n", *sorted(set(listed)), ""]
+    (folder / "NOTICE").write_text("\n".join(notice))
 
 
 def main():

@@ -60,6 +60,7 @@ def test_licences_and_bill_of_materials_cover_every_library(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
         bill = json.loads(archive.read(next(name for name in names if name.endswith(".cdx.json"))))
+        notice = archive.read(next(name for name in names if name.endswith("licenses/NOTICE"))).decode()
     licensed = {name.split("/licenses/")[1].split("/")[0] for name in names if name.endswith("/copyright")}
     listed = {component["name"] for component in bill["components"] if component["bom-ref"].startswith("pkg:deb/")}
     files = [os.path.realpath(f"/lib/x86_64-linux-gnu/{name.rsplit('/', 1)[1]}") for name in names if "lightshaft-libraries/" in name]
@@ -69,6 +70,8 @@ def test_licences_and_bill_of_materials_cover_every_library(wheel):
 
     assert len(owners) > 20
     assert owners <= licensed == listed
+    sources = {each["value"] for component in bill["components"] for each in component.get("properties", []) if each["name"] == "lightshaft:source-package"}
+    assert sources and sources == set(re.findall(r"https://snapshot\.debian\.org/package/([^/]+)/[0-9][^/]*/", notice))
 
 
 @pytest.fixture(scope="module")

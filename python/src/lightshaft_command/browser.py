@@ -9,15 +9,26 @@ import threading
 import webbrowser
 
 from lightshaft_command.children import start
+from lightshaft_command.connections import user_of
 
 PATIENCE = 60.0  # seconds within which the browser must have asked
+SILENCE = 10.0  # seconds after which a connection that says nothing is closed
+
+
+class _Server(http.server.ThreadingHTTPServer):
+    """Answers only this user: others can read the page's address among the arguments of the browser."""
+
+    daemon_threads = True
+
+    def verify_request(self, request: object, client_address: tuple[str, int]) -> bool:
+        return user_of(client_address, ("127.0.0.1", self.server_port)) == os.getuid()
 
 
 def open_address(address: str) -> str:
     """Opens the address, which holds a token; says why not, or "".
 
     Every user of this machine can read the arguments of programs. So the browser is started with the address of a page that
-    leads to the true one, and that answers once.
+    leads to the true one, and that answers once, and this user only.
     """
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         return "there is no display"
@@ -29,6 +40,8 @@ def open_address(address: str) -> str:
     used = threading.Event()
 
     class Once(http.server.BaseHTTPRequestHandler):
+        timeout = SILENCE
+
         def do_GET(self) -> None:
             known = self.path == path and not used.is_set()
             if known:
@@ -41,7 +54,7 @@ def open_address(address: str) -> str:
         def log_message(self, format: str, *args: object) -> None:
             """Says nothing: the terminal is the farm's."""
 
-    server = http.server.HTTPServer(("127.0.0.1", 0), Once)
+    server = _Server(("127.0.0.1", 0), Once)
     threading.Thread(target=server.serve_forever, daemon=True).start()
 
     def close() -> None:
@@ -50,5 +63,6 @@ def open_address(address: str) -> str:
         server.server_close()
 
     threading.Thread(target=close, daemon=True).start()
-    start([sys.executable, "-m", "webbrowser", f"http://127.0.0.1:{server.server_port}{path}"], subprocess.DEVNULL)
+    # Isolated: with -m alone it would run files of the current folder.
+    start([sys.executable, "-I", "-m", "webbrowser", f"http://127.0.0.1:{server.server_port}{path}"], subprocess.DEVNULL)
     return ""

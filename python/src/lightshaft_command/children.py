@@ -1,4 +1,4 @@
-"""Programs that run as long as this one does: started again when they end by themselves, and ended with it."""
+"""Programs that run as long as this one does: started again when they fail, and ended with it."""
 
 import contextlib
 import ctypes
@@ -12,7 +12,9 @@ from typing import IO
 
 from lightshaft_command.programs import Problem
 
-ENDS = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+# A signal that is ignored from the start, as nohup has it, would still be waited for. SIGINT is ignored in all programs that a
+# script starts in the background, and it is by this signal that scripts end them.
+ENDS = {s for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if s == signal.SIGINT or signal.getsignal(s) != signal.SIG_IGN}
 WAKES = ENDS | {signal.SIGCHLD}
 QUICK_END = 5.0  # seconds: a program that runs for less has not started well
 MOST_QUICK_ENDS = 5  # in a row; after these it is not started again
@@ -31,9 +33,13 @@ def _begin() -> None:
     _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
-def start(args: list[str], output: "int | IO[bytes] | None" = None, environment: dict[str, str] | None = None) -> subprocess.Popen[bytes]:
-    """In a session of its own, so that Ctrl-C reaches only this program, which then ends the others in their order."""
-    return subprocess.Popen(args, stdin=subprocess.DEVNULL, stdout=output, stderr=None if output is None else subprocess.STDOUT,
+def start(args: list[str], output: "int | IO[bytes] | None" = None, environment: dict[str, str] | None = None,
+          errors: "IO[bytes] | None" = None) -> subprocess.Popen[bytes]:  # fmt: skip
+    """In a session of its own, so that Ctrl-C reaches only this program, which then ends the others in their order.
+
+    Errors go where the output goes, unless they have a file of their own.
+    """
+    return subprocess.Popen(args, stdin=subprocess.DEVNULL, stdout=output, stderr=errors or (None if output is None else subprocess.STDOUT),
                             env=environment, start_new_session=True, preexec_fn=_begin)  # fmt: skip
 
 
@@ -41,11 +47,25 @@ def how_it_ended(code: int) -> str:
     return f"by signal {-code} ({signal.Signals(-code).name})" if code < 0 else f"with exit code {code}"
 
 
-class Child:
-    """A program that is started again when it ends by itself."""
+def has_ended(process: subprocess.Popen[bytes]) -> bool:
+    """Without waiting for it, so that its id stays its own."""
+    return process.returncode is not None or os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
 
-    def __init__(self, name: str, args: list[str], log: pathlib.Path, environment: dict[str, str] | None = None):
-        self.name, self.args, self.log, self.environment = name, args, log, environment
+
+def finish(process: subprocess.Popen[bytes]) -> int:
+    """Ends it, if it has not ended, and what is left of its session; its exit code."""
+    if process.returncode is None:  # afterwards the id may be another program's
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+    return process.wait()
+
+
+class Child:
+    """A program that is started again when it ends by itself; with `leaves` (what that means) not after it has ended well."""
+
+    def __init__(self, name: str, args: list[str], log: pathlib.Path, environment: dict[str, str] | None = None, leaves: str = ""):
+        self.name, self.args, self.log, self.environment, self.leaves = name, args, log, environment, leaves
+        self.has_left = False
         self._quick_ends = 0
         self._next_start: float | None = None
         self.log.write_bytes(b"")
@@ -62,12 +82,18 @@ class Child:
 
     def look(self) -> None:
         """Starts it again if it has ended. Problem: it ends again and again."""
+        if self.has_left:
+            return
         if self._next_start is not None:
             if time.monotonic() >= self._next_start:
                 self.start()
             return
-        code = self.process.poll()
-        if code is None:
+        if not has_ended(self.process):
+            return
+        code = finish(self.process)
+        if code == 0 and self.leaves:
+            self.has_left = True
+            say(f"the {self.name} {self.leaves}")
             return
         quick = time.monotonic() - self._started < QUICK_END
         self._quick_ends = self._quick_ends + 1 if quick else 0
@@ -92,8 +118,8 @@ class Children:
         return woken is not None and woken.si_signo in ENDS
 
     def run(self, each_time: Callable[[], None]) -> None:
-        """Until the user asks for the end."""
-        while not self.wait(1.0):
+        """Until the user asks for the end, or all have left."""
+        while not all(child.has_left for child in self.kept) and not self.wait(1.0):
             for child in self.kept:
                 child.look()
             each_time()
@@ -103,11 +129,9 @@ class Children:
         at_once = False
         running = [process for process in [*(child.process for child in self.kept), self.extra] if process]
         for process in reversed(running):
-            if process.poll() is None:
+            if not has_ended(process):
                 process.terminate()
-            while process.poll() is None and not at_once:
+            while not has_ended(process) and not at_once:
                 at_once = self.wait(0.5)
-        for process in running:  # also what is left of a program that was killed
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+        for process in running:
+            finish(process)

@@ -18,13 +18,16 @@ import pathlib
 import socket
 import ssl
 import threading
+import time
+from typing import Any
 
 from lightshaft_command.programs import Problem
 
 PATIENCE = 10.0  # seconds for one answer
-MOST_CALLS = 16  # answered at once
+MOST_CALLS = 16  # answered at once; others are sent away
 MOST_BYTES = 1 << 20
 DIGEST = 32  # bytes
+NOT_YET_VALID, EXPIRED = 9, 10  # X509_V_ERR_CERT_... of OpenSSL
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,8 +50,22 @@ class Code:
         return Code(int.from_bytes(raw[:2], "big"), raw[2 : 2 + DIGEST], raw[2 + DIGEST :].hex())
 
 
-def digest_of(certificate: str) -> bytes:
-    return hashlib.sha256(ssl.PEM_cert_to_DER_cert(certificate)).digest()
+def digest_of(certificate: bytes) -> bytes:
+    """Of a certificate as DER: PEM may hold more than the one certificate that is looked at."""
+    return hashlib.sha256(certificate).digest()
+
+
+class _Hurried(ssl.SSLSocket):
+    """Hears a call until PATIENCE is over: who sends a byte now and then gets no more time than others."""
+
+    deadline = 0.0
+
+    def recv_into(self, buffer: Any, nbytes: int | None = None, flags: int = 0) -> int:
+        left = self.deadline - time.monotonic()
+        if left <= 0:
+            raise TimeoutError
+        self.settimeout(left)
+        return super().recv_into(buffer, nbytes, flags)
 
 
 class Enrolment(http.server.ThreadingHTTPServer):
@@ -63,22 +80,36 @@ class Enrolment(http.server.ThreadingHTTPServer):
         threading.Thread(target=self.serve_forever, daemon=True).start()
 
     def code(self) -> Code:
-        return Code(self.server_port, digest_of((self.tls / "ca.pem").read_text()), self.token)
+        return Code(self.server_port, digest_of(ssl.PEM_cert_to_DER_cert((self.tls / "ca.pem").read_text())), self.token)
+
+    def process_request(self, request, client_address) -> None:  # type: ignore[no-untyped-def]
+        """Strangers can call as well, and each call that waited would hold an open file and a thread of this program."""
+        if not self._free.acquire(blocking=False):
+            self.shutdown_request(request)
+            return
+        try:
+            super().process_request(request, client_address)
+        except BaseException:  # there is no thread that gives it back
+            self._free.release()
+            raise
 
     def process_request_thread(self, request, client_address) -> None:  # type: ignore[no-untyped-def]
         """In a thread: a machine that says nothing holds up nobody else."""
-        with self._free:
-            try:
-                request.settimeout(PATIENCE)
-                context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-                # Read each time: the coordinator makes this certificate anew when it starts.
-                context.load_cert_chain(self.tls / "server.pem", self.tls / "server.key")
-                with context.wrap_socket(request, server_side=True) as secured:
-                    self.finish_request(secured, client_address)
-            except OSError:
-                pass  # of TLS, or of a machine that went away
-            finally:
-                self.shutdown_request(request)
+        try:
+            request.settimeout(PATIENCE)
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.sslsocket_class = _Hurried
+            # Read each time: the coordinator makes this certificate anew when it starts.
+            context.load_cert_chain(self.tls / "server.pem", self.tls / "server.key")
+            with context.wrap_socket(request, server_side=True) as secured:
+                assert isinstance(secured, _Hurried)
+                secured.deadline = time.monotonic() + PATIENCE
+                self.finish_request(secured, client_address)
+        except OSError:
+            pass  # of TLS, or of a machine that went away
+        finally:
+            self.shutdown_request(request)
+            self._free.release()
 
 
 class _Handler(http.server.BaseHTTPRequestHandler):
@@ -121,9 +152,11 @@ def _ask(host: str, code: Code, path: str, context: ssl.SSLContext, headers: dic
         answer = connection.getresponse()
         body = answer.read(MOST_BYTES)
     except ssl.SSLCertVerificationError as error:
+        if error.verify_code in (NOT_YET_VALID, EXPIRED):
+            raise Problem(f"the farm's certificate is not valid now ({error.verify_message}): compare the clocks of the two machines") from error
         raise Problem(f"the farm's certificate does not fit {host}: {error.verify_message}; call the machine by a name or address that "
                       f"`lightshaft up --lan` printed, or start that with --name {host}") from error  # fmt: skip
-    except (OSError, http.client.HTTPException) as error:
+    except (OSError, http.client.HTTPException, UnicodeError) as error:  # UnicodeError: of a host's name that cannot be one
         raise Problem(f"no farm answers at {host}, port {code.port} ({error}): does `lightshaft up --lan` run there, and does its "
                       "firewall let this port and the one for workers through?") from error  # fmt: skip
     finally:
@@ -138,17 +171,20 @@ def _ask(host: str, code: Code, path: str, context: ssl.SSLContext, headers: dic
 def join(host: str, code: Code) -> Joined:
     stranger = ssl.create_default_context()
     stranger.check_hostname, stranger.verify_mode = False, ssl.CERT_NONE
+    shown = _ask(host, code, "/authority", stranger, {})
     try:
-        authority = _ask(host, code, "/authority", stranger, {}).decode()
-        same = hmac.compare_digest(digest_of(authority), code.authority)
+        certificate = ssl.PEM_cert_to_DER_cert(shown.decode())
+        same = hmac.compare_digest(digest_of(certificate), code.authority)
     except ValueError:
         same = False
     if not same:
         raise Problem(f"the farm at {host} is not the one that printed this code: its certificate is another")
+    # Nothing but what was compared is trusted: the answer may go on with the authority of whoever sent it.
+    authority = ssl.DER_cert_to_PEM_cert(certificate)
     known = ssl.create_default_context(cadata=authority)
     answer = json.loads(_ask(host, code, "/worker", known, {"Authorization": f"Bearer {code.token}"}))
-    shown = f"[{host}]" if ":" in host else host
-    return Joined(f"{shown}:{answer['port']}", authority, answer["certificate"], answer["key"])
+    name = f"[{host}]" if ":" in host else host
+    return Joined(f"{name}:{answer['port']}", authority, answer["certificate"], answer["key"])
 
 
 def own_addresses() -> list[str]:

@@ -24,7 +24,7 @@ class FirstPicture:
 
     def __init__(self, children: Children, home: pathlib.Path, scene: pathlib.Path | None, farm: dict[str, str]):
         self.children, self.home, self.scene, self.farm = children, home, scene, farm
-        self.picture = home / "picture.png"
+        self.picture, self.errors = home / "picture.png", home / "submit.errors"
         self._began = time.monotonic()
         self._steps = iter(()) if self.picture.exists() else self.steps()
 
@@ -35,16 +35,22 @@ class FirstPicture:
             return
         self.children.extra = None
         if running is not None and running.returncode != 0:
-            say(f"there is no first picture: a step of it ended {how_it_ended(running.returncode)}")
+            why = self.errors.read_text(errors="replace").strip() if self.errors.exists() else ""
+            say(f"there is no first picture: a step of it ended {how_it_ended(running.returncode)}" + (f"\n{why}" if why else ""))
             self._steps = iter(())
             (self.home / "job").unlink(missing_ok=True)  # the next start tries again
-        self.children.extra = next(self._steps, None)
+        try:
+            self.children.extra = next(self._steps, None)
+        except OSError as error:  # a full disk; the farm goes on, so that jobs can be removed
+            say(f"there is no first picture: {error.filename or self.home}: {error.strerror or error}")
+            self._steps = iter(())
 
     def steps(self) -> Iterator[subprocess.Popen[bytes]]:
         self.home.mkdir(exist_ok=True)
         job = self.home / "job"
         lightshaft = find("lightshaft")
         environment = {**os.environ, **self.farm}
+        self.errors.unlink(missing_ok=True)
         if not job.exists():
             scene, options = self.scene or BUNDLED_SCENE, [] if self.scene else BATH
             if not scene.exists():
@@ -61,9 +67,11 @@ class FirstPicture:
                 yield start(["/bin/sh", "-c", '"$0" doctor --json; true', lightshaft], output, environment)
             denoise = ["--denoise"] if _has_denoiser(found) else []
             unfinished = self.home / "job.unfinished"
-            with unfinished.open("wb") as output:
-                yield start([lightshaft, "submit", str(scene), *options, *denoise, "--quiet"], output, environment)
+            # Warnings of the scene, or why it is refused.
+            with unfinished.open("wb") as output, self.errors.open("wb") as errors:
+                yield start([lightshaft, "submit", str(scene), *options, *denoise, "--quiet"], output, environment, errors)
             unfinished.replace(job)
+            self.errors.unlink()
         identity = job.read_text().split()[0]
         say("rendering the first picture; the dashboard shows how it comes")
         yield start([lightshaft, "watch", identity], None, environment)

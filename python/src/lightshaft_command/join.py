@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
         with claim(home) as claimed:
             for name, text in (("ca.pem", joined.authority), ("worker.pem", joined.certificate), ("worker.key", joined.key)):
                 write_secret(home / name, text)
-            start_worker(children, args, home, joined.address, code.token, home)
+            start_worker(children, args, home, joined.address, code.token, home, "was drained by the farm")
             claimed.tell(joined.address)
             say(f"this machine renders for {joined.address} (log: {home / 'worker.log'})")
             say("Ctrl-C ends it, after the worker has handed in what it has; Ctrl-C again at once")

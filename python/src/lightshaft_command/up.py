@@ -2,24 +2,28 @@
 
 import argparse
 import contextlib
-import json
+import http.client
 import os
 import pathlib
+import shlex
 import socket
+import ssl
 import time
 
 from lightshaft_command import browser, enrolment
-from lightshaft_command.children import Child, Children, say
+from lightshaft_command.children import Child, Children, has_ended, say
+from lightshaft_command.connections import listens
 from lightshaft_command.first_picture import FirstPicture
 from lightshaft_command.programs import Problem, find
 from lightshaft_command.state import claim
 
 HTTP, WORKERS, JOINING = 8080, 50051, 50052  # ports, if they are free
-PATIENCE = 60.0  # seconds for the coordinator to start
+PROXIES = ("http_proxy", "https_proxy", "all_proxy")
+PATIENCE = 60.0  # seconds, after which it is said that the coordinator is still starting
 
 
 def free_port(host: str, wanted: int, given: int | None) -> int:
-    """The port to use: the given one, or the wanted one, or 0 for any if that is taken."""
+    """The port to use: the given one, or the wanted one, or any if that is taken."""
     port = wanted if given is None else given
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -28,8 +32,9 @@ def free_port(host: str, wanted: int, given: int | None) -> int:
         except OSError as error:
             if given is not None:
                 raise Problem(f"port {port} cannot be used ({error.strerror}): choose another with --port, or leave it out") from error
-            return 0
-    return port
+            probe.bind((host, 0))
+        found: int = probe.getsockname()[1]
+    return found
 
 
 def start_coordinator(children: Children, args: argparse.Namespace, data: pathlib.Path, names: list[str]) -> dict[str, int]:
@@ -38,53 +43,75 @@ def start_coordinator(children: Children, args: argparse.Namespace, data: pathli
     home = data / "coordinator"
     tls = ["--tls", "--tls-names", ",".join(names)] if args.lan else []
 
-    def words(http: int, workers: int) -> list[str]:
-        return [find("lightshaft-coordinator"), "--http", f"{host}:{http}", "--grpc", f"{host}:{workers}", "--data", str(home), *tls]
+    def words(web: int, workers: int) -> list[str]:
+        return [find("lightshaft-coordinator"), "--http", f"{host}:{web}", "--grpc", f"{host}:{workers}", "--data", str(home), *tls]
 
-    wanted = (free_port(host, HTTP, args.port), free_port(host, WORKERS, None))
     # Another program may take a port that was free just now.
-    for http, workers in (wanted, (args.port or 0, 0)):
+    for wanted_http, wanted_workers in ((HTTP, WORKERS), (0, 0)):
+        ports = {"http": free_port(host, wanted_http, args.port), "grpc": free_port(host, wanted_workers, None)}
         with contextlib.suppress(OSError):  # of a coordinator that was killed
             (home / "ports.json").unlink()
-        child = Child("coordinator", words(http, workers), data / "coordinator.log")
+        # When it is started again, workers and browsers find it where it was.
+        child = Child("coordinator", words(ports["http"], ports["grpc"]), data / "coordinator.log")
         children.kept = [child]
-        if wait_for_file(children, child, home / "ports.json"):
-            break
-    else:
-        raise Problem(f"the coordinator did not start; its log, {child.log}, ends:\n{child.last_lines()}")
-    ports: dict[str, int] = json.loads((home / "ports.json").read_text())
-    # When it is started again, workers and browsers find it where it was.
-    child.args = words(ports["http"], ports["grpc"])
-    return ports
+        if has_started(children, child, home / "ports.json", ports["http"], bool(tls)):
+            return ports
+    raise Problem(f"the coordinator did not start; its log, {child.log}, ends:\n{child.last_lines()}")
 
 
-def wait_for_file(children: Children, child: Child, file: pathlib.Path) -> bool:
-    """False if the program has ended, or was ended, without it."""
-    deadline = time.monotonic() + PATIENCE
-    while not file.exists():
+def answers(port: int, tls: bool) -> bool:
+    # Whoever answers is this user's own program, so its certificate does not matter.
+    unsigned = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    unsigned.check_hostname, unsigned.verify_mode = False, ssl.CERT_NONE
+    host, limit = "127.0.0.1", 1.0
+    connection = http.client.HTTPSConnection(host, port, timeout=limit, context=unsigned) if tls else http.client.HTTPConnection(host, port, timeout=limit)
+    try:
+        connection.request("GET", "/healthz")
+        return connection.getresponse().status == 200
+    except (OSError, http.client.HTTPException):
+        return False
+    finally:
+        connection.close()
+
+
+def has_started(children: Children, child: Child, file: pathlib.Path, port: int, tls: bool) -> bool:
+    """False if the program has ended instead. As long as it lives it may be reading what it had stored.
+
+    On a full disk it cannot write the file that tells of its start.
+    """
+    patient_until = time.monotonic() + PATIENCE
+    while not file.exists() and not (listens(child.process.pid, port) and answers(port, tls)):
         if children.wait(0.1):
             raise KeyboardInterrupt
-        if child.process.poll() is not None:
+        if has_ended(child.process):
             return False
-        if time.monotonic() > deadline:
-            children.end()
-            return False
+        if time.monotonic() > patient_until:
+            say(f"the coordinator is still starting (log: {child.log})")
+            patient_until += PATIENCE
     return True
 
 
 def farm_variables(args: argparse.Namespace, home: pathlib.Path, ports: dict[str, int]) -> dict[str, str]:
     """By which the command `lightshaft` on this machine finds the farm."""
     found = {"LIGHTSHAFT_URL": f"{'https' if args.lan else 'http'}://127.0.0.1:{ports['http']}", "LIGHTSHAFT_TOKEN": (home / "token").read_text().strip()}
-    return {**found, "LIGHTSHAFT_CA": str(home / "tls" / "ca.pem")} if args.lan else found
+    if args.lan:
+        found["LIGHTSHAFT_CA"] = str(home / "tls" / "ca.pem")
+    # The token is not for a proxy, which could not reach this machine's own address either.
+    if any(os.environ.get(name) for proxy in PROXIES for name in (proxy, proxy.upper())):
+        exempt = os.environ.get("no_proxy") or os.environ.get("NO_PROXY") or ""
+        if exempt != "*":  # all hosts; the star counts only if it stands alone
+            exempt = ",".join(filter(None, [exempt, "127.0.0.1"]))
+        found.update(no_proxy=exempt, NO_PROXY=exempt)  # programs differ in which of the two they read
+    return found
 
 
-def start_worker(children: Children, args: argparse.Namespace, data: pathlib.Path, coordinator: str, token: str, tls: pathlib.Path | None) -> None:
+def start_worker(children: Children, args: argparse.Namespace, data: pathlib.Path, coordinator: str, token: str, tls: pathlib.Path | None, leaves: str) -> None:
     words = [find("lightshaft-worker"), "--coordinator", coordinator, "--cache", str(data / "cache")]
     if args.threads:
         words += ["--threads", str(args.threads)]
     if tls:
         words += ["--tls-ca", str(tls / "ca.pem"), "--tls-cert", str(tls / "worker.pem"), "--tls-key", str(tls / "worker.key")]
-    children.kept.append(Child("worker", words, data / "worker.log", {**os.environ, "LIGHTSHAFT_JOIN_TOKEN": token}))
+    children.kept.append(Child("worker", words, data / "worker.log", {**os.environ, "LIGHTSHAFT_JOIN_TOKEN": token}, leaves))
 
 
 def show(args: argparse.Namespace, data: pathlib.Path, farm: dict[str, str]) -> str:
@@ -93,8 +120,8 @@ def show(args: argparse.Namespace, data: pathlib.Path, farm: dict[str, str]) -> 
     address = f"{farm['LIGHTSHAFT_URL']}/#token={farm['LIGHTSHAFT_TOKEN']}"
     say(f"dashboard:        {address}")
     say(f"token:            {farm['LIGHTSHAFT_TOKEN']}   (admin; in {home / 'token'})")
-    authority = f" LIGHTSHAFT_CA={farm['LIGHTSHAFT_CA']}" if args.lan else ""
-    say(f"other terminals:  export LIGHTSHAFT_URL={farm['LIGHTSHAFT_URL']} LIGHTSHAFT_TOKEN=$(cat {home / 'token'}){authority}")
+    others = "".join(f" {name}={shlex.quote(farm[name])}" for name in ("LIGHTSHAFT_CA", "no_proxy", "NO_PROXY") if name in farm)
+    say(f"other terminals:  export LIGHTSHAFT_URL={farm['LIGHTSHAFT_URL']} LIGHTSHAFT_TOKEN=$(cat {home / 'token'}){others}")
     return address
 
 
@@ -104,7 +131,7 @@ def invite(data: pathlib.Path, names: list[str], ports: dict[str, int]) -> None:
     port = free_port("0.0.0.0", JOINING, None)
     answering = enrolment.Enrolment(port, home / "tls", (home / "join-token").read_text().strip(), ports["grpc"])
     say(f"add a machine:    lightshaft join {names[0]} --code {answering.code()}")
-    fingerprint = enrolment.digest_of((home / "tls" / "server.pem").read_text()).hex(":").upper()
+    fingerprint = enrolment.digest_of(ssl.PEM_cert_to_DER_cert((home / "tls" / "server.pem").read_text())).hex(":").upper()
     say(f"                  ports {ports['http']} (dashboard), {ports['grpc']} and {answering.server_port} (workers) must pass this machine's firewall")
     say(f"                  a browser warns once of the farm's own certificate; its SHA-256: {fingerprint}")
 
@@ -118,7 +145,8 @@ def run(args: argparse.Namespace) -> int:
             ports = start_coordinator(children, args, data, names)
             home = data / "coordinator"
             farm = farm_variables(args, home, ports)
-            start_worker(children, args, data, f"127.0.0.1:{ports['grpc']}", (home / "join-token").read_text().strip(), home / "tls" if args.lan else None)
+            start_worker(children, args, data, f"127.0.0.1:{ports['grpc']}", (home / "join-token").read_text().strip(), home / "tls" if args.lan else None,
+                         "was drained and has left; the farm goes on, and has a worker of its own again at the next `lightshaft up`")  # fmt: skip
             address = show(args, data, farm)
             claimed.tell(address)
             if args.lan:
