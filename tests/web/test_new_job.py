@@ -58,7 +58,7 @@ def test_who_may_only_look_is_told_so_by_a_drop(farm, dashboard):
 def test_a_picture_dropped_on_the_viewer_is_compared(farm, dashboard):
     farm.jobs["j-1"] = job(size=farm.size)
     page = dashboard("#/view/j-1")
-    page.wait("document.querySelector('float-view')")
+    page.wait("document.querySelector('float-view') && document.body.innerText.includes('relMSE 0.0100')")  # it is open
     drop(page, {"other.exr": "no picture"}, "float-view")
     page.wait("document.querySelector('.toast')?.innerText.includes('other.exr')")
 
