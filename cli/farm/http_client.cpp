@@ -147,7 +147,8 @@ namespace {
 // Returns the beginning of an address that was given without one. The token must not cross a network in
 // clear text unless the user asks for it, so http:// is only for this machine.
 const char* scheme_of(std::string_view address, bool has_ca) {
-  const bool local = address.starts_with("localhost") || address.starts_with("127.") || address.starts_with("[::1]");
+  const bool local =
+      address.starts_with("localhost") || address.starts_with("127.") || address.starts_with("[::1]");
   return local && !has_ca ? "http://" : "https://";
 }
 

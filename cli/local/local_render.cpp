@@ -265,7 +265,8 @@ Result<json> local_report(const std::string& report, const LocalFacts& facts) {
   if (std::string advice = text_field(j, "advice"); !advice.empty()) {
     const std::string extend = fmt::format("lightshaft extend {} ", text_field(j, "job"));
     if (const std::size_t at = advice.find(extend); at != std::string::npos)
-      advice.replace(at, extend.size(), fmt::format("lightshaft render {} ", shell_word(text_field(j, "name"))));
+      advice.replace(at, extend.size(),
+                     fmt::format("lightshaft render {} ", shell_word(text_field(j, "name"))));
     j["advice"] = advice;
   }
   if (facts.interrupted) j["stopped"] = "user";

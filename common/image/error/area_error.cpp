@@ -17,8 +17,8 @@ constexpr double kFewestSquares = 4;
 // The number of samples that use one set of light vertices in each half (LightVertexCache::kEpoch).
 constexpr std::uint64_t kSetSamples = 16;
 
-// The two-sided 95 % point of Student's distribution, to third order in 1 / degrees of freedom (Abramowitz and
-// Stegun 26.7.5). That is too small for fewer than two degrees; between one and two the logarithm is
+// The two-sided 95 % point of Student's distribution, to third order in 1 / degrees of freedom (Abramowitz
+// and Stegun 26.7.5). That is too small for fewer than two degrees; between one and two the logarithm is
 // interpolated over 1 / freedom, which is at most 3 % too large.
 double student(double freedom) {
   if (freedom < 2) {
@@ -120,9 +120,8 @@ AreaError area_error(const AreaSums& s, bool common) {
                  alike = two_parts ? s.last[c] * s.last[c] + before * before : s.noise[c] * s.noise[c];
     if (!(s.squares[c] > 0)) continue;
     const double freedom = 3 * s.squares[c] * s.squares[c] / s.fourths[c] - 2;
-    out.half_width[c] = (common ? student(degrees) * std::sqrt(alike)
-                                : student(freedom) * std::sqrt(s.squares[c])) /
-                        pixels;
+    out.half_width[c] =
+        (common ? student(degrees) * std::sqrt(alike) : student(freedom) * std::sqrt(s.squares[c])) / pixels;
     if (count > 1)
       correlation = std::max(correlation, std::clamp((alike / s.squares[c] - 1) / (count - 1), 0.0, 1.0));
   }

@@ -10,12 +10,12 @@
 // The mean of the image: if squares are independent, its variance is, per channel,
 //   sum over squares of (sum of D)^2 / pixels^2,
 // with 3 (sum of x)^2 / (sum of x^2) - 2 degrees of freedom, x = (sum of D)^2 of a square: the number of
-// squares if all are alike and Gaussian. If all pixels have errors in common, only the mean of D over the image tells
-// them. This mean is the sum of a part from the last round (range of samples) and a part from the samples
-// before it. If these use different sets of light vertices, the parts are independent, and the sum of their
-// squares has two degrees of freedom if both have equally many samples, and fewer otherwise: N^2 / (n^2 +
-// o^2), if n of N samples are in the last round and o before it. If the parts are not independent, the square
-// of their sum has one. The interval is Student's.
+// squares if all are alike and Gaussian. If all pixels have errors in common, only the mean of D over the
+// image tells them. This mean is the sum of a part from the last round (range of samples) and a part from the
+// samples before it. If these use different sets of light vertices, the parts are independent, and the sum of
+// their squares has two degrees of freedom if both have equally many samples, and fewer otherwise: N^2 / (n^2
+// + o^2), if n of N samples are in the last round and o before it. If the parts are not independent, the
+// square of their sum has one. The interval is Student's.
 //
 // Squares: relMSE of their means is the mean over squares and channels, weighted by pixels, of
 //   E^2 / (S^2 + 0.01),   E: the mean of D over the square, S: its mean value.
