@@ -20,7 +20,7 @@ struct FolderFacts {
   std::uint64_t free_bytes = 0;
 };
 
-// What runs `lightshaft up` and `lightshaft join`, which are written in Python.
+// The Python interpreter and the Python package that run `lightshaft up` and `lightshaft join`.
 struct PythonFacts {
   std::filesystem::path interpreter;  // empty: there is no python3 in PATH
   std::filesystem::path part;  // the folder lightshaft_command; empty: it is not where this program looks

@@ -289,10 +289,11 @@ std::vector<Finding> judge_machine(const MachineFacts& facts) {
                                 fmt::format("{} is missing: .vdb and .nvdb files cannot be read",
                                             facts.vdb_program.string()),
                                 "install the package lightshaft-vdb, or build the target lightshaft-vdb"),
-      !facts.denoiser.empty() ? ok("denoiser", facts.denoiser)
-                              : warning("denoiser", facts.denoiser_trouble,
-                                        "only --denoise needs it: pip install 'lightshaft[denoise]', or run "
-                                        "deploy/install-denoiser.sh"),
+      !facts.denoiser.empty()
+          ? ok("denoiser", facts.denoiser)
+          : warning("denoiser", facts.denoiser_trouble,
+                    "only --denoise needs it: pip install pyoidn beside the wheel, or run "
+                    "deploy/install-denoiser.sh"),
       ok("redis", facts.redis_server.empty()
                       ? "no redis-server in PATH; only a coordinator with --store redis:// needs one, on any "
                         "machine"

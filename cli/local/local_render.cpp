@@ -284,7 +284,7 @@ std::string report_summary(const json& j) {
   std::string line =
       fmt::format("{:g} samples per pixel in {} ({} of loading)", number(j, "spp"),
                   show_seconds(number(j, "render_seconds")), show_seconds(number(j, "load_seconds")));
-  // Who has an image denoised looks at the denoised layers: their error comes first.
+  // The error of the denoised layers comes first: a user who denoises an image looks at these layers.
   const std::string denoised = denoised_text(j);
   if (!denoised.empty()) line += fmt::format(", denoised relMSE {}; as rendered", denoised);
   if (const auto relmse = number_field(j, "relmse"))

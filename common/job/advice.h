@@ -1,4 +1,4 @@
-// What a user can do about an image whose error figures are not trusted yet, in a sentence.
+// Advises the user, in a sentence, how to go on with an image whose error figures are not trusted yet.
 #pragma once
 
 #include <string>

@@ -49,7 +49,7 @@ std::string key_figures(const Json& report) {
   constexpr const char* kKey = " class=\"key\"";
   const double target = number(report, "target_error");
   const std::string note = target > 0 ? fmt::format("target {}", given(target)) : "";
-  // Who has an image denoised looks at the denoised layers: their error comes first.
+  // The error of the denoised layers comes first: a user who denoises an image looks at these layers.
   std::string out = denoised_figure(report, denoised_target(report) ? note : "", kKey);
   std::string raw = fact("relMSE", figure(number(report, "relmse")), within(report, "relmse_ci95"), kKey);
   if (!denoised_target(report) && !note.empty() && !raw.empty())
@@ -95,7 +95,7 @@ std::string mean_figure(const Json& report) {
     half = std::max(half, (ends[1].get<double>() - ends[0].get<double>()) / 2);
   }
   const std::string note = doubtful(report) ? escape_html(phrase("doubt"))
-                           : half > 0       ? fmt::format("95 %: +- {} at most", figure(half))
+                           : half > 0       ? fmt::format("95 %: ± {} at most", figure(half))
                                             : "";
   return fact("Mean of the image", text, note);
 }

@@ -45,7 +45,7 @@ class FairShare {
   void leave(Job& job);
   void enter(Job& job);
 
-  // What follows a call of visit(): the next job, the first job of the next user, or nothing
+  // The answer of visit(): go on with the next job, go on with the first job of the next user, or stop
   enum class Then { next_job, next_user, stop };
   // Calls visit(job, lag) for the jobs that have units to lease, in the order of turns, as far as its answers
   // say. `lag`, in core seconds, is the share of the job's user minus that of the user who is first in turn

@@ -137,9 +137,9 @@ bool has_begun(const JobEntry& entry) {
          entry.stored.totals.began_unix > 0;
 }
 
-// Returns what each of the jobs is to wait for, or an error if that is not possible. `id`: the job, or the
-// sequence of which `jobs` are the frames; the frames that have ended are left out, and those that have begun
-// are if there is something to wait for.
+// Returns for each of the jobs those that it is to wait for, or an error if it cannot wait. `id`: the job, or
+// the sequence of which `jobs` are the frames. Frames that have ended are left out; frames that have begun
+// are left out unless `after` is empty.
 Result<std::vector<JobWait>> may_wait(const JobTable& table, const JobId& id,
                                       const std::vector<EntryPtr>& jobs,
                                       const std::vector<std::string>& after) {

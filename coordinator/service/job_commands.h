@@ -13,7 +13,7 @@
 
 namespace ls::coordinator {
 
-// What a job is to wait for (JobSpec::after)
+// A job, and the jobs that it is to wait for (JobSpec::after)
 struct JobWait {
   EntryPtr job;
   std::vector<std::string> after;

@@ -12,7 +12,7 @@ from local_farm import ROOT, bin_dir
 from test_up import check_a_farm_of_two_machines, leaves_nothing  # noqa: F401
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(bin_dir() != ROOT / "build" / "release" / "bin", reason="wheels are made of the release build")]
-# What a wheel for manylinux may expect of every system: the C and C++ runtime.
+# Every manylinux system has these libraries, the C and C++ runtime; the wheel brings all others.
 SYSTEM = re.compile(r"linux-vdso\.so|ld-linux-x86-64\.so|lib(c|m|dl|rt|pthread|resolv|stdc\+\+|gcc_s)\.so")
 
 # Libraries that the programs need and Python does not, which runs with those of this machine.

@@ -124,10 +124,11 @@ def test_an_archive_is_sent_as_it_is(farm, dashboard, tmp_path):
     fill(page, "#set-spp", "32")
     fill(page, "#set-width", "64")
     fill(page, "#set-height", "48")
+    fill(page, "#set-name", "Chapel v003")
     page.click(".go button")
 
     page.wait("location.hash === '#/jobs/j-new'")
-    assert farm.submitted == [("application/zip", {"spp": "32", "size": "64x48"}, hashlib.sha256(packed.getvalue()).hexdigest())]
+    assert farm.submitted == [("application/zip", {"name": "Chapel v003", "spp": "32", "size": "64x48"}, hashlib.sha256(packed.getvalue()).hexdigest())]
 
 
 def glb(described):

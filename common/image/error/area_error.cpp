@@ -9,13 +9,11 @@
 namespace ls {
 namespace {
 
-// The same of Student's distribution with one and with two degrees of freedom: tan(0.95 pi / 2), and 0.95
-// sqrt(2 / (1 - 0.95^2)).
+// The two-sided 95 % points of Student's distribution with one and with two degrees of freedom: tan(0.95 pi /
+// 2), and 0.95 sqrt(2 / (1 - 0.95^2)).
 constexpr double kOneDegree = 12.706204736432095, kTwoDegrees = 4.302652729911275;
 // The interval of squares is known if at least this many carry their error.
 constexpr double kFewestSquares = 4;
-// The number of samples that use one set of light vertices in each half (LightVertexCache::kEpoch).
-constexpr std::uint64_t kSetSamples = 16;
 
 // The two-sided 95 % point of Student's distribution, to third order in 1 / degrees of freedom (Abramowitz
 // and Stegun 26.7.5). That is too small for fewer than two degrees; between one and two the logarithm is

@@ -39,6 +39,9 @@ struct EarlierMeans;
 // Side in pixels of the squares over whose pixels errors may be correlated: those that share paths
 // (worker/render/integrator/path_reuse.h)
 inline constexpr std::size_t kCorrelatedSide = 16;
+// The number of successive samples whose halves use one set of light vertices each: the renderer's
+// LightVertexCache::kEpoch
+inline constexpr std::uint64_t kSetSamples = 16;
 inline constexpr double kNormal95 = 1.959963984540054;  // two-sided 95 % point of the normal distribution
 
 using ChannelSums = std::array<double, 3>;

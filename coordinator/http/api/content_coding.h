@@ -11,7 +11,7 @@
 
 namespace ls::http {
 
-// Whether the client takes bodies in gzip.
+// Returns true if the client accepts bodies that are compressed with gzip.
 bool accepts_gzip(const Request& request);
 // Returns the bytes in gzip; nullopt: they would not become shorter.
 std::optional<std::string> gzipped(std::span<const std::byte> bytes);

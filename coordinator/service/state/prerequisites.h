@@ -26,7 +26,7 @@ Result<std::vector<std::vector<std::string>>> prerequisites_of(const JobTable& j
 // Returns an error if one of these prerequisites waits for `job` itself, directly or by way of others.
 Result<void> check_no_cycle(const JobTable& jobs, const JobId& job, std::span<const std::string> after);
 
-// What a job that waits for others says of it. `held`: only a user can end the wait.
+// Describes for a job's view the jobs that it waits for. `held`: only a user can end the wait.
 struct Waiting {
   std::vector<AfterView> after;
   std::string words;

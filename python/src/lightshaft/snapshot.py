@@ -21,7 +21,7 @@ from .steps import Call, Steps, fetch, get_job, job_path, succeed
 
 Curve = dict[str, npt.NDArray[np.float64]]
 ENDED = ("done", "failed", "cancelled")
-# Of the curve, in CSS pixels. MARGIN holds a label of 7 characters, such as 1.2e-03: with FONT a character is at
+# Sizes of the curve, in CSS pixels. A label of 7 characters, such as 1.2e-03, fits into MARGIN: a character is at
 # most 0.65 FONT wide in the fonts that notebooks use.
 WIDTH, HEIGHT, MARGIN, FONT = 420, 180, 58, 11
 MAX_ROWS = 1_000_000

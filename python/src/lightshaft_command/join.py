@@ -48,5 +48,3 @@ def run(args: argparse.Namespace) -> int:
     finally:
         children.end()
     return 0
-
-

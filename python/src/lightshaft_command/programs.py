@@ -25,7 +25,7 @@ def find(name: str) -> str:
 
 
 def find_denoiser() -> None:
-    """Tells the programs where the wheel `pyoidn` (pip install 'lightshaft[denoise]') has Open Image Denoise."""
+    """Tells the programs where the wheel `pyoidn` (the wheel's extra `denoise`) has Open Image Denoise."""
     if "LIGHTSHAFT_OIDN" in os.environ:
         return
     found = importlib.util.find_spec("pyoidn")

@@ -317,6 +317,30 @@ TEST(Report, HasEveryKeyOfTheContract) {
   EXPECT_EQ(j["stopped"], "spp");
 }
 
+TEST(Report, HasIntervalsOfAreasOnlyWhereTheErrorIsTrustedAndNoRareLightMayBeMissing) {
+  ReportFacts facts;
+  facts.error = ImageError{.settled = true, .trusted = true};
+  facts.areas = AreaError{{1, 2, 3}, {.5, .25, .125}, .01, .005, .02};
+  const auto report = [&] { return nlohmann::json::parse(report_json(facts)); };
+
+  EXPECT_EQ(report()["mean"], (nlohmann::json{1, 2, 3}));
+  EXPECT_EQ(report()["mean_ci95"], (nlohmann::json{{.5, 1.5}, {1.75, 2.25}, {2.875, 3.125}}));
+  EXPECT_EQ(report()["relmse_16"], .01);
+  EXPECT_EQ(report()["relmse_16_ci95"], (nlohmann::json{.005, .02}));
+  facts.areas->relmse_lo = facts.areas->relmse_hi = 0;  // too few squares
+  EXPECT_TRUE(report()["relmse_16_ci95"].is_null());
+  EXPECT_FALSE(report()["mean_ci95"].is_null());
+  for (const ImageError& doubtful :
+       {ImageError{.settled = false, .trusted = true},
+        ImageError{.settled = true, .trusted = false, .verdict = "don't trust yet"}}) {
+    facts.error = doubtful;
+    EXPECT_TRUE(report()["mean_ci95"].is_null());
+    EXPECT_EQ(report()["mean"], (nlohmann::json{1, 2, 3}));
+  }
+  facts.areas.reset();
+  EXPECT_TRUE(report()["mean"].is_null());
+}
+
 TEST(Report, SaysWhatWasAskedFor) {
   ReportFacts facts;
   facts.job.settings.max_depth = 12;

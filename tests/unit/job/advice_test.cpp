@@ -1,4 +1,4 @@
-// What a user is told to do about an image whose error is not trusted.
+// Tests of the advice on an image whose error figures are not trusted.
 #include "common/job/advice.h"
 
 #include <gtest/gtest.h>

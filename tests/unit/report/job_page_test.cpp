@@ -168,6 +168,20 @@ TEST(JobPage, HasTheErrorOfTheDenoisedLayersFirst) {
   EXPECT_LT(page.find("<dt>relMSE, denoised</dt>"), page.find("<dt>relMSE</dt>"));
 }
 
+TEST(JobPage, HasTheMeanOfTheImageAndTheErrorOfSquares) {
+  json report = some_report();
+  report["mean"] = {0.5, 0.25, 0.125};
+  report["mean_ci95"] = {{0.49, 0.51}, {0.23, 0.27}, {0.12, 0.13}};
+  report["relmse_16"] = 0.003;
+  report["relmse_16_ci95"] = nullptr;
+
+  expect(page_of(report), "<dt>Mean of the image</dt>");
+  expect(page_of(report), "95 %: ± 0.02");
+  expect(page_of(report), "<dt>relMSE, 16 x 16</dt>");
+  report["mean"] = {0.5, "a", nullptr};
+  expect_not(page_of(report), "Mean of the image");
+}
+
 // The verdict is shown for every report with `trusted` false, even early ones, and whatever its
 // `verdict_kind` is.
 TEST(JobPage, IsInDoubtWhereTheReportDoesNotTrustItself) {

@@ -78,7 +78,7 @@ export const api = {
   missingBlobs: async (digests) => (await (await call("POST", "/blobs/missing", json({ digests }))).json()).missing,
   putBlob: (digest, body) =>
     call("PUT", `/blobs/${digest}`, { headers: { "Content-Type": "application/octet-stream" }, body }),
-  /** A scene with all its files in one archive; `spec` as in submit. */
+  /** A scene with all its files in one archive; `spec` as in submit, and the job's name. */
   submitArchive: async (file, type, spec) => {
     const text = (value) => (Array.isArray(value) ? value.join(",") : String(value));
     const query = new URLSearchParams(Object.entries(spec).map(([name, value]) => [name, name === "size" ? value.join("x") : text(value)]));

@@ -54,7 +54,8 @@ export async function submitJob(api, plan, settings, onStep) {
   const spec = specOf(settings);
   if (plan.archive) {
     onStep({ phase: "sending", step: `Sending ${plan.main.name}`, progress: 0 });
-    return (await api.submitArchive(plan.main, plan.archive, spec)).id;
+    const name = settings.name?.trim();
+    return (await api.submitArchive(plan.main, plan.archive, { ...spec, ...(name ? { name } : {}) })).id;
   }
   const files = [{ name: null, file: plan.main }, ...plan.assets];
   const digests = await digestAll(files, onStep);

@@ -42,7 +42,7 @@ struct AreaCoverage {
   double mean = 0, squares = 0;  // shares of images whose interval holds
 };
 
-// Of images of two rounds of equally many samples.
+// Measures these shares with images of two rounds of equally many samples.
 AreaCoverage held_areas(int images, double pixel, double square, double image, bool common) {
   std::mt19937_64 random(21);
   AreaCoverage out;

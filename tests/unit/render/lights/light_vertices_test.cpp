@@ -12,6 +12,7 @@
 
 #include "worker/render/math/random.h"
 
+#include "common/image/error/area_error.h"
 namespace ls::render {
 namespace {
 
@@ -272,6 +273,9 @@ TEST(LightVertices, AreChosenByTheirLobes) {
     EXPECT_NEAR(double{last.weight} * (both + any) / (even + both + 2 * any), 1, 1e-5) << cosine;
   }
 }
+
+static_assert(LightVertexCache::kEpoch == kSetSamples,
+              "intervals of the image's mean are for another length");
 
 TEST(LightVertexCache, GivesEachHalfAndEachEpochASetOfItsOwn) {
   constexpr std::uint64_t e = LightVertexCache::kEpoch;

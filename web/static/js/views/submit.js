@@ -73,7 +73,7 @@ function settingsForm(submit, actions, busy) {
     field("frames", "Frames", "one image", { inputmode: "text", title: "1-10, or 1-10x2 for every second one" }),
     h("label", { key: "denoise", class: "check field-check" }, h("input", { type: "checkbox", name: "denoise", id: "set-denoise", disabled: busy, ".checked": submit.settings.denoise, onchange: actions.onSetting }), "Denoise"),
     h("details", { key: "more", class: "more-settings" }, h("summary", null, "More settings"), h("div", { class: "settings" },
-      submit.plan?.archive ? null : field("name", "Name", "the scene file’s", { inputmode: "text" }),
+      field("name", "Name", "the scene file’s", { inputmode: "text" }),
       field("aov", "Further layers", "depth, normal", { inputmode: "text" }),
       field("seed", "Seed", "0"),
       field("priority", "Priority", "0; higher comes first"),
