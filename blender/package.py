@@ -1,8 +1,6 @@
 #!/usr/bin/env python3
-"""Packs the add-on into build/blender/lightshaft-VERSION.zip, which Blender installs. Prints the path.
-
-Equal sources give equal bytes: names are sorted, and times are those of no day.
-"""
+"""Packs the add-on into build/blender/lightshaft-VERSION.zip, which Blender installs, and prints the path. The
+same sources give the same bytes: names are sorted and times are constant."""
 
 import pathlib
 import tomllib

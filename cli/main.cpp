@@ -12,9 +12,9 @@
 #include "cli/doctor/facts.h"
 #include "cli/local/local_farm.h"
 #include "cli/output/console.h"
-#include "common/base/log.h"
-#include "common/command_line/command.h"
-#include "common/command_line/parse.h"
+#include "core/base/log.h"
+#include "util/command_line/command.h"
+#include "util/command_line/parse.h"
 
 namespace {
 
@@ -35,7 +35,7 @@ void set_log_level() {
 // `lightshaft completion bash | zsh | fish`: prints the script by which a shell completes this command.
 void add_completion(CLI::App& app, Action& action) {
   auto shell = std::make_shared<std::string>();
-  app.add_subcommand("completion", "prints the script by which a shell completes commands and options")
+  app.add_subcommand("completion", "print a script that lets a shell complete commands and options")
       ->callback([shell, &app, &action] {
         action = [shell, &app] {
           const ls::Command program = ls::describe_command(app);
@@ -57,8 +57,7 @@ int main(int argc, char** argv) {
   if (argc == 2 && std::string_view(argv[1]) == kSandboxProbeFlag) return run_sandbox_probe();
   ::signal(SIGPIPE, SIG_IGN);
   set_log_level();
-  CLI::App app("Renders light in smoke, steam, clouds and fire: on this machine, or on a farm of many.",
-               "lightshaft");
+  CLI::App app("Renders light in smoke, steam, clouds and fire, on this machine or on a farm.", "lightshaft");
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
   ls::use_plain_help(app);
@@ -76,6 +75,7 @@ int main(int argc, char** argv) {
   add_validate(app, action);
   add_verify(app, action);
   add_compare(app, action);
+  add_race(app, action);
   add_doctor(app, action);
   add_completion(app, action);
   ls::add_man_page_option(app, LIGHTSHAFT_VERSION);

@@ -1,5 +1,5 @@
-# Every library we use, all packages of Debian 12, Debian 13 and Ubuntu 24.04. Each has one door in the code (see
-# tests/unit/architecture).
+# Every library we use, all packages of Debian 12, Debian 13 and Ubuntu 24.04. Only one place in the code includes each
+# (see tests/unit/architecture).
 find_package(Threads REQUIRED)
 find_package(OpenSSL REQUIRED)
 find_package(tl-expected REQUIRED)

@@ -69,7 +69,7 @@ function(ls_seldom_run target)
   endif()
 endfunction()
 
-# ls_library(NAME [SOURCES files...] [LINK libs...]): a static library of all .cpp files in this folder and its rooms.
+# ls_library(NAME [SOURCES files...] [LINK libs...]): a static library of all .cpp files in this folder and its subfolders.
 function(ls_library name)
   cmake_parse_arguments(ARG "" "" "LINK;SOURCES" ${ARGN})
   if(NOT ARG_SOURCES)
@@ -84,7 +84,7 @@ function(ls_library name)
   endif()
 endfunction()
 
-# ls_test(NAME [LOOPS] [BOTH] [SANITIZED filter] [LINK libs...] [LABELS labels...]): a GoogleTest binary of all *_test.cpp files in this folder and its rooms.
+# ls_test(NAME [LOOPS] [BOTH] [SANITIZED filter] [LINK libs...] [LABELS labels...]): a GoogleTest binary of all *_test.cpp files in this folder and its subfolders.
 # LOOPS: the tests' own loops take most of their time. The target tests-LABEL builds all tests of a label. Unit tests that a
 # whole test run asks under AddressSanitizer (asan) are not asked again in the release build, which has the label `release`
 # for the others, unless BOTH: what they test is arithmetic, which depends on how it was optimised. SANITIZED: the

@@ -1,15 +1,12 @@
 #include "compare/picture.h"
 
 #include <fmt/format.h>
-#include <stdlib.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 
-#include "common/image/exr/exr_file.h"
+#include "core/image/exr/exr_file.h"
 
 namespace ls::race {
 namespace {
@@ -21,23 +18,6 @@ std::size_t values_of(FrameSize size) {
 }
 
 }  // namespace
-
-Result<Scratch> Scratch::make() {
-  std::error_code none;
-  std::filesystem::path base = std::filesystem::temp_directory_path(none);
-  if (none) base = ".";
-  std::string name = (base / "lightshaft-race-XXXXXX").string();
-  if (!::mkdtemp(name.data()))
-    return fail(Errc::unavailable,
-                fmt::format("no folder can be made in {}: {}; set TMPDIR to one that can be written",
-                            base.string(), std::strerror(errno)));
-  return Scratch(name);
-}
-
-Scratch::~Scratch() {
-  std::error_code left;
-  if (!folder_.empty()) std::filesystem::remove_all(folder_, left);
-}
 
 Result<void> keep(const std::filesystem::path& file, std::span<const float> pixels) {
   std::ofstream out(file, std::ios::binary | std::ios::trunc);

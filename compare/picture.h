@@ -1,4 +1,4 @@
-// Stores the images of a race (integrators that render one scene at equal cost, race.h), reads reference
+// Stores the images of a race (integrators that render one scene at equal cost), reads reference
 // images, and computes the errors of images.
 #pragma once
 
@@ -7,29 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "common/base/error.h"
-#include "common/image/frame/frame.h"
-#include "common/image/reference/reference.h"
+#include "core/base/error.h"
+#include "core/image/frame/frame.h"
+#include "core/image/reference/reference.h"
 
 namespace ls::race {
 
 using Pixels = std::vector<float>;  // an image: R, G, B interleaved, row by row from the top; all finite
-
-// A temporary folder for the images of one race; the destructor removes it. The images stay on disk until the
-// end of the race, since they may be too many for memory.
-class Scratch {
- public:
-  static Result<Scratch> make();
-  ~Scratch();
-  Scratch(Scratch&& other) noexcept : folder_(std::exchange(other.folder_, {})) {}
-  Scratch& operator=(Scratch&&) = delete;
-
-  const std::filesystem::path& folder() const { return folder_; }
-
- private:
-  explicit Scratch(std::filesystem::path folder) : folder_(std::move(folder)) {}
-  std::filesystem::path folder_;
-};
 
 Result<void> keep(const std::filesystem::path& file, std::span<const float> pixels);
 Result<Pixels> kept(const std::filesystem::path& file, FrameSize size);
@@ -56,7 +40,7 @@ Result<ReferenceFile> read_reference(const std::filesystem::path& exr, FrameSize
 // Makes the reference of a race from one file, or from two files whose images are independent. A single file
 // without a layer of standard errors is taken as exact. With such a layer s, its image ref counts as two
 // images, ref + s and ref - s: these are the means of the two halves of its samples, in unknown order
-// (common/image/reference/reference.h).
+// (core/image/reference/reference.h).
 Reference combine(const std::vector<ReferenceFile>& files);
 std::string describe(const std::vector<ReferenceFile>& files);
 

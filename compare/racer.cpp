@@ -6,9 +6,9 @@
 #include <mutex>
 #include <thread>
 
-#include "common/base/clock.h"
-#include "common/image/film/film.h"
 #include "compare/picture.h"
+#include "core/base/clock.h"
+#include "core/image/film/film.h"
 #include "worker/render/render.h"
 
 namespace ls::race {
@@ -195,17 +195,6 @@ class RenderRacer final : public Racer {
 };
 
 }  // namespace
-
-std::optional<std::size_t> next_turn(std::span<const Turn> turns, std::size_t lap) {
-  std::optional<std::size_t> best;
-  const auto middle = [&](std::size_t i) { return turns[i].used + turns[i].expected / 2; };
-  for (std::size_t k = 0; k < turns.size(); ++k) {
-    const std::size_t i = (k + lap) % turns.size();
-    if (turns[i].done) continue;
-    if (!best || middle(i) < middle(*best)) best = i;
-  }
-  return best;
-}
 
 std::optional<SampleRange> next_range(RoundIndex k, double seconds_per_sample, double seconds_left,
                                       std::uint64_t most_spp) {

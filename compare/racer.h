@@ -1,5 +1,4 @@
-// The racers of a race: each renders one scene with one integrator and one seed. They take turns, so this
-// file also decides which racer runs next, and for how long.
+// The racers of a race: each renders one scene with one integrator and one seed. They take turns.
 #pragma once
 
 #include <atomic>
@@ -11,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "common/base/error.h"
-#include "common/image/error/error_estimate.h"
-#include "common/image/frame/frame.h"
-#include "common/image/frame/rounds.h"
+#include "core/base/error.h"
+#include "core/image/error/error_estimate.h"
+#include "core/image/frame/frame.h"
+#include "core/image/frame/rounds.h"
 
 namespace ls::render {
 class World;
@@ -78,12 +77,6 @@ class Racer {
   virtual std::vector<std::filesystem::path> halves() const = 0;
   virtual std::vector<std::string> notes() const { return {}; }  // remarks for the report
 };
-
-// Returns the index of the racer that runs next: the one with the smallest used + expected / 2, which is the
-// middle of its next turn on its own clock. So racers take turns and use equal times. If several have the
-// same middle, the first of them from index `lap` on, cyclically, runs, so that no racer always goes first.
-// nullopt: all are done.
-std::optional<std::size_t> next_turn(std::span<const Turn> turns, std::size_t lap);
 
 // Returns the samples that a render adds next: those of round `k` (a fixed range of samples), shortened to
 // what fits into `seconds_left`, and to `most_spp` samples per pixel in total. `seconds_per_sample` is the

@@ -21,10 +21,6 @@
 #include <utility>
 #include <variant>
 
-#include "common/base/clock.h"
-#include "common/base/digest.h"
-#include "common/base/log.h"
-#include "common/trace/tracer.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/auth/throttle.h"
 #include "coordinator/http/auth/token_registry.h"
@@ -34,6 +30,10 @@
 #include "coordinator/service/coordinator.h"
 #include "coordinator/tls/tls_files.h"
 #include "coordinator/webhooks/webhooks.h"
+#include "core/base/clock.h"
+#include "core/base/digest.h"
+#include "core/base/log.h"
+#include "util/trace/tracer.h"
 
 namespace {
 
@@ -128,8 +128,9 @@ Result<std::optional<ls::tls::Texts>> tls_of(const Flags& flags) {
 void warn_of_open_lines(const std::string& address, std::string_view what) {
   const std::string host = address.substr(0, address.rfind(':'));
   if (host != "127.0.0.1" && host != "localhost" && host != "[::1]")
-    ls::log_warn("", fmt::format("{} on {} is not encrypted: use --tls unless the network is yours alone",
-                                 what, address));
+    ls::log_warn("",
+                 fmt::format("{} on {} is not encrypted: use --tls unless you trust everybody on the network",
+                             what, address));
 }
 
 std::string with_port(const std::string& address, int port) {
@@ -203,10 +204,9 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   const auto worker_key = ls::http::read_or_make_token(secrets / "worker-key");
   others.reset();
   if (flags.shared && flags.secrets.empty())
-    ls::log_warn(
-        "",
-        "tokens that are made here are known to this coordinator alone: give all that share this store the "
-        "same --secrets folder");
+    ls::log_warn("",
+                 "only this coordinator knows the tokens that are made here: give all coordinators of this "
+                 "store the same --secrets folder");
   std::shared_ptr<const ls::http::TlsIdentity> identity;
   if (*tls) {
     auto made = ls::http::TlsIdentity::make((*tls)->cert, (*tls)->key);
@@ -242,6 +242,12 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   options.clock = std::make_shared<ls::SystemClock>();
   options.tick = std::chrono::milliseconds(100);
   options.tracer = *tracer;
+  const auto stopping = std::make_shared<std::atomic<bool>>(false);
+  const fs::path reader = ls::program_beside_us("lightshaft-scene");
+  if (!fs::exists(reader, ignored))
+    return fail(Errc::failed_precondition,
+                fmt::format("there is no {}, which reads scenes: install it, too", reader.string()));
+  options.scenes = ls::scenes_by_processes(reader, {.stop = stopping});
   auto coordinator = ls::coordinator::Coordinator::open(std::move(options));
   if (!coordinator) return tl::unexpected(coordinator.error());
 
@@ -286,12 +292,13 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   sigwait(&signals, &signal);
   ls::log_info("", fmt::format("{}: stopping", signal == SIGINT ? "SIGINT" : "SIGTERM"));
   fs::remove(data / "ports.json", ignored);
+  *stopping = true;
   (*http)->stop();
   grpc.stop();
   webhooks->reset();
   coordinator->reset();
   if (port_dead)
-    return fail(Errc::unavailable, "the workers' port did not answer any more; start the coordinator again");
+    return fail(Errc::unavailable, "the workers' port stopped responding; start the coordinator again");
   ls::log_info("", "stopped");
   return {};
 }

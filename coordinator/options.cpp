@@ -4,9 +4,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "common/command_line/command.h"
-#include "common/command_line/parse.h"
 #include "coordinator/service/open_stores.h"
+#include "util/command_line/command.h"
+#include "util/command_line/parse.h"
 
 namespace ls::coordinator {
 namespace {
@@ -47,66 +47,66 @@ void add_shares(CLI::App& app, Flags& flags) {
     app.add_option(name, value, text)->check(CLI::Range(0, 1'000'000))->capture_default_str();
   };
   limit("--workers-per-job", flags.shares.workers_per_job,
-        "at most so many workers on one job; 0: any number");
+        "largest number of workers on one job at once; 0: no limit");
   limit("--units-per-job", flags.shares.units_per_job,
-        "at most so many units of one job lent at once; 0: any number");
-  limit("--workers-per-user", flags.shares.workers_per_user, "and on all jobs of one user");
-  limit("--units-per-user", flags.shares.units_per_user, "and of all jobs of one user");
-  app.add_option(
-         "--film-memory", flags.film_memory,
-         "memory for the images of all jobs that are not done, half of it for one user, e.g. 16G; jobs "
-         "beyond it are refused; default: half of the machine's")
+        "largest number of units of one job that are leased at once; 0: no limit");
+  limit("--workers-per-user", flags.shares.workers_per_user,
+        "largest number of workers on all jobs of one user at once; 0: no limit");
+  limit("--units-per-user", flags.shares.units_per_user,
+        "largest number of units of all jobs of one user that are leased at once; 0: no limit");
+  app.add_option("--film-memory", flags.film_memory,
+                 "memory for the images of all unfinished jobs, e.g. 16G; one user may use half of it; jobs "
+                 "that do not fit are refused; default: half of the machine's memory")
       ->transform(CLI::AsSizeValue(false));
   app.add_option("--user-priority", flags.limits.user_priority,
-                 "the highest priority that a job handed in with a token of the role 'submit' may have")
+                 "highest priority of jobs that are submitted with a token of the role 'submit'")
       ->check(CLI::Range(-1'000'000, 1'000'000))
       ->capture_default_str();
   app.add_option("--audit-percent", flags.audit_percent,
-                 "of the results that another worker renders again, to find workers whose pixels are wrong")
+                 "percentage of results that another worker renders again, to find workers with wrong pixels")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
   app.add_flag("--allow-fake", flags.allow_fake,
-               "for tests: workers started with --fake may join, which make pixels up; without it they are "
-               "refused");
+               "for tests: let workers join that were started with --fake and invent their pixels");
 }
 
 void add_tls(CLI::App& app, Flags& flags) {
   app.add_flag("--tls", flags.tls,
-               "speak TLS, to workers with certificates on both sides, with what is made once in DATA/tls: "
-               "ca.pem for users (LIGHTSHAFT_CA); ca.pem, worker.pem and worker.key for workers");
-  app.add_option("--tls-names", flags.tls_names, "host names and addresses that others call this machine by")
+               "use TLS, and require a certificate of workers; the first start makes the files in DATA/tls: "
+               "users need ca.pem (LIGHTSHAFT_CA), workers need ca.pem, worker.pem and worker.key");
+  app.add_option("--tls-names", flags.tls_names,
+                 "host names and addresses by which others reach this machine")
       ->delimiter(',');
-  auto* ca = app.add_option("--tls-ca", flags.tls_ca,
-                            "certificates of your own instead: of whoever signs the workers'");
-  auto* cert = app.add_option("--tls-cert", flags.tls_cert, "of this machine, with its chain (PEM)");
-  auto* key = app.add_option("--tls-key", flags.tls_key, "its key (PEM), readable by its owner only");
+  auto* ca = app.add_option(
+      "--tls-ca", flags.tls_ca,
+      "your own certificates instead: the authority that signs the workers' certificates (PEM)");
+  auto* cert =
+      app.add_option("--tls-cert", flags.tls_cert, "this machine's certificate with its chain (PEM)");
+  auto* key =
+      app.add_option("--tls-key", flags.tls_key, "the certificate's key (PEM), readable by its owner only");
   ca->needs(cert)->needs(key);
   cert->needs(ca);
   key->needs(ca);
 }
 
 void add_files(CLI::App& app, Flags& flags) {
-  app.add_option(
-         "--keep-unused-hours", flags.keep_unused_hours,
-         "how long files stay that no job needs, and uploads that nobody goes on with; 24, and with --blobs "
-         "for good")
+  app.add_option("--keep-unused-hours", flags.keep_unused_hours,
+                 "hours after which unneeded files and abandoned uploads are removed; default: 24, with "
+                 "--blobs never")
       ->check(CLI::Range(1e-4, 87600.0));
-  app.add_option(
-      "--blobs", flags.blobs,
-      "where files of scenes are kept, if not in --data: a folder, or s3://BUCKET/PREFIX?endpoint=URL with "
-      "keys in AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY");
+  app.add_option("--blobs", flags.blobs,
+                 "where files of scenes are stored: a folder, or s3://BUCKET/PREFIX?endpoint=URL with keys "
+                 "in AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY; default: in --data");
   app.add_flag("--shared", flags.shared,
-               "other coordinators have the same --store and --blobs: each owns whole jobs, and those of one "
-               "that dies "
-               "go to another");
-  app.add_option(
-      "--secrets", flags.secrets,
-      "folder of tokens and of what --tls makes, if not --data: with --shared one that all coordinators "
-      "reach, so that each knows what another one's users and workers show");
+               "share the farm with other coordinators that have the same --store and --blobs: each owns "
+               "whole jobs, and takes over those of a dead coordinator");
+  app.add_option("--secrets", flags.secrets,
+                 "folder of the tokens and the files of --tls; with --shared, give all coordinators the same "
+                 "one, so that they accept each other's users and workers; default: --data");
   app.add_option("--public-http", flags.public_http,
-                 "with --shared: http://HOST:PORT where clients reach this one, if not as --http says");
+                 "with --shared: http://HOST:PORT where clients reach this coordinator; default: --http");
   app.add_option("--public-grpc", flags.public_grpc,
-                 "with --shared: HOST:PORT where workers reach this one, if not as --grpc says");
+                 "with --shared: HOST:PORT where workers reach this coordinator; default: --grpc");
 }
 
 // Checks the flags that --shared requires: other coordinators must be able to read this one's data in order
@@ -115,24 +115,23 @@ Result<void> check_shared(const Flags& flags) {
   if (!flags.shared) return {};
   if (flags.store == "sqlite" || flags.blobs.empty())
     return fail(Errc::invalid_argument,
-                "--shared needs a place that all coordinators reach: --store redis://... and "
-                "--blobs (a shared folder, or s3://...)");
+                "--shared needs storage that all coordinators reach: --store redis://... and --blobs (a "
+                "shared folder, or s3://...)");
   if (flags.keep_unused_hours)
     return fail(Errc::invalid_argument,
-                "--shared and --keep-unused-hours do not go together: one coordinator cannot "
-                "know which files the jobs of another one need");
+                "--shared and --keep-unused-hours cannot be combined: a coordinator does not know which "
+                "files the jobs of the others need");
   if (flags.tls && flags.tls_ca.empty() && flags.secrets.empty())
     return fail(
         Errc::invalid_argument,
-        "--shared with --tls: each coordinator would make an authority of its own, which the others' workers "
-        "and "
-        "users do not know. Give all of them the same --secrets FOLDER, or certificates of one authority "
-        "(deploy/make-certificates.sh; --tls-ca, --tls-cert, --tls-key)");
+        "--shared with --tls: each coordinator would make its own authority, which the workers and users of "
+        "the others do not trust. Give all of them the same --secrets FOLDER, or certificates of one "
+        "authority (deploy/make-certificates.sh; --tls-ca, --tls-cert, --tls-key)");
   const bool anywhere = flags.http.starts_with("0.0.0.0:") || flags.http.starts_with("[::]:");
   if (anywhere && flags.public_http.empty())
     return fail(Errc::invalid_argument,
-                "--shared with --http on all addresses: say with --public-http "
-                "http://HOST:PORT where clients reach this coordinator");
+                "--shared with --http on all addresses: add --public-http http://HOST:PORT, where clients "
+                "reach this coordinator");
   return {};
 }
 
@@ -141,27 +140,29 @@ Result<void> check_shared(const Flags& flags) {
 std::variant<Flags, int> parse_flags(int argc, char** argv) {
   Flags flags;
   std::string log_format = "text";
-  CLI::App app("Cuts jobs into units, hands them to workers, and folds what they send into one exact image.",
-               "lightshaft-coordinator");
+  CLI::App app(
+      "Divides jobs into units, sends them to workers, and combines the results into one exact image.",
+      "lightshaft-coordinator");
   use_plain_help(app);
   app.set_version_flag("--version", "lightshaft-coordinator " LIGHTSHAFT_VERSION);
-  app.add_option("--http", flags.http, "ADDR:PORT of the HTTP interface and the dashboard; port 0: any")
+  app.add_option("--http", flags.http,
+                 "ADDR:PORT of the HTTP interface and the dashboard; port 0: any free port")
       ->capture_default_str();
-  app.add_option("--grpc", flags.grpc, "ADDR:PORT that workers connect to; port 0: any")
+  app.add_option("--grpc", flags.grpc, "ADDR:PORT that workers connect to; port 0: any free port")
       ->capture_default_str();
   app.add_option("--data", flags.data, "folder for jobs, blobs, images and tokens")->capture_default_str();
   app.add_option("--store", flags.store,
-                 "where jobs are kept: sqlite, or redis://[USER:PASSWORD@]HOST[:PORT][/DB]")
+                 "where jobs are stored: sqlite, or redis://[USER:PASSWORD@]HOST[:PORT][/DB]")
       ->capture_default_str();
   add_tls(app, flags);
   add_files(app, flags);
   add_shares(app, flags);
   app.add_option(
       "--webhook", flags.webhooks,
-      "address that is told of every change of a job's state (docs/guide/operations.md); may be repeated");
-  app.add_option("--log-format", log_format, "text, or json: an object a line")
+      "URL that receives every change of a job's state (docs/guide/operations.md); may be repeated");
+  app.add_option("--log-format", log_format, "text, or json with one object per line")
       ->check(CLI::IsMember({"text", "json"}));
-  app.set_config("--config", "", "file with these options, one 'name = value' a line");
+  app.set_config("--config", "", "file with these options, one 'name = value' per line");
   app.allow_config_extras(false);
   for (const auto& [option, value] : {std::pair("--http", "ADDRESS"),
                                       {"--grpc", "ADDRESS"},

@@ -6,10 +6,10 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/log.h"
-#include "common/base/machine_memory.h"
 #include "coordinator/http/message/limits.h"
 #include "coordinator/service/coordinator.h"
+#include "core/base/log.h"
+#include "core/base/machine_memory.h"
 
 namespace ls::coordinator {
 

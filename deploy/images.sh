@@ -21,7 +21,7 @@ done
 mkdir -p build/image
 if [ "$binaries" = prebuilt ]; then
   bin="${LIGHTSHAFT_BIN:-build/release/bin}"
-  for program in lightshaft lightshaft-coordinator lightshaft-worker lightshaft-vdb lightshaft-denoise lightshaft-exr; do
+  for program in lightshaft lightshaft-coordinator lightshaft-worker lightshaft-vdb lightshaft-denoise lightshaft-exr lightshaft-scene lightshaft-validate; do
     [ -x "$bin/$program" ] || { echo "error: --prebuilt, but there is no $bin/$program: build the project first" >&2; exit 1; }
     strip -o "build/image/$program" "$bin/$program"
   done

@@ -18,7 +18,7 @@ for program in dpkg-shlibdeps file; do
   command -v "$program" >/dev/null || { echo "error: $program is missing; deploy/install-deps.sh installs it" >&2; exit 1; }
 done
 
-programs=(lightshaft lightshaft-coordinator lightshaft-worker lightshaft-vdb lightshaft-denoise lightshaft-exr)
+programs=(lightshaft lightshaft-coordinator lightshaft-worker lightshaft-vdb lightshaft-denoise lightshaft-exr lightshaft-scene lightshaft-validate)
 if [ "$prebuilt" = 0 ]; then
   # A build folder that was configured with tests stays so.
   [ -f build/release/CMakeCache.txt ] || cmake --preset release -DLIGHTSHAFT_TESTS=OFF

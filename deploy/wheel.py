@@ -24,7 +24,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build" / "release"
 # Every system has these, newer ones than the build's serve it as well, and two copies of them in one process do not work.
 SYSTEM = {"libc6", "libgcc-s1", "libstdc++6"}
-LIBRARIES = "lightshaft-libraries"  # common/sandbox/sandbox.cpp knows this name
+LIBRARIES = "lightshaft-libraries"  # util/sandbox/sandbox.cpp knows this name
 ENTRY_POINTS = """[console_scripts]
 lightshaft = lightshaft_command.programs:lightshaft
 lightshaft-coordinator = lightshaft_command.programs:coordinator
@@ -118,8 +118,8 @@ def add_licences(folder, travels):
             shutil.copyfile(whole, folder / name)
     shutil.copyfile(ROOT / "LICENSE", folder / "LICENSE")
     # The LGPL and the MPL ask that whoever gets a library learns where its source is.
-    listed = run("dpkg-query", "-W", "-f", "https://snapshot.debian.org/package/${source:Package}/${source:Version}/\\n", *travels).splitlines()
-    notice = [(ROOT / "NOTICE").read_text(), "The libraries in this wheel are those of Debian, unchanged. Their sources:\n", *sorted(set(listed)), ""]
+    listed = run("dpkg-query", "-W", "-f", "${source:Package} ${source:Version}\\n", *travels).splitlines()
+    notice = [(ROOT / "NOTICE").read_text(), "The libraries in this wheel are those of Debian, unchanged. Debian's archive of all versions has their sources, by these names and versions of source packages:\n", *sorted(set(listed)), ""]
     (folder / "NOTICE").write_text("\n".join(notice))
 
 

@@ -17,7 +17,7 @@ while [ $# -gt 0 ]; do
   shift
 done
 
-programs=(lightshaft lightshaft-coordinator lightshaft-worker lightshaft-vdb lightshaft-denoise lightshaft-exr)
+programs=(lightshaft lightshaft-coordinator lightshaft-worker lightshaft-vdb lightshaft-denoise lightshaft-exr lightshaft-scene lightshaft-validate)
 if [ "$prebuilt" = 0 ]; then
   deploy/install-deps.sh
   # A build folder that was configured with tests stays so.

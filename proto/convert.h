@@ -1,5 +1,5 @@
 // Converts the messages of farm.proto (the protocol between coordinator and workers) to and from the structs
-// of common/protocol/messages.h. A struct whose values are within their limits and whose texts are UTF-8
+// of util/protocol/messages.h. A struct whose values are within their limits and whose texts are UTF-8
 // survives the round trip unchanged. A received message is converted, or rejected with invalid_argument and
 // the name of the invalid field, so the code that uses the structs need not check lengths, rectangles or
 // lists again.
@@ -9,10 +9,10 @@
 
 #include <string>
 
-#include "common/base/error.h"
-#include "common/protocol/limits.h"
-#include "common/protocol/messages.h"
+#include "core/base/error.h"
 #include "proto/farm.pb.h"
+#include "util/protocol/limits.h"
+#include "util/protocol/messages.h"
 
 namespace ls::wire {
 

@@ -1,11 +1,11 @@
-// Converts received protobuf messages to the structs of common/protocol/messages.h. Every field is checked,
+// Converts received protobuf messages to the structs of util/protocol/messages.h. Every field is checked,
 // because senders are not trusted.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <utility>
 
-#include "common/base/safe_text.h"
+#include "core/base/safe_text.h"
 #include "proto/convert.h"
 
 // Defines `name` as the value of `expression`, a Result; if that is an error, the enclosing function returns

@@ -1,8 +1,8 @@
-// Converts the structs of common/protocol/messages.h to protobuf messages.
+// Converts the structs of util/protocol/messages.h to protobuf messages.
 #include <algorithm>
 #include <utility>
 
-#include "common/base/overloaded.h"
+#include "core/base/overloaded.h"
 #include "proto/convert.h"
 
 namespace ls::wire {

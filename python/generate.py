@@ -39,7 +39,7 @@ def camel(name):
 
 
 class Models:
-    """Turns schemas into the texts of classes; objects that stand within others get a name of their own."""
+    """Turns schemas into the source text of classes. Nested objects get names of their own."""
 
     def __init__(self, document):
         self.classes = {}

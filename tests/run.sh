@@ -2,6 +2,8 @@
 # Installs what is missing, builds, and runs every test.
 #   tests/run.sh                everything: release build, unit, statistical, system and browser tests; sanitizer builds
 #   tests/run.sh --quick        the inner loop: release build, unit tests, the fast system tests
+#   tests/run.sh --only PART    one part and the builds that it needs; may be repeated. The parts: lint, unit, statistical,
+#                               asan, tsan (the sanitizers), system, web, python, containers, blender, kubernetes, upgrade
 #   tests/run.sh --blender      also the tests of the add-on that need Blender, a download of 350 MB and some minutes
 #   tests/run.sh --kubernetes   also the tests that need Kubernetes' API server, which the first time takes minutes to build
 #   tests/run.sh --upgrade      also the upgrade from the last release, whose programs are built the first time
@@ -13,18 +15,32 @@
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-quick=0 blender=0 kubernetes=0 upgrade=0 docker=0 require_all=0
-for arg in "$@"; do
-  case "$arg" in
+quick=0 blender=0 kubernetes=0 upgrade=0 docker=0 require_all=0 only=" "
+usage() { sed -n '3,/^# System/s/^# \{0,1\}//p' tests/run.sh | sed '$d' >&2; exit 2; }
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --only)
+      case "${2:-}" in
+        lint | unit | statistical | asan | tsan | system | web | python | containers) ;;
+        blender) blender=1 ;;
+        kubernetes) kubernetes=1 ;;
+        upgrade) upgrade=1 ;;
+        *) usage ;;
+      esac
+      only+="$2 "
+      shift ;;
     --quick) quick=1 ;;
     --blender) blender=1 ;;
     --kubernetes) kubernetes=1 ;;
     --upgrade) upgrade=1 ;;
     --docker) docker=1 ;;
     --require-all) require_all=1 ;;
-    *) echo "usage: tests/run.sh [--quick] [--blender] [--kubernetes] [--upgrade] [--docker] [--require-all]" >&2; exit 2 ;;
+    *) usage ;;
   esac
+  shift
 done
+
+if [ "$quick" -eq 1 ] && [ "$only" != " " ]; then echo "tests/run.sh: --quick and --only exclude each other" >&2; exit 2; fi
 
 started=$SECONDS
 logs=build/test-logs
@@ -41,6 +57,11 @@ total() { awk -v column="$1" '{ n += $column } END { print n + 0 }' "$counts"; }
 summary() { echo "$(total 1) passed, $(total 2) failed, $(total 3) skipped"; }
 # Ends a lane, or the whole run: what comes after needs what failed.
 give_up() { printf '\n%s\n' "$1"; count 0 1 0; summary; exit 1; }
+
+# A lane that gives up ends with 1 and has counted its failure; one that is killed has not.
+lane_ended() {  # lane, exit code
+  [ "$2" -le 1 ] || { printf '\nthe lane of %s ended with exit code %s\n' "$1" "$2"; count 0 1 0; }
+}
 
 # Sets `used`: seconds of the processors that what this lane has waited for took.
 count_processor_seconds() {
@@ -65,42 +86,32 @@ build() {  # preset, targets...
   cmake --build --preset "$preset" ${1:+--target "$@"} >"$logs/build-$preset.log" 2>&1 || { grep -E '^FAILED|^ninja: |[ :]error: |Killed|No space' -A 12 "$logs/build-$preset.log" | head -n 80; give_up "the '$preset' build failed"; }
 }
 
-# Each GoogleTest case counts: the binaries' own summaries are added up. (--output-on-failure would print failing ones twice.)
-run_ctest() {  # preset, label, log name
-  local log="$logs/$3.log"
-  ctest --preset "$1" -L "^$2\$" --verbose -j "$(nproc)" >"$log" 2>&1
-  local rc=$?
-  # ctest -V prefixes lines with the test's number.
-  local p f s
-  p=$(grep -oE '\[  PASSED  \] [0-9]+' "$log" | awk '{ n += $4 } END { print n + 0 }')
-  f=$(grep -oE '\[  FAILED  \] [0-9]+ test' "$log" | awk '{ n += $4 } END { print n + 0 }')
-  s=$(grep -oE '\[  SKIPPED \] [0-9]+ test' "$log" | awk '{ n += $4 } END { print n + 0 }')
-  if [ "$rc" -ne 0 ]; then
-    [ "$f" -gt 0 ] || f=1
-    # Tests of hostile messages make libprotobuf complain.
-    grep -v 'libprotobuf ERROR' "$log" | grep -E -A 4 ': Failure$|: ERROR: |WARNING: ThreadSanitizer' | head -n 80
-    grep -E '\[  FAILED  \]|\*\*\*|SUMMARY' "$log" | head -n 40
-  fi
-  count "$p" "$f" "$s"
-  echo "$3: $p passed, $f failed, $s skipped$([ "$rc" -eq 0 ] || echo ', ctest says failed')"
+# Adds the JUnit files of a step to the sums, and prints its failures. A command that failed without a failed test counts as one.
+count_results() {  # name, exit code of the command, arguments of results.py...
+  local name="$1" rc="$2" p f s; shift 2
+  /usr/bin/python3 -B tests/support/results.py "$@" >"$logs/$name.results"
+  read -r p f s < <(tail -n 1 "$logs/$name.results")
+  if [ "$rc" -ne 0 ] && [ "${f:-0}" -eq 0 ]; then f=1; tail -n 20 "$logs/$name.log"; fi
+  count "${p:-0}" "${f:-1}" "${s:-0}"
+  head -n -1 "$logs/$name.results" | head -n 120
+  echo "$name: ${p:-0} passed, ${f:-1} failed, ${s:-0} skipped"
+}
+
+# Each case of a GoogleTest program counts, and a program that writes no result file is a failure.
+run_ctest() {  # preset, label, name
+  local log="$logs/$3.log" cases="$PWD/$logs/$3-cases" rc
+  mkdir -p "$cases"
+  GTEST_OUTPUT="xml:$cases/" ctest --preset "$1" -L "^$2\$" --no-tests=error --output-junit "$PWD/$logs/$3.xml" --verbose -j "$(nproc)" >"$log" 2>&1
+  rc=$?
+  # Tests of hostile messages make libprotobuf complain.
+  [ "$rc" -eq 0 ] || grep -v 'libprotobuf ERROR' "$log" | grep -E -A 4 ': ERROR: |WARNING: ThreadSanitizer|SUMMARY' | head -n 80
+  count_results "$3" "$rc" ctest "$logs/$3.xml" "$cases"
 }
 
 run_pytest() {  # name, arguments...; by $PYTHON if it is set
-  local name="$1" log="$logs/$1.log"; shift
-  "${PYTHON:-/usr/bin/python3}" -m pytest -q -ra --durations=0 -p no:cacheprovider "$@" >"$log" 2>&1
-  local rc=$? last
-  last=$(grep -E '[0-9]+ (passed|failed|skipped|error)' "$log" | tail -n 1)
-  local p f s e
-  p=$(grep -oE '[0-9]+ passed' <<<"$last" | grep -oE '[0-9]+'); f=$(grep -oE '[0-9]+ failed' <<<"$last" | grep -oE '[0-9]+')
-  s=$(grep -oE '[0-9]+ skipped' <<<"$last" | grep -oE '[0-9]+'); e=$(grep -oE '[0-9]+ error' <<<"$last" | grep -oE '[0-9]+')
-  f=$((${f:-0} + ${e:-0}))
-  if [ "$rc" -ne 0 ]; then
-    [ "$f" -gt 0 ] || f=1
-    grep -E '^(FAILED|ERROR|E  )' "$log" | head -n 60
-  fi
-  count "${p:-0}" "$f" "${s:-0}"
-  grep -E '^SKIPPED' "$log" || true
-  echo "$name: ${last:-pytest exited with $rc}"
+  local name="$1"; shift
+  "${PYTHON:-/usr/bin/python3}" -m pytest -q -ra --durations=0 --junitxml="$logs/$name.xml" -p no:cacheprovider "$@" >"$logs/$name.log" 2>&1
+  count_results "$name" $? pytest "$logs/$name.xml"
 }
 
 run_lint() {
@@ -167,50 +178,63 @@ run_packages() {
   esac
 }
 
+wanted() { [ "$only" = " " ] || [[ "$only" = *" $1 "* ]]; }
+wanted_any() { local part; for part in "$@"; do if wanted "$part"; then return 0; fi; done; return 1; }
+part() { if wanted "$1"; then shift; step "$@"; fi; }  # part, then as for step
+
 waiting_lane() {
   # Most of their time is waiting, so several files run side by side. A file runs in one process: its tests share what is slow
   # to make.
-  step "system tests" run_pytest system -n 3 --dist loadfile tests/system
-  step "browser tests" run_pytest web -n 2 --dist loadfile tests/web
-  step "Python package" run_in_venv python tests/python tests/packages
-  step "Open Job Description" run_in_venv openjd tests/openjd
-  step "Blender" run_blender
-  step "Kubernetes" run_kubernetes
-  step "upgrade" run_upgrade
-  step "Docker's engine" prepare_docker
-  step "compose" run_compose
-  step "Docker" run_docker
-  step "packages" run_packages
+  part system "system tests" run_pytest system -n 3 --dist loadfile tests/system
+  part web "browser tests" run_pytest web -n 2 --dist loadfile tests/web
+  part python "Python package" run_in_venv python tests/python tests/packages
+  part python "Open Job Description" run_in_venv openjd tests/openjd
+  part blender "Blender" run_blender
+  part kubernetes "Kubernetes" run_kubernetes
+  part upgrade "upgrade" run_upgrade
+  part containers "Docker's engine" prepare_docker
+  part containers "compose" run_compose
+  part containers "Docker" run_docker
+  part containers "packages" run_packages
 }
 
 computing_lane() {
   renice -n 5 "$BASHPID" >/dev/null  # what waits has short turns, and limits to its patience
-  step "release build: tests" build release tests-release tests-statistical
-  step "unit and architecture tests" run_ctest release release unit
-  step "statistical tests" run_ctest release statistical statistical
-  step "AddressSanitizer build" build asan tests-asan lightshaft-coordinator lightshaft-worker
-  step "AddressSanitizer: unit tests" run_ctest asan asan unit-asan
-  LIGHTSHAFT_CLI="$LIGHTSHAFT_BIN/lightshaft" LIGHTSHAFT_BIN="$PWD/build/asan/bin" step "AddressSanitizer: a farm" run_pytest farm-asan tests/system -m sanitized
-  step "ThreadSanitizer build" build tsan tests-tsan
-  step "ThreadSanitizer: unit tests" run_ctest tsan tsan threads-tsan
+  local label=release targets=()
+  [ "$only" = " " ] || label=unit  # without the AddressSanitizer's part, the release build runs all unit tests
+  if wanted unit; then targets+=("tests-$label"); fi
+  if wanted statistical; then targets+=(tests-statistical); fi
+  if [ "${#targets[@]}" -gt 0 ]; then step "release build: tests" build release "${targets[@]}"; fi
+  part unit "unit and architecture tests" run_ctest release "$label" unit
+  part statistical "statistical tests" run_ctest release statistical statistical
+  part asan "AddressSanitizer build" build asan tests-asan lightshaft-coordinator lightshaft-worker
+  part asan "AddressSanitizer: unit tests" run_ctest asan asan unit-asan
+  LIGHTSHAFT_CLI="$LIGHTSHAFT_BIN/lightshaft" LIGHTSHAFT_BIN="$PWD/build/asan/bin" part asan "AddressSanitizer: a farm" run_pytest farm-asan tests/system -m sanitized
+  part tsan "ThreadSanitizer build" build tsan tests-tsan
+  part tsan "ThreadSanitizer: unit tests" run_ctest tsan tsan threads-tsan
 }
 
 deploy/install-deps.sh --tests >"$logs/install.log" 2>&1 || { tail -n 20 "$logs/install.log"; give_up "what the tests need could not be installed"; }
-step "lint" run_lint
+part lint "lint" run_lint
 export LIGHTSHAFT_BIN="$PWD/build/release/bin"
-step "release build: programs" build release lightshaft lightshaft-coordinator lightshaft-worker fake_oidn_blurs race_pages
+if wanted_any unit asan system web python containers blender kubernetes upgrade; then
+  step "release build: programs" build release lightshaft lightshaft-coordinator lightshaft-worker fake_oidn_blurs
+fi
 
 if [ "$quick" -eq 1 ]; then
   step "system tests, the fast ones" run_pytest system -n 3 --dist loadfile tests/system -m "not slow" &
   waiting=$!
   (step "release build: tests" build release tests-unit
    step "unit and architecture tests" run_ctest release unit unit)
+  lane_ended "builds and unit tests" $?
 else
   waiting_lane &
   waiting=$!
   (computing_lane)
+  lane_ended "builds and unit tests" $?
 fi
 wait "$waiting"
+lane_ended "system tests" $?
 
 printf '\nThe slowest steps (%s):\n' "$times"
 tail -n +2 "$times" | sort -t, -k3 -rn | head -n 6 | awk -F, '{ printf "  %5d s  %s\n", $3, $1 }'
@@ -218,6 +242,11 @@ if [ -s "$not_run" ]; then printf '\nNot part of this run:\n'; sed 's/^/  /' "$n
 if [ "$require_all" -eq 1 ] && [ "$(total 3)" -gt 0 ]; then
   echo "--require-all: $(total 3) tests were skipped"
   count 0 "$(total 3)" "-$(total 3)"
+fi
+# Of a run of some parts, what is not part of it was asked for.
+if [ "$require_all" -eq 1 ] && [ "$only" != " " ] && [ -s "$not_run" ]; then
+  echo "--require-all: parts that were asked for did not run"
+  count 0 1 0
 fi
 summary
 [ "$(total 2)" -eq 0 ] && [ "$(total 1)" -gt 0 ]

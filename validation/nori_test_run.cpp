@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "common/assets/image.h"
-#include "common/base/clock.h"
+#include "core/assets/image.h"
+#include "core/base/clock.h"
 #include "validation/measure/hypothesis_tests.h"
 #include "validation/measure/measure.h"
 #include "worker/render/bsdf/bsdf.h"

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "common/base/error.h"
-#include "common/scene/reader/nori_test.h"
+#include "core/base/error.h"
+#include "formats/reader/nori_test.h"
 #include "validation/measure/judge.h"
 #include "worker/render/render.h"
 

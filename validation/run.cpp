@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/clock.h"
-#include "common/base/overloaded.h"
+#include "core/base/clock.h"
+#include "core/base/overloaded.h"
 #include "validation/fixtures/checks.h"
 #include "validation/measure/hypothesis_tests.h"
 #include "validation/measure/measure.h"

@@ -8,10 +8,10 @@
 #include <mutex>
 #include <vector>
 
-#include "common/base/clock.h"
-#include "common/scene/analysis/needs.h"
-#include "common/scene/json/serialize.h"
-#include "common/scene/schema/integrators.h"
+#include "core/base/clock.h"
+#include "core/scene/analysis/needs.h"
+#include "core/scene/json/serialize.h"
+#include "core/scene/schema/integrators.h"
 #include "worker/render/base/build_stop.h"
 
 namespace ls::worker {

@@ -8,8 +8,8 @@
 
 namespace ls::worker {
 
-// `threads` is the number of threads that build a world (a scene ready to render). Units (each one tile and
-// one range of samples) are rendered on the threads that call render().
+// `threads` is the number of threads that build a world (a scene ready to render). Units are rendered on the
+// threads that call render().
 std::unique_ptr<LocalBackend> make_inprocess_backend(int threads);
 
 }  // namespace ls::worker

@@ -9,9 +9,9 @@
 #include <random>
 #include <thread>
 
-#include "common/base/log.h"
-#include "common/sandbox/sandbox.h"
-#include "common/trace/tracer.h"
+#include "core/base/log.h"
+#include "util/sandbox/sandbox.h"
+#include "util/trace/tracer.h"
 #include "worker/agent/agent.h"
 #include "worker/agent/link_ring.h"
 #include "worker/cache/cache.h"

@@ -8,12 +8,12 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "common/base/log.h"
-#include "common/base/machine_memory.h"
-#include "common/base/secret.h"
-#include "common/command_line/command.h"
-#include "common/command_line/parse.h"
-#include "common/protocol/limits.h"
+#include "core/base/log.h"
+#include "core/base/machine_memory.h"
+#include "core/base/secret.h"
+#include "util/command_line/command.h"
+#include "util/command_line/parse.h"
+#include "util/protocol/limits.h"
 #include "worker/child/child.h"
 #include "worker/machine.h"
 
@@ -31,45 +31,45 @@ struct Files {
 
 void describe(CLI::App& app, Options& o, Files& files) {
   app.add_option("--coordinator", o.coordinators,
-                 "HOST:PORT where the coordinator listens for workers; several that share a farm, separated "
-                 "by commas")
+                 "HOST:PORT where the coordinator listens for workers; if several coordinators share a farm, "
+                 "all of them, separated by commas")
       ->delimiter(',');
-  app.add_option("--threads", o.threads, "Units rendered at once; default: all CPUs")
+  app.add_option("--threads", o.threads, "Number of units to render at once; default: number of CPUs")
       ->check(CLI::Range(1, kMostChildThreads));
-  app.add_option("--cache", o.cache, "Folder for scenes and assets, may be shared by workers");
-  app.add_option("--cache-limit", o.cache_limit, "Bytes to keep there, e.g. 20G; default: no limit")
+  app.add_option("--cache", o.cache, "Folder for the files of scenes; several workers may share it");
+  app.add_option("--cache-limit", o.cache_limit, "Largest size of the cache, e.g. 20G; default: no limit")
       ->transform(CLI::AsSizeValue(false));
   app.add_option("--memory-limit", o.memory_limit,
-                 "Bytes that the renderer may use, e.g. 8G; default: 9/10 of the machine's")
+                 "Memory that the renderer may use, e.g. 8G; default: 90 % of the machine's memory")
       ->transform(CLI::AsSizeValue(false));
   app.add_option("--hang-after", o.hang_seconds,
-                 "Seconds without a finished sample after which the renderer is restarted")
+                 "Restart the renderer if no sample is finished for this many seconds")
       ->check(CLI::PositiveNumber);
-  app.add_option("--build-limit", o.build_seconds,
-                 "Seconds that reading a scene's files and building its world may take; no other scene is "
-                 "built meanwhile; default: 1800")
+  app.add_option(
+         "--build-limit", o.build_seconds,
+         "Longest time in seconds for loading a scene; no other scene is loaded meanwhile; default: 1800")
       ->check(CLI::PositiveNumber);
   app.add_option("--idle-exit", o.idle_seconds,
-                 "End after this many seconds without work, with an error if the coordinator has not been "
-                 "reached; default: wait for work")
+                 "End after this many seconds without work, with an error if the coordinator was never "
+                 "reached; default: wait for ever")
       ->check(CLI::PositiveNumber);
-  app.add_option("--name", o.name, "Name shown to people; default: the host's");
-  app.add_option("--tags", o.tags, "What jobs may ask for, separated by commas")->delimiter(',');
+  app.add_option("--name", o.name, "Name of this worker in lists; default: the host name");
+  app.add_option("--tags", o.tags, "Tags of this worker, separated by commas; jobs can require them")
+      ->delimiter(',');
   app.add_option("--token-file", files.token, "File with the farm's join token (or LIGHTSHAFT_JOIN_TOKEN)");
-  app.add_option("--log-format", "text, or json: an object a line")->check(CLI::IsMember({"text", "json"}));
-  auto* ca = app.add_option("--tls-ca", files.tls_ca,
-                            "Speak TLS, with a coordinator whose certificate is of this authority (its "
-                            "DATA/tls/ca.pem)");
+  app.add_option("--log-format", "text, or json with one object per line")
+      ->check(CLI::IsMember({"text", "json"}));
+  auto* ca = app.add_option(
+      "--tls-ca", files.tls_ca,
+      "Use TLS; the coordinator's certificate must be signed by this authority (its DATA/tls/ca.pem)");
   auto* cert =
       app.add_option("--tls-cert", files.tls_cert, "This worker's certificate (DATA/tls/worker.pem)");
-  auto* key = app.add_option("--tls-key", files.tls_key, "Its key (DATA/tls/worker.key)");
+  auto* key = app.add_option("--tls-key", files.tls_key, "Key of that certificate (DATA/tls/worker.key)");
   ca->needs(cert)->needs(key);
   cert->needs(ca);
   key->needs(ca);
-  app.add_flag(
-      "--fake", o.fake,
-      "Render no scene: make pixels up, a pure function of the unit, for tests; the coordinator needs "
-      "--allow-fake");
+  app.add_flag("--fake", o.fake,
+               "For tests: invent pixels instead of rendering scenes; the coordinator needs --allow-fake");
   app.add_flag("--render-child", o.render_child)->group("");
   app.add_option("--fake-delay", "Milliseconds that a fake unit takes")->group("");
   app.add_option("--fake-sample-seconds", o.fake_options.sample_seconds)->group("");
@@ -137,13 +137,13 @@ std::variant<Options, int> parse_options(int argc, char** argv) {
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   for (const std::string& address : o.coordinators)
     if (const std::size_t scheme = address.find("://"); scheme != std::string::npos)
-      return usage(fmt::format(
-          "--coordinator {}: it is HOST:PORT of the port for workers (the coordinator's --grpc), without {}; "
-          "{} say",
-          address, address.substr(0, scheme + 3), example_of(address.substr(scheme + 3))));
+      return usage(
+          fmt::format("--coordinator {}: give HOST:PORT of the port for workers (the coordinator's --grpc), "
+                      "without {}, for example {}",
+                      address, address.substr(0, scheme + 3), example_of(address.substr(scheme + 3))));
   if (const auto* delay = app.get_option("--fake-delay"); delay->count() > 0) {
     const double ms = delay->as<double>();
-    if (!(ms >= 0 && ms < 1e6)) return usage("--fake-delay is a number of milliseconds");
+    if (!(ms >= 0 && ms < 1e6)) return usage("--fake-delay must be a number of milliseconds");
     o.fake_options.delay = from_seconds(ms * 1e-3);
   }
   if (!(o.fake_options.sample_seconds >= 0 && o.fake_options.sample_seconds <= 1))

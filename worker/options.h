@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/log.h"
+#include "core/base/log.h"
 #include "worker/client/client.h"
 #include "worker/fake/fake.h"
 

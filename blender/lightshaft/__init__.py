@@ -1,4 +1,4 @@
-"""Lightshaft for Blender: a render engine that hands scenes to a Lightshaft farm or to this machine."""
+"""Lightshaft for Blender: a render engine that sends scenes to a Lightshaft farm or renders on this machine."""
 
 
 def register():

@@ -1,4 +1,4 @@
-"""Bakes procedural textures into images, by Cycles, so that they can be exported."""
+"""Bakes procedural textures into images with Cycles, so that they can be exported."""
 
 import bpy
 
@@ -12,7 +12,8 @@ SHADERS = {"BSDF_PRINCIPLED", "BSDF_DIFFUSE", "BSDF_GLOSSY", "EMISSION", "MIX_SH
 
 
 def procedural_inputs(material):
-    """(node, input) of each shader that is fed by what can't be exported as it is; those in groups can't be baked apart."""
+    """The (node, input) pairs of shaders whose value cannot be exported directly. Nodes in groups cannot be baked
+    separately."""
     for node in material.node_tree.nodes if material.node_tree else ():
         if node.type in SHADERS:
             place = Place(node)

@@ -9,7 +9,8 @@ TURNED = ((-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1))  # looks alo
 
 
 def add_camera(document, problems, camera, scene, size, medium, matrix_class):
-    """`medium`: the id of what the camera is in, or None. `matrix_class`: Blender's Matrix."""
+    """Adds the camera. `medium`: the id of the medium around the camera, or None. `matrix_class`: Blender's
+    Matrix."""
     data, name = camera.data, camera.name
     render = scene.render
     if abs(render.pixel_aspect_x - render.pixel_aspect_y) > 1e-6:
@@ -27,7 +28,7 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class):
         problems.unsupported("Render Properties > Film: Exposure. Set it to 1, and use Color Management")
     if scene.cycles.use_fast_gi:
         problems.warning(
-            "Render Properties > Light Paths: Fast GI Approximation has no effect: all light is followed"
+            "Render Properties > Light Paths: Fast GI Approximation has no effect: all light is traced"
         )
     width, height = size
     if abs(camera.matrix_world.determinant()) < 1e-30:
@@ -63,7 +64,7 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class):
         problems.unsupported("Render Properties: Motion Blur. Lightshaft renders an instant: switch it off")
     if render.film_transparent:
         problems.unsupported(
-            "Render Properties > Film: Transparent. Lightshaft's images have no alpha: switch it off"
+            "Render Properties > Film: Transparent. images of Lightshaft have no alpha: switch it off"
         )
     film = element("film", "hdrfilm", None, element("rfilter", "gaussian"), width=width, height=height)
     sampler = element("sampler", "independent", None, sample_count=int(scene.lightshaft.samples))
@@ -73,7 +74,7 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class):
 
 
 def unscaled(matrix, matrix_class):
-    """Without scale and shear: the axis z, and the plane of z and y, stay, and it mirrors if `matrix` does."""
+    """Removes scale and shear. The axis z and the plane of z and y stay, and a mirroring stays."""
     y, z = matrix.col[1].xyz, matrix.col[2].xyz.normalized()
     x = y.cross(z).normalized()
     side = x if matrix.determinant() > 0 else -x
@@ -82,7 +83,8 @@ def unscaled(matrix, matrix_class):
 
 
 def focus_distance(camera):
-    """Along the view axis, as Blender measures it, to the object or as given."""
+    """Returns the distance in focus along the view axis, as Blender measures it: to the focus object, or the given
+    value."""
     dof = camera.data.dof
     if dof.focus_object is None:
         return float(dof.focus_distance)

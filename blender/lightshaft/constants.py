@@ -1,4 +1,4 @@
-"""Nodes whose inputs are all constant, computed as Cycles computes them: a number or three numbers each."""
+"""Evaluates nodes whose inputs are all constant, in the same way as Cycles. A value is a number or three numbers."""
 
 import colorsys
 import math
@@ -13,8 +13,8 @@ def luminance(colour):
 
 
 def as_type(value, kind, source):
-    """A value of a socket of type `source` as what one of type VALUE, RGBA or VECTOR takes: a number is the
-    luminance of a colour, and the mean of a vector."""
+    """Converts a value of a socket of type `source` for a socket of type VALUE, RGBA or VECTOR: a colour becomes
+    its luminance as a number, and a vector its mean."""
     if value is None or kind not in ("VALUE", "RGBA", "VECTOR"):
         return value
     if kind == "VALUE":
@@ -25,9 +25,9 @@ def as_type(value, kind, source):
 
 
 def computed(node, output, value):
-    """What the node gives at `output`; None: it is not computed here, or an input is not constant.
-
-    `value(name)`: of the input of that identifier, a number or three; None if it is not constant."""
+    """Returns the value of the node at `output`, or None if it cannot be computed here or an input is not
+    constant. `value(name)` returns the value of the input with that identifier: a number, three numbers, or None
+    if it is not constant."""
     build = NODES.get(node.type)
     if build is None:
         return None
@@ -60,8 +60,8 @@ TO_REC709 = np.array([
 
 
 def blackbody(kelvin):
-    """Planck's law as a colour of luminance 1 in linear Rec.709; as in Blender between 800 and 12000 kelvin, and
-    without negative light."""
+    """Returns the colour of a black body with luminance 1 in linear Rec.709, by Planck's law. It matches Blender
+    between 800 and 12000 kelvin, and never has negative components."""
     kelvin = _clamped(kelvin, 800.0, 12000.0)
     wave = np.arange(380.0, 781.0, 20.0)
     xyz = wave**-5 / np.expm1(1.4387769e7 / (wave * kelvin)) @ MATCHING  # hc / k in nm K

@@ -8,7 +8,8 @@ from .problems import ExportError
 
 
 def element(kind, plugin, name=None, *children, **values):
-    """An object such as <bsdf type="diffuse" name="..."> with its parameters; those that are None are left out."""
+    """Makes an object such as <bsdf type="diffuse" name="..."> with its parameters. Parameters that are None are
+    left out."""
     result = ElementTree.Element(kind, {"type": plugin, **({"name": name} if name else {})})
     for key, value in values.items():
         if value is not None:
@@ -18,7 +19,8 @@ def element(kind, plugin, name=None, *children, **values):
 
 
 def parameter(name, value):
-    """A parameter by the type of its value: an element as it is, three numbers a colour, 4 x 4 a transform."""
+    """Makes a parameter of the type of its value: three numbers become a colour, 4 x 4 numbers a transform, and an
+    element stays as it is."""
     if isinstance(value, ElementTree.Element):
         # Another element: a texture can be a parameter of several objects, under another name in each.
         named = ElementTree.Element(value.tag, {**value.attrib, "name": name})
@@ -49,7 +51,7 @@ def reference(identifier, name=None):
 
 
 class Document:
-    """Elements directly in the scene, in their order, and a folder with the files that they name."""
+    """A list of top-level elements of the scene, and a folder with the files that they name."""
 
     def __init__(self, folder):
         self.folder, self.files = pathlib.Path(folder), {}
@@ -60,7 +62,7 @@ class Document:
         self.root.append(child)
 
     def define(self, wanted, child):
-        """Adds an object under an id like `wanted` that is not taken yet, and returns the id."""
+        """Adds an object under an unused id like `wanted` and returns the id."""
         base = "".join(c if c.isalnum() or c in "._-" else "_" for c in wanted) or "unnamed"
         identifier, count = base, 1
         while identifier in self.ids:
@@ -72,7 +74,8 @@ class Document:
         return identifier
 
     def write(self, content, suffix):
-        """A file named by its content, so that equal ones are stored and sent once; returns its name."""
+        """Writes a file that is named by its content, so that equal files are stored and sent once. Returns its
+        name."""
         name = hashlib.sha256(content).hexdigest()[:32] + suffix
         if name not in self.files:
             self.files[name] = self.folder / name
@@ -80,7 +83,7 @@ class Document:
         return name
 
     def take(self, path, owner):
-        """A file of the user's, which stays where it is; returns the name by which the scene knows it."""
+        """Adds a file of the user without moving it. Returns its name in the scene."""
         path = pathlib.Path(path)
         if not path.is_file():
             raise ExportError(
@@ -93,7 +96,7 @@ class Document:
         return name
 
     def save(self):
-        """Writes scene.xml and links beside it the files that lie elsewhere; returns its path."""
+        """Writes scene.xml and, beside it, links to files in other folders. Returns its path."""
         for name, path in self.files.items():
             if path.parent != self.folder and not (self.folder / name).exists():
                 (self.folder / name).symlink_to(path.resolve())

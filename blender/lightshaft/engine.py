@@ -1,4 +1,4 @@
-"""The render engine: exports, starts a job, and shows its image as it comes."""
+"""The render engine: exports the scene, starts a job, and shows its image while it renders."""
 
 import pathlib
 import tempfile
@@ -60,7 +60,7 @@ class LightshaftEngine(bpy.types.RenderEngine):
             self.report({"ERROR"}, str(error))
         except Exception as error:  # a fault of the add-on; Blender 5.0 would crash where it saves the image
             traceback.print_exc()
-            self.report({"ERROR"}, f"The Lightshaft add-on has a fault, see the system console: {error!r}")
+            self.report({"ERROR"}, f"The Lightshaft add-on has a bug, see the system console: {error!r}")
 
     def render_in(self, depsgraph, folder):
         scene = depsgraph.scene
@@ -121,11 +121,11 @@ class LightshaftEngine(bpy.types.RenderEngine):
         self.update_progress(1.0)
 
     def escaped(self):
-        """Whether the user pressed Esc; tests, which have no keyboard, put another answer here."""
+        """Returns True if the user pressed Esc. Tests replace this function, because they have no keyboard."""
         return self.test_break()
 
     def show(self, data, scene, size):
-        """Puts what is there of an image into Blender's."""
+        """Copies the pixels received so far into Blender's image."""
         if not data:
             return
         try:
@@ -158,7 +158,8 @@ class LightshaftEngine(bpy.types.RenderEngine):
 
 
 def along_axis(scene, shape):
-    """Cosine between each pixel's ray and the view axis: Blender's depth is along the axis."""
+    """Returns the cosine between each pixel's ray and the view axis, because Blender measures depth along the
+    axis."""
     data = scene.camera.data
     if data.type != "PERSP":
         return 1.0
@@ -173,7 +174,7 @@ def along_axis(scene, shape):
 
 
 def compatible_panels():
-    """Blender's own panels of what this engine exports: of the camera, lights, worlds, materials and passes."""
+    """Returns Blender's panels for what this engine exports: camera, lights, worlds, materials and passes."""
     without = {"VIEWLAYER_PT_filter", "VIEWLAYER_PT_layer_passes", "RENDER_PT_freestyle"}
     for panel in bpy.types.Panel.__subclasses__():
         engines = getattr(panel, "COMPAT_ENGINES", None)

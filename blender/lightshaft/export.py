@@ -1,4 +1,4 @@
-"""Exports the evaluated scene of a dependency graph: what Lightshaft renders, and the list of what it cannot."""
+"""Exports the evaluated scene of a dependency graph, and lists what Lightshaft cannot render."""
 
 import bpy
 from bpy_extras.object_utils import world_to_camera_view
@@ -21,7 +21,7 @@ SHEET = 1e-5  # the back of a sheet that gives off light stands this share of it
 
 
 class Shape:
-    """A part of a mesh, ready to be placed."""
+    """A part of a mesh that can be placed in the scene."""
 
     def __init__(self, filenames, bsdf, emission, medium):
         self.filenames, self.bsdf, self.emission, self.medium = filenames, bsdf, emission, medium
@@ -29,7 +29,7 @@ class Shape:
 
 
 def export(depsgraph, folder, size):
-    """(path of scene.xml, its Document, warnings); `ExportError` names everything that is wrong."""
+    """Returns (path of scene.xml, its Document, warnings). Raises ExportError, which lists all errors."""
     return Exporter(depsgraph, folder, size).run()
 
 
@@ -106,7 +106,8 @@ class Exporter:
             )
 
     def check_lamp(self, item, matrix):
-        """Blender hides lamps from the camera as a rule; here what gives off light is seen."""
+        """Warns about visible lights: Blender hides lamps from the camera, but Lightshaft shows everything that
+        emits light."""
         data = item.data
         radius = {"POINT": getattr(data, "shadow_soft_size", 0), "AREA": getattr(data, "size", 0)}.get(
             data.type, 0
@@ -117,12 +118,13 @@ class Exporter:
         around = radius / max(depth, radius)
         if depth > -radius and -around < x < 1 + around and -around < y < 1 + around:
             self.problems.warning(
-                f"light '{item.name}' is in view, and seen: Blender hides lamps from the camera, Lightshaft does not. "
+                f"light '{item.name}' is visible in the image: Blender hides lamps from the camera, Lightshaft does not. "
                 "Move it out of the picture, or make it a point light of Radius 0"
             )
 
     def check_collections(self, layer):
-        """Holdout and Indirect Only of collections, which the objects in them do not say themselves."""
+        """Reports Holdout and Indirect Only of collections, since the objects inside do not have these flags
+        themselves."""
         if layer.exclude:
             return
         for name, on in (("Holdout", layer.holdout), ("Indirect Only", layer.indirect_only)):
@@ -270,7 +272,8 @@ def material_name(slot):
 
 
 def inside_mesh(tree, to_local):
-    """Whether a point is within a closed mesh: by the sides of the faces that three rays from it hit first."""
+    """Returns True if the point is inside a closed mesh. It decides by the sides of the first faces that three
+    rays hit."""
 
     def contains(point):
         start, votes = to_local @ point, 0

@@ -1,7 +1,5 @@
-"""Reads the images of Lightshaft and writes the textures sent to it, without a library that Blender's Python lacks.
-
-Of OpenEXR what these files use: one part of scan lines, not compressed or compressed by ZIP or ZIPS.
-"""
+"""Reads the images of Lightshaft and writes textures, without libraries that Blender's Python lacks. Supports the
+part of OpenEXR that these files use: one part of scan lines, uncompressed or compressed with ZIP or ZIPS."""
 
 import struct
 import zlib
@@ -13,7 +11,8 @@ LINES = {0: 1, 2: 1, 3: 16}  # of a block, by compression: none, ZIPS, ZIP
 
 
 def read(data):
-    """Layers by the names of their channels, each an array of float32 in rows from the top; `ValueError` if damaged."""
+    """Returns the layers by channel name, each an array of float32 with the top row first. Raises ValueError if
+    the file is damaged."""
     try:
         return read_parts(data)
     except (struct.error, IndexError, zlib.error) as error:
@@ -73,7 +72,7 @@ def channel_list(data):
 
 
 def unpacked(block):
-    """ZIP of OpenEXR: differences of bytes, whose even ones stand before the odd ones."""
+    """Undoes OpenEXR's ZIP prediction: the data are differences of bytes, with the even bytes before the odd ones."""
     coded = np.frombuffer(zlib.decompress(block), np.uint8).astype(np.int64)
     coded[1:] -= 128
     values = np.cumsum(coded).astype(np.uint8)
@@ -84,7 +83,7 @@ def unpacked(block):
 
 
 def write(pixels):
-    """An image of float32, height x width x 3 in rows from the top, as bytes of an EXR file."""
+    """Encodes an image (float32, height x width x 3, top row first) as an EXR file. Returns its bytes."""
     pixels = np.asarray(pixels, "<f4")
     height, width, _ = pixels.shape
     window = struct.pack("<4i", 0, 0, width - 1, height - 1)
@@ -114,7 +113,7 @@ def write(pixels):
 
 
 def write_png(pixels):
-    """Bytes (height x width x 1 or 3, rows from the top) as a PNG file."""
+    """Encodes bytes (height x width x 1 or 3, top row first) as a PNG file."""
     height, width, channels = pixels.shape
     rows = np.concatenate([np.zeros((height, 1), np.uint8), pixels.reshape(height, -1)], axis=1)
 

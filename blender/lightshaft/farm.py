@@ -1,4 +1,4 @@
-"""A job on a farm, by its HTTP API."""
+"""A job on a farm, over its HTTP API."""
 
 import hashlib
 import json
@@ -17,11 +17,11 @@ class Farm:
         parts = urllib.parse.urlsplit(self.url)
         if parts.scheme not in ("http", "https") or not parts.netloc:
             raise ExportError(
-                f"Preferences > Add-ons > Lightshaft > Farm: '{url}' is no address. Write it like http://farm:8080"
+                f"Preferences > Add-ons > Lightshaft > Farm: '{url}' is not an address. Write it like http://farm:8080"
             )
 
     def submit(self, scene, files, spec):
-        """Sends the scene and those of its files that the farm lacks; (job, warnings of the farm)."""
+        """Sends the scene and the files that the farm does not have. Returns (job, warnings of the farm)."""
         paths = {name: path for name, path in files.items()}
         digests = {name: digest(path) for name, path in paths.items()}
         by_digest = {digests[name]: path for name, path in paths.items()}
@@ -55,12 +55,12 @@ class Farm:
             raise ExportError(refusal(error)) from error
         except (OSError, urllib.error.URLError) as error:
             raise Unreachable(
-                f"The farm at {self.url} does not answer: {getattr(error, 'reason', error)}"
+                f"The farm at {self.url} does not respond: {getattr(error, 'reason', error)}"
             ) from error
 
 
 class Unreachable(ExportError):
-    """May pass: a coordinator that restarts goes on with its jobs."""
+    """The farm cannot be reached. This may be temporary: a coordinator that restarts continues its jobs."""
 
 
 def digest(path):
@@ -69,9 +69,9 @@ def digest(path):
 
 
 def refusal(error):
-    """What the farm says, in a sentence that says where to mend it."""
+    """Returns the farm's error as a sentence that says where to correct it."""
     if error.code == 401:
-        return "The farm does not know this token. Set it in Preferences > Add-ons > Lightshaft > Token"
+        return "The farm does not accept this token. Set it in Preferences > Add-ons > Lightshaft > Token"
     try:
         problem = json.loads(error.read())
     except ValueError:
@@ -82,7 +82,7 @@ def refusal(error):
 
 
 class FarmJob:
-    """Asked again and again until `ended`. A farm that is away for a while is waited for."""
+    """A job that is polled until `ended`. If the farm is unreachable for a while, it waits."""
 
     def __init__(self, farm, identifier):
         self.farm, self.identifier = farm, identifier
@@ -105,7 +105,7 @@ class FarmJob:
         self.ended = job["state"] == "done"
 
     def image(self):
-        """The EXR as far as it has come."""
+        """Fetches the EXR of what is rendered so far."""
         return self.farm.request("GET", f"{self.path}/image.exr", patience=None)
 
     def cancel(self):

@@ -1,4 +1,4 @@
-"""Lights and the world. Blender's watts are of a light that radiates to all sides alike."""
+"""Lights and the world. Blender's watts are for a light that emits equally in all directions."""
 
 import math
 
@@ -12,7 +12,7 @@ PROFILE = 512  # pixels of the image that a spot light throws
 
 
 def add_light(document, problems, item, matrix, matrix_class):
-    """A light object at `matrix`; what it casts is in W, as in the Light properties."""
+    """Adds a light object at `matrix`. Its power is in W, as in the Light properties."""
     data, name = item.data, item.name
     colour = light_colour(data)
     if (
@@ -37,7 +37,7 @@ def add_light(document, problems, item, matrix, matrix_class):
         return
     if data.cycles.max_bounces < 1024:  # Blender's default
         problems.warning(
-            f"light '{name}': Max Bounces has no effect: its light is followed like that of others"
+            f"light '{name}': Max Bounces has no effect: its light is traced like that of others"
         )
     rigid = matrix.normalized()
     if data.type == "SUN":
@@ -79,7 +79,7 @@ def vector(name, values, kind="vector"):
 
 
 def lamp(shape, to_world, radiance):
-    """A shape that gives off light and lets light of others pass, as Blender's lamps do."""
+    """Adds a shape that emits light and lets the light of others pass, like Blender's lamps."""
     emitter = element("emitter", "area", None, radiance=radiance)
     return element("shape", shape, None, element("bsdf", "null"), emitter, to_world=to_world)
 
@@ -118,7 +118,8 @@ def add_spot(document, problems, data, name, colour, to_world):
 
 
 def spot_profile(half, blend):
-    """Blender's falloff over the square around the cone: a smooth step of the cosine between the edge and the blend."""
+    """Makes an image of Blender's falloff over the square around the cone: a smooth step of the cosine between the
+    edge and the blend."""
     across = (np.arange(PROFILE) + 0.5) / PROFILE * 2 - 1
     tangent = np.hypot(across[None, :], across[:, None]) * math.tan(half)
     cosine = 1 / np.sqrt(1 + tangent**2)

@@ -1,4 +1,4 @@
-"""A render by the program `lightshaft` on this machine, with the interface of a farm's job."""
+"""A render by the program `lightshaft` on this machine, with the same interface as a job on a farm."""
 
 import pathlib
 import shutil
@@ -11,8 +11,8 @@ def find_program(preferred):
     found = shutil.which(preferred or "lightshaft")
     if not found:
         raise ExportError(
-            f"The program {preferred or 'lightshaft'} is not there. "
-            "Set Preferences > Add-ons > Lightshaft > Program to where it is installed, or render on a farm"
+            f"The program {preferred or 'lightshaft'} does not exist. "
+            "Set Preferences > Add-ons > Lightshaft > Program to its path, or render on a farm"
         )
     return found
 
@@ -60,7 +60,7 @@ class LocalJob:
         self.ended, self.progress = True, 1.0
 
     def image(self):
-        """The finished image, or the partial ones folded as far as they are there."""
+        """Returns the finished image, or the combination of the partial ones so far."""
         if self.ended:
             return self.output.read_bytes()
         preview = self.folder / "preview.exr"

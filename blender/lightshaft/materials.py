@@ -7,7 +7,7 @@ from .nodes import Place, constant, output_node
 
 
 class Owner:
-    """Whose material this is, for messages."""
+    """The object and the material, for messages."""
 
     def __init__(self, name, material):
         self.name, self.material = name, material
@@ -21,7 +21,7 @@ class Owner:
 
 
 class Surface:
-    """`bsdf` None: nothing but emission."""
+    """A surface and its emission. `bsdf` is None if there is only emission."""
 
     def __init__(self, bsdf, emission=None):
         self.bsdf, self.emission = bsdf, emission
@@ -33,7 +33,7 @@ class Materials:
         self.known = {}
 
     def surface(self, name, material):
-        """(id of the bsdf or None, emission or None) of a material; each is exported once."""
+        """Returns (id of the bsdf or None, emission or None) of a material. Each material is exported once."""
         key = material.name_full if material else None
         if key not in self.known:
             found = self.build(Owner(name, material))
@@ -148,7 +148,7 @@ class Materials:
             or strength != 1.0
         ):
             self.problems.unsupported(
-                f"{where}: Lightshaft takes normals of an image through a Normal Map or Bump node of strength 1"
+                f"{where}: Lightshaft reads normals of an image only through a Normal Map or Bump node of strength 1"
             )
             return bsdf
         texture = self.textures.image_node(inner, output, owner)
@@ -159,7 +159,7 @@ class Materials:
                 self.problems.unsupported(f"{where}: space {node.space.title()}. Choose Tangent Space")
             if source.node.uv_map:
                 self.problems.warning(
-                    f"{where}: the mesh's UV map for rendering is taken, named in the node: {source.node.uv_map}"
+                    f"{where}: the node names another UV map than the mesh's map for rendering, which is used: {source.node.uv_map}"
                 )
             return element("bsdf", "normalmap", None, bsdf, normalmap=texture, follow_mirroring=True)
         distance = constant(source, source.input("Distance"))
@@ -252,7 +252,7 @@ class Materials:
             emission = [x * (1 - share) + y * share for x, y in zip(a, b)]
         else:
             self.problems.error(
-                f"{owner}, node '{place.title}': two emissions mixed by a texture, or the first by one. Mix by a number, make the emission the second, or use Add Shader"
+                f"{owner}, node '{place.title}': emission is mixed by a texture in a way that Lightshaft does not support. Mix by a number, make the emission the second, or use Add Shader"
             )
             return Surface(None)
         sides = [
@@ -297,7 +297,7 @@ def two_sided(bsdf):
 
 
 def times(share, emission):
-    """A radiance times a number or a texture; None: no light."""
+    """Multiplies a radiance by a number or a texture. None means no light."""
     if emission is None or (isinstance(share, float) and share == 0.0):
         return None
     if isinstance(emission, list) and not any(emission):
@@ -308,12 +308,14 @@ def times(share, emission):
 
 
 def keeps_energy(node):
-    """Whether light that is lost between the node's facets is added back, as by its distribution Multiscatter GGX."""
+    """Returns True if the node adds back light that is lost between facets, as its distribution Multiscatter GGX
+    does."""
     return node.distribution == "MULTI_GGX"
 
 
 def opaque(colour, metallic, roughness, transmission, eta, multiple=True):
-    """A dielectric coat over a diffuse base, which is nearest to Blender's, wherever it can be; else Burley's model."""
+    """Makes an opaque surface: a dielectric coat over a diffuse base where possible, because that is closest to
+    Blender; otherwise Burley's model."""
     if transmission != 0.0 or not isinstance(roughness, float):
         return burley(colour, metallic, roughness, transmission, eta, multiple)
     coated = element(
@@ -334,6 +336,7 @@ def burley(colour, metallic, roughness, transmission, eta, multiple):
 
 
 def adjusted_ior(ior, level):
-    """The index whose reflection straight on is that of `ior` times twice the level, as Blender's Specular IOR Level says."""
+    """Returns the index of refraction whose reflection at normal incidence is that of `ior` times twice the level,
+    which is what Blender's Specular IOR Level means."""
     f0 = min(((ior - 1) / (ior + 1)) ** 2 * 2 * level, 0.99)
     return max((1 + math.sqrt(f0)) / (1 - math.sqrt(f0)), 1.001)

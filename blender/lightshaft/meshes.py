@@ -1,4 +1,4 @@
-"""Meshes as PLY files: a part for each material, with normals and texture coordinates of their corners."""
+"""Writes meshes as PLY files: one part for each material, with normals and texture coordinates of the vertices."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ class Part:
         return ply(self.table, self.corners)
 
     def back(self, distance):
-        """The same sheet turned round, `distance` behind its front."""
+        """Returns the same sheet with its front reversed, `distance` behind it."""
         table = self.table.copy()
         table[:, :3] -= distance * table[:, 3:6]
         table[:, 3:6] *= -1
@@ -21,7 +21,7 @@ class Part:
 
 
 def parts(mesh):
-    """The parts of a mesh with at least one triangle."""
+    """Returns the parts of a mesh that have at least one triangle."""
     mesh.calc_loop_triangles()
     count = len(mesh.loop_triangles)
     if not count:
@@ -52,7 +52,7 @@ def taken(collection, attribute, size, kind):
 
 
 def is_closed(triangles):
-    """Whether each edge is between two triangles that run along it in opposite directions."""
+    """Returns True if each edge belongs to two triangles that run along it in opposite directions."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(
         np.int64
     )
@@ -62,7 +62,7 @@ def is_closed(triangles):
 
 
 def ply(table, corners):
-    """A binary PLY file of the corners used, each distinct one once."""
+    """Encodes the vertices in use as a binary PLY file, each distinct one once."""
     rows = np.ascontiguousarray(table[corners.ravel()])
     packed = rows.view(np.dtype((np.void, rows.dtype.itemsize * rows.shape[1]))).ravel()
     _, first, index = np.unique(packed, return_index=True, return_inverse=True)

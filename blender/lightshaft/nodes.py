@@ -1,21 +1,22 @@
-"""Walks node trees: through reroutes and groups to the node that a socket's value comes from."""
+"""Follows node trees: finds the node from which a socket's value comes, through reroutes and groups."""
 
 from .constants import as_type, computed
 
 
 class Place:
-    """A node within the groups that were entered to reach it."""
+    """A node, and the groups that were entered to reach it."""
 
     def __init__(self, node, groups=()):
         self.node, self.groups = node, groups
 
     def input(self, name):
-        """By its identifier, or else by its name."""
+        """Finds an input by its identifier, or else by its name."""
         by_identifier = next((socket for socket in self.node.inputs if socket.identifier == name), None)
         return by_identifier or next((socket for socket in self.node.inputs if socket.name == name), None)
 
     def source(self, socket):
-        """What feeds an input: (Place, output socket); (None, socket) with the socket that holds the value if nothing does."""
+        """Returns what is linked to an input as (Place, output socket). If nothing is linked, returns (None, the
+        socket with the value)."""
         groups = self.groups
         while True:
             if (
@@ -45,7 +46,7 @@ class Place:
 
 
 def output_node(tree, kind):
-    """The active output of a tree; of materials and worlds not one that is only for EEVEE."""
+    """Returns the active output of a tree. For materials and worlds it ignores outputs that are only for EEVEE."""
     found = [
         node
         for node in tree.nodes
@@ -55,13 +56,13 @@ def output_node(tree, kind):
 
 
 def plain(socket):
-    """The value of an input that nothing feeds: a number, or three."""
+    """Returns the value of an unlinked input: a number, or three numbers."""
     value = socket.default_value
     return [float(v) for v in value][:3] if hasattr(value, "__len__") else float(value)
 
 
 def constant(place, socket):
-    """The value of an input if it is the same everywhere, else None: three numbers for colours and vectors."""
+    """Returns the value of an input if it is constant, else None. Colours and vectors have three numbers."""
     source, output = place.source(socket)
     if source is None:
         value = plain(output) if output is not None and hasattr(output, "default_value") else None

@@ -1,15 +1,13 @@
-"""What of a scene cannot be exported, in Blender's words, with the name of the object, the node and what to do."""
+"""Collects what cannot be exported from a scene, in Blender's terms: object, node and what to do."""
 
 
 class ExportError(Exception):
-    """The scene is not rendered; the message lists why."""
+    """The scene is not rendered. The message lists the reasons."""
 
 
 class Problems:
-    """Collects what is wrong, so that a user sees all of it at once.
-
-    `leave_out`: what Lightshaft does not have is left out and reported, instead of refused.
-    """
+    """Collects problems, so that a user sees all of them at once. With `leave_out`, features that Lightshaft does
+    not have are left out and reported instead of refused."""
 
     def __init__(self, leave_out=False):
         self.leave_out, self.errors, self.warnings = leave_out, [], []

@@ -1,4 +1,4 @@
-"""What a user sets: of the scene, and of this installation."""
+"""The settings of a scene and of this installation."""
 
 import os
 import types
@@ -17,7 +17,7 @@ class LightshaftSettings(bpy.types.PropertyGroup):
     )
     samples: IntProperty(
         name="Samples",
-        description="Samples per pixel; with a target error the most of any pixel",
+        description="Samples per pixel; with a target error, the limit for each pixel",
         default=64,
         min=1,
         max=1 << 20,
@@ -30,14 +30,14 @@ class LightshaftSettings(bpy.types.PropertyGroup):
     )
     max_depth: IntProperty(
         name="Max Depth",
-        description="Longest path in segments: 2 is direct light; -1: no limit",
+        description="Largest number of segments of a path: 2 is direct light, -1 has no limit",
         default=-1,
         min=-1,
         max=1 << 20,
     )
     seed: IntProperty(name="Seed", min=0)
     animate_seed: BoolProperty(name="Other Noise Each Frame", default=True)
-    priority: IntProperty(name="Priority", description="On a farm jobs of higher priority go first")
+    priority: IntProperty(name="Priority", description="Jobs of higher priority are rendered first on a farm")
     denoise: BoolProperty(
         name="Denoised Pass",
         description="Adds the pass Denoised; needs Open Image Denoise on the farm or this machine",
@@ -50,8 +50,8 @@ class LightshaftSettings(bpy.types.PropertyGroup):
     unsupported: EnumProperty(
         name="Not in Lightshaft",
         items=[
-            ("REFUSE", "Refuse", "End the render with a list of what Lightshaft does not have"),
-            ("LEAVE_OUT", "Leave Out", "Render without it, and report each as a warning"),
+            ("REFUSE", "Refuse", "End the render with a list of unsupported features"),
+            ("LEAVE_OUT", "Leave Out", "Render without unsupported features, and report each as a warning"),
         ],
     )
 
@@ -61,11 +61,11 @@ class LightshaftPreferences(bpy.types.AddonPreferences):
 
     url: StringProperty(name="Farm", description="Address of the coordinator, such as http://farm:8080")
     token: StringProperty(
-        name="Token", description="As `lightshaft token add --role submit` prints it", subtype="PASSWORD"
+        name="Token", description="Token, as `lightshaft token add --role submit` prints it", subtype="PASSWORD"
     )
     program: StringProperty(
         name="Program",
-        description="Where `lightshaft` is; empty: where the system finds it",
+        description="Path of `lightshaft`; empty: search the PATH",
         subtype="FILE_PATH",
     )
 
@@ -75,7 +75,7 @@ class LightshaftPreferences(bpy.types.AddonPreferences):
 
 
 def preferences():
-    """The preferences; what is empty comes from the environment, as for Lightshaft's other clients."""
+    """Returns the preferences. Empty ones come from the environment, like in Lightshaft's other clients."""
     addon = bpy.context.preferences.addons.get(__package__)
     chosen = addon.preferences if addon else None
     return types.SimpleNamespace(

@@ -1,4 +1,4 @@
-"""Image textures, checkers and baked procedural textures as textures of the scene."""
+"""Exports image textures, checkers and baked procedural textures."""
 
 import pathlib
 
@@ -22,13 +22,15 @@ CHECKER_OUTPUTS = ("Color", "Fac", "Factor")
 
 
 class Textures:
-    """`baked`: images by (material, node, input), as the operator Bake for Lightshaft left them."""
+    """Converts textures. `baked`: images by (material, node, input) that the operator Bake for Lightshaft has
+    made."""
 
     def __init__(self, document, problems):
         self.document, self.problems, self.images = document, problems, {}
 
     def value(self, place, name, owner):
-        """An input as a number, a colour or a texture element; None, with an error told, if it is nothing of these."""
+        """Returns an input as a number, a colour or a texture element. Returns None and reports an error if that
+        is impossible."""
         socket = place.input(name)
         share = place.node.type in SHARES and name in SHARES[place.node.type]
         fixed = constant(place, socket)
@@ -51,10 +53,10 @@ class Textures:
         return None
 
     def within_one(self, value, place, name, owner):
-        """A share of light, of which nothing reflects more than comes; Blender's fields take more."""
+        """Clamps a share of light to 1, since nothing reflects more than it receives; Blender's fields allow more."""
         values = value if isinstance(value, list) else [value]
         if max(values) > 1.001 or min(values) < -0.001:
-            self.problems.warning(f"{owner}, node '{place.title}': {name} is rendered as if within 0 and 1")
+            self.problems.warning(f"{owner}, node '{place.title}': {name} is clamped to the range 0 to 1")
         values = [min(max(v, 0.0), 1.0) for v in values]
         return values if isinstance(value, list) else values[0]
 
@@ -105,7 +107,8 @@ class Textures:
         )
 
     def file(self, image, owner, alpha=False):
-        """(name, raw) of an image's file; written anew where the original is not a file of a kind that is read."""
+        """Returns (name, raw) of an image's file. If Lightshaft cannot read the file's format, the image is
+        written to a new file."""
         key = (image.name_full, alpha)
         if key not in self.images:
             self.images[key] = self.write(image, owner, alpha)
@@ -162,7 +165,8 @@ class Textures:
         )
 
     def mapping(self, place, where):
-        """The 4 x 4 that takes texture coordinates of the mesh to those of the look-up; None with an error told."""
+        """Returns the 4 x 4 matrix that maps texture coordinates of the mesh to those of the lookup. Returns None
+        and reports an error if there is none."""
         source, output = place.source(place.input("Vector"))
         if source is None:
             return np.eye(4)
@@ -178,7 +182,7 @@ class Textures:
         if node.type == "UVMAP" or (node.type == "TEX_COORD" and output.name == "UV"):
             if node.type == "UVMAP" and node.uv_map:
                 self.problems.warning(
-                    f"{where}: the mesh's UV map for rendering is taken, named in node '{source.title}': {node.uv_map}"
+                    f"{where}: the mesh's map for rendering is used instead of the UV map named in node '{source.title}': {node.uv_map}"
                 )
             return np.eye(4)
         self.problems.error(
@@ -217,7 +221,8 @@ class Textures:
 
 
 def exported_as_it_is(place, output):
-    """Whether a texture node needs no baking: an image, or a checker of one scale and fixed colours, looked up by UV."""
+    """Returns True if a texture node needs no baking: an image, or a checker with one scale and constant colours,
+    looked up by UV."""
     if place is None:
         return False
     node = place.node
@@ -231,7 +236,8 @@ def exported_as_it_is(place, output):
 
 
 def by_uv(place):
-    """Whether the coordinates of a texture come from UV, through mappings that do not vary; what is not linked is UV."""
+    """Returns True if the coordinates of a texture come from UV through constant mappings. Unlinked coordinates
+    are UV."""
     source, output = place.source(place.input("Vector"))
     if source is None:
         return True
@@ -241,7 +247,7 @@ def by_uv(place):
 
 
 def mapping_matrix(place):
-    """What a Mapping node does to points, or to the texture; None if it varies."""
+    """Returns the matrix of a Mapping node for points, or for textures. None: it is not constant."""
     values = [
         constant(place, place.input(name)) if place.input(name) else None
         for name in ("Location", "Rotation", "Scale")
@@ -275,7 +281,7 @@ def bake_key(node, socket):
 
 
 def baked_image(material, node, socket):
-    """The image that the operator baked for an input of this material, if it did."""
+    """Returns the image that was baked for an input of this material, or None."""
     import bpy
 
     return bpy.data.images.get(material.get(bake_key(node, socket), "")) if material else None

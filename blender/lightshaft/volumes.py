@@ -8,10 +8,8 @@ from .nodes import Place, constant, output_node
 
 
 class Coefficients:
-    """Scattering, absorption (1/m) and emission (radiance/m) in three channels, and the phase function's mean cosine.
-
-    `grid`: the name of the grid that multiplies scattering and absorption, None without one.
-    """
+    """Scattering, absorption (1/m) and emission (radiance/m) in three channels, and the mean cosine of the phase
+    function. `grid`: the name of the grid that multiplies scattering and absorption, or None."""
 
     def __init__(self, scattering=(0, 0, 0), absorption=(0, 0, 0), emission=(0, 0, 0), g=0.0, grid=None):
         self.scattering, self.absorption, self.emission, self.g, self.grid = (
@@ -28,7 +26,8 @@ class Volumes:
         self.document, self.problems = document, problems
 
     def coefficients(self, owner, of_grid):
-        """What the material's Volume input says; None if there is nothing, or an error was told."""
+        """Returns the coefficients of the material's Volume input. Returns None if there are none or if an error
+        was reported."""
         material = owner.material
         node = output_node(material.node_tree, "OUTPUT_MATERIAL") if material and material.node_tree else None
         output = Place(node) if node else None
@@ -63,7 +62,7 @@ class Volumes:
                 continue
             if values[name] is None:
                 self.problems.error(
-                    f"{where}: {name} varies by nodes. Lightshaft takes numbers, and the grids of OpenVDB files: "
+                    f"{where}: {name} varies by nodes. Lightshaft supports numbers and grids of OpenVDB files: "
                     "unlink it, or bake the volume to an OpenVDB file (Geometry Nodes: Mesh to Volume; Physics: Fluid)"
                 )
                 return None
@@ -84,7 +83,7 @@ class Volumes:
             found.grid = self.grid_name(place, values)
             if any(found.emission):
                 self.problems.unsupported(
-                    f"{where}: emission of a grid's volume, which Blender gives off everywhere in its box. Set it to 0"
+                    f"{where}: emission of a grid's volume, which Blender emits everywhere in its box. Set it to 0"
                 )
                 found.emission = (0, 0, 0)
         return found
@@ -99,7 +98,8 @@ class Volumes:
         )
 
     def grid_name(self, place, values):
-        """The grid that multiplies the density: of a Principled Volume its attribute, else what is linked to Density."""
+        """Returns the grid that multiplies the density: the attribute of a Principled Volume, else what is linked
+        to Density."""
         if values.get("Density") is None:
             node = place.source(place.input("Density"))[0].node
             return node.attribute_name if node.type == "ATTRIBUTE" else "density"
@@ -136,10 +136,8 @@ class Volumes:
         return self.document.define(name, medium("homogeneous", found, total(found), any(found.emission)))
 
     def grid(self, item, owner, found, path, matrix, box):
-        """A medium in the box (of the object's space) of a grid's file: its id, and where the box [-1, 1]^3 of it stands.
-
-        None if it is empty, or an error was told.
-        """
+        """Makes a medium of a grid's file in the box (in object space). Returns its id, and the position of its
+        box [-1, 1]^3. Returns None if it is empty or if an error was reported."""
         data = item.data
         if found.grid is None:
             self.problems.error(

@@ -26,14 +26,14 @@ def add_world(document, problems, textures, world):
     output = Place(node)
     if output.source(output.input("Volume"))[0]:
         problems.error(
-            f"{owner}: a Volume without end. Put its shader into the material of a cube around the scene"
+            f"{owner}: an infinite Volume. Put its shader into the material of a cube around the scene"
         )
     background, _ = output.source(output.input("Surface"))
     if background is None:
         return
     if background.node.type != "BACKGROUND":
         problems.error(
-            f"{owner}, node '{background.title}': Lightshaft takes a Background node. Link one to Surface"
+            f"{owner}, node '{background.title}': the world needs a Background node. Link one to Surface"
         )
         return
     strength = constant(background, background.input("Strength"))
@@ -50,7 +50,7 @@ def add_world(document, problems, textures, world):
     where = f"{owner}, node '{source.title}'"
     if source.node.type != "TEX_ENVIRONMENT" or source.node.image is None:
         problems.error(
-            f"{where}: Lightshaft takes an Environment Texture with an image. Bake the sky to an HDRI and open it there"
+            f"{where}: the background needs an Environment Texture with an image. Bake the sky to an HDRI and open it there"
         )
         return
     if source.node.projection != "EQUIRECTANGULAR":
@@ -78,7 +78,7 @@ def direction_mapping(problems, place, where):
             own[:3, 3] = 0
         if own is None or not np.allclose(own @ own.T, np.eye(4), atol=1e-5):
             problems.error(
-                f"{where}, node '{source.title}': Lightshaft turns the world, no more. Set Scale to 1, and type Point"
+                f"{where}, node '{source.title}': Lightshaft can only rotate the world. Set Scale to 1, and type Point"
             )
             return None
         return None if inner is None else own @ inner

@@ -5,10 +5,12 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "worker/render/base/build_id.h"
 
@@ -40,9 +42,18 @@ void add_merge(CLI::App& app, Action& action);
 void add_validate(CLI::App& app, Action& action);
 void add_verify(CLI::App& app, Action& action);
 void add_compare(CLI::App& app, Action& action);
+// Adds the commands race-lane and race-tool, which `compare` starts.
+void add_race(CLI::App& app, Action& action);
 void add_doctor(CLI::App& app, Action& action);
-// Adds the commands up and join.
+// Adds the commands up and join, of which Python knows the options.
 void add_python_commands(CLI::App& app, Action& action);
+// Becomes another program with these arguments. Returns an exit code if that fails, of which a message was
+// printed.
+int become(const std::filesystem::path& program, std::vector<std::string> arguments);
+// Becomes the Python that runs this command with these arguments; returns as become() does.
+int run_in_python(const char* command, const std::vector<std::string>& arguments);
+// Returns the options of a command that the user gave, each as "--name=value", and its other arguments.
+std::vector<std::string> given_options(const CLI::App& app);
 
 // Returns the version and the build, such as "lightshaft 0.2.0, build ...".
 inline std::string version_text() {

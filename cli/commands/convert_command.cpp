@@ -12,8 +12,8 @@
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
-#include "common/scene/json/serialize.h"
-#include "common/scene/reader/xml_write.h"
+#include "core/scene/json/serialize.h"
+#include "formats/reader/xml_write.h"
 
 namespace ls::cli {
 namespace {
@@ -113,7 +113,7 @@ Result<std::vector<FileCopy>> copies_for(const LocalScene& scene, const Scene& w
     const auto there = sha256_file(to);
     if (!there || *there != file->second.digest)
       return fail(Errc::already_exists,
-                  fmt::format("{} is there already, and is not the scene's {}: choose another folder for OUT",
+                  fmt::format("{} exists and differs from the scene's {}: choose another folder for OUT",
                               to.string(), before));
   }
   return copies;
@@ -141,12 +141,9 @@ Result<Converted> convert_scene(const LocalScene& scene, const fs::path& out) {
   KnownAssets assets(written);
   const ReadResult again = read_scene(out.filename().string(), converted.text, assets);
   if (!again.scene || digest_of(*again.scene) != converted.digest)
-    return fail(
-        Errc::internal,
-        fmt::format(
-            "{} cannot be written as XML that reads back to the same scene; nothing was written. This "
-            "is a fault of this program: please report it with the scene. {}",
-            scene.name, format_diagnostics(again.diagnostics)));
+    return fail(Errc::internal, fmt::format("{} cannot be written as XML of the same scene, so nothing was "
+                                            "written. This is a bug: please report it with the scene. {}",
+                                            scene.name, format_diagnostics(again.diagnostics)));
   return converted;
 }
 
@@ -170,7 +167,7 @@ int run(const ConvertFlags& flags) {
   if (const auto ok = check_output("OUT", flags.out); !ok) return print_error(ok.error());
   std::error_code error;
   if (std::filesystem::equivalent(flags.in, flags.out, error))
-    return usage_error(fmt::format("{} would be written over itself: choose another OUT", flags.in));
+    return usage_error(fmt::format("OUT {} is the scene itself: choose another OUT", flags.in));
   const auto scene = read_local_scene(flags.in, *defines, flags.strict);
   if (!scene) return print_rejected(scene.error());
   print_diagnostics(scene->warnings);
@@ -178,7 +175,7 @@ int run(const ConvertFlags& flags) {
   if (!converted) return print_error(converted.error());
   for (const FileCopy& copy : converted->copies) {
     if (!flags.quiet && copy.renamed)
-      print_note(fmt::format("{} becomes {}", copy.name_before, copy.to.string()));
+      print_note(fmt::format("{} is renamed to {}", copy.name_before, copy.to.string()));
     if (const auto done = copy_beside(copy); !done) return print_error(done.error());
   }
   if (const auto written = write_output(flags.out, converted->text); !written)
@@ -196,14 +193,14 @@ void add_convert(CLI::App& app, Action& action) {
   const auto [convert, flags] = add_command<ConvertFlags>(
       app, action, "convert",
       "write a scene as canonical Mitsuba 3 XML. Its files are copied to OUT's folder under the names that "
-      "the scene has for them, unless they are there; a name that leads out of the folder becomes one in it. "
-      "OUT has the same digest then, if no file had to be renamed; it is printed",
+      "the scene uses, unless they exist; files that would be outside of the folder get names inside. Prints "
+      "the digest of the scene, which OUT shares if no file was renamed",
       run);
   add_option(*convert, "in", flags->in, "IN", "the scene")->required();
   add_option(*convert, "out", flags->out, "OUT", "the XML file to write")->required();
   add_defines(*convert, flags->defines);
-  convert->add_flag("--strict", flags->strict, "warnings are errors");
-  convert->add_flag("--quiet", flags->quiet, "only the digest, warnings and errors");
+  convert->add_flag("--strict", flags->strict, "treat warnings as errors");
+  convert->add_flag("--quiet", flags->quiet, "print only the digest, warnings and errors");
 }
 
 }  // namespace ls::cli

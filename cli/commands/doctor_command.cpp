@@ -11,7 +11,7 @@
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/reply_fields.h"
-#include "common/base/safe_text.h"
+#include "core/base/safe_text.h"
 
 namespace ls::cli {
 namespace {
@@ -55,7 +55,7 @@ int run_doctor(const DoctorFlags& flags) {
     findings.push_back({"farm",
                         {},
                         Status::ok,
-                        "not checked: no address is given",
+                        "not checked: no address was given",
                         "give --farm URL or LIGHTSHAFT_URL to check a farm"});
   } else {
     const auto connection = connection_of(flags.farm);
@@ -76,12 +76,12 @@ int run_doctor(const DoctorFlags& flags) {
 void add_doctor(CLI::App& app, Action& action) {
   const auto [doctor, flags] = add_command<DoctorFlags>(
       app, action, "doctor",
-      "checks this machine, and whether a farm can be used from it; exit code 1 if not", run_doctor);
+      "check this machine and its access to a farm; exit code 1 if something does not work", run_doctor);
   flags->farm.add_to(*doctor);
   add_option(*doctor, "--farm", flags->farm.url, "URL", "the same as --to")->excludes("--to");
   add_option(*doctor, "--cache", flags->cache, "DIR",
-             "the cache of a worker; default: that of this user's workers");
-  add_option(*doctor, "--data", flags->data, "DIR", "the data folder of a coordinator, to check it, too");
+             "cache folder of a worker; default: the one of this user's workers");
+  add_option(*doctor, "--data", flags->data, "DIR", "also check this data folder of a coordinator");
 }
 
 }  // namespace ls::cli

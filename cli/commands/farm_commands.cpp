@@ -16,10 +16,11 @@
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
-#include "common/base/parse_number.h"
-#include "common/base/safe_text.h"
-#include "common/job/limits.h"
 #include "coordinator/base/limits.h"
+#include "coordinator/views/describe_change.h"
+#include "core/base/parse_number.h"
+#include "core/base/safe_text.h"
+#include "core/job/objects.h"
 
 namespace ls::cli {
 namespace {
@@ -29,8 +30,9 @@ using nlohmann::json;
 struct FarmFlags {
   FarmOptions farm;
   std::string id, frame, spp, target_error, out, report, html, region, fps, exposure, role, user;
-  std::string state, search, owner, sort, limit, offset, seconds, seed, priority;
+  std::string state, search, owner, sort, limit, offset, priority;
   std::vector<std::string> after;
+  JobOptions job;
   bool quiet = false, none = false, denoised = false;
 };
 constexpr std::chrono::milliseconds kVideoPause(500);  // pause between checks whether a video is ready
@@ -54,7 +56,7 @@ int jobs(FarmApi& api, const FarmFlags& flags) {
   if (code != kOk || flags.farm.json) return code;
   const std::size_t shown = objects_field(*answer, "jobs").size();
   if (const auto total = number_field(*answer, "total"); total && *total > static_cast<double>(shown))
-    print_note(fmt::format("{} of {:.0f} jobs; --limit and --offset choose others", shown, *total));
+    print_note(fmt::format("{} of {:.0f} jobs; --limit and --offset select others", shown, *total));
   return code;
 }
 int workers(FarmApi& api, const FarmFlags& flags) {
@@ -74,26 +76,24 @@ int pause(FarmApi& api, const FarmFlags& flags) { return change(api, flags, {{"s
 int resume(FarmApi& api, const FarmFlags& flags) { return change(api, flags, {{"state", "running"}}); }
 int cancel(FarmApi& api, const FarmFlags& flags) { return change(api, flags, {{"state", "cancelled"}}); }
 
+// Changes one setting of the job to the value that the text gives.
+int change(FarmApi& api, const FarmFlags& flags, std::string_view name, const std::string& text) {
+  coordinator::JobChange asked;
+  Result<void> done;
+  job::for_each_setting(asked, [&](const job::Setting& s, auto& value) {
+    if (s.name == name)
+      done = job::good_or(job::read(s, job::Form::option, text, value), s, job::Form::option, "");
+  });
+  return done ? change(api, flags, job::write_object(asked)) : print_error(done.error());
+}
+
 int extend(FarmApi& api, const FarmFlags& flags) {
   if (flags.spp.empty() == flags.target_error.empty())
     return usage_error("extend needs either --spp TOTAL or a smaller --target-error E");
-  if (!flags.target_error.empty()) {
-    const auto target = parse_positive("--target-error", flags.target_error, kMaxTargetError);
-    if (!target) return print_error(target.error());
-    return change(api, flags, {{"target_error", *target}});
-  }
-  const auto spp = parse_whole("--spp", flags.spp, 1, kMaxSpp);
-  if (!spp) return print_error(spp.error());
-  return change(api, flags, {{"spp", *spp}});
+  return flags.spp.empty() ? change(api, flags, "target_error", flags.target_error)
+                           : change(api, flags, "spp", flags.spp);
 }
-
-int priority(FarmApi& api, const FarmFlags& flags) {
-  const auto value = parse_number<int>(flags.priority);
-  if (!value || std::abs(std::int64_t{*value}) > kMaxPriority)
-    return usage_error(fmt::format("priority '{0}': it must be a whole number from -{1} to {1}",
-                                   flags.priority, kMaxPriority));
-  return change(api, flags, {{"priority", *value}});
-}
+int priority(FarmApi& api, const FarmFlags& flags) { return change(api, flags, "priority", flags.priority); }
 
 int after(FarmApi& api, const FarmFlags& flags) { return change(api, flags, {{"after", flags.after}}); }
 
@@ -124,45 +124,20 @@ int remove(FarmApi& api, const FarmFlags& flags) {
 
 // Submits the scene of a job once more.
 int again(FarmApi& api, const FarmFlags& flags) {
-  JobOptions options;
-  options.spp = flags.spp;
-  options.target_error = flags.target_error;
-  options.time = flags.seconds;
-  options.seed = flags.seed;
-  options.priority = flags.priority;
-  options.after = flags.after;
-  const auto spec = options.parse();
+  const auto spec = flags.job.parse();
   if (!spec) return print_error(spec.error());
-  json body{{"priority", spec->priority}};
-  if (spec->spp) body["spp"] = *spec->spp;
-  if (spec->target_error) body["target_error"] = *spec->target_error;
-  if (spec->time) body["time"] = *spec->time;
-  if (spec->seed) body["seed"] = *spec->seed;
-  if (!spec->after.empty()) body["after"] = spec->after;
+  const json body = job::write_object(*spec, job::goes_with_again);
   const auto job = api.post(job_path(flags.id) + "/again", body);
   if (!job) return print_rejected(job.error());
   print(flags.farm.json ? dump(*job) : plain_text(text_field(*job, "id")));
   return kOk;
 }
 
-// Parses a rectangle "X0,Y0,X1,Y1" in pixels; returns a JSON array of the four numbers.
-Result<json> parse_region(const std::string& text) {
-  json rect = json::parse('[' + text + ']', nullptr, false);
-  const bool pixels =
-      rect.is_array() && rect.size() == 4 &&
-      std::all_of(rect.begin(), rect.end(), [](const json& v) { return v.is_number_unsigned(); });
-  if (!pixels)
-    return bad_argument(fmt::format("--region '{}': it must be X0,Y0,X1,Y1 in pixels, 0,0,64,64 say", text));
-  return rect;
-}
-
 int focus(FarmApi& api, const FarmFlags& flags) {
   if (flags.region.empty() != flags.none)
     return usage_error("focus needs either --region X0,Y0,X1,Y1 or --none");
   if (flags.none) return change(api, flags, {{"focus", nullptr}});
-  const auto region = parse_region(flags.region);
-  if (!region) return print_error(region.error());
-  return change(api, flags, {{"focus", *region}});
+  return change(api, flags, "focus", flags.region);
 }
 
 // Requests a video, waits until the coordinator has made it, and downloads it.
@@ -188,7 +163,7 @@ int video(FarmApi& api, const FarmFlags& flags) {
     if (state == "ready") break;
     if (state != "waiting" && state != "making") {
       complain(state == "failed" ? plain_text(text_field(*made, "error"))
-                                 : "the coordinator was started again meanwhile: ask for the video again");
+                                 : "the coordinator was restarted meanwhile: request the video again");
       return kFailed;
     }
     std::this_thread::sleep_for(kVideoPause);
@@ -246,7 +221,8 @@ int list_tokens(FarmApi& api, const FarmFlags& flags) {
 
 int revoke_token(FarmApi& api, const FarmFlags& flags) {
   if (flags.id.find_first_not_of("0123456789abcdef") != std::string::npos)
-    return usage_error(fmt::format("'{}' is no token's id: `lightshaft token list` prints them", flags.id));
+    return usage_error(
+        fmt::format("no token has the id '{}': `lightshaft token list` prints the ids", flags.id));
   const auto done = api.remove("/api/v1/tokens/" + flags.id);
   return done ? kOk : print_rejected(done.error());
 }
@@ -260,7 +236,7 @@ std::pair<CLI::App*, FarmFlags*> add(CLI::App& app, Action& action, const char* 
   flags->farm.add_to(*command);
   if (of_a_job) {
     add_option(*command, "id", flags->id, "ID", "the job's id, as `submit` and `jobs` print it")->required();
-    add_option(*command, "--frame", flags->frame, "N", "of a sequence: this frame alone");
+    add_option(*command, "--frame", flags->frame, "N", "for a sequence: only this frame");
   }
   command->callback([flags, run, &action] {
     action = [flags, run] {
@@ -275,94 +251,88 @@ std::pair<CLI::App*, FarmFlags*> add(CLI::App& app, Action& action, const char* 
 }  // namespace
 
 void add_farm_commands(CLI::App& app, Action& action) {
-  const auto [jobs_command, listing] = add(app, action, "jobs", "the jobs of a farm", jobs);
+  const auto [jobs_command, listing] = add(app, action, "jobs", "list the jobs of a farm", jobs);
   jobs_command->footer(
       "Examples:\n"
       "  lightshaft jobs --state running,queued\n"
       "  lightshaft jobs --search chapel --sort=-submitted --limit 20");
   add_option(*jobs_command, "--state", listing->state, "STATE,...",
-             "only these: queued, running, paused, done, failed, cancelled");
-  add_option(*jobs_command, "--search", listing->search, "TEXT", "only those with this in their name or id");
-  add_option(*jobs_command, "--owner", listing->owner, "USER", "only those of this user");
+             "only jobs in these states: queued, running, paused, done, failed, cancelled");
+  add_option(*jobs_command, "--search", listing->search, "TEXT",
+             "only jobs with this text in their name or id");
+  add_option(*jobs_command, "--owner", listing->owner, "USER", "only jobs of this user");
   add_option(*jobs_command, "--sort", listing->sort, "ORDER",
-             "order (of submission, the default), active, submitted, name, owner, state, progress or relmse; "
-             "with - before it the other way round");
-  add_option(*jobs_command, "--limit", listing->limit, "N", "at most so many");
-  add_option(*jobs_command, "--offset", listing->offset, "N", "without the first N of them");
+             "sort by order (of submission, the default), active, submitted, name, owner, state, progress or "
+             "relmse; a - in front reverses the order");
+  add_option(*jobs_command, "--limit", listing->limit, "N", "show at most this many jobs");
+  add_option(*jobs_command, "--offset", listing->offset, "N", "skip the first N jobs");
   add(app, action, "show", "one job", show, true);
   const auto [watch_command, watching] = add(app, action, "watch", "follow a job until it ends", watch, true);
   watch_command->add_flag("--quiet", watching->quiet, "no progress bar");
-  add(app, action, "pause", "hand out no more of a job", pause, true);
-  add(app, action, "resume", "go on with a paused job", resume, true);
-  add(app, action, "cancel", "end a job for good", cancel, true);
+  add(app, action, "pause", "pause a job", pause, true);
+  add(app, action, "resume", "continue a paused job", resume, true);
+  add(app, action, "cancel", "cancel a job for good", cancel, true);
   const auto [extend_command, extending] =
-      add(app, action, "extend", "more samples or less error for a job, done or not", extend, true);
-  add_option(*extend_command, "--spp", extending->spp, "TOTAL", "the new total per pixel");
+      add(app, action, "extend", "give a job more samples or a smaller target error, even after its end",
+          extend, true);
+  add_option(*extend_command, "--spp", extending->spp, "TOTAL", "the new total of samples per pixel");
   add_option(*extend_command, "--target-error", extending->target_error, "E",
-             "of a job that has one: go on until the image's relMSE is below this");
+             "for a job with a target error: continue until the image's relMSE is below this");
   const auto [priority_command, ranking] =
-      add(app, action, "priority", "puts a job before others, or behind them", priority, true);
-  add_option(*priority_command, "priority", ranking->priority, "N", "higher goes first; 0 is the default")
+      add(app, action, "priority", "change the priority of a job", priority, true);
+  add_option(*priority_command, "priority", ranking->priority, "N",
+             "jobs of higher priority are rendered first; default: 0")
       ->required();
   const auto [after_command, following] =
-      add(app, action, "after", "lets a job wait until others are done", after, true);
-  add_option(*after_command, "jobs", following->after, "JOB", "the jobs to wait for; none: it waits no more");
+      add(app, action, "after", "make a job wait until others are done", after, true);
+  add_option(*after_command, "jobs", following->after, "JOB", "the jobs to wait for; none: stop waiting");
   const auto [again_command, repeating] =
-      add(app, action, "again", "submits the scene of a job once more; prints the new job's id", again, true);
-  add_option(*again_command, "--spp", repeating->spp, "N", "samples per pixel instead of the job's end");
-  add_option(*again_command, "--target-error", repeating->target_error, "E", "a target instead");
-  add_option(*again_command, "--time", repeating->seconds, "SECONDS", "a time instead");
-  add_option(*again_command, "--seed", repeating->seed, "N", "other noise");
-  add_option(*again_command, "--priority", repeating->priority, "N", "higher goes first; default 0");
-  add_option(*again_command, "--after", repeating->after, "JOB,...", "begin when these jobs are done")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  add(app, action, "log", "what happened to a job", log, true);
-  add(app, action, "remove", "removes a job that has ended, with its image", remove, true);
+      add(app, action, "again", "submit the scene of a job again and print the new job's id", again, true);
+  repeating->job.add_to(*again_command, JobOptions::Command::again);
+  add(app, action, "log", "print the log of a job", log, true);
+  add(app, action, "remove", "remove a job that has ended, with its image", remove, true);
   const auto [fetch_command, fetching] =
-      add(app, action, "fetch", "the image of a job, finished or as it is", fetch, true);
+      add(app, action, "fetch", "fetch the image of a job, finished or not", fetch, true);
   fetch_command->footer(
       "Examples:\n"
       "  lightshaft fetch j-1234abcd                     writes SCENE.exr, or SCENE_####.exr of a sequence\n"
       "  lightshaft fetch j-1234abcd -o image.png\n"
       "  lightshaft fetch j-1234abcd --frame 7 -o seventh.exr");
-  add_option(
-      *fetch_command, "-o,--output", fetching->out, "OUT.exr",
-      "the image, .exr or .png; of a sequence every frame's, out_####.exr say; default: the scene's name "
-      "in this folder");
+  add_option(*fetch_command, "-o,--output", fetching->out, "OUT.exr",
+             "file of the image, .exr or .png; for a sequence with # for the frame number, for example "
+             "out_####.exr; default: the scene's name in this folder");
   add_option(*fetch_command, "--report", fetching->report, "REPORT.json",
-             "its report, too; with # in its name, every frame's");
+             "also write the report as JSON; with # in the name, one for each frame");
   add_option(*fetch_command, "--html", fetching->html, "REPORT.html",
-             "its report as a page; of a sequence every frame's, with # in the name");
-  const auto [focus_command, looking] =
-      add(app, action, "focus", "which part of a job's image gets the next samples first", focus, true);
+             "also write the report as an HTML page; with # in the name, one for each frame");
+  const auto [focus_command, looking] = add(
+      app, action, "focus", "choose the part of a job's image that gets the next samples first", focus, true);
   add_option(*focus_command, "--region", looking->region, "X0,Y0,X1,Y1",
-             "the tiles of these pixels go before all others");
-  focus_command->add_flag("--none", looking->none, "all tiles are treated alike again");
+             "render the tiles of these pixels before all others");
+  focus_command->add_flag("--none", looking->none, "treat all tiles alike again");
   const auto [video_command, filming] =
-      add(app, action, "video", "a video of the finished frames of a sequence", video, true);
+      add(app, action, "video", "make a video of the finished frames of a sequence", video, true);
   add_option(*video_command, "-o,--output", filming->out, "OUT.mp4", "the video")->required();
-  add_option(*video_command, "--fps", filming->fps, "N", "pictures per second; without it 24");
-  add_option(*video_command, "--exposure", filming->exposure, "STOPS", "in stops; without it 0");
-  video_command->add_flag("--denoised", filming->denoised, "of the denoised images");
-  add(app, action, "workers", "the workers of a farm", workers);
+  add_option(*video_command, "--fps", filming->fps, "N", "frames per second; default: 24");
+  add_option(*video_command, "--exposure", filming->exposure, "STOPS", "exposure in stops; default: 0");
+  video_command->add_flag("--denoised", filming->denoised, "show the denoised images");
+  add(app, action, "workers", "list the workers of a farm", workers);
 }
 
 void add_tokens(CLI::App& app, Action& action) {
-  CLI::App* token = app.add_subcommand("token", "who may use a farm: for its admin");
+  CLI::App* token = app.add_subcommand("token", "manage the tokens of a farm (admins only)");
   token->require_subcommand(1);
   const auto [adder, adding] =
-      add(*token, action, "add", "makes a token and prints it; it is kept nowhere else", add_token);
+      add(*token, action, "add", "make a token and print it; it cannot be shown again", add_token);
   adder
       ->add_option("--role", adding->role,
-                   "what it may do: submit (own jobs), read, join (a worker's) or admin")
+                   "role of the token: submit (own jobs), read, join (for workers) or admin")
       ->required()
       ->check(CLI::IsMember({"submit", "read", "join", "admin"}));
-  add_option(*adder, "--user", adding->user, "NAME", "whose it is: owner of the jobs handed in with it");
-  add(*token, action, "list", "the tokens, without their secrets", list_tokens);
-  const auto [revoke, revoking] =
-      add(*token, action, "revoke", "makes a token worthless, at once", revoke_token);
-  add_option(*revoke, "id", revoking->id, "ID", "its id, as `list` prints it")->required();
+  add_option(*adder, "--user", adding->user, "NAME", "owner of the jobs that are submitted with the token");
+  add(*token, action, "list", "list the tokens without their secrets", list_tokens);
+  const auto [revoke, revoking] = add(*token, action, "revoke", "revoke a token at once", revoke_token);
+  add_option(*revoke, "id", revoking->id, "ID", "id of the token, as `list` prints it")->required();
 }
 
 }  // namespace ls::cli

@@ -12,8 +12,8 @@
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/reply_fields.h"
-#include "common/base/safe_text.h"
-#include "common/scene/analysis/prune.h"
+#include "core/base/safe_text.h"
+#include "core/scene/analysis/prune.h"
 #include "worker/machine.h"
 #include "worker/render/base/work_counters.h"
 
@@ -121,9 +121,9 @@ std::uint64_t sum_of_bytes(const ordered_json& list) {
 }
 
 std::string head(const ordered_json& j) {
-  const std::string spp = j.at("spp").is_null() ? "as many as it takes" : j.at("spp").dump();
+  const std::string spp = j.at("spp").is_null() ? "as many as needed" : j.at("spp").dump();
   return fmt::format(
-      "{}\n{} x {} pixels, {} samples per pixel, integrator {}\ninstantiated for: {} ({} there are)\n",
+      "{}\n{} x {} pixels, {} samples per pixel, integrator {}\nvariant of the renderer: {} (of {})\n",
       text_at(j, "scene"), j.at("size")[0].get<int>(), j.at("size")[1].get<int>(), spp,
       text_at(j, "integrator"), text_at(j, "variant"), j.at("variants").get<int>());
 }
@@ -137,7 +137,8 @@ std::string parts(const ordered_json& j, bool used) {
       if (used) row.insert(row.begin() + 1, bytes > 0 ? show_bytes(bytes) : "-");
       rows.push_back(std::move(row));
     }
-  return titled(used ? "uses, and the bytes of files that it reads" : "leaves out: no bytes", rows);
+  return titled(used ? "parts in use, and the bytes of files that they read" : "parts that are left out",
+                rows);
 }
 
 // Lists the renderer's optional features that the scene uses and those that it does not use, such as grids, a
@@ -148,7 +149,7 @@ std::string made_ready(const ordered_json& j) {
     for (const auto& x : j.at(key)) all.push_back(plain_text(x.get<std::string>()));
     return all.empty() ? std::string("nothing") : fmt::format("{}", fmt::join(all, "; "));
   };
-  return fmt::format("\nmade ready to trace, it has: {}\nand does without: {}\n", listed("features_used"),
+  return fmt::format("\nthe loaded scene has: {}\nand does without: {}\n", listed("features_used"),
                      listed("features_left_out"));
 }
 
@@ -159,7 +160,7 @@ std::string technique_table(const ordered_json& j) {
         {text_at(t, "name"),
          fmt::format("{}=\"{}\"", text_at(t.at("off"), "parameter"), text_at(t.at("off"), "value")),
          text_at(t, "what")});
-  return titled("techniques at work, and what switches each off in the scene's integrator", rows);
+  return titled("techniques in use, and the integrator's parameter that switches each off", rows);
 }
 
 std::string pruned(const ordered_json& j) {
@@ -169,7 +170,7 @@ std::string pruned(const ordered_json& j) {
     rows.push_back(
         {times(x.at("count"), text_at(x, "what")), bytes > 0 ? show_bytes(bytes) : "", text_at(x, "why")});
   }
-  return titled("taken out of the scene, as no pixel depends on it", rows);
+  return titled("removed from the scene, because no pixel depends on it", rows);
 }
 
 std::string files(const ordered_json& j) {
@@ -180,12 +181,12 @@ std::string files(const ordered_json& j) {
   for (const auto& file : travel)
     going.push_back({text_at(file, "name"), show_bytes(file.at("bytes")), text_at(file, "uses")});
   for (const auto& file : stay) staying.push_back({text_at(file, "name"), show_bytes(file.at("bytes"))});
-  return (travel.empty() ? fmt::format("\ngoes to workers: {} of scene, no files\n", scene)
-                         : titled(fmt::format("goes to workers: {} in {} files, and {} of scene",
+  return (travel.empty() ? fmt::format("\nsent to workers: {} of scene, no files\n", scene)
+                         : titled(fmt::format("sent to workers: {} in {} files, and {} of scene",
                                               show_bytes(sum_of_bytes(travel)), travel.size(), scene),
                                   going)) +
-         titled(fmt::format("stays here: {} in {} files that nothing needed names",
-                            show_bytes(sum_of_bytes(stay)), stay.size()),
+         titled(fmt::format("not sent: {} in {} files that nothing uses", show_bytes(sum_of_bytes(stay)),
+                            stay.size()),
                 staying);
 }
 
@@ -208,8 +209,8 @@ std::string memory(const ordered_json& j) {
     rows.push_back(
         {text_at(s, "name"), bytes > 0 ? show_bytes(bytes) : "-", bar(bytes, largest), text_at(s, "detail")});
   }
-  return titled(fmt::format("in a worker's memory: {}", show_bytes(sum_of_bytes(all))), rows) +
-         fmt::format("in the coordinator's: {} of film\n", show_bytes(j.at("film_bytes")));
+  return titled(fmt::format("memory of a worker: {}", show_bytes(sum_of_bytes(all))), rows) +
+         fmt::format("memory of the coordinator: {} of film\n", show_bytes(j.at("film_bytes")));
 }
 
 // Describes a variant's instructions per path, and by how many percent they exceed those of the cheapest
@@ -234,7 +235,7 @@ std::string variants(const ordered_json& j) {
   const std::string uncounted =
       j.contains("uncounted") ? fmt::format("instructions are not counted: {}\n", text_at(j, "uncounted"))
                               : "";
-  return titled("every instantiation that covers the scene, on a small image", rows) +
+  return titled("all variants of the renderer that can render the scene, on a small image", rows) +
          (j.at("variants_agree") ? "the same bits\n" : "DIFFERENT BITS: this is a bug\n") + uncounted;
 }
 
@@ -337,16 +338,16 @@ int run(const InspectFlags& flags) {
 
 void add_inspect(CLI::App& app, Action& action) {
   const auto [inspect, flags] = add_command<InspectFlags>(
-      app, action, "inspect", "read and check a scene without rendering; say what it needs", run);
+      app, action, "inspect", "read and check a scene without rendering, and print what it needs", run);
   add_option(*inspect, "scene", flags->scene, "SCENE", "Mitsuba XML, .pbrt, .gltf or .glb")->required();
   add_defines(*inspect, flags->defines);
-  add_option(*inspect, "--frame", flags->frame, "N", "of a sequence: this frame");
-  inspect->add_flag("--strict", flags->strict, "warnings are errors");
+  add_option(*inspect, "--frame", flags->frame, "N", "for a sequence: only this frame");
+  inspect->add_flag("--strict", flags->strict, "treat warnings as errors");
   inspect->add_flag("--variants", flags->variants,
-                    "renders a small image with every instantiation that covers the scene: their bits must "
-                    "be the same; and counts their instructions, if this machine can");
+                    "render a small image with every variant of the renderer that can render the scene, "
+                    "compare their bits, and count their instructions if this machine can");
   inspect->add_flag("--work", flags->work,
-                    "counts the work of a small image (builds with LIGHTSHAFT_COUNT only)");
+                    "count the work for a small image (only in builds with LIGHTSHAFT_COUNT)");
   inspect->add_flag("--json", flags->json, "as JSON");
 }
 

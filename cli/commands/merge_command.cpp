@@ -11,13 +11,13 @@
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
-#include "common/image/exr/final_image.h"
-#include "common/image/film/merge.h"
-#include "common/protocol/limits.h"
-#include "common/scene/analysis/prune.h"
-#include "common/scene/json/serialize.h"
 #include "coordinator/admission/cryptomatte_manifests.h"
 #include "coordinator/store/files.h"
+#include "core/image/exr/final_image.h"
+#include "core/image/film/merge.h"
+#include "core/scene/analysis/prune.h"
+#include "core/scene/json/serialize.h"
+#include "util/protocol/limits.h"
 
 namespace ls::cli {
 namespace {
@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 struct MergeFlags {
   std::vector<std::string> partials, defines;
-  std::string out, report, scene;
+  std::string out, report, scene, techniques;
   std::optional<std::uint32_t> frame;
   bool float_output = false;
 };
@@ -47,7 +47,7 @@ Result<std::vector<fs::path>> files_of(const std::vector<std::string>& arguments
     if (error) return bad_argument(fmt::format("{}: {}", argument, error.message()));
     std::sort(files.begin() + before, files.end());
   }
-  if (files.empty()) return bad_argument("there is no .exr file in the folders given");
+  if (files.empty()) return bad_argument("the given folders contain no .exr file");
   return files;
 }
 
@@ -100,14 +100,16 @@ tl::expected<CryptomatteManifests, coordinator::Rejected> manifests(const MergeF
   const AovSet aovs = merged.film.aovs();
   const auto defines = parse_defines(flags.defines);
   if (!defines) return coordinator::rejected(defines.error());
-  const auto scene =
+  auto scene =
       read_local_scene(flags.scene, *defines, false, flags.frame, aovs.any_of(aovs_of(AovKind::ids)));
   if (!scene) return tl::unexpected(scene.error());
+  if (const auto ok = use_techniques(flags.techniques, scene->scene); !ok)
+    return coordinator::rejected(ok.error());
   if (!is_of(scene->scene, merged.scene))
     return coordinator::rejected(
         {Errc::invalid_argument,
-         fmt::format("the partials are of scene {}, and {} is another one: give the same scene file, with "
-                     "the same -D and --frame",
+         fmt::format("the partial images were rendered from scene {}, and {} is another scene: give the same "
+                     "scene file, with the same -D, --techniques and --frame",
                      merged.scene.hex(), flags.scene)});
   return coordinator::manifests_of(scene->scene, aovs);
 }
@@ -154,16 +156,18 @@ int run(const MergeFlags& flags) {
 
 void add_merge(CLI::App& app, Action& action) {
   const auto [merge, flags] = add_command<MergeFlags>(
-      app, action, "merge", "fold partial images into the final one, exactly as the coordinator does", run);
+      app, action, "merge", "combine partial images into the final one, exactly as the coordinator does",
+      run);
   add_option(*merge, "partials", flags->partials, "PARTIAL.exr...", "partial images, or folders of them")
       ->required();
   add_option(*merge, "-o,--output", flags->out, "OUT.exr", "the image, .exr or .png")->required();
-  add_option(*merge, "--report", flags->report, "REPORT.json", "write digest and error as JSON");
+  add_option(*merge, "--report", flags->report, "REPORT.json", "write the digest and the error as JSON");
   add_option(*merge, "--scene", flags->scene, "SCENE",
-             "what they were rendered from: gives mattes the names of things, which partials lack");
+             "the scene that was rendered; cryptomattes get their names from it");
   add_defines(*merge, flags->defines);
-  add_option(*merge, "--frame", flags->frame, "N", "of a sequence: this frame");
-  merge->add_flag("--float", flags->float_output, "32-bit pixels instead of half");
+  add_techniques(*merge, flags->techniques);
+  add_option(*merge, "--frame", flags->frame, "N", "for a sequence: only this frame");
+  merge->add_flag("--float", flags->float_output, "write 32-bit pixels instead of half");
 }
 
 }  // namespace ls::cli

@@ -1,43 +1,19 @@
-// `lightshaft up` and `lightshaft join` are written in Python (python/src/lightshaft_command). This program
-// finds them and becomes the Python that runs them.
+// Some commands are written in Python (python/src/lightshaft_command). This program finds them and becomes
+// the Python that runs them.
 #include <fmt/format.h>
 #include <signal.h>
-#include <unistd.h>
 
-#include <cerrno>
 #include <cstdlib>
-#include <cstring>
 
 #include "cli/commands/commands.h"
 #include "cli/doctor/facts.h"
 #include "cli/output/console.h"
-#include "common/base/spawn.h"
+#include "core/base/spawn.h"
 
 namespace ls::cli {
 namespace {
 
 Error missing(std::string text) { return {Errc::failed_precondition, std::move(text)}; }
-
-int run_in_python(const char* command, const std::vector<std::string>& arguments) {
-  const PythonFacts python = find_python();
-  if (python.interpreter.empty())
-    return print_error(missing(
-        fmt::format("`lightshaft {}` needs Python 3.11 or later, and there is no python3 in PATH", command)));
-  if (python.part.empty())
-    return print_error(missing(
-        fmt::format("`lightshaft {}` is written in Python, and its part of this program is missing: there is "
-                    "no lightshaft_command beside it; install Lightshaft again",
-                    command)));
-  std::vector<std::string> words = {python.interpreter.string(), "-B", python.part.string(), command};
-  words.insert(words.end(), arguments.begin(), arguments.end());
-  std::vector<char*> argv;
-  for (std::string& word : words) argv.push_back(word.data());
-  argv.push_back(nullptr);
-  ::setenv("LIGHTSHAFT_PROGRAMS", program_beside_us("").c_str(), 1);
-  ::signal(SIGPIPE, SIG_DFL);
-  ::execv(argv.front(), argv.data());
-  return print_error(missing(fmt::format("cannot start {}: {}", argv.front(), std::strerror(errno))));
-}
 
 void add(CLI::App& app, Action& action, const char* name, const char* help) {
   CLI::App* command = app.add_subcommand(name, help);
@@ -50,9 +26,38 @@ void add(CLI::App& app, Action& action, const char* name, const char* help) {
 
 }  // namespace
 
+int run_in_python(const char* command, const std::vector<std::string>& arguments) {
+  const PythonFacts python = find_python();
+  if (python.interpreter.empty())
+    return print_error(missing(
+        fmt::format("`lightshaft {}` needs Python 3.11 or later, and there is no python3 in PATH", command)));
+  if (python.part.empty())
+    return print_error(
+        missing(fmt::format("`lightshaft {}` needs lightshaft_command, which is missing beside this program: "
+                            "install Lightshaft again",
+                            command)));
+  ::setenv("LIGHTSHAFT_PROGRAMS", program_beside_us("").c_str(), 1);
+  ::signal(SIGPIPE, SIG_DFL);
+  // Python starts without the means to answer signals. It unblocks them when it has these (__main__.py).
+  sigset_t ends;
+  ::sigemptyset(&ends);
+  ::sigaddset(&ends, SIGINT);
+  ::sigaddset(&ends, SIGTERM);
+  ::pthread_sigmask(SIG_BLOCK, &ends, nullptr);
+  // The standard library is enough, so PYTHONPATH and the user's packages have no part in this. The Python of
+  // a wheel starts as it was set up.
+  const char* of_wheel = std::getenv("LIGHTSHAFT_PYTHON");
+  std::vector<std::string> words;
+  if (!of_wheel || !*of_wheel) words = {"-E", "-s"};
+  words.insert(words.end(), {"-B", python.part.string(), command});
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  return become(python.interpreter, words);
+}
+
 void add_python_commands(CLI::App& app, Action& action) {
-  add(app, action, "up", "a farm on this machine, with its dashboard, until Ctrl-C");
-  add(app, action, "join", "renders for the farm of another machine's `lightshaft up --lan`, until Ctrl-C");
+  add(app, action, "up", "run a farm on this machine, with its dashboard, until Ctrl-C");
+  add(app, action, "join",
+      "render for a farm that another machine runs with `lightshaft up --lan`, until Ctrl-C");
 }
 
 }  // namespace ls::cli

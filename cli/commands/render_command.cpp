@@ -11,7 +11,7 @@
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
-#include "common/protocol/limits.h"
+#include "util/protocol/limits.h"
 #include "worker/child/child.h"
 #include "worker/machine.h"
 
@@ -63,7 +63,8 @@ int replay_sample(const LocalScene& scene, const JobSpec& spec, int threads, std
   const FrameSize size = built->job.settings.size;
   if (x >= size.width || y >= size.height)
     return usage_error(
-        fmt::format("--pixel {},{}: the image is {} x {}, counted from 0", x, y, size.width, size.height));
+        fmt::format("--pixel {},{} is outside of the image: it has {} x {} pixels, counted from 0", x, y,
+                    size.width, size.height));
   const render::SampleValue value = render::render_sample(*built->world, x, y, sample);
   print(fmt::format("pixel {},{} sample {}: {:.9g} {:.9g} {:.9g}", x, y, sample, value.rgb[0], value.rgb[1],
                     value.rgb[2]));
@@ -73,7 +74,7 @@ int replay_sample(const LocalScene& scene, const JobSpec& spec, int threads, std
 
 int replay(const RenderFlags& flags, const LocalScene& scene, const LocalRenderOptions& options) {
   if (flags.pixel.empty() || flags.sample.empty())
-    return usage_error("--pixel and --sample belong together: one sample of one pixel");
+    return usage_error("--pixel and --sample need each other: together they name one sample of one pixel");
   const auto pixel = parse_pixel(flags.pixel);
   if (!pixel) return print_error(pixel.error());
   const auto sample = parse_whole("--sample", flags.sample, 0, limits::kSampleIndex);
@@ -135,7 +136,7 @@ int run(const RenderFlags& flags) {
     if (const auto ok = check_files(*options); !ok) return print_error(ok.error());
   if (frames && !one_sample) return render_sequence(flags.scene, *frames, *options);
   if (frames && frames->count() > 1)
-    return usage_error("--pixel and --sample are of one frame: name it, --frames 7 say");
+    return usage_error("--pixel and --sample need one frame: add it, for example --frames 7");
   const auto scene = read_local_scene(flags.scene, options->spec.defines, flags.job.strict,
                                       frames ? std::optional(frames->first) : std::nullopt);
   if (!scene) return print_rejected(scene.error());
@@ -156,26 +157,26 @@ void add_render(CLI::App& app, Action& action) {
       "LIGHTSHAFT_LOG=warn, info or debug shows what coordinator and worker do inside `render`.");
   add_option(*render, "scene", flags->scene, "SCENE", "Mitsuba XML, .pbrt, .gltf or .glb")->required();
   add_option(*render, "-o,--output", flags->out, "OUT.exr",
-             "the image: .exr with all layers, or .png; default: the scene's name, with .exr, in this "
-             "folder. Of a sequence: with # for the frame's number, out_####.exr say");
-  flags->job.add_to(*render);
+             "file of the image: .exr with all layers, or .png; for a sequence with # for the frame number, "
+             "for example out_####.exr; default: the scene's name with .exr, in this folder");
+  flags->job.add_to(*render, JobOptions::Command::render);
   add_option(*render, "--threads", flags->threads, "N", "default: all");
   add_option(*render, "--pixel", flags->pixel, "X,Y",
              "with --sample: print the value of one sample of this pixel");
-  add_option(*render, "--sample", flags->sample, "N", "its number, from 0");
+  add_option(*render, "--sample", flags->sample, "N", "number of the sample, from 0");
   add_option(*render, "--reference", flags->reference, "REF.exr",
-             "the right image, of another seed: the report has the true error, too");
-  add_option(*render, "--report", flags->report, "REPORT.json",
-             "write what it cost and how large the error is, as JSON");
+             "a reference image, rendered with another seed; the report then also has the true error");
+  add_option(*render, "--report", flags->report, "REPORT.json", "write the report (cost and error) as JSON");
   add_option(*render, "--html", flags->html, "REPORT.html",
-             "the same as a page, with image, curves and maps in it");
+             "write the report as an HTML page with image, curves and maps");
   add_option(*render, "--partial-dir", flags->partial_dir, "DIR",
-             "keep every unit's partial image: `lightshaft merge` folds them");
-  render->add_flag("--isolate", flags->isolate, "render in a child process, which may crash");
-  auto* quiet = render->add_flag("--quiet", flags->quiet, "only warnings and errors");
+             "folder to keep the partial image of every unit in; `lightshaft merge` combines them");
+  render->add_flag("--isolate", flags->isolate,
+                   "render in a child process, so that a crash does not end this one");
+  auto* quiet = render->add_flag("--quiet", flags->quiet, "print only warnings and errors");
   render
       ->add_flag("--progress", flags->progress,
-                 "progress as lines, one for each percent, for logs and programs")
+                 "print progress as one line for each percent, for logs and programs")
       ->excludes(quiet);
 }
 

@@ -11,8 +11,8 @@
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
-#include "common/base/safe_text.h"
-#include "common/image/reference/reference.h"
+#include "core/base/safe_text.h"
+#include "core/image/reference/reference.h"
 
 namespace ls::cli {
 namespace {
@@ -51,7 +51,7 @@ Job submit_bundle(const SubmitFlags& flags, const JobSpec& spec, const std::stri
         {Errc::invalid_argument, fmt::format("{}: there is no such file", flags.scene)});
   auto api = FarmApi::open(flags.farm);
   if (!api) return coordinator::rejected(api.error());
-  auto job = api->submit_bundle(flags.scene, type, spec_query(spec, !flags.job.priority.empty(), flags.name));
+  auto job = api->submit_bundle(flags.scene, type, spec_query(spec, flags.job.given(), flags.name));
   if (!job) return job;
   for (const std::string& warning : texts_field(*job, "warnings")) print_note(warning);
   return job;
@@ -124,29 +124,14 @@ void add_submit(CLI::App& app, Action& action) {
       "  lightshaft submit smoke.xml --frames 1-48 -o out_####.exr\n"
       "  lightshaft submit beauty.xml --frames 1-48 --after j-1234abcd  each frame after that job's frame");
   flags->farm.add_to(*submit);
-  flags->job.add_to(*submit);
-  add_option(*submit, "--name", flags->name, "NAME", "what lists call the job; default: the scene's file");
-  add_option(
-      *submit, "--after", flags->job.after, "JOB,...",
-      "begin when these jobs are done; of two sequences of the same frames, each frame after its frame")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  add_option(*submit, "--priority", flags->job.priority, "N", "higher goes first; default 0");
-  add_option(*submit, "--tags", flags->job.tags, "A,B", "only workers with all of these")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  add_option(*submit, "--max-workers", flags->job.max_workers, "N", "at most so many workers at once");
-  add_option(*submit, "--max-units", flags->job.max_units, "N",
-             "at most so many units lent to workers at once");
-  add_option(*submit, "--memory", flags->job.memory, "BYTES", "only workers with so much memory, 8G say");
-  add_option(*submit, "--numeric-class", flags->job.numeric_class, "CLASS",
-             "only workers of this class, by the beginning of its digits or of its platform in `lightshaft "
-             "workers`");
+  flags->job.add_to(*submit, JobOptions::Command::submit);
+  add_option(*submit, "--name", flags->name, "NAME", "name of the job in lists; default: the scene's file");
   add_option(*submit, "--reference", flags->reference, "REF.exr",
-             "the right image: every checkpoint is compared with it. Of another seed than the job's");
-  submit->add_flag("--wait", flags->wait, "until the job is done");
+             "the true image, rendered with another seed: every checkpoint is compared with it");
+  submit->add_flag("--wait", flags->wait, "wait until the job is done");
   add_option(*submit, "-o,--output", flags->out, "OUT.exr",
-             "wait, then fetch the image, .exr or .png; of a sequence every frame's, out_####.exr say");
+             "wait, then fetch the image, .exr or .png; of a sequence those of all frames, for example "
+             "out_####.exr");
   add_option(*submit, "--report", flags->report, "REPORT.json",
              "wait, then fetch the report; with # in its name, every frame's");
   add_option(*submit, "--html", flags->html, "REPORT.html",

@@ -17,14 +17,14 @@
 #include "cli/output/console.h"
 #include "cli/output/interrupt.h"
 #include "cli/output/job_options.h"
-#include "common/base/safe_text.h"
-#include "common/image/film/film.h"
-#include "common/image/frame/rounds.h"
-#include "common/job/sealed_image.h"
-#include "common/scene/analysis/prune.h"
-#include "common/scene/json/serialize.h"
 #include "coordinator/admission/cryptomatte_manifests.h"
 #include "coordinator/store/files.h"
+#include "core/base/safe_text.h"
+#include "core/image/film/film.h"
+#include "core/image/frame/rounds.h"
+#include "core/job/sealed_image.h"
+#include "core/scene/analysis/prune.h"
+#include "core/scene/json/serialize.h"
 #include "worker/machine.h"
 #include "worker/render/render.h"
 
@@ -34,7 +34,7 @@ namespace {
 constexpr std::uint64_t kDefaultTiles = 4;
 
 struct VerifyFlags {
-  std::string image, scene, frame, tiles, seed;
+  std::string image, scene, frame, tiles, seed, techniques;
   std::vector<std::string> defines;
   int threads = 0;
   bool json = false;
@@ -46,13 +46,12 @@ Result<FinalPicture> open_image(const std::string& path) {
   return read_final_exr(*bytes, path);
 }
 
-// Checks that the image was rendered from this scene, and that this machine has the image's numeric class
-// (machines of one class give the same bits).
+// Checks that the image was rendered from this scene, and that this machine has the image's numeric class.
 Result<void> check_same(const SealedImage& image, const LocalScene& scene, const VerifyFlags& flags) {
   if (const Digest mine = digest_of(scene.scene); mine != image.scene)
     return bad_argument(fmt::format(
-        "{} was rendered from scene {}, and {} is scene {}: give the same scene file, with the same -D "
-        "and --frame",
+        "{} was rendered from scene {}, and {} is scene {}: give the same scene file, with the same -D, "
+        "--techniques and --frame",
         flags.image, image.scene.hex(), flags.scene, mine.hex()));
   if (render::numeric_class() != image.numeric_class)
     return fail(
@@ -90,9 +89,9 @@ std::vector<TileIndex> random_tiles(TileIndex all, std::uint64_t count, std::uin
   return chosen;
 }
 
-// Renders all rounds (ranges of samples) of the tile again. Compares the hash chain over the rounds' digests
-// with the chain stored in the image, and the values in every layer with the image's. The world must have
-// been built from the image's scene and settings.
+// Renders all rounds of the tile again. Compares the hash chain over the rounds' digests with the chain
+// stored in the image, and the values in every layer with the image's. The world must have been built from
+// the image's scene and settings.
 VerifiedTile verify_tile(const render::World& world, const SealedImage& image, TileIndex tile,
                          const std::atomic<bool>& stop) {
   VerifiedTile out{tile, image.grid().rect(tile), 0, false, {}};
@@ -120,12 +119,12 @@ VerifiedTile verify_tile(const render::World& world, const SealedImage& image, T
     }
   }
   if (film.tile_digest(tile) != image.tiles[tile])
-    out.problem = fmt::format("rendered again it is {}, the image seals {}", film.tile_digest(tile).hex(),
-                              image.tiles[tile].hex());
+    out.problem = fmt::format("rendered again it has the digest {}, but the image's seal has {}",
+                              film.tile_digest(tile).hex(), image.tiles[tile].hex());
   else if (const auto pixel = first_difference(image, film, tile))
     out.problem = fmt::format(
-        "its seal is right, but pixel {},{} has another value in layer {} than its samples give: the image "
-        "was changed afterwards",
+        "the seal is right, but pixel {},{} has another value in layer {} than its samples: the image was "
+        "changed afterwards",
         pixel->x, pixel->y, pixel->layer);
   out.error = film.error(tile);
   return out;
@@ -190,9 +189,10 @@ Contents contents_of(const FinalPicture& picture) {
 }
 
 std::string line_of(const Contents& c) {
-  if (!c.changed.empty()) return fmt::format("not as sealed: {}", fmt::join(c.changed, ", "));
-  if (c.sealed) return "all layers and headers are as sealed";
-  return "layers and headers have no seal: what was not rendered again may have been changed";
+  if (!c.changed.empty()) return fmt::format("differs from the seal: {}", fmt::join(c.changed, ", "));
+  if (c.sealed) return "all layers and headers match the seal";
+  return "the image has no seal of its layers and headers: tiles that were not rendered again may have been "
+         "changed";
 }
 
 nlohmann::ordered_json to_json(const std::vector<VerifiedTile>& tiles, const Contents& contents,
@@ -254,8 +254,8 @@ Result<Numbers> numbers_of(const VerifyFlags& flags) {
 
 int run(const VerifyFlags& flags) {
   if (flags.scene.empty())
-    return usage_error(fmt::format("say of which scene the image is: lightshaft verify {} --scene SCENE.xml",
-                                   shell_word(flags.image)));
+    return usage_error(
+        fmt::format("the scene is missing: lightshaft verify {} --scene SCENE.xml", shell_word(flags.image)));
   // Declared before `interrupt`, so that it outlives the thread of `interrupt`, which sets it.
   std::atomic<bool> stop{false};
   Interrupt interrupt;
@@ -274,6 +274,7 @@ int run(const VerifyFlags& flags) {
   auto scene = read_local_scene(flags.scene, *defines, false, numbers->frame,
                                 coordinator::wants_labels(image->settings));
   if (!scene) return print_rejected(scene.error());
+  if (const auto ok = use_techniques(flags.techniques, scene->scene); !ok) return print_error(ok.error());
   // A job renders its scene pruned: without what its integrator and max_depth do not need.
   scene->scene =
       scene::pruned(scene->scene, scene::pruned_for(image->settings.integrator, image->settings.max_depth))
@@ -293,10 +294,12 @@ int run(const VerifyFlags& flags) {
   const Tally tally = tally_of(verified);
   if (!flags.json) {
     print(line_of(contents));
-    print(fmt::format("{} of {} tiles are as sealed{} ({} in the image; the same choice again: --seed {})",
-                      tally.right, verified.size(),
-                      tally.stopped > 0 ? fmt::format(", {} were not rendered: stopped", tally.stopped) : "",
-                      image->grid().count(), numbers->seed));
+    print(fmt::format(
+        "{} of {} tiles match the seal{} ({} in the image; --seed {} chooses the same tiles again)",
+        tally.right, verified.size(),
+        tally.stopped > 0 ? fmt::format(", {} were not rendered because the run was stopped", tally.stopped)
+                          : "",
+        image->grid().count(), numbers->seed));
   }
   return tally.right == verified.size() && contents.as_sealed() ? kOk : kFailed;
 }
@@ -309,10 +312,13 @@ void add_verify(CLI::App& app, Action& action) {
       "render random tiles of a finished image again and compare them with the digests sealed in it", run);
   add_option(*verify, "image", flags->image, "OUT.exr", "a finished EXR")->required();
   add_option(*verify, "--scene", flags->scene, "SCENE", "the scene it was rendered from");
-  add_option(*verify, "--tiles", flags->tiles, "K", fmt::format("how many (default {})", kDefaultTiles));
-  add_option(*verify, "--seed", flags->seed, "N", "chooses the tiles; default: anew each time");
+  add_option(*verify, "--tiles", flags->tiles, "K",
+             fmt::format("number of tiles (default {})", kDefaultTiles));
+  add_option(*verify, "--seed", flags->seed, "N",
+             "seed for the choice of tiles; default: another one each time");
   add_defines(*verify, flags->defines);
-  add_option(*verify, "--frame", flags->frame, "N", "of a sequence: this frame");
+  add_techniques(*verify, flags->techniques);
+  add_option(*verify, "--frame", flags->frame, "N", "for a sequence: only this frame");
   add_option(*verify, "--threads", flags->threads, "N", "default: all")->check(CLI::Range(1, 1024));
   verify->add_flag("--json", flags->json, "as JSON");
 }

@@ -11,10 +11,10 @@
 
 #include "cli/farm/farm_api.h"
 #include "cli/output/reply_fields.h"
-#include "common/base/clock.h"
-#include "common/base/machine_memory.h"
-#include "common/base/spawn.h"
-#include "common/denoise/denoiser.h"
+#include "core/base/clock.h"
+#include "core/base/machine_memory.h"
+#include "core/base/spawn.h"
+#include "util/denoise/denoiser.h"
 #include "worker/machine.h"
 #include "worker/render/render.h"
 
@@ -178,7 +178,8 @@ int run_sandbox_probe() {
 
 PythonFacts find_python() {
   PythonFacts facts;
-  facts.interpreter = in_path("python3");
+  const char* of_wheel = std::getenv("LIGHTSHAFT_PYTHON");
+  facts.interpreter = of_wheel && *of_wheel ? of_wheel : in_path("python3");
   // Where `cmake --install` puts it, in a wheel, and in a build. That of a build comes last: beside a package
   // that is unpacked somewhere it is a folder of others.
   for (const char* folder : {"../../share/lightshaft/lightshaft_command", "../../../lightshaft_command",

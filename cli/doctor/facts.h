@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "cli/farm/http_client.h"
-#include "common/sandbox/sandbox.h"
+#include "util/sandbox/sandbox.h"
 
 namespace ls::cli {
 
@@ -20,9 +20,10 @@ struct FolderFacts {
   std::uint64_t free_bytes = 0;
 };
 
-// The Python interpreter and the Python package that run `lightshaft up` and `lightshaft join`.
+// The Python interpreter and the Python package that run the commands up, join, farm up and compare.
 struct PythonFacts {
-  std::filesystem::path interpreter;  // empty: there is no python3 in PATH
+  // That of LIGHTSHAFT_PYTHON, which a wheel sets, or python3 in PATH; empty: there is none
+  std::filesystem::path interpreter;
   std::filesystem::path part;  // the folder lightshaft_command; empty: it is not where this program looks
 };
 PythonFacts find_python();
@@ -30,8 +31,7 @@ PythonFacts find_python();
 struct MachineFacts {
   std::string processor_target;  // processor for which the program was compiled, such as "x86-64-v3"
   bool processor_fits = false;
-  // Numeric class of `lightshaft render` on this machine, in hexadecimal: machines of one class render the
-  // same bits.
+  // Numeric class of `lightshaft render` on this machine, in hexadecimal.
   std::string numeric_class;
   std::uint64_t memory_bytes = 0;
   int cpus = 0;

@@ -8,8 +8,8 @@
 #include <set>
 
 #include "cli/output/console.h"
-#include "common/base/safe_text.h"
-#include "common/scene/limits.h"
+#include "core/base/safe_text.h"
+#include "core/scene/limits.h"
 #include "worker/machine.h"
 
 namespace ls::cli {
@@ -82,11 +82,12 @@ Finding of_sandbox(const MachineFacts& facts) {
 
 Finding of_python(const PythonFacts& facts) {
   if (facts.interpreter.empty())
-    return warning("python", "there is no python3 in PATH",
-                   "only `lightshaft up` and `lightshaft join` need it: install Python 3.11 or later");
+    return warning(
+        "python", "there is no python3 in PATH",
+        "only `lightshaft up`, `join`, `farm up` and `compare` need it: install Python 3.11 or later");
   if (facts.part.empty())
     return warning("python", "lightshaft_command, a part of this program, is not where it should be",
-                   "only `lightshaft up` and `lightshaft join` need it: install Lightshaft again");
+                   "only `lightshaft up`, `join`, `farm up` and `compare` need it: install Lightshaft again");
   return ok("python", facts.interpreter.string());
 }
 
@@ -216,7 +217,7 @@ void add_workers(std::vector<Finding>& all, const FarmFacts& facts, const std::s
   for (const WorkerFacts& worker : *facts.workers)
     if (worker.state != "lost" && worker.state != "gone") present.push_back(worker);
   if (present.empty()) {
-    all.push_back(warning("workers", "none is connected, so that no job goes on",
+    all.push_back(warning("workers", "none is connected, so that no job continues",
                           "start lightshaft-worker with this coordinator's address for workers (--grpc)"));
     return;
   }
@@ -226,7 +227,7 @@ void add_workers(std::vector<Finding>& all, const FarmFacts& facts, const std::s
       "unhealthy or quarantined", "see their activity: lightshaft workers");
   add_if_any(
       all, present, [](const WorkerFacts& w) { return w.fake; }, "workers",
-      "they make pixels up (--fake) instead of rendering", "stop them on a farm that renders");
+      "they invent pixels (--fake) instead of rendering", "stop them on a farm that renders");
   if (before == all.size()) all.push_back(ok("workers", fmt::format("{} connected", present.size())));
   if (!facts.version.empty())
     add_if_any(

@@ -21,8 +21,7 @@ struct Finding {
 };
 
 std::vector<Finding> judge_machine(const MachineFacts& facts);
-// Judges the farm. `program_version` is this command's version, `numeric_class` this machine's numeric class
-// (machines of one class render the same bits).
+// Judges the farm. `program_version` is this command's version, `numeric_class` this machine's numeric class.
 std::vector<Finding> judge_farm(const FarmFacts& facts, const std::string& program_version,
                                 const std::string& numeric_class);
 

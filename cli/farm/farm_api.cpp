@@ -1,7 +1,6 @@
 #include "cli/farm/farm_api.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
@@ -11,8 +10,10 @@
 #include "cli/farm/http_client.h"
 #include "cli/output/job_options.h"
 #include "cli/output/reply_fields.h"
-#include "common/base/safe_text.h"
-#include "common/base/secret.h"
+#include "core/base/safe_text.h"
+#include "core/base/secret.h"
+#include "core/job/describe.h"
+#include "core/job/objects.h"
 
 namespace ls::cli {
 namespace {
@@ -127,7 +128,7 @@ Result<HttpClient::Options> connection_of(const FarmOptions& options) {
   o.url = options.url.empty() ? environment("LIGHTSHAFT_URL") : options.url;
   if (o.url.empty())
     return bad_argument(
-        "where is the coordinator? Give --to URL or set LIGHTSHAFT_URL, http://localhost:8080 say");
+        "where is the coordinator? Give --to URL or set LIGHTSHAFT_URL, for example http://localhost:8080");
   o.ca = options.ca.empty() ? environment("LIGHTSHAFT_CA") : options.ca;
   o.token = environment("LIGHTSHAFT_TOKEN");
   if (!options.token_file.empty()) {
@@ -280,10 +281,6 @@ class Query {
   void add(std::string_view key, std::string_view value) {
     text_ += fmt::format("{}{}={}", text_.empty() ? "?" : "&", key, percent_encode(value));
   }
-  template <class T>
-  void add(std::string_view key, const std::optional<T>& value) {
-    if (value) add(key, fmt::format("{}", *value));
-  }
   std::string take() { return std::move(text_); }
 
  private:
@@ -308,30 +305,18 @@ std::optional<std::string> bundle_type(const std::string& file) {
   return std::nullopt;
 }
 
-std::string spec_query(const JobSpec& spec, bool with_priority, const std::string& name) {
+std::string spec_query(const JobSpec& spec, const std::set<std::string_view>& given,
+                       const std::string& name) {
   Query query;
   if (!name.empty()) query.add("name", name);
-  query.add("spp", spec.spp);
-  query.add("target_error", spec.target_error);
-  if (spec.target_layer != TargetLayer::raw)
-    query.add("target_layer", std::string(to_string(spec.target_layer)));
-  query.add("time", spec.time);
-  query.add("seed", spec.seed);
-  if (spec.size) query.add("size", fmt::format("{}x{}", spec.size->width, spec.size->height));
-  query.add("integrator", spec.integrator);
-  if (!spec.aov.empty()) query.add("aov", fmt::format("{}", fmt::join(spec.aov, ",")));
-  for (const auto& [name, value] : spec.defines) query.add("define", name + "=" + value);
-  if (with_priority) query.add("priority", fmt::format("{}", spec.priority));
-  if (spec.float_output) query.add("float", "true");
-  if (spec.denoise) query.add("denoise", "true");
-  if (!spec.tags.empty()) query.add("tags", fmt::format("{}", fmt::join(spec.tags, ",")));
-  if (spec.frames) query.add("frames", to_string(*spec.frames));
-  query.add("max_workers", spec.max_workers);
-  query.add("max_units", spec.max_units);
-  query.add("memory", spec.memory);
-  query.add("numeric_class", spec.numeric_class);
-  if (!spec.after.empty()) query.add("after", fmt::format("{}", fmt::join(spec.after, ",")));
-  if (spec.reference) query.add("reference", spec.reference->hex());
+  job::for_each_setting(spec, [&]<class T>(const job::Setting& s, const T& value) {
+    if (value == T{} && !given.contains(s.name)) return;
+    if constexpr (std::is_same_v<T, job::Defines>) {
+      for (const auto& [define, text] : value) query.add(s.query_name(), define + "=" + text);
+    } else {
+      job::with_value(value, [&](const auto& one) { query.add(s.query_name(), job::text_of(one)); });
+    }
+  });
   return query.take();
 }
 

@@ -5,13 +5,14 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "cli/farm/http_client.h"
 #include "cli/local/local_scene.h"
-#include "common/job/settings.h"
 #include "coordinator/service/coordinator.h"
+#include "core/job/settings.h"
 
 namespace ls::cli {
 
@@ -83,9 +84,10 @@ coordinator::Rejected problem_of(const HttpResponse& response);
 // sends an archive unchanged, with the options in the query of the request.
 std::optional<std::string> bundle_type(const std::string& file);
 
-// Returns the spec as query parameters, such as "?spp=8&define=a%3D1", or an empty text. Options that the
-// user did not give are left out, because the archive may set them. `with_priority`: true if the user gave
-// a priority; `spec` alone does not show that, since it always has one. `name`: the job's; empty: not given.
-std::string spec_query(const JobSpec& spec, bool with_priority, const std::string& name = {});
+// Returns the spec as query parameters, such as "?spp=8&define=a%3D1", or an empty text. Settings that have
+// their default are left out, because the archive may set them, except those in `given`, the names of what
+// the user gave. `name`: the job's; empty: not given.
+std::string spec_query(const JobSpec& spec, const std::set<std::string_view>& given,
+                       const std::string& name = {});
 
 }  // namespace ls::cli

@@ -9,9 +9,9 @@
 #include "cli/output/console.h"
 #include "cli/output/convergence_text.h"
 #include "cli/output/reply_fields.h"
-#include "common/base/safe_text.h"
-#include "common/image/exr/final_image.h"
-#include "common/report/number_text.h"
+#include "core/base/safe_text.h"
+#include "core/image/exr/final_image.h"
+#include "util/report/number_text.h"
 
 namespace ls::cli {
 namespace {
@@ -121,8 +121,8 @@ void add_error_rows(std::vector<Row>& rows, const json& job) {
   add_known(rows, "efficiency", job, "efficiency_per_core", "{:.3g} (1 / (relMSE x core seconds))");
 }
 
-// Returns the numeric class of a worker or job (machines of one class render the same bits): its first 12
-// digits, which `submit --numeric-class` accepts, and the platform in words.
+// Returns the numeric class of a worker or job: its first 12 digits, which `submit --numeric-class` accepts,
+// and the platform in words.
 std::string class_text(const json& of) {
   const std::string digits = text(of, "numeric_class").substr(0, 12), platform = text(of, "platform");
   return platform.empty() ? digits : digits + " " + platform;

@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/clock.h"
-#include "common/base/error.h"
+#include "core/base/clock.h"
+#include "core/base/error.h"
 
 namespace ls::cli {
 

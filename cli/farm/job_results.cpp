@@ -12,7 +12,7 @@
 #include "cli/output/convergence_text.h"
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
-#include "common/base/safe_text.h"
+#include "core/base/safe_text.h"
 
 namespace ls::cli {
 namespace {
@@ -52,10 +52,10 @@ Result<Plan> plan_sequence(const std::string& id, const json& job, const json& f
     return fail(Errc::internal, "the coordinator does not say which frames the job has");
   for (const auto& [option, name] : {std::pair("-o", wanted.image), std::pair("--html", wanted.html)})
     if (!name.empty() && !has_frame_number(name) && list->size() != 1)
-      return bad_argument(
-          fmt::format("{} {}: job {} has {} frames: give a name with # for their numbers, out_#### say, "
-                      "or choose one by --frame N",
-                      option, name, id, list->size()));
+      return bad_argument(fmt::format(
+          "{} {}: job {} has {} frames: give a name with # for their numbers, for example out_####, "
+          "or choose one by --frame N",
+          option, name, id, list->size()));
   Plan plan;
   const bool reports = has_frame_number(wanted.report);
   for (const json& frame : *list) {
@@ -103,8 +103,8 @@ std::string fetch_command(const std::string& id, const Results& wanted) {
 
 std::string goes_on(const std::string& id) {
   const std::string word = shell_word(id);
-  return fmt::format("job {} goes on: lightshaft watch {} follows it, lightshaft cancel {} ends it", id, word,
-                     word);
+  return fmt::format("job {} continues: lightshaft watch {} follows it, lightshaft cancel {} ends it", id,
+                     word, word);
 }
 
 std::string default_image(const json& job) {

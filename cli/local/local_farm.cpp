@@ -10,11 +10,12 @@
 #include <cstring>
 #include <utility>
 
-#include "common/base/machine_memory.h"
-#include "common/base/parse_number.h"
-#include "common/protocol/limits.h"
-#include "common/sandbox/call_filter.h"
 #include "coordinator/store/files.h"
+#include "core/base/machine_memory.h"
+#include "core/base/parse_number.h"
+#include "formats/read.h"
+#include "util/protocol/limits.h"
+#include "util/sandbox/call_filter.h"
 #include "worker/child/child.h"
 #include "worker/child/serve.h"
 #include "worker/inprocess.h"
@@ -150,6 +151,7 @@ Result<std::unique_ptr<LocalFarm>> LocalFarm::open(Options options) {
   o.blobs = farm->blobs_;
   o.clock = std::make_shared<SystemClock>();
   o.denoise_threads = options.threads;
+  o.scenes = scenes_in_this_process;
   o.tick = std::chrono::milliseconds(100);
   auto opened = coordinator::Coordinator::open(std::move(o));
   if (!opened) return tl::unexpected(opened.error());

@@ -69,8 +69,8 @@ class LocalFarm {
   Result<Digest> adopt(const std::filesystem::path& file);
   tl::expected<JobId, coordinator::Rejected> submit(const LocalScene& scene, const JobSpec& spec);
 
-  // Renders the submitted jobs until stop(). `on_result` is called with the result of every finished unit
-  // (one tile and range of samples), on the agent's thread. Call once.
+  // Renders the submitted jobs until stop(). `on_result` is called with the result of every finished unit, on
+  // the agent's thread. Call once.
   Result<void> start(std::function<void(const UnitResult&)> on_result);
   void stop();
 

@@ -19,10 +19,10 @@
 #include "cli/output/interrupt.h"
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
-#include "common/base/safe_text.h"
-#include "common/image/reference/reference.h"
-#include "common/report/job_page.h"
 #include "coordinator/service/coordinator.h"
+#include "core/base/safe_text.h"
+#include "core/image/reference/reference.h"
+#include "util/report/job_page.h"
 #include "worker/render/render.h"
 
 namespace ls::cli {

@@ -10,14 +10,14 @@
 #include <set>
 #include <utility>
 
-#include "common/base/file_form.h"
-#include "common/job/frame_diagnostics.h"
-#include "common/scene/analysis/prune.h"
-#include "common/scene/file_names.h"
-#include "common/scene/folder_assets.h"
-#include "common/scene/gltf/asset.h"
-#include "common/scene/limits.h"
-#include "common/scene/schema/integrators.h"
+#include "core/base/file_form.h"
+#include "core/job/frame_diagnostics.h"
+#include "core/scene/analysis/prune.h"
+#include "core/scene/limits.h"
+#include "core/scene/schema/integrators.h"
+#include "formats/file_names.h"
+#include "formats/folder_assets.h"
+#include "formats/gltf/asset.h"
 
 namespace ls::cli {
 namespace {
@@ -209,15 +209,6 @@ tl::expected<LocalScene, coordinator::Rejected> read_local_scene(
   auto reader = SceneReader::open(path, defines, strict);
   if (!reader) return tl::unexpected(std::move(reader.error()));
   return reader->read(frame, labels);
-}
-
-tl::expected<LocalTest, coordinator::Rejected> read_local_test(const std::string& path, bool strict) {
-  auto text = read_text(path);
-  if (!text) return tl::unexpected(std::move(text.error()));
-  RecordedFolder folder(fs::path(path).parent_path());
-  NoriTestResult read = read_nori_test(path, *text, folder, {{}, strict, {}});
-  if (!read.test) return unreadable(path, std::move(read.diagnostics));
-  return LocalTest{std::move(*read.test), std::move(read.diagnostics), folder.take_files()};
 }
 
 bool is_needed(const LocalScene& scene, const JobSpec& spec, const LocalFile& file) {

@@ -11,10 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "common/scene/folder_assets.h"
-#include "common/scene/read.h"
-#include "common/scene/reader/nori_test.h"
 #include "coordinator/service/coordinator.h"
+#include "formats/folder_assets.h"
+#include "formats/read.h"
 
 namespace ls::cli {
 
@@ -73,14 +72,6 @@ class SceneReader {
   explicit SceneReader(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
-
-// A Nori test file, with every file that its scenes name.
-struct LocalTest {
-  NoriTest test;
-  std::vector<Diagnostic> warnings;
-  std::map<std::string, LocalFile> files;
-};
-tl::expected<LocalTest, coordinator::Rejected> read_local_test(const std::string& path, bool strict);
 
 // Returns an error that the scene caused, with the message `text`, as a diagnostic of the scene as a whole:
 // its place is the scene's name without a line.

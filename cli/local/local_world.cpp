@@ -1,8 +1,8 @@
 #include "cli/local/local_world.h"
 
-#include "common/scene/json/serialize.h"
-#include "common/scene/schema/integrators.h"
 #include "coordinator/store/blobs/memory_blobs.h"
+#include "core/scene/json/serialize.h"
+#include "core/scene/schema/integrators.h"
 #include "worker/render/render.h"
 
 namespace ls::cli {
@@ -31,7 +31,8 @@ tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalSce
   for (const auto& [name, file] : scene.files)
     if (const auto adopted = blobs.adopt(file.digest, file.path); !adopted)
       return coordinator::rejected(adopted.error());
-  auto admission = coordinator::admit(submit_request(scene, spec), blobs, scene.frame);
+  auto admission =
+      coordinator::admit(submit_request(scene, spec), blobs, scenes_in_this_process(), scene.frame);
   if (!admission) return tl::unexpected(std::move(admission.error()));
   const auto limit = render::limit_threads(threads);
   // The scene in the form that a worker receives.

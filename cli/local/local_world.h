@@ -5,8 +5,8 @@
 #include <memory>
 
 #include "cli/local/local_scene.h"
-#include "common/scene/analysis/needs.h"
 #include "coordinator/admission/admission.h"
+#include "core/scene/analysis/needs.h"
 #include "worker/render/render.h"
 
 namespace ls::cli {

@@ -10,7 +10,7 @@
 #include <new>
 #include <system_error>
 
-#include "common/base/safe_text.h"
+#include "core/base/safe_text.h"
 
 namespace ls::cli {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "common/base/error.h"
-#include "common/scene/diagnostic.h"
 #include "coordinator/service/coordinator.h"
+#include "core/base/error.h"
+#include "core/scene/diagnostic.h"
 
 namespace ls::cli {
 

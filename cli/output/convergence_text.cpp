@@ -4,7 +4,7 @@
 
 #include "cli/output/console.h"
 #include "cli/output/reply_fields.h"
-#include "common/base/safe_text.h"
+#include "core/base/safe_text.h"
 
 namespace ls::cli {
 namespace {

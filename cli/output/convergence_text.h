@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "common/report/phrases.h"
+#include "util/report/phrases.h"
 
 namespace ls::cli {
 

@@ -1,177 +1,144 @@
 #include "cli/output/job_options.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
-#include <cmath>
 #include <optional>
+#include <type_traits>
 
-#include "common/base/parse_number.h"
-#include "common/job/limits.h"
+#include "core/base/parse_number.h"
+#include "core/job/describe.h"
+#include "core/job/spec_draft.h"
 
 namespace ls::cli {
 namespace {
 
-// Parses two whole numbers with the character `between` between them, such as "640x360".
-std::optional<std::pair<int, int>> two_numbers(std::string_view text, char between) {
-  const auto at = text.find(between);
-  if (at == std::string_view::npos) return std::nullopt;
-  const auto first = parse_number<int>(text.substr(0, at)), second = parse_number<int>(text.substr(at + 1));
-  if (!first || !second) return std::nullopt;
-  return std::pair(*first, *second);
+using job::Form;
+using job::Setting;
+
+constexpr std::string_view kDefineOption = "-D,--define", kDefinePlaceholder = "NAME=VALUE";
+
+// Returns the text of a value as option `what`, or the error that says what is wrong with it.
+template <class T>
+Result<T> parse_as(const Setting& setting, std::string_view text, T value = {}) {
+  if (const std::string problem = job::read(setting, Form::option, text, value); !problem.empty())
+    return bad_argument(fmt::format("{} {}", setting.option, problem));
+  return value;
 }
 
-Result<TargetLayer> parse_layer(const std::string& text) {
-  const auto layer = parse_target_layer(text);
-  return layer ? Result<TargetLayer>(*layer)
-               : bad_argument(fmt::format("--target-layer '{}': it must be raw or denoised", text));
+bool has(JobOptions::Command command, const Setting& s) {
+  if (s.option.empty()) return false;
+  return command == JobOptions::Command::submit ||
+         (command == JobOptions::Command::render ? s.render : s.again);
 }
 
-Result<int> parse_priority(const std::string& text) {
-  const auto value = parse_number<int>(text);
-  if (!value || std::abs(std::int64_t{*value}) > kMaxPriority)
-    return bad_argument(fmt::format("--priority '{}': it must be a whole number from -{} to {}", text,
-                                    kMaxPriority, kMaxPriority));
-  return *value;
+// Returns the sentence about the setting as help texts are written: without a capital and a full stop.
+std::string help_of(const Setting& s) {
+  std::string help(s.doc.substr(0, s.doc.size() - 1));
+  help[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(help[0])));
+  return s.choices ? fmt::format("{}: {}", help, s.choices()) : help;
 }
 
 }  // namespace
 
 Result<std::uint64_t> parse_whole(const std::string& what, const std::string& text, std::uint64_t least,
                                   std::uint64_t most) {
-  const auto value = parse_number<std::uint64_t>(text);
-  if (!value || *value < least || *value > most)
-    return bad_argument(
-        fmt::format("{} '{}': it must be a whole number from {} to {}", what, text, least, most));
-  return *value;
+  return parse_as<std::uint64_t>({.range = {static_cast<std::int64_t>(least), most}, .option = what}, text);
 }
 
 Result<std::uint32_t> parse_frame(const std::string& text) {
-  const auto frame = parse_whole("--frame", text, 0, kMaxFrameNumber);
-  if (!frame) return tl::unexpected(frame.error());
-  return static_cast<std::uint32_t>(*frame);
-}
-
-Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& text) {
-  const std::string_view units = "KMGT";
-  const std::size_t unit = text.empty() ? std::string_view::npos : units.find(text.back());
-  const bool scaled = unit != std::string_view::npos;
-  const auto value = parse_number<std::uint64_t>(scaled ? text.substr(0, text.size() - 1) : text);
-  const int shift = scaled ? 10 * (static_cast<int>(unit) + 1) : 0;
-  if (!value || *value == 0 || *value > kMaxMemory >> shift)
-    return bad_argument(fmt::format("{} '{}': write it as bytes, or with K, M, G or T as 8G, at most {}T",
-                                    what, text, kMaxMemory >> 40));
-  return *value << shift;
+  return parse_as<std::uint32_t>({.range = {0, kMaxFrameNumber}, .option = "--frame"}, text);
 }
 
 Result<double> parse_positive(const std::string& what, const std::string& text, double most) {
-  const auto value = parse_number<double>(text);
-  if (!value || !std::isfinite(*value) || !(*value > 0) || *value > most)
-    return bad_argument(
-        fmt::format("{} '{}': it must be a number above 0, at most {:.9g}", what, text, most));
-  return *value;
+  return parse_as<double>({.range = {0, static_cast<std::uint64_t>(most)}, .option = what}, text);
 }
 
 Result<FrameSize> parse_size(const std::string& text) {
-  const auto size = two_numbers(text, 'x');
-  if (!size) return bad_argument(fmt::format("--size '{}': write it as WIDTHxHEIGHT, 640x360 say", text));
-  const auto [width, height] = *size;
-  if (width < 1 || height < 1)
-    return bad_argument(fmt::format("--size '{}': such an image has no pixels", text));
-  if (width > kMaxFrameSide || height > kMaxFrameSide || std::int64_t{width} * height > kMaxFramePixels)
-    return bad_argument(fmt::format("--size '{}': at most {} pixels a side and {} in all", text,
-                                    kMaxFrameSide, kMaxFramePixels));
-  return FrameSize{width, height};
+  return parse_as<FrameSize>({.option = "--size"}, text);
 }
 
 Result<std::pair<int, int>> parse_pixel(const std::string& text) {
-  const auto pixel = two_numbers(text, ',');
-  if (!pixel || pixel->first < 0 || pixel->second < 0)
+  const std::size_t comma = std::min(text.find(','), text.size());
+  const auto x = parse_number<int>(std::string_view(text).substr(0, comma)),
+             y = parse_number<int>(std::string_view(text).substr(std::min(comma + 1, text.size())));
+  if (!x || !y || *x < 0 || *y < 0)
     return bad_argument(fmt::format("--pixel '{}': write it as X,Y, counted from 0 at the top left", text));
-  return *pixel;
+  return std::pair(*x, *y);
 }
 
 Result<std::map<std::string, std::string>> parse_defines(const std::vector<std::string>& defines) {
   std::map<std::string, std::string> values;
   for (const std::string& define : defines) {
-    const auto equals = define.find('=');
-    if (equals == std::string::npos || equals == 0)
-      return bad_argument(fmt::format("-D '{}': write it as name=value", define));
-    if (!values.emplace(define.substr(0, equals), define.substr(equals + 1)).second)
-      return bad_argument(fmt::format("-D '{}': '{}' is given twice", define, define.substr(0, equals)));
+    auto with_this = parse_as(Setting{.option = kDefineOption}, define, std::move(values));
+    if (!with_this) return with_this;
+    values = std::move(*with_this);
   }
-  if (values.size() > kMaxDefines) return bad_argument(fmt::format("-D: at most {} of them", kMaxDefines));
   return values;
 }
 
 void add_defines(CLI::App& app, std::vector<std::string>& defines) {
-  add_option(app, "-D,--define", defines, "name=value", "sets the scene's $name")->allow_extra_args(false);
+  add_option(app, std::string(kDefineOption), defines, std::string(kDefinePlaceholder),
+             "sets the scene's $NAME")
+      ->allow_extra_args(false);
 }
 
-void JobOptions::add_to(CLI::App& app) {
-  add_option(app, "--spp", spp, "N", "samples per pixel; default: the scene's");
-  add_option(app, "--target-error", target_error, "E", "stop when the image's relMSE is below this");
-  add_option(app, "--target-layer", target_layer, "LAYER",
-             "whose relMSE --target-error means: raw, the image as rendered (default), or denoised, its "
-             "denoised layers, which --denoise adds");
-  add_option(app, "--time", time, "SECONDS", "stop after this many seconds, counted from the first ray");
-  add_option(app, "--seed", seed, "N", "default 0");
-  add_option(app, "--frames", frames, "A-B",
-             "a sequence, 1-10 or 1-10x2 say: a run of # in the names of files is the frame's number, and "
-             "$frame is it, too");
-  add_option(app, "--size", size, "WxH", "size of the image instead of the scene's");
-  add_option(app, "--integrator", integrator, "NAME",
-             "volpath, volpath_distant_mis, path or whitted instead of the scene's");
-  add_option(app, "--aov", aov, "NAME,...",
-             "further layers of the image: " + known_aovs() + " (docs/reference/aovs.md)")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  add_defines(app, defines);
-  app.add_flag("--float", float_output, "32-bit pixels in the image instead of half");
-  app.add_flag("--denoise", denoise,
-               "also the layers denoised.R, G, B, with their own error (needs Open Image Denoise: "
-               "deploy/install-denoiser.sh)");
-  app.add_flag("--strict", strict, "warnings of the scene are errors");
+void add_techniques(CLI::App& app, std::string& techniques) {
+  add_option(app, "--techniques", techniques, "-NAME,+NAME", "as given to the job");
+}
+
+Result<void> use_techniques(const std::string& techniques, Scene& scene) {
+  std::optional<TechniqueChoice> choice;
+  const auto parse = [](const std::string& text) -> Result<TechniqueChoice> {
+    if (const auto parsed = parse_technique_choice(text)) return *parsed;
+    return bad_argument("--techniques " +
+                        job::must_be(job::allowed<TechniqueChoice>({}, job::Form::option), text));
+  };
+  if (auto ok = take(techniques, choice, parse); !ok) return ok;
+  if (choice) scene.integrator = with_choice(scene.integrator, *choice);
+  return {};
+}
+
+void JobOptions::add_to(CLI::App& app, Command command) {
+  const JobSpec any;
+  job::for_each_setting(any, [&]<class T>(const Setting& s, const T&) {
+    if (!has(command, s)) return;
+    Given& given = given_[s.name];
+    const std::string option(s.option), placeholder(s.placeholder), help = help_of(s);
+    if constexpr (std::is_same_v<T, bool>)
+      app.add_flag(option, given.flag, help);
+    else if constexpr (std::is_same_v<T, job::Names>)
+      add_option(app, option, given.list, placeholder, help)->delimiter(',')->allow_extra_args(false);
+    else if constexpr (std::is_same_v<T, job::Defines>)
+      add_option(app, option, given.list, placeholder, help)->allow_extra_args(false);
+    else
+      add_option(app, option, given.text, placeholder, help);
+  });
+  if (command != Command::again) app.add_flag("--strict", strict, "warnings of the scene are errors");
+}
+
+std::set<std::string_view> JobOptions::given() const {
+  std::set<std::string_view> names;
+  for (const auto& [name, given] : given_)
+    if (given.flag || !given.text.empty() || !given.list.empty()) names.insert(name);
+  return names;
 }
 
 Result<JobSpec> JobOptions::parse() const {
-  JobSpec spec;
-  std::optional<int> priority_value;
-  std::optional<std::uint64_t> workers, units;
-  std::optional<TargetLayer> layer;
-  for (const auto& taken :
-       {take(spp, spec.spp, whole("--spp", 1, kMaxSpp)),
-        take(target_error, spec.target_error, positive("--target-error", kMaxTargetError)),
-        take(target_layer, layer, parse_layer), take(time, spec.time, positive("--time", kMaxSeconds)),
-        take(seed, spec.seed, whole("--seed", 0, ~std::uint64_t{0})), take(size, spec.size, parse_size),
-        take(priority, priority_value, parse_priority),
-        take(max_workers, workers, whole("--max-workers", 1, kMaxAtOnce)),
-        take(max_units, units, whole("--max-units", 1, kMaxAtOnce)),
-        take(memory, spec.memory, [](const std::string& text) { return parse_bytes("--memory", text); })})
-    if (!taken) return tl::unexpected(taken.error());
-  if (!integrator.empty()) spec.integrator = integrator;
-  if (!numeric_class.empty()) spec.numeric_class = numeric_class;
-  auto values = parse_defines(defines);
-  if (!values) return tl::unexpected(values.error());
-  spec.defines = std::move(*values);
-  if (!frames.empty()) {
-    const auto range = parse_frames(frames);
-    if (!range) return bad_argument("--" + range.error().message);
-    spec.frames = *range;
-    if (spec.defines.contains("frame"))
-      return bad_argument("-D frame: with --frames the scene's $frame is the number of the frame");
+  job::SpecDraft draft(Form::option);
+  for (const std::string_view name : given()) {
+    const Given& given = given_.at(name);
+    // Only definitions are added one by one: their values may contain commas.
+    std::vector<std::string> texts = given.list;
+    if (name != "defines") texts = {fmt::format("{}", fmt::join(given.list, ","))};
+    if (given.flag) texts = {"true"};
+    if (!given.text.empty()) texts = {given.text};
+    for (const std::string& text : texts)
+      if (const auto known = draft.add(name, text); !known) return tl::unexpected(known.error());
   }
-  if (const auto known = parse_aovs(aov); !known) return bad_argument("--aov: " + known.error().message);
-  spec.aov = aov;
-  spec.priority = priority_value.value_or(0);
-  spec.float_output = float_output;
-  spec.target_layer = layer.value_or(TargetLayer::raw);
-  if (layer && !spec.target_error)
-    return bad_argument("--target-layer says which error --target-error means: give that, too");
-  spec.denoise = denoise || spec.target_layer == TargetLayer::denoised;
-  spec.tags = tags;
-  spec.after = after;
-  if (workers) spec.max_workers = static_cast<std::uint32_t>(*workers);
-  if (units) spec.max_units = static_cast<std::uint32_t>(*units);
+  auto spec = draft.finish();
+  if (spec)
+    if (auto ok = job::check_spec(*spec, Form::option); !ok) return tl::unexpected(ok.error());
   return spec;
 }
 

@@ -1,15 +1,16 @@
-// Adds and parses options of commands. JobOptions has the options that `render` and `submit` share: they
-// describe the requested job.
+// Adds and parses options of commands. JobOptions has the options that describe the requested job.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "common/base/error.h"
-#include "common/job/settings.h"
+#include "core/base/error.h"
+#include "core/job/settings.h"
 
 namespace ls::cli {
 
@@ -20,36 +21,48 @@ CLI::Option* add_option(CLI::App& app, const std::string& name, T& value, const 
   return app.add_option(name, value, help)->type_name(type);
 }
 
-// Values of the options. Numbers are kept as text here; parse() converts them, and its error messages name
-// the option.
-struct JobOptions {
-  std::string spp, target_error, target_layer, time, seed, size, integrator, priority, frames;
-  std::string max_workers, max_units, memory, numeric_class;
-  std::vector<std::string> aov, defines, tags, after;
-  bool float_output = false;
-  bool denoise = false;
-  bool strict = false;
+// The options of a job's settings. Their names, help, ranges and the commands that have them are in
+// core/job/describe.h.
+class JobOptions {
+ public:
+  enum class Command { render, submit, again };
 
-  void add_to(CLI::App& app);
+  void add_to(CLI::App& app, Command command);
   // invalid_argument: the message has the option, the given text and the allowed values.
   Result<JobSpec> parse() const;
+  // Returns the names of the settings that the user gave.
+  std::set<std::string_view> given() const;
+
+  bool strict = false;
+
+ private:
+  // The value of an option as it was given. Numbers are kept as text, so that messages about them name the
+  // option.
+  struct Given {
+    std::string text;
+    std::vector<std::string> list;  // of an option that may be given several times
+    bool flag = false;
+  };
+  std::map<std::string_view, Given> given_;  // by the name of the setting
 };
 
-void add_defines(CLI::App& app, std::vector<std::string>& defines);  // adds -D name=value
+void add_defines(CLI::App& app, std::vector<std::string>& defines);  // adds -D NAME=VALUE
 
-// Parses a whole number, as in "--spp 64". `what` is the option's name, for the message.
+// Adds --techniques, which `use_techniques()` takes.
+void add_techniques(CLI::App& app, std::string& techniques);
+// Lets the scene use the techniques that the option names; empty text: those of the scene.
+Result<void> use_techniques(const std::string& techniques, Scene& scene);
+
+// Parses a whole number, as in "--threads 4". `what` is the option's name, for the message.
 Result<std::uint64_t> parse_whole(const std::string& what, const std::string& text, std::uint64_t least,
                                   std::uint64_t most);
 // Parses the value of --frame, the number of a frame.
 Result<std::uint32_t> parse_frame(const std::string& text);
-// Parses a number of bytes, such as "8G"; the units are powers of 1024.
-Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& text);
 Result<double> parse_positive(const std::string& what, const std::string& text, double most);
 Result<FrameSize> parse_size(const std::string& text);             // parses, for example, "640x360"
 Result<std::pair<int, int>> parse_pixel(const std::string& text);  // parses, for example, "12,34"
 Result<std::map<std::string, std::string>> parse_defines(
-    const std::vector<std::string>& defines);  // each is "name=value"
-
+    const std::vector<std::string>& defines);  // each is "NAME=VALUE"
 // Parses the value of an option into `field` if the option was given, that is, if `text` is not empty.
 template <class T, class Parse>
 Result<void> take(const std::string& text, T& field, const Parse& parse) {

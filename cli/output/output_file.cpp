@@ -60,8 +60,8 @@ Result<void> check_numbered(const std::string& option, const std::string& name, 
   const fs::path path(name);
   const fs::path better = path.parent_path() / (path.stem().string() + "_####" + path.extension().string());
   return bad_argument(
-      fmt::format("{} {}: {} frames need as many names: {} say, where #### is the frame's number", option,
-                  name, frames.count(), better.string()));
+      fmt::format("{} {}: {} frames need as many names, for example {}, where #### is the frame's number",
+                  option, name, frames.count(), better.string()));
 }
 
 Result<void> check_outputs(const std::string& option, const std::string& name,

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/error.h"
-#include "common/base/frame_range.h"
-#include "common/protocol/messages.h"
+#include "core/base/error.h"
+#include "core/base/frame_range.h"
+#include "util/protocol/messages.h"
 
 namespace ls::cli {
 
@@ -41,7 +41,7 @@ Result<void> save_result(const std::filesystem::path& file, std::span<const std:
 Result<void> save_result(const std::filesystem::path& file, const std::string& text);
 
 // Stores the partial (the pixel sums) of every unit of a render as an EXR file in a folder, for `lightshaft
-// merge`. A unit is one tile and one round (range of samples).
+// merge`.
 class PartialDir {
  public:
   // Creates the folder if it is missing. Files of earlier renders stay, except those of the same tile and

@@ -14,7 +14,7 @@
 
 #include "cli/output/console.h"
 #include "cli/output/convergence_text.h"
-#include "common/base/safe_text.h"
+#include "core/base/safe_text.h"
 
 namespace ls::cli {
 namespace {

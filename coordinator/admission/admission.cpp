@@ -4,29 +4,27 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <ranges>
 #include <set>
 
-#include "common/base/file_form.h"
-#include "common/base/text/name_forms.h"
-#include "common/job/health_notes.h"
-#include "common/job/limits.h"
-#include "common/protocol/limits.h"
-#include "common/scene/analysis/needs.h"
-#include "common/scene/analysis/prune.h"
-#include "common/scene/json/serialize.h"
-#include "common/scene/limits.h"
-#include "common/scene/read.h"
-#include "common/scene/schema/integrators.h"
-#include "common/scene/schema/nori_words.h"
 #include "coordinator/admission/cryptomatte_manifests.h"
 #include "coordinator/admission/decoded_reference.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/store/jobs/job_store.h"
+#include "core/base/file_form.h"
+#include "core/base/text/name_forms.h"
+#include "core/job/health_notes.h"
+#include "core/job/spec_draft.h"
+#include "core/scene/analysis/needs.h"
+#include "core/scene/analysis/prune.h"
+#include "core/scene/json/serialize.h"
+#include "core/scene/limits.h"
+#include "core/scene/schema/integrators.h"
+#include "core/scene/schema/nori_integrators.h"
+#include "util/protocol/limits.h"
 
 namespace ls::coordinator {
 namespace {
@@ -97,32 +95,6 @@ Result<void> choose_integrator(const Scene& scene, const JobSpec& spec, RenderSe
   return {};
 }
 
-Result<void> check_size(FrameSize size) {
-  if (size.width <= 0 || size.height <= 0)
-    return invalid(fmt::format("an image of {} x {} has no pixels", size.width, size.height));
-  if (size.width > limits::kMaxFrameSide || size.height > limits::kMaxFrameSide ||
-      std::int64_t{size.width} * size.height > limits::kMaxFramePixels)
-    return invalid(fmt::format("an image of {} x {} is larger than {} a side or {} pixels", size.width,
-                               size.height, limits::kMaxFrameSide, limits::kMaxFramePixels));
-  return {};
-}
-
-Result<void> check_spec(const JobSpec& spec) {
-  if (spec.target_error && !(std::isfinite(*spec.target_error) && *spec.target_error > 0))
-    return invalid("target_error must be positive");
-  if (spec.target_layer == TargetLayer::denoised && !spec.target_error)
-    return invalid(
-        "target_layer says which error target_error means, and there is no target_error: give one");
-  if (spec.time && !(std::isfinite(*spec.time) && *spec.time > 0 && *spec.time <= kMaxSeconds))
-    return invalid(fmt::format("time must be between 0 and {} seconds", kMaxSeconds));
-  if (spec.spp && (*spec.spp == 0 || *spec.spp > limits::kMaxSpp))
-    return invalid(fmt::format("{} samples per pixel: it must be 1 to {}", *spec.spp, limits::kMaxSpp));
-  if (std::abs(spec.priority) > kMaxPriority)
-    return invalid(fmt::format("priority must be within +-{}", kMaxPriority));
-  if (const auto aovs = parse_aovs(spec.aov); !aovs) return tl::unexpected(aovs.error());
-  return {};
-}
-
 // Sets the AOVs: those that the job requests and those that the scene requests.
 Result<void> choose_aovs(const Scene& scene, const JobSpec& spec, RenderSettings& settings) {
   std::vector<std::string> names = spec.aov;
@@ -142,7 +114,9 @@ Result<RenderSettings> settings_of(const Scene& scene, const JobSpec& spec, std:
                                    std::vector<std::string>& warnings) {
   RenderSettings settings;
   settings.size = spec.size.value_or(scene.film.image_size());
-  if (auto ok = check_size(settings.size); !ok) return tl::unexpected(ok.error());
+  if (!job::fits({}, settings.size))
+    return invalid("the image's size " +
+                   job::must_be(job::allowed<FrameSize>({}, job::Form::query), job::text_of(settings.size)));
   settings.seed = spec.seed.value_or(0) + frame;
   if (auto ok = choose_integrator(scene, spec, settings, warnings); !ok) return tl::unexpected(ok.error());
   if (auto ok = choose_aovs(scene, spec, settings); !ok) return tl::unexpected(ok.error());
@@ -236,20 +210,23 @@ struct UploadedScene {
 // scene. Otherwise it is listed in not_uploaded, and the caller decides whether it is needed. A scene file
 // that the scene includes must be in the store in any case.
 tl::expected<UploadedScene, Rejected> read_uploaded(const SubmitRequest& request, const BlobStore& blobs,
+                                                    const SceneReader& read_scene,
                                                     std::optional<std::uint32_t> frame, bool strict) {
   UploadedAssets assets(request.assets, blobs, strict);
-  ReadResult read =
+  auto read =
       read_scene(request.scene_name, request.scene_text, assets, {request.spec.defines, false, frame, true});
-  if (!read.scene)
+  if (!read) return rejected(read.error());
+  if (!read->scene)
     return rejected({Errc::invalid_argument, fmt::format("the scene {} cannot be read", request.scene_name)},
-                    std::move(read.diagnostics));
-  return UploadedScene{std::move(*read.scene), std::move(read.diagnostics), assets.text_bytes,
+                    std::move(read->diagnostics));
+  return UploadedScene{std::move(*read->scene), std::move(read->diagnostics), assets.text_bytes,
                        std::move(assets.not_uploaded)};
 }
 
 // Returns the part of the scene that the job's integrator uses, or an error if a file of this part is not in
 // the store.
 tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, const BlobStore& blobs,
+                                                  const SceneReader& read_scene,
                                                   std::optional<std::uint32_t> frame,
                                                   const UploadedScene& read, const RenderSettings& settings) {
   const scene::PrunedFor whom = scene::pruned_for(settings.integrator, settings.max_depth);
@@ -258,7 +235,7 @@ tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, 
   if (std::ranges::none_of(pruned.scene.assets, missing)) return pruned;
   // Read again with `strict`, the scene gives an error at each place that names a missing file. If there is
   // no error now, the missing files have arrived meanwhile.
-  const auto again = read_uploaded(request, blobs, frame, true);
+  const auto again = read_uploaded(request, blobs, read_scene, frame, true);
   if (!again) return tl::unexpected(again.error());
   return scene::pruned(again->scene, whom);
 }
@@ -272,15 +249,15 @@ Result<void> check_job(const StoredJob& job) {
 }  // namespace
 
 tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const BlobStore& blobs,
-                                        std::optional<std::uint32_t> frame) {
+                                        const SceneReader& read_scene, std::optional<std::uint32_t> frame) {
   if (request.scene_text.size() > scene::kMaxTextBytes)
     return rejected({Errc::invalid_argument, fmt::format("the scene text has {} bytes; {} are allowed",
                                                          request.scene_text.size(), scene::kMaxTextBytes)});
   if (request.assets.size() > limits::kMaxAssets)
     return rejected({Errc::invalid_argument, fmt::format("{} assets were named; {} are allowed",
                                                          request.assets.size(), limits::kMaxAssets)});
-  if (auto ok = check_spec(request.spec); !ok) return rejected(ok.error());
-  auto read = read_uploaded(request, blobs, frame, false);
+  if (auto ok = job::check_spec(request.spec); !ok) return rejected(ok.error());
+  auto read = read_uploaded(request, blobs, read_scene, frame, false);
   if (!read) return tl::unexpected(std::move(read.error()));
 
   Admission admission;
@@ -292,6 +269,8 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
   auto settings = settings_of(read->scene, request.spec, frame.value_or(0), job.warnings);
   if (!settings) return rejected(settings.error());
   job.settings = std::move(*settings);
+  if (request.spec.techniques)
+    read->scene.integrator = with_choice(read->scene.integrator, *request.spec.techniques);
   ReferenceOrigin origin;
   if (request.spec.reference) {
     auto right = load_reference(request.spec, job.settings.size, blobs);
@@ -308,7 +287,7 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
   if (job.spp && *job.spp > limits::kMaxSpp)
     return rejected({Errc::invalid_argument,
                      fmt::format("{} samples per pixel: at most {} are allowed", *job.spp, limits::kMaxSpp)});
-  const auto pruned = needed_part(request, blobs, frame, *read, job.settings);
+  const auto pruned = needed_part(request, blobs, read_scene, frame, *read, job.settings);
   if (!pruned) return tl::unexpected(pruned.error());
   const Scene& scene = pruned->scene;
   for (const Asset& a : scene.assets)
@@ -317,7 +296,7 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
   if (job.assets.size() > ls::limits::kAssetsPerJob)
     return rejected(
         {Errc::invalid_argument,
-         fmt::format("the scene uses {} files; workers can be told of {}: merge some of its meshes",
+         fmt::format("the scene uses {} files; a message to a worker holds {}: merge some of its meshes",
                      job.assets.size(), ls::limits::kAssetsPerJob)});
   note_analysis(*pruned, job.settings, job);
   admission.text_bytes = request.scene_text.size() + read->text_bytes;
@@ -347,6 +326,7 @@ Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, c
     if (!changes.target_error) job.spec.target_layer = TargetLayer::raw;
     job.spec.time = changes.time;
   }
+  if (changes.memory) job.spec.memory = changes.memory;
   job.spec.priority = changes.priority;
   job.spec.after = changes.after;
   if (changes.seed) job.settings.seed = *(job.spec.seed = changes.seed);

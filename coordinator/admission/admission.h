@@ -5,11 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "common/image/reference/reference.h"
 #include "coordinator/domain/farm/farm.h"
 #include "coordinator/store/blobs/blob_store.h"
 #include "coordinator/store/jobs/job_store.h"
 #include "coordinator/views/views.h"
+#include "core/image/reference/reference.h"
+#include "core/scene/reading.h"
 
 namespace ls::coordinator {
 
@@ -21,21 +22,23 @@ struct Admission {
 
 // Reads the submitted scene and makes a job of it. The scene can use only the request's assets as files, so
 // it can never read a path on this machine. Only assets that the scene uses become part of the job; each must
-// be in `blobs`. Stores nothing. `frame` is the number of a frame of a sequence (a job with frames). The
-// scene is then read for this frame, and the frame's seed is the job's seed plus this number. So frames have
-// independent noise, and a frame that is rendered alone has the same pixels as in the sequence.
+// be in `blobs`. Stores nothing. `read` reads the scene. `frame` is the number of a frame of a sequence (a
+// job with frames). The scene is then read for this frame, and the frame's seed is the job's seed plus this
+// number. So frames have independent noise, and a frame that is rendered alone has the same pixels as in the
+// sequence.
 tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const BlobStore& blobs,
-                                        std::optional<std::uint32_t> frame = {});
+                                        const SceneReader& read, std::optional<std::uint32_t> frame = {});
 
 // Admits all frames of spec.frames, or returns their errors. The limits kMaxSequence... in
 // coordinator/base/limits.h apply to all frames together.
 tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitRequest& request,
-                                                              const BlobStore& blobs);
+                                                              const BlobStore& blobs,
+                                                              const SceneReader& read);
 
 // Returns a new job with the scene, settings and files of the job `before`, but without id, owner and time of
 // submission. If `changes` has any of spp, target_error and time, all three are taken from `changes`. Its
-// seed (if set) and priority also apply; its other members are ignored. failed_precondition: a file of the
-// scene is no longer in `blobs`.
+// seed and memory (if set) and priority also apply; its other members are ignored. failed_precondition: a
+// file of the scene is no longer in `blobs`.
 Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, const BlobStore& blobs);
 
 // Reads the reference image of a job whose image has this size. failed_precondition: its blob is missing.
@@ -43,7 +46,7 @@ Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, c
 Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const BlobStore& blobs);
 
 // Returns the command that renders a sample of the job again, still without the pixel and the number of the
-// sample (replay_command() in common/job/health_notes.h adds them).
+// sample (replay_command() in core/job/health_notes.h adds them).
 std::string replay_of(const StoredJob& job);
 
 // Returns the least memory, in bytes, that a worker needs for the job.

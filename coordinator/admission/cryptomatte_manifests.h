@@ -2,10 +2,10 @@
 // manifest maps the identifiers to the names of the objects.
 #pragma once
 
-#include "common/image/aov/identifiers.h"
-#include "common/image/exr/final_image.h"
-#include "common/job/settings.h"
-#include "common/scene/scene.h"
+#include "core/image/aov/identifiers.h"
+#include "core/image/exr/final_image.h"
+#include "core/job/settings.h"
+#include "core/scene/scene.h"
 
 namespace ls::coordinator {
 

@@ -13,8 +13,8 @@
 #include <cstring>
 #include <memory>
 
-#include "common/base/safe_text.h"
-#include "common/image/reference/exchange.h"
+#include "core/base/safe_text.h"
+#include "core/image/reference/exchange.h"
 
 namespace ls::coordinator {
 namespace {

@@ -6,13 +6,13 @@
 #include <filesystem>
 #include <span>
 
-#include "common/base/error.h"
-#include "common/base/spawn.h"
-#include "common/image/reference/reference.h"
+#include "core/base/error.h"
+#include "core/base/spawn.h"
+#include "core/image/reference/reference.h"
 
 namespace ls::coordinator {
 
-// As read_reference() (common/image/reference/reference.h), but the file is decoded by the program
+// As read_reference() (core/image/reference/reference.h), but the file is decoded by the program
 // lightshaft-exr, which is shut in by the sandbox of render children, ends after a minute, and may take
 // 256 MB and 48 bytes for each pixel of limits.max_pixels. invalid_argument also: it needed more, or crashed.
 // failed_precondition: the program is not installed beside this one.

@@ -4,9 +4,9 @@
 
 #include <set>
 
-#include "common/job/frame_diagnostics.h"
 #include "coordinator/admission/admission.h"
 #include "coordinator/base/limits.h"
+#include "core/job/frame_diagnostics.h"
 
 namespace ls::coordinator {
 namespace {
@@ -33,14 +33,14 @@ void note_if_all_are_one(std::vector<Admission>& frames) {
 // Returns the bytes of scene text that all frames are expected to have together, from kProbes of them that
 // are spread evenly: reading thousands of frames takes long, only to refuse them. 0 if one cannot be read, or
 // if there are few.
-std::uint64_t expected_size(const SubmitRequest& request, const BlobStore& blobs,
+std::uint64_t expected_size(const SubmitRequest& request, const BlobStore& blobs, const SceneReader& read,
                             const std::vector<std::uint32_t>& numbers) {
   constexpr std::size_t kProbes = 8;
   constexpr double kTolerance = 1.25;  // other frames may be smaller than those that were looked at
   if (numbers.size() < 4 * kProbes) return 0;
   std::uint64_t sum = 0;
   for (std::size_t i = 0; i < kProbes; ++i) {
-    const auto frame = admit(request, blobs, numbers[i * (numbers.size() - 1) / (kProbes - 1)]);
+    const auto frame = admit(request, blobs, read, numbers[i * (numbers.size() - 1) / (kProbes - 1)]);
     if (!frame) return 0;
     sum += std::max(frame->text_bytes, frame->scene_json.size());
   }
@@ -51,7 +51,8 @@ std::uint64_t expected_size(const SubmitRequest& request, const BlobStore& blobs
 }  // namespace
 
 tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitRequest& request,
-                                                              const BlobStore& blobs) {
+                                                              const BlobStore& blobs,
+                                                              const SceneReader& read) {
   const auto numbers = request.spec.frames.value().frames();
   const auto too_much = [&](std::string_view what, std::uint64_t most) {
     return rejected({Errc::invalid_argument,
@@ -60,14 +61,14 @@ tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitReques
   };
   if (request.scene_text.size() > limits::kMaxSequenceText / numbers.size())
     return too_much("bytes of scene text", limits::kMaxSequenceText);
-  if (const auto size = expected_size(request, blobs, numbers); size > limits::kMaxSequenceText)
+  if (const auto size = expected_size(request, blobs, read, numbers); size > limits::kMaxSequenceText)
     return too_much("bytes of scene text", limits::kMaxSequenceText);
   std::uint64_t text = 0, kept = 0, files = 0, tiles = 0;  // totals of all frames
   std::vector<Admission> frames;
   FrameDiagnostics found;
   std::uint32_t bad = 0;
   for (const std::uint32_t frame : numbers) {
-    auto taken = admit(request, blobs, frame);
+    auto taken = admit(request, blobs, read, frame);
     if (!taken && taken.error().diagnostics.empty()) {
       if (frame != numbers.front())
         taken.error().error.message = fmt::format("frame {}: {}", frame, taken.error().error.message);

@@ -1,8 +1,7 @@
 // The image of one unfinished job: the film (the sums of all folded samples), the accepted partials that wait
 // for an earlier round of their tile, the errors of the tiles, and the CPU costs of the units. A partial is
-// the encoded pixel sums of one unit, that is, of one round (range of samples) of one tile; to fold it is to
-// add it to the film. Not thread-safe; guarded by the service's lock. The film is cheap to copy for work
-// outside the lock.
+// the encoded pixel sums of one unit; to fold it is to add it to the film. Not thread-safe; guarded by the
+// service's lock. The film is cheap to copy for work outside the lock.
 #pragma once
 
 #include <atomic>
@@ -15,18 +14,18 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/clock.h"
-#include "common/image/film/film.h"
-#include "common/image/film/health.h"
-#include "common/image/frame/frame.h"
-#include "common/image/frame/rounds.h"
 #include "coordinator/assemble/round_errors.h"
 #include "coordinator/store/log/partial_log.h"
+#include "core/base/clock.h"
+#include "core/image/film/film.h"
+#include "core/image/film/health.h"
+#include "core/image/frame/frame.h"
+#include "core/image/frame/rounds.h"
 
 namespace ls::coordinator {
 
-// Numeric health (counts of invalid samples) of the units in a job's film (its image); a unit is one round
-// (range of samples) of one tile. Each unit in the film counts once, even if it was rendered twice.
+// Numeric health (counts of invalid samples) of the units in a job's film (its image). Each unit in the film
+// counts once, even if it was rendered twice.
 class HealthTable {
  public:
   // Adds the health of a unit that was added to the film. The last round of a job may be truncated, with
@@ -48,9 +47,8 @@ class HealthTable {
   std::map<TileIndex, Health> full_, tails_;
 };
 
-// The CPU cost of an image's units; a unit is one round (range of samples) of one tile. The cost of a
-// checkpoint (the image with a given number of rounds for each tile) is the sum over its units, even if some
-// tiles already have later rounds.
+// The CPU cost of an image's units. The cost of a checkpoint (the image with a given number of rounds for
+// each tile) is the sum over its units, even if some tiles already have later rounds.
 class UnitCosts {
  public:
   explicit UnitCosts(TileIndex tiles = 0) : tiles_(tiles) {}

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "common/image/exr/final_image.h"
-#include "common/job/advice.h"
+#include "core/image/exr/final_image.h"
+#include "core/job/advice.h"
 
 namespace ls::coordinator {
 namespace {

@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "common/base/digest.h"
-#include "common/denoise/denoised_image.h"
-#include "common/image/error/convergence.h"
-#include "common/image/error/error_estimate.h"
-#include "common/image/film/film.h"
-#include "common/image/reference/reference.h"
 #include "coordinator/store/jobs/job_store.h"
+#include "core/base/digest.h"
+#include "core/image/error/convergence.h"
+#include "core/image/error/error_estimate.h"
+#include "core/image/film/film.h"
+#include "core/image/reference/reference.h"
+#include "util/denoise/denoised_image.h"
 
 namespace ls::coordinator {
 

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/error.h"
-#include "common/image/error/error_estimate.h"
-#include "common/image/film/film.h"
+#include "core/base/error.h"
+#include "core/image/error/error_estimate.h"
+#include "core/image/film/film.h"
 
 namespace ls::coordinator {
 

@@ -15,9 +15,9 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/digest.h"
 #include "coordinator/assemble/assembly.h"
 #include "coordinator/store/files.h"
+#include "core/base/digest.h"
 
 namespace ls::coordinator {
 

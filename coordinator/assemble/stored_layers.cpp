@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/image/frame/frame.h"
+#include "core/image/frame/frame.h"
 
 namespace ls::coordinator {
 

@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/image/exr/pixel_layers.h"
 #include "coordinator/assemble/snapshot.h"
+#include "core/image/exr/pixel_layers.h"
 
 namespace ls::coordinator {
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "common/protocol/limits.h"
+#include "util/protocol/limits.h"
 
 namespace ls::coordinator {
 namespace {

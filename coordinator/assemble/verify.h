@@ -1,12 +1,11 @@
-// Verifies a worker's result: a partial, which is the encoded pixel sums of one unit, that is, of one round
-// (range of samples) of one tile. verify_result() keeps no state and needs no lock, so any thread may call
-// it.
+// Verifies a worker's result: a partial, which is the encoded pixel sums of one unit. verify_result() keeps
+// no state and needs no lock, so any thread may call it.
 #pragma once
 
 #include <variant>
 
-#include "common/image/film/partial.h"
-#include "common/protocol/messages.h"
+#include "core/image/film/partial.h"
+#include "util/protocol/messages.h"
 
 namespace ls::coordinator {
 
@@ -17,8 +16,7 @@ struct OtherRange {
 };
 // The result is wrong: it is too large, its EXR file cannot be decoded, its header (tile, samples, scene,
 // settings, numeric class), EXR windows or digest differ from the expected ones, its values are not finite,
-// or its CPU time or health is impossible. The error names the fault. A numeric class is a set of machines
-// that compute the same bits.
+// or its CPU time or health is impossible. The error names the fault.
 struct BadResult {
   Error error;
 };

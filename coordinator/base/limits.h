@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "common/base/clock.h"
-#include "common/image/frame/render_limits.h"
+#include "core/base/clock.h"
+#include "core/image/frame/render_limits.h"
 
 namespace ls::coordinator::limits {
 
@@ -32,8 +32,9 @@ inline constexpr std::size_t kMaxJobs = 100'000;       // jobs kept; every frame
 inline constexpr std::size_t kMaxJobsOfUser = 25'000;  // of these jobs, one user may own this many
 // Of a sequence so many frames count in the memory for images (Coordinator::Options::film_bytes)
 inline constexpr std::size_t kFilmsOfSequence = 4;
-// Memory that reading one byte of a scene's text takes at most: 110 bytes were measured for spheres
-inline constexpr std::uint64_t kMemoryPerTextByte = 128;
+// Memory that reading one byte of a scene's text takes at most: for spheres, 207 bytes here and 82 in the
+// process that reads the text were measured
+inline constexpr std::uint64_t kMemoryPerTextByte = 320;
 inline constexpr std::uint64_t kMemoryOfReference = std::uint64_t{1}
                                                     << 30;  // while one is decoded and checked
 // Memory that reading the scenes of all submissions may take at the same time; half of it for one user
@@ -44,7 +45,7 @@ using ls::kMaxFramePixels;
 using ls::kMaxFrameSide;
 using ls::kMaxSpp;
 
-// Sequences (the limit on the number of frames is in common/base/frame_range.h)
+// Sequences (the limit on the number of frames is in core/base/frame_range.h)
 
 // Bytes of scene text read for all frames together
 inline constexpr std::size_t kMaxSequenceText = std::size_t{512} << 20;
@@ -71,9 +72,9 @@ inline constexpr Duration kMaxVideoTime = std::chrono::hours(1);  // time for ma
 // the last ones
 inline constexpr Duration kVideoStallLimit = std::chrono::minutes(2);
 
-// Results. A partial is the encoded result of one unit (one round of one tile). The limits in bytes apply to
-// all jobs together. They are chosen so that the coordinator needs less than 600 MB of memory for a job with
-// a UHD film (8.3 million pixels at 48 bytes each) and some tens of workers.
+// Results. A partial is the encoded result of one unit. The limits in bytes apply to all jobs together. They
+// are chosen so that the coordinator needs less than 600 MB of memory for a job with a UHD film (8.3 million
+// pixels at 48 bytes each) and some tens of workers.
 
 // Bytes of one partials-NNN.seg file, a segment of a job's log of partials
 inline constexpr std::uint64_t kMaxSegmentBytes = std::uint64_t{64} << 20;

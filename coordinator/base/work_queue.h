@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/clock.h"
+#include "core/base/clock.h"
 
 namespace ls::coordinator {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "common/base/check.h"
 #include "coordinator/domain/limits.h"
+#include "core/base/check.h"
 
 namespace ls::coordinator {
 namespace {

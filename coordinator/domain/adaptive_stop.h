@@ -1,6 +1,6 @@
 // Adaptive sampling (AdaptiveStop) decides when the tiles of a job with a target error stop getting samples.
 // It reads only the tiles' own error estimates. A round is a fixed range of sample indices
-// (common/image/frame/rounds.h); folding adds the pixel sums of a tile's round to the image. Tiles stop in
+// (core/image/frame/rounds.h); folding adds the pixel sums of a tile's round to the image. Tiles stop in
 // groups (stop_groups()).
 //
 // The image's relMSE is the mean over its pixels. Take a group of p pixels whose relative variance per
@@ -37,9 +37,9 @@
 #include <span>
 #include <vector>
 
-#include "common/image/frame/frame.h"
-#include "common/image/frame/rounds.h"
 #include "coordinator/domain/job_state.h"
+#include "core/image/frame/frame.h"
+#include "core/image/frame/rounds.h"
 
 namespace ls::coordinator {
 
@@ -153,7 +153,7 @@ class AdaptiveStop {
 };
 
 // Decides when a job ends if its target error applies to its denoised layers
-// (common/denoise/denoised_image.h). The stop rule (AdaptiveStop) still decides which tiles get samples,
+// (util/denoise/denoised_image.h). The stop rule (AdaptiveStop) still decides which tiles get samples,
 // from the errors of the image itself: its levels do not depend on the denoiser. This class only decides at
 // which level the job ends.
 //

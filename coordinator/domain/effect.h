@@ -1,7 +1,6 @@
-// Effects: the actions that the farm requests. The service carries them out in the order given. A unit is one
-// round (range of samples) of one tile, and a partial is the encoded pixel sums of one unit. To fold a
-// partial is to add it to the job's image, its film. A lease is a list of units that is assigned to one
-// worker. A numeric class is a set of machines that compute the same bits.
+// Effects: the actions that the farm requests. The service carries them out in the order given. A partial is
+// the encoded pixel sums of one unit. To fold a partial is to add it to the job's image, its film. Terms:
+// docs/reference/glossary.md. Terms: docs/reference/glossary.md.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +9,11 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/digest.h"
-#include "common/base/id.h"
-#include "common/protocol/messages.h"
 #include "coordinator/domain/farm_figures.h"
 #include "coordinator/domain/job_state.h"
+#include "core/base/digest.h"
+#include "core/base/id.h"
+#include "util/protocol/messages.h"
 
 namespace ls::coordinator {
 

@@ -1,6 +1,5 @@
 // Events: the farm's inputs. Every fact on which a decision depends arrives as an event; the farm reads no
-// clock and no file. A unit is one round (range of samples) of one tile; a lease is a list of units that is
-// assigned to one worker. A numeric class is a set of machines that compute the same bits.
+// clock and no file. Terms: docs/reference/glossary.md.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +10,13 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/clock.h"
-#include "common/base/digest.h"
-#include "common/base/id.h"
-#include "common/image/frame/frame.h"
-#include "common/image/frame/rounds.h"
-#include "common/protocol/messages.h"
 #include "coordinator/domain/job_state.h"
+#include "core/base/clock.h"
+#include "core/base/digest.h"
+#include "core/base/id.h"
+#include "core/image/frame/frame.h"
+#include "core/image/frame/rounds.h"
+#include "util/protocol/messages.h"
 
 namespace ls::coordinator {
 
@@ -32,7 +31,7 @@ struct JobPlan {
   int priority = 0;                    // jobs of a higher priority go first
   std::vector<std::string> tags;       // only a worker that has all these tags gets units of the job
   // Command that renders a sample of the job again, still without the pixel and the number of the sample.
-  // replay_command() (common/job/health_notes.h) adds these.
+  // replay_command() (core/job/health_notes.h) adds these.
   std::string replay = "lightshaft render SCENE";
   // Limits and fair shares (fair_share.h, docs/design/scheduling.md)
   std::string owner;  // the user (JobView::owner); empty: the administrator, to whom no user limits apply
@@ -164,7 +163,7 @@ struct WorkerJoined {
   // Who answers for the worker: its certificate or its address, as far as the coordinator can tell. All
   // workers of one principal have one vote. Empty: the worker is a principal of its own.
   std::string principal = {};
-  // Memory for briefs that it offers (BriefMemory in common/protocol/briefs.h), in bytes; 0: each lease needs
+  // Memory for briefs that it offers (BriefMemory in util/protocol/briefs.h), in bytes; 0: each lease needs
   // its brief
   std::uint64_t brief_bytes = 0;
 };
@@ -229,7 +228,7 @@ struct UnitFolded {
   UnitKey unit;
   SampleRange samples;  // the same as in the Fold effect
   // The tile's relative squared error after all rounds up to this one, summed over pixels and channels:
-  // TileError::relative.squares (common/image/error/error_estimate.h).
+  // TileError::relative.squares (core/image/error/error_estimate.h).
   double rel_error_sum = 0;
 };
 // The error of the denoised layers has been computed, as the effect CheckDenoised (effect.h) requested, at

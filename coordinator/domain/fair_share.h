@@ -1,9 +1,9 @@
-// Fair scheduling: the order in which units of jobs are leased, that is, assigned to workers. A unit is one
-// round (range of samples) of one tile. Higher priorities go first; within one priority, users have equal
-// shares, and the jobs of one user go in the order in which they were submitted (the frames of a sequence are
-// submitted together, in their order). Shares are measured in core seconds: those that results have reported
-// plus those predicted for leased units. The user with the smallest share goes next (start-time fair
-// queueing, Goyal et al. 1996, with measured instead of declared lengths).
+// Fair scheduling: the order in which units of jobs are leased, that is, assigned to workers. Higher
+// priorities go first; within one priority, users have equal shares, and the jobs of one user go in the order
+// in which they were submitted (the frames of a sequence are submitted together, in their order). Shares are
+// measured in core seconds: those that results have reported plus those predicted for leased units. The user
+// with the smallest share goes next (start-time fair queueing, Goyal et al. 1996, with measured instead of
+// declared lengths). Terms: docs/reference/glossary.md.
 //
 // A user who arrives, or returns after a pause, starts at least at the share of the user who got the last
 // lease. So a user gains no turns by waiting, and loses none after having used the farm alone. If two users

@@ -15,8 +15,7 @@ struct WebhookFigures {
   std::uint64_t delivered = 0, failed_attempts = 0, given_up = 0, waiting = 0;
 };
 
-// Why a unit (one round of one tile) left a worker's lease (the list of units assigned to it) without a
-// result.
+// Why a unit left a worker's lease without a result.
 enum class FreedCause {
   worker_lost,
   newer_stream,  // the worker has opened a new connection, which ends the leases of the old one
@@ -54,8 +53,7 @@ constexpr std::string_view to_string(FreedCause cause) {
 }
 
 // Counters of leases, results and additions to the image. All start at 0 when the coordinator starts; members
-// whose names end in _now are current values. A unit is one round (range of samples) of one tile; a lease is
-// the list of units that is assigned to a worker at once.
+// whose names end in _now are current values. Terms: docs/reference/glossary.md.
 struct FarmFigures {
   // Leases
   std::uint64_t leases_granted = 0, units_leased = 0;
@@ -91,9 +89,9 @@ struct ShareLimits {
   bool operator==(const ShareLimits&) const = default;
 };
 
-// The part of the farm that can render a job pinned to a numeric class (set of machines that compute the same
-// bits). `workers` and `threads`: those of this class; `of_workers` and `of_threads`: those of all classes.
-// Only connected workers that are not quarantined count.
+// The part of the farm that can render a job pinned to a numeric class. `workers` and `threads`: those of
+// this class; `of_workers` and `of_threads`: those of all classes. Only connected workers that are not
+// quarantined count.
 struct ClassShare {
   int workers = 0, of_workers = 0;
   int threads = 0, of_threads = 0;

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "common/image/frame/frame.h"
-#include "common/job/health_notes.h"
+#include "core/image/frame/frame.h"
+#include "core/job/health_notes.h"
 
 namespace ls::coordinator {
 

@@ -1,8 +1,8 @@
-// A job in the farm. A unit is one round (range of samples) of one tile; a lease is a list of units that is
-// assigned to one worker. At every moment each planned unit of the job is done (its result is accepted),
-// leased to a worker, or queued. The stop rule of a job with a target error (adaptive_stop.h) goes through
-// levels: falling thresholds, each of which determines for every tile the round after which it stops. A level
-// is identified by the mean number of samples per pixel that the image has there.
+// A job in the farm. At every moment each planned unit of the job is done (its result is accepted), leased to
+// a worker, or queued. The stop rule of a job with a target error (adaptive_stop.h) goes through levels:
+// falling thresholds, each of which determines for every tile the round after which it stops. A level is
+// identified by the mean number of samples per pixel that the image has there. Terms:
+// docs/reference/glossary.md.
 #pragma once
 
 #include <algorithm>
@@ -19,12 +19,12 @@
 #include <utility>
 #include <vector>
 
-#include "common/image/frame/frame.h"
 #include "coordinator/domain/adaptive_stop.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/domain/limits.h"
 #include "coordinator/domain/unit_queue.h"
 #include "coordinator/domain/unit_table.h"
+#include "core/image/frame/frame.h"
 
 namespace ls::coordinator {
 
@@ -124,10 +124,9 @@ struct WorkerFailures {
 std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
                              const std::vector<FailedAttempt>& attempts, const std::string& replay);
 
-// The workers that held a lease on a unit (one round of one tile) but did not deliver its accepted result. If
-// results of a unit differ, only these workers may vote on it (farm_trust.cpp). The table is bounded: beyond
-// kMaxVoters the entries of the earliest rounds are dropped, and later results of those units are mere
-// claims, not votes.
+// The workers that held a lease on a unit but did not deliver its accepted result. If results of a unit
+// differ, only these workers may vote on it (farm_trust.cpp). The table is bounded: beyond kMaxVoters the
+// entries of the earliest rounds are dropped, and later results of those units are mere claims, not votes.
 class VoterTable {
  public:
   // `since`: when the unit was leased to the worker, if the worker may still be rendering it
@@ -250,8 +249,8 @@ struct Job {
   CostModel cost;
   UnitFailures failures;
   std::map<UnitCode, Audit> audits;
-  // Number of results that were chosen for an audit although no other worker of the numeric class (set of
-  // machines that compute the same bits) was connected, so that the audit did not begin
+  // Number of results that were chosen for an audit although no other worker of the numeric class was
+  // connected, so that the audit did not begin
   std::uint64_t audits_missed = 0;
   VoterTable voters;
   Load load;

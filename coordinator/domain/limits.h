@@ -1,15 +1,14 @@
-// All limits and constants of the farm's decisions. A unit is one round (range of samples) of one tile; a
-// lease is a list of units that is assigned to one worker. The stop rule of jobs with a target error
+// All limits and constants of the farm's decisions. The stop rule of jobs with a target error
 // (adaptive_stop.h) goes through levels, which determine how many samples each tile gets; each further level
-// gives more.
+// gives more. Terms: docs/reference/glossary.md.
 #pragma once
 
 #include <cstdint>
 
-#include "common/base/clock.h"
-#include "common/image/frame/render_limits.h"
-#include "common/image/frame/rounds.h"
-#include "common/job/limits.h"
+#include "core/base/clock.h"
+#include "core/image/frame/render_limits.h"
+#include "core/image/frame/rounds.h"
+#include "core/job/limits.h"
 
 namespace ls::coordinator {
 

@@ -1,9 +1,9 @@
-// The units of a job that wait for a worker; a unit is one round (range of samples) of one tile. Each tile
-// has its own end, since the tiles of an adaptive job (one with a target error) stop after different numbers
-// of rounds. The waiting units of a tile are all rounds from `next` to its end, and earlier rounds that were
-// leased (assigned to a worker) and came back without a result. Lower rounds go first, so that a complete
-// picture is available early. In an adaptive job some rounds are speculative: the job may end without them.
-// They go after all certain rounds, in the order in which the stop rule (adaptive_stop.h) would request them.
+// The units of a job that wait for a worker. Each tile has its own end, since the tiles of an adaptive job
+// (one with a target error) stop after different numbers of rounds. The waiting units of a tile are all
+// rounds from `next` to its end, and earlier rounds that were leased (assigned to a worker) and came back
+// without a result. Lower rounds go first, so that a complete picture is available early. In an adaptive job
+// some rounds are speculative: the job may end without them. They go after all certain rounds, in the order
+// in which the stop rule (adaptive_stop.h) would request them. Terms: docs/reference/glossary.md.
 //
 // A focus is a set of tiles whose certain units go before those of all other tiles. It changes only the order
 // of units, not which units belong to the job and which of them are certain. The order of speculative units

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "common/base/check.h"
+#include "core/base/check.h"
 
 namespace ls::coordinator {
 

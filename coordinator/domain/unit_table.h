@@ -1,15 +1,15 @@
-// The state of one job's units; a unit is one round (range of samples) of one tile. For each unit the table
-// keeps the accepted result (digest and worker, 36 bytes per unit, allocated when a round begins), and for
-// each tile the number of rounds that are folded, that is, added to the image.
+// The state of one job's units. For each unit the table keeps the accepted result (digest and worker, 36
+// bytes per unit, allocated when a round begins), and for each tile the number of rounds that are folded,
+// that is, added to the image. Terms: docs/reference/glossary.md.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <vector>
 
-#include "common/base/digest.h"
-#include "common/image/frame/frame.h"
-#include "common/image/frame/rounds.h"
+#include "core/base/digest.h"
+#include "core/image/frame/frame.h"
+#include "core/image/frame/rounds.h"
 
 namespace ls::coordinator {
 

@@ -4,7 +4,7 @@
 #include <cstring>
 #include <utility>
 
-#include "common/base/parse_number.h"
+#include "core/base/parse_number.h"
 
 namespace ls::coordinator {
 

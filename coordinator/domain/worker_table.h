@@ -1,6 +1,4 @@
-// All known workers, with their connections and failures, and all leases. A unit is one round (range of
-// samples) of one tile; a lease is a list of units that is assigned to one worker. A numeric class is a set
-// of machines that compute the same bits.
+// All known workers, with their connections and failures, and all leases. Terms: docs/reference/glossary.md.
 #pragma once
 
 #include <algorithm>
@@ -12,11 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "common/protocol/briefs.h"
-#include "common/protocol/limits.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/domain/job.h"
 #include "coordinator/domain/limits.h"
+#include "util/protocol/briefs.h"
+#include "util/protocol/limits.h"
 
 namespace ls::coordinator {
 

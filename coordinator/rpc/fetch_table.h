@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "common/base/clock.h"
+#include "core/base/clock.h"
 
 namespace ls::coordinator::rpc {
 

@@ -21,12 +21,12 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/guarded.h"
-#include "common/base/log.h"
-#include "common/base/parse_number.h"
-#include "common/protocol/limits.h"
 #include "coordinator/rpc/join_guard.h"
 #include "coordinator/rpc/port_watch.h"
+#include "core/base/guarded.h"
+#include "core/base/log.h"
+#include "core/base/parse_number.h"
+#include "util/protocol/limits.h"
 
 namespace ls::coordinator::rpc {
 

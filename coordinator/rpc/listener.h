@@ -11,9 +11,9 @@
 #include <string_view>
 #include <utility>
 
-#include "common/base/clock.h"
-#include "common/base/error.h"
 #include "coordinator/rpc/connection_table.h"
+#include "core/base/clock.h"
+#include "core/base/error.h"
 
 namespace ls::coordinator::rpc {
 

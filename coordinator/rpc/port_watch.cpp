@@ -41,7 +41,7 @@ std::string PortWatch::trouble() const {
   if (silent_ < kReported) return {};
   return fmt::format(
       "the workers' port has not answered for {} s: no worker can join or come back. If that lasts, the "
-      "coordinator ends, so that it is started anew",
+      "coordinator ends, so that it is restarted",
       static_cast<int>(seconds(kPortLook)) * silent_);
 }
 

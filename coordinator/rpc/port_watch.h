@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "common/base/clock.h"
+#include "core/base/clock.h"
 
 namespace ls::coordinator::rpc {
 

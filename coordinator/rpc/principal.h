@@ -8,8 +8,8 @@
 #include <string>
 #include <string_view>
 
-#include "common/base/digest.h"
 #include "coordinator/rpc/join_guard.h"
+#include "core/base/digest.h"
 
 namespace ls::coordinator {
 

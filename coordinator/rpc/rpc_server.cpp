@@ -10,15 +10,15 @@
 #include <set>
 #include <thread>
 
-#include "common/base/guarded.h"
-#include "common/base/log.h"
-#include "common/protocol/limits.h"
 #include "coordinator/base/work_queue.h"
 #include "coordinator/rpc/connection_table.h"
 #include "coordinator/rpc/fetch_table.h"
 #include "coordinator/rpc/listener.h"
 #include "coordinator/rpc/port_watch.h"
 #include "coordinator/rpc/streams.h"
+#include "core/base/guarded.h"
+#include "core/base/log.h"
+#include "util/protocol/limits.h"
 
 namespace ls::coordinator {
 

@@ -7,9 +7,9 @@
 #include <optional>
 #include <string>
 
-#include "common/base/error.h"
 #include "coordinator/rpc/join_guard.h"
 #include "coordinator/service/coordinator.h"
+#include "core/base/error.h"
 
 namespace ls::coordinator {
 

@@ -8,10 +8,10 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/base/log.h"
-#include "common/protocol/limits.h"
 #include "coordinator/rpc/principal.h"
+#include "core/base/log.h"
 #include "proto/convert.h"
+#include "util/protocol/limits.h"
 
 namespace ls::coordinator::rpc {
 namespace {
@@ -255,9 +255,8 @@ void BlobStream::next() {
 }
 
 // Ends the call with an error. If the blob is missing or damaged, the coordinator is informed first and
-// pauses the jobs that need the blob. Then Finish() reports the error to the worker, which returns its units
-// (a unit is one tile and one round of samples). Since their job is paused, they are not leased again
-// immediately.
+// pauses the jobs that need the blob. Then Finish() reports the error to the worker, which returns its units.
+// Since their job is paused, they are not leased again immediately.
 void BlobStream::refuse(const Error& why) {
   if (why.code == Errc::not_found || why.code == Errc::failed_precondition)
     coordinator_.blob_missing(digest_, why);

@@ -7,11 +7,11 @@
 #include <functional>
 #include <memory>
 
-#include "common/base/clock.h"
-#include "common/base/guarded.h"
 #include "coordinator/rpc/join_guard.h"
 #include "coordinator/rpc/listener.h"
 #include "coordinator/service/coordinator.h"
+#include "core/base/clock.h"
+#include "core/base/guarded.h"
 #include "proto/farm.grpc.pb.h"
 #include "proto/farm.pb.h"
 

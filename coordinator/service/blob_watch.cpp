@@ -6,10 +6,10 @@
 
 #include <algorithm>
 
-#include "common/base/log.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/base/work_queue.h"
 #include "coordinator/service/core.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 namespace {
@@ -34,8 +34,8 @@ std::optional<BlobRef> file_of(const StoredJob& job, const Digest& digest) {
 std::string what_to_do(const StoredJob& job, const BlobRef& file, bool damaged) {
   const bool scene = file.digest == job.scene;
   return fmt::format(
-      "it waits for its {} '{}', whose blob {} {}: {}hand in the same scene again with `lightshaft submit`, "
-      "and this job goes on by itself",
+      "it waits for its {} '{}', whose blob {} {}: {}submit the same scene again with `lightshaft submit`, "
+      "and this job continues automatically",
       scene ? "scene" : "file", file.name, file.digest.hex(), damaged ? "was damaged here" : "is not here",
       scene ? "" : fmt::format("upload the file again (PUT /api/v1/blobs/{}), or ", file.digest.hex()));
 }

@@ -1,7 +1,6 @@
 // Watches over blobs (files of scenes). Jobs whose blobs are missing or damaged are paused; this does not
-// count as a failure of a unit (one tile and one round of samples) or of a worker. The jobs resume
-// automatically when the blobs are available again. Blobs that no job needs are removed. "The lock" is that
-// of Core.
+// count as a failure of a unit or of a worker. The jobs resume automatically when the blobs are available
+// again. Blobs that no job needs are removed. "The lock" is that of Core.
 #pragma once
 
 #include <optional>
@@ -10,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "common/base/guarded.h"
 #include "coordinator/base/work_queue.h"
 #include "coordinator/service/job_commands.h"
 #include "coordinator/store/blobs/collected_blobs.h"
+#include "core/base/guarded.h"
 
 namespace ls::coordinator {
 

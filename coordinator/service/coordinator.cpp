@@ -6,8 +6,6 @@
 #include <random>
 #include <thread>
 
-#include "common/base/log.h"
-#include "common/base/secret.h"
 #include "coordinator/base/work_queue.h"
 #include "coordinator/service/blob_watch.h"
 #include "coordinator/service/core.h"
@@ -19,6 +17,8 @@
 #include "coordinator/service/worker_sessions.h"
 #include "coordinator/store/blobs/memory_blobs.h"
 #include "coordinator/store/files.h"
+#include "core/base/log.h"
+#include "core/base/secret.h"
 
 namespace ls::coordinator {
 
@@ -95,7 +95,7 @@ struct Coordinator::Parts {
   ImageWriter images{core, files, blobs, denoising, comparer, writes, clock};
   Pictures pictures{core, *store, files, blobs, denoising, clock};
   Videos videos{core, files, pictures, clock};
-  Submission submission{core, *store, files, blobs, denoising, clock, options.film_bytes};
+  Submission submission{core, *store, files, blobs, options.scenes, denoising, clock, options.film_bytes};
   const Restore restore{*store, files, blobs, clock};
   JobCommands commands{core, *store, files, restore, images, writes, clock};
   BlobWatch blob_watch{core, blobs, commands, options.keep_unused, clock};

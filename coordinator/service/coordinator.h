@@ -1,6 +1,6 @@
-// The coordinator without its network interfaces: one thread-safe object that contains the farm (the state
-// machine that decides which worker renders what), the job store and the assembler of images. rpc/ and http/
-// serve it over the network; `lightshaft render` calls it in its own process.
+// The coordinator without its network interfaces: one thread-safe object that contains the farm, the job
+// store and the assembler of images. rpc/ and http/ serve it over the network; `lightshaft render` calls it
+// in its own process. Terms: docs/reference/glossary.md.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +12,15 @@
 #include <string>
 #include <vector>
 
-#include "common/base/clock.h"
-#include "common/base/error.h"
-#include "common/trace/tracer.h"
 #include "coordinator/domain/farm_figures.h"
 #include "coordinator/store/blobs/blob_store.h"
 #include "coordinator/store/jobs/job_store.h"
 #include "coordinator/views/views.h"
 #include "coordinator/views/worker_session.h"
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "util/reading/scene_process.h"
+#include "util/trace/tracer.h"
 
 namespace ls::coordinator {
 
@@ -44,15 +45,16 @@ class Coordinator {
     // has it too, that an id is theirs. Empty: a random one, so that all workers get new ids
     std::string worker_key;
     bool allow_fake = false;  // true: fake workers, which invent their pixels, may join (for tests)
-    // Version of this program. Workers of another version finish the jobs of their numeric class (machines
-    // that compute the same bits) but begin none, so that jobs submitted during an upgrade do not depend on
-    // workers that will stop soon. Empty: any worker begins jobs.
+    // Version of this program. Workers of another version finish the jobs of their numeric class but begin
+    // none, so that jobs submitted during an upgrade do not depend on workers that will stop soon. Empty: any
+    // worker begins jobs.
     std::string version;
     ShareLimits limits;
     double audit_rate = 0.01;  // fraction of the results that are audited: another worker renders them again
     std::shared_ptr<const Clock> clock;
-    int denoise_threads = 0;  // 0: one per core that this process may use
-    std::string denoiser;     // file of the library Open Image Denoise; empty: it is searched for
+    OpenReader scenes = scenes_by_processes();  // what reads the scenes of submissions
+    int denoise_threads = 0;                    // 0: one per core that this process may use
+    std::string denoiser;  // file of the library Open Image Denoise; empty: it is searched for
     // Memory for the images of all jobs that are not done, in bytes. Jobs beyond it are refused.
     std::uint64_t film_bytes = std::numeric_limits<std::uint64_t>::max();
     // Time between two Tick events, which a thread of the coordinator raises. nullopt: no such thread; the
@@ -106,11 +108,11 @@ class Coordinator {
   Result<VideoView> make_video(const JobId& id, const VideoAsked& asked);
   Result<VideoView> video(const JobId& id) const;
   Result<std::filesystem::path> video_file(const JobId& id) const;
-  // False-colour maps of the error and of the samples (common/image/exr/maps.h).
+  // False-colour maps of the error and of the samples (core/image/exr/maps.h).
   Result<std::vector<std::byte>> error_png(const JobId& id) const;
   Result<std::vector<std::byte>> samples_png(const JobId& id) const;
   // layers_json() lists the layers of the image (final or current). pixels() returns a rectangle of one layer
-  // at one mip level as numbers (common/image/exr/pixel_layers.h).
+  // at one mip level as numbers (core/image/exr/pixel_layers.h).
   Result<std::string> layers_json(const JobId& id) const;
   Result<std::vector<std::byte>> pixels(const JobId& id, const PixelsAsked& asked) const;
   Result<std::string> report_json(const JobId& id) const;

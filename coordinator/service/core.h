@@ -2,6 +2,7 @@
 // only through Guarded<Core>::lock(). So a function with a Core& parameter runs under the lock, and a
 // function without one does not need the lock. Members of a JobEntry that never change (id, scene, settings,
 // grid) may also be read without the lock. Slow work has its own threads, which hold the lock only briefly.
+// Terms: docs/reference/glossary.md.
 // The path of a worker's result:
 //   receive() -> [verify threads: decode, digest] -> [commit thread: append to the job's log, one fdatasync
 //     for many results] -> farm (the state machine that decides which worker renders what) -> acknowledge
@@ -13,12 +14,12 @@
 #include <deque>
 #include <vector>
 
-#include "common/base/guarded.h"
 #include "coordinator/domain/farm/farm.h"
 #include "coordinator/domain/farm_figures.h"
 #include "coordinator/service/state/job_files.h"
 #include "coordinator/service/state/publisher.h"
 #include "coordinator/service/state/records.h"
+#include "core/base/guarded.h"
 
 namespace ls::coordinator {
 

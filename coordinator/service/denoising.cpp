@@ -1,7 +1,7 @@
 #include "coordinator/service/denoising.h"
 
-#include "common/image/exr/final_image.h"
 #include "coordinator/admission/admission.h"
+#include "core/image/exr/final_image.h"
 
 namespace ls::coordinator {
 

@@ -7,12 +7,12 @@
 #include <mutex>
 #include <optional>
 
-#include "common/base/clock.h"
-#include "common/base/digest.h"
-#include "common/denoise/denoised_image.h"
-#include "common/image/film/film.h"
 #include "coordinator/assemble/job_report.h"
 #include "coordinator/store/blobs/blob_store.h"
+#include "core/base/clock.h"
+#include "core/base/digest.h"
+#include "core/image/film/film.h"
+#include "util/denoise/denoised_image.h"
 
 namespace ls::coordinator {
 
@@ -23,7 +23,7 @@ struct Denoised {
 
 class Denoising {
  public:
-  // `library` is the file of Open Image Denoise; empty: it is searched for (common/denoise/denoiser.h).
+  // `library` is the file of Open Image Denoise; empty: it is searched for (util/denoise/denoiser.h).
   Denoising(int threads, std::string library, const Clock& clock, const BlobStore& blobs)
       : threads_(threads), library_(std::move(library)), clock_(clock), blobs_(blobs) {}
 

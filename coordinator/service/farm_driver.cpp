@@ -1,18 +1,17 @@
-// FarmDriver: carries out the effects of the farm (the state machine that decides which worker renders what).
-// A unit is one tile and one round (a range of samples); a lease is a list of units assigned to one worker;
-// to fold a unit is to add its pixel sums (a partial) to the job's image; an audit is a second rendering of a
-// unit by another worker, for comparison.
+// FarmDriver: carries out the effects of the farm. To fold a unit is to add its pixel sums (a partial) to the
+// job's image; an audit is a second rendering of a unit by another worker, for comparison. Terms:
+// docs/reference/glossary.md.
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "common/base/clock.h"
-#include "common/base/failpoint.h"
-#include "common/base/log.h"
 #include "coordinator/service/core.h"
 #include "coordinator/service/image_writer.h"
 #include "coordinator/service/reference_comparer.h"
 #include "coordinator/service/state/prerequisites.h"
+#include "core/base/clock.h"
+#include "core/base/failpoint.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 

@@ -6,14 +6,14 @@
 
 #include <algorithm>
 
-#include "common/base/failpoint.h"
-#include "common/base/log.h"
-#include "common/image/exr/final_image.h"
-#include "common/scene/json/serialize.h"
 #include "coordinator/admission/cryptomatte_manifests.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/service/core.h"
 #include "coordinator/store/log/audit_file.h"
+#include "core/base/failpoint.h"
+#include "core/base/log.h"
+#include "core/image/exr/final_image.h"
+#include "core/scene/json/serialize.h"
 
 namespace ls::coordinator {
 namespace {

@@ -3,8 +3,6 @@
 // and the report.
 #pragma once
 
-#include "common/base/guarded.h"
-#include "common/image/exr/final_image.h"
 #include "coordinator/assemble/job_report.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/service/denoising.h"
@@ -12,6 +10,8 @@
 #include "coordinator/service/state/job_files.h"
 #include "coordinator/service/state/records.h"
 #include "coordinator/store/blobs/blob_store.h"
+#include "core/base/guarded.h"
+#include "core/image/exr/final_image.h"
 
 namespace ls::coordinator {
 

@@ -1,27 +1,26 @@
 // JobCommands: carries out users' commands on jobs and sequences (jobs with frames; each frame is a job too).
 // To extend a job is to let it render more samples, which is possible even after its end; its image is then
-// loaded from disk again. The farm is the state machine that decides which worker renders what.
+// loaded from disk again.
 #include "coordinator/service/job_commands.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdlib>
 
-#include "common/base/log.h"
-#include "common/image/frame/frame.h"
-#include "common/job/limits.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/service/core.h"
 #include "coordinator/service/state/prerequisites.h"
+#include "coordinator/views/describe_change.h"
+#include "core/base/log.h"
+#include "core/image/frame/frame.h"
+#include "core/job/objects.h"
 
 namespace ls::coordinator {
 namespace {
 
 // Checks the rules that hold for changes of jobs and of sequences alike.
 Result<void> check(const JobChange& change) {
-  if (change.priority && std::abs(std::int64_t{*change.priority}) > kMaxPriority)
-    return fail(Errc::invalid_argument, fmt::format("priority must be within +-{}", kMaxPriority));
+  if (auto ok = job::check_ranges(change, "change"); !ok) return ok;
   if (change.spp && change.target_error)
     return fail(Errc::invalid_argument,
                 "samples (spp) and target_error cannot be changed at once: one decides "

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "common/base/guarded.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/service/image_writer.h"
 #include "coordinator/service/restore.h"
+#include "core/base/guarded.h"
 
 namespace ls::coordinator {
 

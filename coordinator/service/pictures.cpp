@@ -7,11 +7,11 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "common/image/exr/final_image.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/service/core.h"
 #include "coordinator/service/image_writer.h"
 #include "coordinator/views/views.h"
+#include "core/image/exr/final_image.h"
 
 namespace ls::coordinator {
 namespace {

@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/guarded.h"
 #include "coordinator/assemble/stored_layers.h"
 #include "coordinator/service/denoising.h"
 #include "coordinator/service/state/job_files.h"
 #include "coordinator/service/state/job_table.h"
+#include "core/base/guarded.h"
 
 namespace ls::coordinator {
 

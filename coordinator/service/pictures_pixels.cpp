@@ -7,10 +7,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "common/image/exr/final_image.h"
 #include "coordinator/service/core.h"
 #include "coordinator/service/image_writer.h"
 #include "coordinator/service/pictures.h"
+#include "core/image/exr/final_image.h"
 
 namespace ls::coordinator {
 namespace {

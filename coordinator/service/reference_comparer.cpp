@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
-#include "common/base/log.h"
-#include "common/image/reference/flip.h"
 #include "coordinator/admission/admission.h"
 #include "coordinator/service/core.h"
+#include "core/base/log.h"
+#include "core/image/reference/flip.h"
 
 namespace ls::coordinator {
 namespace {

@@ -10,10 +10,10 @@
 #include <stop_token>
 #include <vector>
 
-#include "common/base/guarded.h"
 #include "coordinator/base/work_queue.h"
 #include "coordinator/service/state/job_table.h"
 #include "coordinator/store/blobs/blob_store.h"
+#include "core/base/guarded.h"
 
 namespace ls::coordinator {
 

@@ -1,5 +1,5 @@
-// Restore and Takeover: add stored jobs to the farm (the state machine that decides which worker renders
-// what) again. A job's image so far comes from its snapshot file and from its log of accepted results.
+// Restore and Takeover: add stored jobs to the farm again. A job's image so far comes from its snapshot file
+// and from its log of accepted results.
 #include "coordinator/service/restore.h"
 
 #include <fmt/format.h>
@@ -8,14 +8,14 @@
 #include <set>
 #include <unordered_set>
 
-#include "common/base/clock.h"
-#include "common/base/log.h"
 #include "coordinator/admission/admission.h"
 #include "coordinator/domain/limits.h"
 #include "coordinator/domain/unit_table.h"
 #include "coordinator/service/blob_watch.h"
 #include "coordinator/service/core.h"
 #include "coordinator/store/log/audit_file.h"
+#include "core/base/clock.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 namespace {
@@ -181,10 +181,10 @@ void Restore::take_up_records(Core& core, JobEntry& entry, JobRestored& event) c
   const std::uint64_t spp = entry.stored.spp.value_or(kMaxSppWithoutLimit);
   JobTotals& totals = entry.stored.totals;
   totals.core_seconds = 0;
-  // The units (one tile and one round of samples) of which the loop below has counted a result. The log may
-  // have several results of a unit, and only one is counted. `seen` has the units of full rounds, identified
-  // by their codes alone, which saves memory for millions of units. `seen_cut` has the units of truncated
-  // rounds, identified by the code and the end of the sample range.
+  // The units of which the loop below has counted a result. The log may have several results of a unit, and
+  // only one is counted. `seen` has the units of full rounds, identified by their codes alone, which saves
+  // memory for millions of units. `seen_cut` has the units of truncated rounds, identified by the code and
+  // the end of the sample range.
   std::unordered_set<UnitCode> seen;
   std::set<std::pair<UnitCode, std::uint64_t>> seen_cut;
   seen.reserve(entry.log->found().size());

@@ -6,12 +6,12 @@
 
 #include <vector>
 
-#include "common/base/guarded.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/service/state/job_files.h"
 #include "coordinator/service/state/job_table.h"
 #include "coordinator/service/state/records.h"
 #include "coordinator/store/blobs/blob_store.h"
+#include "core/base/guarded.h"
 
 namespace ls::coordinator {
 

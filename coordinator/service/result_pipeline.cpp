@@ -1,6 +1,5 @@
-// ResultPipeline: handles results that workers send. A result contains the pixel sums of one unit (one tile
-// and one round of samples). The farm is the state machine that decides which worker renders what; it also
-// decides whether a result is needed.
+// ResultPipeline: handles results that workers send. A result contains the pixel sums of one unit. The farm
+// decides whether a result is needed. Terms: docs/reference/glossary.md.
 #include "coordinator/service/result_pipeline.h"
 
 #include <fmt/format.h>
@@ -8,10 +7,10 @@
 #include <set>
 #include <utility>
 
-#include "common/base/failpoint.h"
-#include "common/base/log.h"
 #include "coordinator/domain/limits.h"
 #include "coordinator/service/core.h"
+#include "core/base/failpoint.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 namespace {
@@ -126,9 +125,8 @@ std::vector<ResultPipeline::Stored> ResultPipeline::prepare(const std::vector<Ch
     const Wanted wanted = farm.wanted(a.result.unit, a.from->numeric_class);
     const bool accept = wanted.verdict == Verdict::yes;
     const bool sound = !farm.quarantined(a.from->worker) && std::holds_alternative<Partial>(item.verified);
-    // The first result decides the job's numeric class (machines that compute the same bits). The class is
-    // stored in the job's record before any result is stored in the job's log. So the record always states
-    // the class of the results in the log.
+    // The first result decides the job's numeric class. The class is stored in the job's record before any
+    // result is stored in the job's log. So the record always states the class of the results in the log.
     if (accept && sound && !wanted.pinned)
       core->driver.run(ClassChosen{a.result.unit.job, a.from->numeric_class});
     // A job that accepts a result of a fake worker (which invents pixels, for tests) is marked as fake. The

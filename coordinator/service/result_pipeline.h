@@ -1,5 +1,5 @@
 // The path of a worker's result: each result is verified separately, made durable in a batch with others,
-// reported to the farm and acknowledged to its worker.
+// reported to the farm and acknowledged to its worker. Terms: docs/reference/glossary.md.
 #pragma once
 
 #include <functional>
@@ -8,13 +8,13 @@
 #include <stop_token>
 #include <vector>
 
-#include "common/base/guarded.h"
 #include "coordinator/assemble/verify.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/base/work_queue.h"
 #include "coordinator/domain/farm_figures.h"
 #include "coordinator/service/state/records.h"
 #include "coordinator/service/state/worker_entry.h"
+#include "core/base/guarded.h"
 
 namespace ls::coordinator {
 

@@ -3,20 +3,20 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "common/base/clock.h"
-#include "common/base/log.h"
 #include "coordinator/admission/admission.h"
 #include "coordinator/service/core.h"
 #include "coordinator/service/state/prerequisites.h"
+#include "core/base/clock.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 namespace {
 
 // Returns one admission for a job, or one per frame for a sequence.
-tl::expected<std::vector<Admission>, Rejected> admit_all(const SubmitRequest& request,
-                                                         const BlobStore& blobs) {
-  if (request.spec.frames) return admit_sequence(request, blobs);
-  auto one = admit(request, blobs);
+tl::expected<std::vector<Admission>, Rejected> admit_all(const SubmitRequest& request, const BlobStore& blobs,
+                                                         const SceneReader& read) {
+  if (request.spec.frames) return admit_sequence(request, blobs, read);
+  auto one = admit(request, blobs, read);
   if (!one) return tl::unexpected(std::move(one.error()));
   std::vector<Admission> all;
   all.push_back(std::move(*one));
@@ -40,7 +40,7 @@ tl::expected<JobId, Rejected> Submission::submit(const SubmitRequest& request) {
                                (request.spec.reference ? limits::kMemoryOfReference : 0);
   const Gate::Place turn(turns_, request.owner, memory);
   const auto in_use = blobs_.in_use();
-  auto admitted = admit_all(request, blobs_);
+  auto admitted = admit_all(request, blobs_, scenes_());
   if (!admitted) return tl::unexpected(std::move(admitted.error()));
   std::vector<StoredJob> jobs;
   const std::string traceparent = clean_traceparent(request.traceparent);

@@ -1,13 +1,14 @@
 // Accepts a user's submission: a job, or a sequence, which is one job per frame.
 #pragma once
 
-#include "common/base/guarded.h"
 #include "coordinator/base/gate.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/service/denoising.h"
 #include "coordinator/service/state/job_files.h"
 #include "coordinator/store/blobs/collected_blobs.h"
 #include "coordinator/views/views.h"
+#include "core/base/guarded.h"
+#include "core/scene/reading.h"
 
 namespace ls::coordinator {
 
@@ -16,11 +17,13 @@ struct Core;
 class Submission {
  public:
   Submission(Guarded<Core>& core, JobStore& store, const JobFiles& files, CollectedBlobs& blobs,
-             const Denoising& denoising, const Clock& clock, std::uint64_t film_bytes)
+             const OpenReader& scenes, const Denoising& denoising, const Clock& clock,
+             std::uint64_t film_bytes)
       : core_(core),
         store_(store),
         files_(files),
         blobs_(blobs),
+        scenes_(scenes),
         denoising_(denoising),
         clock_(clock),
         film_bytes_(film_bytes) {}
@@ -42,6 +45,7 @@ class Submission {
   JobStore& store_;
   const JobFiles& files_;
   CollectedBlobs& blobs_;
+  const OpenReader& scenes_;
   const Denoising& denoising_;
   const Clock& clock_;
   const std::uint64_t film_bytes_;  // as Coordinator::Options::film_bytes

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/log.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/service/core.h"
 #include "coordinator/service/video/video_encoder.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 namespace {

@@ -6,11 +6,11 @@
 #include <future>
 #include <random>
 
-#include "common/base/log.h"
-#include "common/base/overloaded.h"
-#include "common/base/secret.h"
-#include "common/protocol/limits.h"
 #include "coordinator/service/core.h"
+#include "core/base/log.h"
+#include "core/base/overloaded.h"
+#include "core/base/secret.h"
+#include "util/protocol/limits.h"
 
 namespace ls::coordinator {
 namespace {
@@ -27,7 +27,7 @@ Result<void> check_hello(const WorkerHello& hello, const JoinCheck& may_join, bo
   if (hello.fake && !allow_fake)
     return fail(
         Errc::failed_precondition,
-        "this worker runs with --fake: it makes pixels up instead of rendering. Start it without --fake, "
+        "this worker runs with --fake: it invents pixels instead of rendering. Start it without --fake, "
         "or, for tests, start the coordinator with --allow-fake");
   if (hello.name.size() > ls::limits::kNameBytes || hello.build.size() > ls::limits::kNameBytes ||
       hello.previous_id.value.size() > ls::limits::kIdBytes)

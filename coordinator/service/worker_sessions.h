@@ -1,5 +1,4 @@
-// The streams of workers: how workers join, the messages that they send, and how they leave. A lease is a
-// list of units (rounds of tiles) that is assigned to one worker until a deadline.
+// The streams of workers: how workers join, the messages that they send, and how they leave.
 #pragma once
 
 #include <functional>
@@ -14,8 +13,8 @@ class WorkerSessions {
   struct Options {
     JoinCheck may_join;
     bool allow_fake = false;
-    // Only workers of this version get units of jobs that are not yet pinned to a numeric class (machines
-    // that compute the same bits); empty: workers of all versions do
+    // Only workers of this version get units of jobs that are not yet pinned to a numeric class; empty:
+    // workers of all versions do
     std::string version;
     std::uint64_t start = 0;   // number of this start of the coordinator
     std::string lease_prefix;  // the ids of the farm's leases begin with this text

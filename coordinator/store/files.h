@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/error.h"
+#include "core/base/error.h"
 
 namespace ls::coordinator {
 

@@ -17,8 +17,8 @@
 #include <memory>
 #include <optional>
 
-#include "common/base/secret.h"
-#include "common/base/spawn.h"
+#include "core/base/secret.h"
+#include "core/base/spawn.h"
 
 namespace ls::tls {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "common/base/error.h"
+#include "core/base/error.h"
 
 namespace ls::tls {
 

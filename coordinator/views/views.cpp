@@ -6,8 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "common/base/parse_number.h"
-#include "common/job/advice.h"
+#include "core/base/parse_number.h"
+#include "core/job/advice.h"
 
 namespace ls::coordinator {
 namespace {

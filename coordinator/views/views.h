@@ -14,20 +14,20 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/digest.h"
-#include "common/base/error.h"
-#include "common/base/frame_range.h"
-#include "common/base/id.h"
-#include "common/image/error/convergence.h"
-#include "common/image/film/health.h"
-#include "common/image/frame/frame.h"
-#include "common/image/frame/rounds.h"
-#include "common/image/reference/reference.h"
-#include "common/job/health_notes.h"
-#include "common/job/settings.h"
-#include "common/scene/diagnostic.h"
 #include "coordinator/domain/farm_figures.h"
 #include "coordinator/domain/job_state.h"
+#include "core/base/digest.h"
+#include "core/base/error.h"
+#include "core/base/frame_range.h"
+#include "core/base/id.h"
+#include "core/image/error/convergence.h"
+#include "core/image/film/health.h"
+#include "core/image/frame/frame.h"
+#include "core/image/frame/rounds.h"
+#include "core/image/reference/reference.h"
+#include "core/job/health_notes.h"
+#include "core/job/settings.h"
+#include "core/scene/diagnostic.h"
 
 namespace ls::coordinator {
 
@@ -71,10 +71,10 @@ struct ErrorFigures {
   double rmse_lo = 0, rmse_hi = 0;
 };
 // Error of an image against a reference image. The error that the reference's own noise causes is subtracted
-// (common/image/reference/reference.h).
+// (core/image/reference/reference.h).
 struct ReferenceError {
   double rmse = 0, relmse = 0;
-  // Mean HDR-FLIP, a perceived error (common/image/reference/flip.h). Computed only each time the number of
+  // Mean HDR-FLIP, a perceived error (core/image/reference/flip.h). Computed only each time the number of
   // samples has doubled, and at the job's end; nullopt: not computed
   std::optional<double> flip;
   std::optional<double> mse_stderr = {}, relmse_stderr = {};
@@ -156,7 +156,7 @@ struct JobView {
   // checkpoint was compared yet
   std::optional<ReferenceError> reference_error;
   // True if the reference and the image share scene and seed. They then share their noise as well, so
-  // reference_error is meaningless (common/image/reference/reference.h: same_noise())
+  // reference_error is meaningless (core/image/reference/reference.h: same_noise())
   bool reference_same_seed = false;
   std::optional<ConvergenceStatus> convergence_status;  // nullopt: no checkpoint yet
   // Number of pixels in which too few samples found light for a reliable error estimate (error_estimate.h),
@@ -194,8 +194,8 @@ struct JobView {
   // the three counts over its frames.
   Health health;
   std::vector<HealthNote> notes;  // `health` as sentences for users; empty: no problems
-  // The numeric class (the set of machines that compute the same bits) to which the job is pinned; nullopt:
-  // it is pinned to none. `platform` names the machines and the build of this class
+  // The numeric class to which the job is pinned; nullopt: it is pinned to none. `platform` names the
+  // machines and the build of this class
   std::optional<Digest> numeric_class;
   std::string platform;
   // The part of the farm that belongs to that class; nullopt: the job is pinned to no class, has ended, or is
@@ -257,7 +257,7 @@ struct TileView {
   std::vector<std::string> workers;  // names of the workers rendering it now
 };
 
-// A request for a rectangle of one layer at one mip level (common/image/exr/pixel_layers.h).
+// A request for a rectangle of one layer at one mip level (core/image/exr/pixel_layers.h).
 struct PixelsAsked {
   std::string layer;
   int level = 0;
@@ -317,7 +317,7 @@ struct SubmitRequest {
   std::map<std::string, Digest> assets;
   JobSpec spec;
   std::string owner = {};  // the user who submits it: JobView::owner
-  // Header `traceparent` of the user's request (common/trace/span.h); a malformed one is ignored
+  // Header `traceparent` of the user's request (util/trace/span.h); a malformed one is ignored
   std::string traceparent = {};
 };
 struct Rejected {

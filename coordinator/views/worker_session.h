@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "common/protocol/messages.h"
+#include "util/protocol/messages.h"
 
 namespace ls::coordinator {
 

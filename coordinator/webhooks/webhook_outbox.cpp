@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "common/base/digest.h"
 #include "coordinator/store/files.h"
+#include "core/base/digest.h"
 
 namespace ls::coordinator::webhooks {
 

@@ -17,9 +17,9 @@
 #include <string>
 #include <vector>
 
-#include "common/base/clock.h"
-#include "common/base/error.h"
-#include "common/base/id.h"
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "core/base/id.h"
 
 namespace ls::coordinator::webhooks {
 

@@ -8,11 +8,11 @@
 #include <set>
 #include <thread>
 
-#include "common/base/guarded.h"
-#include "common/base/log.h"
-#include "common/base/secret.h"
 #include "coordinator/views/views.h"
 #include "coordinator/webhooks/webhook_outbox.h"
+#include "core/base/guarded.h"
+#include "core/base/log.h"
+#include "core/base/secret.h"
 
 namespace ls::coordinator {
 namespace webhooks {

@@ -26,11 +26,11 @@
 #include <string>
 #include <vector>
 
-#include "common/base/clock.h"
-#include "common/base/error.h"
-#include "common/http/post.h"
-#include "common/trace/tracer.h"
 #include "coordinator/service/coordinator.h"
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "util/http/post.h"
+#include "util/trace/tracer.h"
 
 namespace ls::coordinator {
 

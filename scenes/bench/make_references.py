@@ -3,7 +3,7 @@
 
 usage: make_references.py [FOLDER] [--scenes DIR] [--names a,b,c] [--threads N]
 FOLDER is `references` beside this file; without DIR the scenes are made by make_bench.py. Each image is rendered by a process of its
-own through the adapters in tests/bench/adapters, which say what they need of a machine: here `pip install bpy mitsuba numpy OpenEXR`
+own through the adapters in bench/adapters, which say what they need of a machine: here `pip install bpy mitsuba numpy OpenEXR`
 for one Python. Images are half floats, compressed without loss. The header's string `reference` names program, version, integrator,
 samples and seed. Printed is each image's relMSE, by the difference of both. Which program renders what, and why, is in README.md
 beside this file.

@@ -227,7 +227,7 @@ def test_a_wrong_token(stage, on_farm, monkeypatch):
     stage.sky(1)
     monkeypatch.setenv("LIGHTSHAFT_TOKEN", "wrong")
 
-    assert "The farm does not know this token" in refused(stage)
+    assert "The farm does not accept this token" in refused(stage)
 
 
 def test_the_denoised_pass_is_that_of_the_finished_image(stage, on_farm):

@@ -95,7 +95,7 @@ same question: are the pixels those of one worker that nothing happened to? Work
 |---|---|---|---|---|
 {table}
 
-"Killed at STEP": the process kills itself with SIGKILL when it comes to that step of a unit's life for the n-th time, n random (`common/base/failpoint.h`). Workers behind bad networks are in a network namespace, and every packet of theirs passes through `tests/chaos/weather.py`; full disks are small file systems; the wall clock is libfaketime's.
+"Killed at STEP": the process kills itself with SIGKILL when it comes to that step of a unit's life for the n-th time, n random (`core/base/failpoint.h`). Workers behind bad networks are in a network namespace, and every packet of theirs passes through `tests/chaos/weather.py`; full disks are small file systems; the wall clock is libfaketime's.
 A lease that is cut in its middle may still read as a shorter one: its other units wait for its deadline, ten seconds at least. A takeover takes some six seconds ([decisions/0024](../decisions/0024-several-coordinators.md)). "Older": Redis is killed and started with what it had saved before, as a replica that was behind.
 {skipped}"""
 

@@ -19,7 +19,7 @@ from s3_server import ENVIRONMENT, S3Server
 from weather import Network, Skip
 from webhook_receiver import Receiver
 
-sys.path.insert(0, str(ROOT / "tests" / "bench"))
+sys.path.insert(0, str(ROOT / "bench"))
 
 ANYWHERE = 120  # seconds within which some coordinator must answer for a job that there is, whatever happens
 MEDDLED = ("doubled", "held", "cut", "oversized", "to_doubled", "to_held")  # leases that are cut wait for two minutes
@@ -164,7 +164,7 @@ class SharedFarm(contextlib.ExitStack):
 
     def _add_workers(self, fakes, reals):
         """A tenth of the fake ones behind lines that can be cut, a tenth in the namespace, some behind the meddler; three steady ones that nothing is
-        done to themselves; the others are killed, frozen and so on. Of many ten each are one process (tests/bench/fleet.cpp), as on a machine
+        done to themselves; the others are killed, frozen and so on. Of many ten each are one process (bench/fleet.cpp), as on a machine
         with ten of them."""
         ports = [c.grpc for c in self.coordinators]
         direct = [f"127.0.0.1:{port}" for port in ports]

@@ -373,7 +373,7 @@ def messages_doubled_moved_and_cut(farm, dice):
 # ---- clients ----
 
 @fault()
-def strangers_at_the_doors(farm, dice):
+def requests_without_a_right(farm, dice):
     """Half requests, garbage, and connections that say nothing, at both ports of all coordinators."""
     sent = (b"", b"GET / HTTP/1.1\r\n\r\n", b"\x16\x03\x01\x02", b"\x16" + b"\xff" * 600, os.urandom(4096))
     held_open = []

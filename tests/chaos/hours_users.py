@@ -467,10 +467,10 @@ class Strangers(threading.Thread):
         status = self.expect(other.name_, at, method, f"/api/v1/jobs/{job}{path}", (404, 307), body, "another user's job")
         self.redirects += status == 307
 
-    def other_doors(self):
+    def other_ports(self):
         at = self.dice.randrange(3)
         who, method, path, allowed, body, what = self.dice.choice((
-            ("join", "GET", "/api/v1/jobs", (403,), None, "a worker's token at the HTTP door"),
+            ("join", "GET", "/api/v1/jobs", (403,), None, "a worker's token over HTTP"),
             ("read", "POST", "/api/v1/jobs?spp=2", (403,), SCENE.encode(), "a read token that hands in"),
             ("none", "GET", "/api/v1/jobs", (401,), None, "no token"),
             ("anna", "GET", "/metrics", (403,), None, "a user's token at the figures"),
@@ -479,7 +479,7 @@ class Strangers(threading.Thread):
             ("read", "DELETE", "/api/v1/tokens/0", (403,), None, "a read token that revokes")))
         self.expect(who, at, method, path, allowed, body, what)
 
-    def worker_door(self):
+    def worker_port(self):
         """A user's token, or a guess, in a worker's hello; the certificate is right."""
         grpc, tls, at = farm_rpc.grpc, self.farm.folder / "secrets" / "tls", self.dice.randrange(3)
         pem = [(tls / name).read_bytes() for name in ("ca.pem", "worker.key", "worker.pem")]
@@ -487,9 +487,9 @@ class Strangers(threading.Thread):
         with grpc.secure_channel(f"127.0.0.1:{self.farm.coordinators[at].grpc}", grpc.ssl_channel_credentials(*pem)) as channel:
             said = farm_rpc.work(channel, self.tokens[who])
         if said not in ("UNAVAILABLE", "DEADLINE_EXCEEDED"):
-            self.count["a user's token at the workers' door"] = self.count.get("a user's token at the workers' door", 0) + 1
+            self.count["a user's token at the workers' port"] = self.count.get("a user's token at the workers' port", 0) + 1
             if said not in ("UNAUTHENTICATED", "RESOURCE_EXHAUSTED"):
-                self.record.wrong("a token overstepped", what="a user's token at the workers' door", who=who, said=said)
+                self.record.wrong("a token overstepped", what="a user's token at the workers' port", who=who, said=said)
 
     def revoked(self):
         """A guest's token, revoked at one coordinator, opens none."""
@@ -510,9 +510,9 @@ class Strangers(threading.Thread):
             try:
                 self.anothers_job()
                 if turn % 5 == 0:
-                    self.other_doors()
+                    self.other_ports()
                 if turn % 30 == 0:
-                    self.worker_door()
+                    self.worker_port()
                 if turn % 60 == 0:
                     self.revoked()
             except Exception as error:

@@ -2,7 +2,7 @@
 #include <stdexcept>
 
 #include "cli/local/local_farm.h"
-#include "common/image/exr/exr_file.h"
+#include "core/image/exr/exr_file.h"
 #include "tests/coverage/job.h"
 
 namespace ls::test {

@@ -11,9 +11,9 @@
 #include <thread>
 #include <vector>
 
-#include "common/image/error/convergence.h"
-#include "common/image/film/film.h"
-#include "common/scene/read.h"
+#include "core/image/error/convergence.h"
+#include "core/image/film/film.h"
+#include "formats/read.h"
 #include "tests/coverage/job.h"
 #include "validation/measure/hypothesis_tests.h"
 #include "worker/render/render.h"

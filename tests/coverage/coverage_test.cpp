@@ -34,7 +34,7 @@ class ShortCoverage : public ::testing::TestWithParam<const char*> {};
 // run is allowed to be off by. Of 2,000 jobs paired anew a share may be .95 +- (.02 + .023): of an estimator
 // that covers 88 % it is .88 +- .0073, 3.7 of these below, so that one in 9,000 passes. The shares of the 100
 // rendered jobs say a quarter as much; they would show halves that are not independent.
-TEST_P(ShortCoverage, TheIntervalHoldsTheTrueErrorAndTheEstimateIsRightInTheMean) {
+TEST_P(ShortCoverage, IntervalContainsTheTrueErrorAndTheEstimateIsUnbiased) {
   Tests tests("coverage/short");
   const double level = tests.level(7);
   // All pixels share light vertices. With fewer samples the interval of relMSE is too narrow for such images
@@ -91,7 +91,7 @@ TEST(ShortCoverage, HoldsForJobsThatStopAtATarget) {
 // are uncertain, and errors are correlated. Intervals that ignore this hold for about half of such images.
 // 600 images give some 400 that are trusted, of which the share that holds has a standard deviation of 1.1 %
 // if it is 95 %. So the bound is 0.9, and an estimator that covers 88 % is below it in six of seven cases.
-TEST(ShortCoverage, HoldsForWholeImagesOfFewSamplesThatSharePaths) {
+TEST(ShortCoverage, HoldsForImagesOfFewSamplesWithPathReuse) {
   const double level = Tests("coverage/rendered").level(2);
   const auto file = std::filesystem::path(testing::TempDir()) / "shared.xml";
   std::ofstream(file) << scene_of("fog, lit from within", 8).xml;

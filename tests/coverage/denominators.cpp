@@ -7,7 +7,7 @@
 #include <functional>
 #include <random>
 
-#include "common/image/error/error_estimate.h"
+#include "core/image/error/error_estimate.h"
 
 namespace ls::test {
 namespace {

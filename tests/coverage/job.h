@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/image/error/error_estimate.h"
-#include "common/scene/scene.h"
+#include "core/image/error/error_estimate.h"
+#include "core/scene/scene.h"
 #include "tests/coverage/scenes.h"
 
 namespace ls::test {

@@ -9,7 +9,7 @@
 #include <exception>
 #include <string>
 
-#include "common/base/log.h"
+#include "core/base/log.h"
 #include "tests/coverage/coverage.h"
 #include "tests/coverage/denominators.h"
 #include "validation/measure/hypothesis_tests.h"

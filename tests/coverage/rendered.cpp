@@ -11,8 +11,8 @@
 #include <thread>
 
 #include "cli/local/local_scene.h"
-#include "common/image/error/convergence.h"
-#include "common/image/film/film.h"
+#include "core/image/error/convergence.h"
+#include "core/image/film/film.h"
 #include "worker/render/render.h"
 #include "worker/render/world/world.h"
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "common/image/frame/frame.h"
+#include "core/image/frame/frame.h"
 #include "tests/coverage/coverage.h"
 
 namespace ls::test {

@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <exception>
 
-#include "common/base/log.h"
+#include "core/base/log.h"
 #include "tests/coverage/rendered.h"
 
 int main(int argc, char** argv) {

@@ -9,11 +9,11 @@
 
 #include <jpeglib.h>
 
-#include "common/assets/grid_files.h"
-#include "common/assets/image.h"
-#include "common/assets/mesh.h"
-#include "common/image/exr/exr_file.h"
-#include "common/image/exr/final_image.h"
+#include "core/assets/grid_files.h"
+#include "core/assets/image.h"
+#include "core/assets/mesh.h"
+#include "core/image/exr/exr_file.h"
+#include "core/image/exr/final_image.h"
 #include "tests/fuzz/all_targets.h"
 #include "tests/unit/nvdb/nvdb_builder.h"
 #include "worker/fake/fake_pixels.h"

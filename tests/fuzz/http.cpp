@@ -2,7 +2,7 @@
 // the HTTP library makes of bytes is not ours; what we make of its requests is.
 #include "coordinator/http/message/message.h"
 #include "tests/fuzz/all_targets.h"
-#include "tests/fuzz/http_door.h"
+#include "tests/fuzz/http_coordinator.h"
 
 namespace ls::fuzz {
 namespace {
@@ -43,15 +43,15 @@ std::optional<Request> request_of(std::string_view text) {
 }  // namespace
 
 void http(Bytes input) {
-  HttpDoor door;
+  HttpCoordinator coordinator;
   for (const Bytes part : parts_of(input, 6)) {
-    const auto request = request_of(door.with_job(text_of(part)));
-    if (request && door.small()) door.ask(*request);
+    const auto request = request_of(coordinator.with_job(text_of(part)));
+    if (request && coordinator.small()) coordinator.ask(*request);
   }
 }
 
 Seeds http_seeds() {
-  const std::string token = std::string("authorization: Bearer ") + HttpDoor::kToken + "\n";
+  const std::string token = std::string("authorization: Bearer ") + HttpCoordinator::kToken + "\n";
   const std::string scene =
       R"(<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="4"/></film></sensor><shape type="sphere"/><emitter type="constant"/></scene>)";
   const std::string submit = "POST /api/v1/jobs?spp=4&size=8x4&define=a=b&tags=x,y&name=s.xml HTTP\n" +
@@ -75,7 +75,7 @@ Seeds http_seeds() {
                   "content-type: application/json\n\n{\"sha256\":[\"" + digest + "\"]}");
   seeds.push_back(std::string("POST /api/v1/session\ncontent-type: application/json\norigin: http://a\nhost: "
                               "a\n\n{\"token\":\"") +
-                  HttpDoor::kToken + "\"}");
+                  HttpCoordinator::kToken + "\"}");
   for (const char* address :
        {"/healthz", "/readyz", "/metrics", "/", "/js/main.js", "/api/v1/openapi.json", "/api/v1/workers",
         "/api/v1/jobs", "/api/v1/events?last_event_id=3", "/%2e%2e/x?a=%00+b"})

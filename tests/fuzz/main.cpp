@@ -12,8 +12,8 @@
 #include <iterator>
 #include <string_view>
 
-#include "common/base/digest.h"
-#include "common/base/log.h"
+#include "core/base/digest.h"
+#include "core/base/log.h"
 #include "tests/fuzz/all_targets.h"
 
 namespace {

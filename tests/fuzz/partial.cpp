@@ -1,8 +1,8 @@
 // Partial EXRs, as workers and `lightshaft merge` hand them in: each alone, and all merged into a final EXR.
-#include "common/image/film/partial.h"
-#include "common/image/exr/exr_file.h"
-#include "common/image/exr/final_image.h"
-#include "common/image/film/merge.h"
+#include "core/image/film/partial.h"
+#include "core/image/exr/exr_file.h"
+#include "core/image/exr/final_image.h"
+#include "core/image/film/merge.h"
 #include "tests/fuzz/all_targets.h"
 #include "worker/fake/fake_pixels.h"
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "coordinator/service/coordinator.h"
+#include "formats/read.h"
 #include "proto/convert.h"
 #include "tests/fuzz/all_targets.h"
 #include "worker/fake/fake_pixels.h"
@@ -74,7 +75,7 @@ WorkerHello hello() {
 class Farm {
  public:
   Farm() {
-    coordinator_ = std::move(Coordinator::open({}).value());
+    coordinator_ = std::move(Coordinator::open({.scenes = scenes_in_this_process}).value());
     JobSpec spec;
     spec.spp = 6;
     job_ = coordinator_->submit({"fuzz.xml", kScene, {}, spec}).value();

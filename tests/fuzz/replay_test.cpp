@@ -9,7 +9,7 @@
 #include <iterator>
 #include <random>
 
-#include "common/base/log.h"
+#include "core/base/log.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace ls::fuzz {
@@ -25,14 +25,14 @@ class Replay : public testing::TestWithParam<Target> {
   void SetUp() override { log_level(LogLevel::off); }
 };
 
-TEST_P(Replay, SeedsComeBack) {
+TEST_P(Replay, SeedsRunWithoutCrash) {
   const auto seeds = GetParam().seeds();
   ASSERT_FALSE(seeds.empty());
   for (const std::string& seed : seeds) GetParam().run(input_of(seed));
   GetParam().run({});
 }
 
-TEST_P(Replay, DamagedSeedsComeBack) {
+TEST_P(Replay, DamagedSeedsRunWithoutCrash) {
   constexpr int kTurns = 12;  // of each seed; a fuzzer makes many more
   std::mt19937 random(1);
   for (const std::string& seed : GetParam().seeds())
@@ -45,7 +45,7 @@ TEST_P(Replay, DamagedSeedsComeBack) {
     }
 }
 
-TEST_P(Replay, FindingsOfThePastComeBack) {
+TEST_P(Replay, PastFindingsRunWithoutCrash) {
   const std::filesystem::path folder = std::filesystem::path(FUZZ_CORPUS) / GetParam().name;
   std::vector<std::filesystem::path> files;
   std::error_code none;  // of a target without findings
@@ -59,14 +59,14 @@ TEST_P(Replay, FindingsOfThePastComeBack) {
   }
 }
 
-TEST_P(Replay, CorpusOfTheFuzzersComesBack) {
+TEST_P(Replay, CorpusRunsWithoutCrash) {
   const auto pack = std::filesystem::path(FUZZ_CORPUS) / (std::string(GetParam().name) + ".pack");
   const auto inputs = unpacked(content(pack));
   ASSERT_FALSE(inputs.empty()) << pack;
   for (const std::string& input : inputs) GetParam().run(input_of(input));
 }
 
-TEST(Pack, HoldsWhatWasPackedAndNothingThatIsCutShort) {
+TEST(Pack, RoundTripsAndRefusesTruncatedData) {
   const std::vector<std::string> inputs{"", "a", std::string(70000, 'b')};
   const std::string pack = packed(inputs);
 

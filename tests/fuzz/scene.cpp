@@ -1,12 +1,12 @@
 // Scene files of strangers (XML, pbrt, glTF): read, described, written in both forms and read back to the
 // same scene.
-#include "common/scene/analysis/needs.h"
-#include "common/scene/analysis/prune.h"
-#include "common/scene/diagnostic.h"
-#include "common/scene/json/serialize.h"
-#include "common/scene/read.h"
-#include "common/scene/reader/nori_test.h"
-#include "common/scene/reader/xml_write.h"
+#include "core/scene/analysis/needs.h"
+#include "core/scene/analysis/prune.h"
+#include "core/scene/diagnostic.h"
+#include "core/scene/json/serialize.h"
+#include "formats/read.h"
+#include "formats/reader/nori_test.h"
+#include "formats/reader/xml_write.h"
 #include "tests/fuzz/all_targets.h"
 
 namespace ls::fuzz {

@@ -1,9 +1,9 @@
 // The small texts that travel between processes and lie in stores. The first byte says which.
-#include "common/image/film/health.h"
-#include "common/image/film/partial.h"
-#include "common/job/settings.h"
 #include "coordinator/assemble/assembly.h"
 #include "coordinator/store/jobs/job_store.h"
+#include "core/image/film/health.h"
+#include "core/image/film/partial.h"
+#include "core/job/settings.h"
 #include "tests/fuzz/all_targets.h"
 #include "worker/child/protocol.h"
 

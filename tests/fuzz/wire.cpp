@@ -8,7 +8,7 @@
 
 #include "coordinator/http/net/request_head.h"
 #include "tests/fuzz/all_targets.h"
-#include "tests/fuzz/http_door.h"
+#include "tests/fuzz/http_coordinator.h"
 
 namespace ls::fuzz {
 namespace {
@@ -54,41 +54,42 @@ bool read_body(Parser& parser, Arriving& from, std::string& body) {
 }
 
 // False: the connection is closed.
-bool serve_one(HttpDoor& door, Arriving& from) {
+bool serve_one(HttpCoordinator& coordinator, Arriving& from) {
   Parser parser;
-  prepare(parser, door.api().limits());
+  prepare(parser, coordinator.api().limits());
   error_code ec;
   bhttp::read_header(from, from.buffer, parser, ec);
   if (read_result(ec, false) != Read::ok) return false;
   auto parsed = to_request(parser);
   if (const auto* refused = std::get_if<Response>(&parsed)) {
-    door.check(*refused, Method::get);
+    coordinator.check(*refused, Method::get);
     return false;
   }
   Request& request = std::get<Request>(parsed);
   if (request.has_body && !read_body(parser, from, request.body)) return false;
   must(!request.content_length || request.body.size() == *request.content_length || !request.has_body,
        "a body is as long as it was announced");
-  if (!door.small()) return false;
-  door.ask(request);
+  if (!coordinator.small()) return false;
+  coordinator.ask(request);
   return parser.keep_alive();
 }
 
 }  // namespace
 
 void wire(Bytes input) {
-  HttpDoor door;
+  HttpCoordinator coordinator;
   for (const Bytes part : parts_of(input, 4)) {
     if (part.empty()) continue;
-    const std::string bytes = door.with_job(text_of(part.subspan(1)));
+    const std::string bytes = coordinator.with_job(text_of(part.subspan(1)));
     Arriving from(bytes, part[0] == 0 ? bytes.size() : part[0]);
-    for (int request = 0; request < 8 && serve_one(door, from); ++request) {
+    for (int request = 0; request < 8 && serve_one(coordinator, from); ++request) {
     }
   }
 }
 
 Seeds wire_seeds() {
-  const std::string common = std::string("Host: a\r\nAuthorization: Bearer ") + HttpDoor::kToken + "\r\n";
+  const std::string common =
+      std::string("Host: a\r\nAuthorization: Bearer ") + HttpCoordinator::kToken + "\r\n";
   const std::string scene =
       R"(<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="4"/></film></sensor><shape type="sphere"/><emitter type="constant"/></scene>)";
   const auto with_body = [&](const std::string& line, const std::string& type, const std::string& body) {

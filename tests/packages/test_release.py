@@ -56,7 +56,7 @@ def programs(artefacts, tmp_path_factory):
     for deb in artefacts.glob("*.deb"):
         subprocess.run(["dpkg-deb", "-x", deb, folder], check=True)
     found = [file for file in folder.rglob("*") if not file.is_symlink() and file.is_file() and file.read_bytes()[:4] == b"\x7fELF"]
-    assert {"lightshaft", "lightshaft-coordinator", "lightshaft-worker", "lightshaft-vdb", "lightshaft-denoise", "lightshaft-exr"} == {f.name for f in found}
+    assert {"lightshaft", "lightshaft-coordinator", "lightshaft-worker", "lightshaft-vdb", "lightshaft-denoise", "lightshaft-exr", "lightshaft-scene", "lightshaft-validate"} == {f.name for f in found}
     return found
 
 

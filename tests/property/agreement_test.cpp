@@ -126,7 +126,7 @@ SceneBuilder lamps_in_fog(bool grid) {
   return builder;
 }
 
-TEST(Lamps, GiveTheSameImageWhetherDirectionsAreAimedAtThemOrNot) {
+TEST(Lamps, GiveTheSameImageWithAndWithoutAimedDirections) {
   Tests tests("property/lamps");
   for (const bool grid : {false, true}) {
     SceneBuilder aimed = lamps_in_fog(grid), plain = aimed;
@@ -149,7 +149,7 @@ SceneBuilder mirror_in_fog(int light_vertices, int camera_points) {
   return b;
 }
 
-TEST(Mirrors, ShowTheSameFogWhetherLightIsSampledAtPointsOfItOrNot) {
+TEST(Mirrors, ShowTheSameFogWithAndWithoutPointsOnSegments) {
   Tests tests("property/mirrors");
   for (const int light_vertices : {-1, 1}) {
     const SceneBuilder points = mirror_in_fog(light_vertices, 2), none = mirror_in_fog(light_vertices, -1);

@@ -37,7 +37,7 @@ Means means_of(const SceneBuilder& builder, std::uint64_t spp, int seeds, std::u
 // A disk of radius R and reflectance a in the sun, and a small plate at the height h above its middle that
 // faces it: the light that the disk sends to the plate has the irradiance a E cos(sun) R^2 / (R^2 + h^2), the
 // form factor of a disk seen from a point on its axis. The plate's shadow falls beside the disk.
-TEST(Connections, BringTheLightThatADiskInTheSunSendsBack) {
+TEST(Connections, TransportLightReflectedByASunlitDisk) {
   constexpr int kSeeds = 24;
   constexpr double kRadius = 1, kHeight = .8, kDisk = .8, kPlate = .5, kSun = 5;
   Tests tests("property/lit_disk");

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "common/scene/schema/describe.h"
+#include "core/scene/schema/describe.h"
 
 namespace ls::test {
 

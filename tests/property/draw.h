@@ -6,8 +6,8 @@
 #include <utility>
 #include <variant>
 
-#include "common/scene/schema/describe_fields.h"
-#include "common/scene/schema/traits.h"
+#include "core/scene/schema/describe_fields.h"
+#include "core/scene/schema/traits.h"
 #include "tests/property/random_scene.h"
 #include "tests/support/scene_builder.h"
 

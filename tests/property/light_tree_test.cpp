@@ -11,7 +11,7 @@ namespace {
 
 // Light is sampled at points of the camera's segments, for which it is chosen before the point is known; and
 // paths that are scattered there hit the lamps.
-TEST(LightTree, GivesTheSameImageAsTheTableWhereCameraSegmentsHavePoints) {
+TEST(LightTree, GivesTheSameImageAsTheTableWithPointsOnCameraSegments) {
   constexpr int kSeeds = 24;
   Tests tests("property/light_tree");
   const auto scene = [](int light_tree) {

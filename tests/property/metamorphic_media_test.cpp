@@ -50,7 +50,7 @@ std::vector<float> refined(int n, const std::vector<float>& v) {
   return out;
 }
 
-TEST(Metamorphic, ATrilinearFieldOnTwiceTheGridIsTheSame) {
+TEST(Metamorphic, TrilinearFieldIsTheSameOnATwiceAsFineGrid) {
   Tests tests("property/twice_the_grid");
   std::mt19937 random(4);
   std::vector<float> values(5 * 5 * 5);
@@ -69,7 +69,7 @@ TEST(Metamorphic, ATrilinearFieldOnTwiceTheGridIsTheSame) {
 }
 
 // Half the size and twice the density: the same optical depths. Seen from as near, in the same bits.
-TEST(Metamorphic, HalfTheSizeAtTwiceTheDensityIsTheSame) {
+TEST(Metamorphic, HalfSizeAtTwiceTheDensityIsTheSame) {
   const auto with = [](double size) {
     SceneBuilder builder({12, 12});
     builder.container(CubeShape{}, scale(size), builder.null(),
@@ -87,7 +87,7 @@ TEST(Metamorphic, HalfTheSizeAtTwiceTheDensityIsTheSame) {
 
 // Density beyond the container that no ray meets, in the macro cells that they cross: majorants are four
 // orders of magnitude too large.
-TEST(Metamorphic, AMajorantTenThousandTimesTooLargeChangesNothing) {
+TEST(Metamorphic, MajorantTenThousandTimesTooLargeChangesNothing) {
   Tests tests("property/majorant");
   for (const char* integrator : {"volpath", "volpath_distant_mis"}) {
     const auto with = [&](float outside) {
@@ -107,7 +107,7 @@ TEST(Metamorphic, AMajorantTenThousandTimesTooLargeChangesNothing) {
   tests.close();
 }
 
-TEST(Metamorphic, BoundariesOfNothingChangeNothing) {
+TEST(Metamorphic, NullBoundariesChangeNothing) {
   Tests tests("property/boundaries");
   std::uint64_t seed = 40;
   for (const NamedScene& s : different_scenes()) {
@@ -123,7 +123,7 @@ TEST(Metamorphic, BoundariesOfNothingChangeNothing) {
 }
 
 // Radiance towards b of a slab lit from a, by irradiance on the slab, is that towards a lit from b.
-TEST(Metamorphic, LightGoesBothWaysThroughASlab) {
+TEST(Metamorphic, SlabIsReciprocal) {
   Tests tests("property/both_ways");
   const auto direction = [](double degrees) {
     return Vec3{std::sin(degrees * kPi / 180), 0, std::cos(degrees * kPi / 180)};
@@ -149,7 +149,7 @@ TEST(Metamorphic, LightGoesBothWaysThroughASlab) {
 }
 
 // A sample is its own: alone, in any order and in any company it is the same.
-TEST(Metamorphic, SamplesKnowNoOrder) {
+TEST(Metamorphic, OrderOfSamplesDoesNotMatter) {
   for (const NamedScene& s : different_scenes()) {
     const auto world = world_of(s.builder);
     const auto tile = render::render_tile(*world, {3, 4, 6, 6}, {0, 8}, nullptr, nullptr);

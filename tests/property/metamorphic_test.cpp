@@ -41,7 +41,7 @@ TEST(Metamorphic, ScalingChangesNothing) {
 }
 
 // Binary fractions of a few digits stay exact in double.
-TEST(Metamorphic, ShiftingByAPowerOfTwoChangesNoBitOfExactCoordinates) {
+TEST(Metamorphic, ShiftByAPowerOfTwoKeepsAllBitsOfExactCoordinates) {
   for (const NamedScene& s : different_scenes()) {
     if (s.name == "coloured fog") continue;  // the directions of its spot light are no short fractions
     EXPECT_EQ(pixels(moved(s.builder, {{}, 1, {0x1p17, -0x1p16, 0x1p17}}), 2), pixels(s.builder, 2))
@@ -49,13 +49,13 @@ TEST(Metamorphic, ShiftingByAPowerOfTwoChangesNoBitOfExactCoordinates) {
   }
 }
 
-TEST(Metamorphic, ShiftingChangesNothing) {
+TEST(Metamorphic, TranslationChangesNothing) {
   expect_alike("property/shifting", scenes(), [](const SceneBuilder& builder) {
     return std::optional(moved(builder, {{}, 1, {1e5, -1e5, 1e5}}));
   });
 }
 
-TEST(Metamorphic, TurningChangesNothing) {
+TEST(Metamorphic, RotationChangesNothing) {
   const Transform turn = rotate_x(37) * rotate_y(101) * rotate_x(-15);
   expect_alike("property/turning", scenes(),
                [&](const SceneBuilder& builder) { return std::optional(moved(builder, {turn})); });
@@ -92,7 +92,7 @@ TEST(Metamorphic, ExchangingChannelsExchangesThemInTheImage) {
 }
 
 // ---- light
-TEST(Metamorphic, ALightOfTwoHalvesIsTheLight) {
+TEST(Metamorphic, TwoHalvesOfALightEqualTheLight) {
   expect_alike("property/two_halves", scenes(),
                [](const SceneBuilder& builder) -> std::optional<SceneBuilder> {
                  SceneBuilder out = builder;

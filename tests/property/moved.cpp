@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "common/base/overloaded.h"
-#include "common/scene/schema/describe_fields.h"
+#include "core/base/overloaded.h"
+#include "core/scene/schema/describe_fields.h"
 
 namespace ls::test {
 namespace {

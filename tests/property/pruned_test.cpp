@@ -1,4 +1,4 @@
-// What is taken out of a scene before it becomes a job (common/scene/analysis/prune.h) changes no image:
+// Pruning a scene (core/scene/analysis/prune.h) before it becomes a job changes no image:
 // random scenes beside themselves as they are sent. The same bits, but where decision 0012 names an
 // exception: without a surface that light passes, a medium or a layer of a blend, paths draw other numbers,
 // and means are compared as in agreement_test.cpp.
@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-#include "common/scene/analysis/prune.h"
+#include "core/scene/analysis/prune.h"
 #include "tests/property/compare.h"
 #include "tests/property/random_scene.h"
 #include "tests/property/watch.h"

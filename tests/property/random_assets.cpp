@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "common/image/exr/exr_file.h"
+#include "core/image/exr/exr_file.h"
 #include "tests/support/scene_builder.h"
 
 namespace ls::test {
@@ -198,7 +198,7 @@ Asset random_ply(Dice& dice, RandomAssets& assets, double wild) {
   return assets.add(".ply", s);
 }
 
-// One mesh, version 4, double precision; the format is told in common/assets/serialized.cpp.
+// One mesh, version 4, double precision; the format is told in core/assets/serialized.cpp.
 Asset random_serialized(Dice& dice, RandomAssets& assets, double wild) {
   const Mesh m = random_mesh(dice, wild);
   std::string plain;

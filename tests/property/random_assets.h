@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "common/scene/read.h"
+#include "formats/read.h"
 #include "tests/property/dice.h"
 #include "worker/render/render.h"
 

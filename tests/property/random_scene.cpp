@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/scene/schema/validate.h"
+#include "core/scene/schema/validate.h"
 #include "tests/property/draw.h"
 
 namespace ls::test {

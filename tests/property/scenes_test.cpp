@@ -8,9 +8,9 @@
 #include <chrono>
 #include <cmath>
 
-#include "common/scene/json/serialize.h"
-#include "common/scene/reader/xml_write.h"
-#include "common/scene/schema/validate.h"
+#include "core/scene/json/serialize.h"
+#include "core/scene/schema/validate.h"
+#include "formats/reader/xml_write.h"
 #include "tests/property/random_scene.h"
 #include "tests/property/watch.h"
 #include "tests/support/render_check.h"
@@ -153,7 +153,7 @@ std::string wrong_with(RandomScene& s, Tally& tally) {
   return text;
 }
 
-TEST(RandomScenes, AreRefusedWithAPlaceOrRenderCleanAndAlikeInEveryVariant) {
+TEST(RandomScenes, AreRefusedWithAPlaceOrRenderTheSameInEveryVariant) {
   const auto [first, count] = scenes_to_try(kRandomScenes);
   constexpr int kEnough = 12;  // failures
   Tally tally;

@@ -22,7 +22,7 @@ std::optional<SceneBuilder> with_twins(const SceneBuilder& builder, bool first) 
   return out;
 }
 
-TEST(Touching, ATwinThatNobodySeesChangesNothing) {
+TEST(Touching, InvisibleDuplicateChangesNothing) {
   Tests tests("property/twins");
   for (const bool first : {true, false}) {
     SCOPED_TRACE(first ? "listed before" : "listed after");
@@ -88,7 +88,7 @@ TEST(Touching, BoxesThatShareFacesAreOneBox) {
 
 // A hair takes 1.2e-4 of the fog from each face, in place of which light may come through: some 4e-4 of the
 // image. The standard error of a second look is 1e-3 of it or more.
-TEST(Touching, AHairBetweenFogAndWallsChangesNothing) {
+TEST(Touching, TinyGapBetweenFogAndWallsChangesNothing) {
   constexpr double kHair = 0x1p-13;
   expect_same_fog("property/hair", {{{-1, 1 - kHair}, {-1, 1 - kHair}, {-1 + kHair, 1}}});
 }

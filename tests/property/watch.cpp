@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "common/scene/reader/xml_write.h"
+#include "formats/reader/xml_write.h"
 #include "tests/property/random_scene.h"
 
 namespace ls::test {

@@ -167,8 +167,8 @@ MESH = {"type": "ply", "vertex_positions": CORNERS, "faces": FACES}
 @pytest.mark.parametrize(
     "thing, path, words",
     [
-        ({"type": "bitmap", "data": COLOURS, "filename": "a.exr"}, "x.data", "give one of the two"),
-        ({"type": "bitmap", "data": COLOURS, "bitmap": COLOURS}, "x.bitmap", "give one of the two"),
+        ({"type": "bitmap", "data": COLOURS, "filename": "a.exr"}, "x.data", "give only one of the two"),
+        ({"type": "bitmap", "data": COLOURS, "bitmap": COLOURS}, "x.bitmap", "give only one of the two"),
         ({"type": "bitmap", "data": COLOURS[0, 0]}, "x.data", "(3,"),
         ({"type": "bitmap", "data": COLOURS[..., :2]}, "x.data", "(5, 4, 2)"),
         ({"type": "bitmap", "data": COLOURS.astype(int)}, "x.data", "int64"),
@@ -204,7 +204,7 @@ def test_an_archive_is_a_scene_with_its_files(farm, tmp_path):
     jobs = [farm.submit(scene, **settings) for scene in (fog, tmp_path / "fog.zip")]
 
     assert pixels(jobs[0]) == pixels(jobs[1]) and {"depth", "normal"} <= set(jobs[1].layers())
-    with pytest.raises(lightshaft.RequestRejected, match="has all its files: folder means nothing"):
+    with pytest.raises(lightshaft.RequestRejected, match="contains all its files: folder has no effect"):
         farm.submit(tmp_path / "fog.zip", folder=tmp_path)
     with pytest.raises(lightshaft.FileRefused, match="none.zip"):
         farm.submit(tmp_path / "none.zip")

@@ -92,7 +92,7 @@ RING["again"] = RING
         ({"ball": {"type": "sphere", "bsdf": {"reflectance": 1}}}, "ball.bsdf", "needs a 'type'"),
         ({"ball": {"type": "sphere", "radius": float("nan")}}, "ball.radius", "nan"),
         ({"ball": {"type": "sphere", "center": [1, 2]}}, "ball.center", "shape (2,)"),
-        ({"ball": {"type": "sphere", "center": object()}}, "ball.center", "object cannot stand here"),
+        ({"ball": {"type": "sphere", "center": object()}}, "ball.center", "object is not possible here"),
         (
             {
                 "ball": {
@@ -104,7 +104,7 @@ RING["again"] = RING
             "1 or 3 numbers",
         ),
         ({"ball": {"type": "sphere", "x": {"type": "ref"}}}, "ball.x", "a reference is"),
-        ({"ball": {"type": "sphere", "name": "a\x00b"}}, "ball.name", "no scene can have"),
+        ({"ball": {"type": "sphere", "name": "a\x00b"}}, "ball.name", "are not allowed in scenes"),
         ({"ball": {"type": "sphere", 3: 4}}, "ball", "keys must be strings"),
         ({"ball": RING}, None, "more than 64 deep"),
     ],

@@ -1,4 +1,4 @@
-// What the stop rule promises, on images whose truth is known; the long version is tests/bench/stopping.cpp.
+// Tests the promises of the stop rule on images whose truth is known. bench/stopping.cpp is the long version.
 // Seeds are fixed.
 #include <gtest/gtest.h>
 
@@ -52,7 +52,7 @@ const Measured& usual(const std::string& name) {
   return found->second;
 }
 
-TEST(Stopping, TheErrorIsWhatWasAskedForOrALittleLess) {
+TEST(Stopping, FinalErrorIsAtOrSlightlyBelowTheTarget) {
   for (const char* name : {"even noise", "uneven noise", "a shaft in a calm room", "dark", "fireflies"}) {
     const Measured& m = usual(name);
     EXPECT_LE(m.realised, m.target) << name;
@@ -60,7 +60,7 @@ TEST(Stopping, TheErrorIsWhatWasAskedForOrALittleLess) {
   }
 }
 
-TEST(Stopping, SamplesGoFurtherThanUniformOnes) {
+TEST(Stopping, AdaptiveSamplesAreMoreEfficientThanUniformOnes) {
   for (const char* name : {"uneven noise", "a shaft in a calm room", "dark", "fireflies"}) {
     const Measured& m = usual(name);
     EXPECT_GT(m.uniform_variance / m.spp / m.realised, 1.7) << name;
@@ -69,7 +69,7 @@ TEST(Stopping, SamplesGoFurtherThanUniformOnes) {
   EXPECT_GT(even.uniform_variance / even.spp / even.realised, .97) << "nothing to gain, little to lose";
 }
 
-TEST(Stopping, TheBiasIsFarBelowTheErrorPromised) {
+TEST(Stopping, BiasIsFarBelowTheTargetError) {
   for (const char* name : {"uneven noise", "fireflies", "rare fireflies"}) {
     const Measured m = measure(name, 300, 30);
     const double promised = std::sqrt(m.target);

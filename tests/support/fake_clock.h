@@ -3,7 +3,7 @@
 
 #include <atomic>
 
-#include "common/base/clock.h"
+#include "core/base/clock.h"
 
 namespace ls {
 

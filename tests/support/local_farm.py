@@ -195,6 +195,10 @@ class LocalFarm:
         except urllib.error.HTTPError as error:
             raise HttpError(error.code, error.read().decode(errors="replace")) from None
 
+    def token_of(self, user):
+        """A token of the role `submit`."""
+        return json.loads(self.request("POST", "/api/v1/tokens", json.dumps({"role": "submit", "user": user}).encode()))["token"]
+
     def get(self, path):
         return json.loads(self.request("GET", path))
 

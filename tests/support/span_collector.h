@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "common/trace/tracer.h"
 #include "tests/support/fake_clock.h"
+#include "util/trace/tracer.h"
 
 namespace ls::test {
 

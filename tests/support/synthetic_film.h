@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "common/image/error/error_estimate.h"
 #include "coordinator/domain/adaptive_stop.h"
 #include "coordinator/domain/limits.h"
+#include "core/image/error/error_estimate.h"
 #include "tests/unit/domain/stop_oracle.h"
 
 namespace ls::test {

@@ -67,7 +67,7 @@ def test_partials_have_the_channels_and_merge_to_the_same_layers(fog, expected, 
     lightshaft("merge", kept, "-o", tmp_path / "named.exr", "--scene", fog)
     assert names(tmp_path / "named.exr") == names(expected[1]) and layers(tmp_path / "named.exr") == layers(expected[1])
     said = lightshaft("merge", kept, "-o", tmp_path / "no.exr", "--scene", fog, "-D", "density=3", code=2).stderr
-    assert "is another one: give the same scene file" in said and not (tmp_path / "no.exr").exists()
+    assert "is another scene: give the same scene file" in said and not (tmp_path / "no.exr").exists()
     # Nobody who does not ask for them pays for them.
     plain = tmp_path / "plain"
     render(fog, tmp_path / "out.exr", "--partial-dir", plain)

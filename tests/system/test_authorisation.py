@@ -19,7 +19,7 @@ ORIGIN = {"Origin": "http://farm"}
 BLOB = b"known to all"
 
 
-class Door:
+class Interface:
     """A farm with a token of every role, and a finished job of the owner."""
 
     def __init__(self, folder):
@@ -105,64 +105,64 @@ class Door:
 
 
 @pytest.fixture(scope="module")
-def door(tmp_path_factory):
-    door = Door(tmp_path_factory.mktemp("door"))
-    with door.farm:
-        yield door
+def interface(tmp_path_factory):
+    interface = Interface(tmp_path_factory.mktemp("interface"))
+    with interface.farm:
+        yield interface
 
 
-def documented(door):
-    paths = json.loads(door.ask("get", "/api/v1/openapi.json", "admin")[2])["paths"]
+def documented(interface):
+    paths = json.loads(interface.ask("get", "/api/v1/openapi.json", "admin")[2])["paths"]
     return {f"{method} {path}" for path, item in paths.items() for method in item if method != "parameters"}
 
 
-def test_every_route_of_the_document_has_a_row_and_every_row_a_route(door):
-    assert set(ROUTES) == documented(door)
+def test_every_route_of_the_document_has_a_row_and_every_row_a_route(interface):
+    assert set(ROUTES) == documented(interface)
 
 
 @pytest.mark.parametrize("operation", ROUTES)
-def test_route_answers_each_caller_as_the_table_says(door, operation):
+def test_route_answers_each_caller_as_the_table_says(interface, operation):
     method = operation.split()[0]
     for caller in CALLERS:
         expected = ROUTES[operation][caller]
-        path, body, kind = door.prepare(operation, caller)
-        status, headers, data = door.ask(method, path, caller, body, kind)
+        path, body, kind = interface.prepare(operation, caller)
+        status, headers, data = interface.ask(method, path, caller, body, kind)
         assert status == expected, (caller, data)
         if status >= 400 and method != "head":
             assert headers["Content-Type"] == "application/problem+json", caller
             assert json.loads(data)["status"] == status
         if method == "get":
-            assert door.ask("head", path, caller)[0] == expected, caller
-        if caller in door.sessions and "session" not in operation:
-            path, body, kind = door.prepare(operation, caller)
-            assert door.ask(method, path, caller, body, kind, session=True)[0] == expected, f"{caller}, with a session"
+            assert interface.ask("head", path, caller)[0] == expected, caller
+        if caller in interface.sessions and "session" not in operation:
+            path, body, kind = interface.prepare(operation, caller)
+            assert interface.ask(method, path, caller, body, kind, session=True)[0] == expected, f"{caller}, with a session"
 
 
-def test_a_job_of_another_and_none_at_all_look_the_same(door):
-    answers = [door.ask("get", f"/api/v1/jobs/{job}", "other") for job in (door.done, "j-" + "0" * (len(door.done) - 2))]
+def test_a_job_of_another_and_none_at_all_look_the_same(interface):
+    answers = [interface.ask("get", f"/api/v1/jobs/{job}", "other") for job in (interface.done, "j-" + "0" * (len(interface.done) - 2))]
     told = [json.loads(data) for _, _, data in answers]
     assert told[0] == told[1]
     assert [dict(h) | {"Date": ""} for _, h, _ in answers][0] == [dict(h) | {"Date": ""} for _, h, _ in answers][1]
 
 
-def test_a_submit_token_lists_its_own_jobs_alone(door):
-    mine = door.submit("other")
-    jobs = {c: json.loads(door.ask("get", "/api/v1/jobs", c)[2])["jobs"] for c in ("owner", "other", "read", "admin")}
+def test_a_submit_token_lists_its_own_jobs_alone(interface):
+    mine = interface.submit("other")
+    jobs = {c: json.loads(interface.ask("get", "/api/v1/jobs", c)[2])["jobs"] for c in ("owner", "other", "read", "admin")}
     assert mine in {j["id"] for j in jobs["other"]} and {j["owner"] for j in jobs["other"]} == {"bert"}
     assert {j["owner"] for j in jobs["owner"]} == {"anna"}
-    seen = json.loads(door.ask("get", "/api/v1/jobs", "other")[2])
+    seen = json.loads(interface.ask("get", "/api/v1/jobs", "other")[2])
     assert seen["owners"] == ["bert"] and sum(seen["states"].values()) == seen["total"] == len(jobs["other"])
     for caller in ("read", "admin"):
-        assert {door.done, mine} <= {j["id"] for j in jobs[caller]}
+        assert {interface.done, mine} <= {j["id"] for j in jobs[caller]}
 
 
-def test_an_event_stream_tells_a_submit_token_of_its_own_jobs_alone(door):
-    last = json.loads(door.ask("get", f"/api/v1/jobs/{door.done}", "admin")[2])
+def test_an_event_stream_tells_a_submit_token_of_its_own_jobs_alone(interface):
+    last = json.loads(interface.ask("get", f"/api/v1/jobs/{interface.done}", "admin")[2])
     assert last["owner"] == "anna"
-    connection = http.client.HTTPConnection("127.0.0.1", door.farm.http, timeout=PATIENCE)
-    connection.request("GET", "/api/v1/events?last_event_id=0", headers={"Authorization": f"Bearer {door.tokens['other']}"})
+    connection = http.client.HTTPConnection("127.0.0.1", interface.farm.http, timeout=PATIENCE)
+    connection.request("GET", "/api/v1/events?last_event_id=0", headers={"Authorization": f"Bearer {interface.tokens['other']}"})
     stream = connection.getresponse()
-    mine = door.submit("other")
+    mine = interface.submit("other")
     of_others, kind = [], None
     while True:
         line = stream.readline().decode().rstrip("\n")
@@ -171,12 +171,12 @@ def test_an_event_stream_tells_a_submit_token_of_its_own_jobs_alone(door):
         if not line.startswith("data: "):
             continue
         data = json.loads(line[6:])
-        if kind == "worker" and data.get("job") == door.done:
+        if kind == "worker" and data.get("job") == interface.done:
             of_others.append(data)
-        if kind == "tile" and data["job"] == door.done:
+        if kind == "tile" and data["job"] == interface.done:
             of_others.append(data)
         if kind == "job":
-            if data["id"] == door.done:
+            if data["id"] == interface.done:
                 of_others.append(data)
             if data["id"] == mine and data["state"] == "done":
                 break
@@ -184,46 +184,46 @@ def test_an_event_stream_tells_a_submit_token_of_its_own_jobs_alone(door):
     assert of_others == []
 
 
-def test_a_revoked_token_ends_its_sessions_and_its_event_streams(door):
-    made = json.loads(door.ask("post", "/api/v1/tokens", "admin", b'{"role": "read", "user": "gone"}')[2])
-    door.tokens["gone"] = made["token"]
-    door.sessions["gone"] = door.open_session("gone")
-    connection = http.client.HTTPConnection("127.0.0.1", door.farm.http, timeout=PATIENCE)
+def test_a_revoked_token_ends_its_sessions_and_its_event_streams(interface):
+    made = json.loads(interface.ask("post", "/api/v1/tokens", "admin", b'{"role": "read", "user": "gone"}')[2])
+    interface.tokens["gone"] = made["token"]
+    interface.sessions["gone"] = interface.open_session("gone")
+    connection = http.client.HTTPConnection("127.0.0.1", interface.farm.http, timeout=PATIENCE)
     connection.request("GET", "/api/v1/events", headers={"Authorization": f"Bearer {made['token']}"})
     stream = connection.getresponse()
     assert stream.status == 200
 
-    assert door.ask("delete", f"/api/v1/tokens/{made['id']}", "admin")[0] == 204
+    assert interface.ask("delete", f"/api/v1/tokens/{made['id']}", "admin")[0] == 204
 
-    assert door.ask("get", "/api/v1/jobs", "gone")[0] == 401
-    assert door.ask("get", "/api/v1/jobs", "gone", session=True)[0] == 401
+    assert interface.ask("get", "/api/v1/jobs", "gone")[0] == 401
+    assert interface.ask("get", "/api/v1/jobs", "gone", session=True)[0] == 401
     stream.read()  # returns: it has ended, with the next heartbeat
     connection.close()
 
 
-def test_only_digests_of_tokens_are_on_the_disk(door):
-    secret = door.make_token("submit", "carla")
-    assert hashlib.sha256(secret.encode()).hexdigest() in (door.farm.data / "tokens").read_text()
-    for file in door.farm.data.rglob("*"):
+def test_only_digests_of_tokens_are_on_the_disk(interface):
+    secret = interface.make_token("submit", "carla")
+    assert hashlib.sha256(secret.encode()).hexdigest() in (interface.farm.data / "tokens").read_text()
+    for file in interface.farm.data.rglob("*"):
         if file.is_file():
             assert secret.encode() not in file.read_bytes(), file
-    assert secret not in door.farm.coordinator.output()
+    assert secret not in interface.farm.coordinator.output()
 
 
-def test_the_command_line_makes_lists_and_revokes_tokens(door):
+def test_the_command_line_makes_lists_and_revokes_tokens(interface):
     def run(*args, caller="admin"):
-        env = dict(os.environ, LIGHTSHAFT_URL=f"http://127.0.0.1:{door.farm.http}", LIGHTSHAFT_TOKEN=door.tokens[caller])
-        return subprocess.run([door.farm.bin / "lightshaft", "token", *args], env=env, capture_output=True, text=True, timeout=PATIENCE)
+        env = dict(os.environ, LIGHTSHAFT_URL=f"http://127.0.0.1:{interface.farm.http}", LIGHTSHAFT_TOKEN=interface.tokens[caller])
+        return subprocess.run([interface.farm.bin / "lightshaft", "token", *args], env=env, capture_output=True, text=True, timeout=PATIENCE)
 
     made = run("add", "--role", "submit", "--user", "dora")
     assert made.returncode == 0, made.stderr
-    door.tokens["dora"] = made.stdout.strip()
-    assert door.ask("get", "/api/v1/jobs", "dora")[0] == 200
+    interface.tokens["dora"] = made.stdout.strip()
+    assert interface.ask("get", "/api/v1/jobs", "dora")[0] == 200
     listed = run("list")
-    assert "dora" in listed.stdout and "DATA/join-token" in listed.stdout and door.tokens["dora"] not in listed.stdout
+    assert "dora" in listed.stdout and "DATA/join-token" in listed.stdout and interface.tokens["dora"] not in listed.stdout
     identity = next(line.split()[0] for line in listed.stdout.splitlines() if "dora" in line)
     assert run("revoke", identity).returncode == 0
-    assert door.ask("get", "/api/v1/jobs", "dora")[0] == 401
+    assert interface.ask("get", "/api/v1/jobs", "dora")[0] == 401
 
     for args in (["revoke", identity], ["revoke", "../jobs"], ["add", "--role", "submit"], ["add", "--role", "boss"]):
         wrong = run(*args)
@@ -232,11 +232,11 @@ def test_the_command_line_makes_lists_and_revokes_tokens(door):
     assert refused.returncode == 1 and "submit" in refused.stderr
 
 
-def test_tokens_survive_a_kill_of_the_coordinator(door):
-    door.farm.restart_coordinator()
+def test_tokens_survive_a_kill_of_the_coordinator(interface):
+    interface.farm.restart_coordinator()
     for caller in ("read", "owner", "admin"):
-        assert door.ask("get", f"/api/v1/jobs/{door.done}", caller)[0] == 200
-    assert door.ask("get", f"/api/v1/jobs/{door.done}", "other")[0] == 404
+        assert interface.ask("get", f"/api/v1/jobs/{interface.done}", caller)[0] == 200
+    assert interface.ask("get", f"/api/v1/jobs/{interface.done}", "other")[0] == 404
 
 
 def test_every_rpc_has_a_row():
@@ -244,12 +244,12 @@ def test_every_rpc_has_a_row():
 
 
 @pytest.mark.parametrize("caller", RPC_CALLERS)
-def test_rpcs_answer_each_caller_as_the_table_says(door, caller):
+def test_rpcs_answer_each_caller_as_the_table_says(interface, caller):
     rpc = pytest.importorskip("farm_rpc", reason="python3-grpcio is not installed")
-    token = door.tokens[caller] or ""
-    with rpc.channel_of(door.farm.grpc) as channel:
+    token = interface.tokens[caller] or ""
+    with rpc.channel_of(interface.farm.grpc) as channel:
         assert rpc.work(channel, token) == RPCS["Work"][caller]
-        status, got = rpc.fetch_blob(channel, token, door.blob)
+        status, got = rpc.fetch_blob(channel, token, interface.blob)
     assert status == RPCS["FetchBlob"][caller]
     assert (got > 0) == (status == "OK")
 

@@ -87,7 +87,7 @@ def test_tls_at_a_port_without_it_is_named(idle):
 def test_a_worker_is_told_of_a_url_and_of_the_wrong_port(idle, tmp_path):
     worker = [bin_dir() / "lightshaft-worker", "--fake", "--cache", tmp_path / "cache"]
     given = subprocess.run([*worker, "--coordinator", "http://farm.example:8080"], capture_output=True, text=True)
-    assert given.returncode == 2 and "without http://; farm.example:50051 say" in given.stderr
+    assert given.returncode == 2 and "without http://, for example farm.example:50051" in given.stderr
 
     log = tmp_path / "log"
     with open(log, "w") as out:
@@ -108,7 +108,7 @@ def test_ctrl_c_in_a_wait_says_that_the_job_goes_on(idle, tmp_path):
         _, error = waiting.communicate()
 
     assert waiting.returncode == -signal.SIGINT
-    assert f"job {job} goes on: lightshaft watch {job} follows it, lightshaft cancel {job} ends it" in error
+    assert f"job {job} continues: lightshaft watch {job} follows it, lightshaft cancel {job} ends it" in error
     assert json.loads(call(idle, "show", job, "--json").stdout)["state"] == "queued"
 
 

@@ -5,13 +5,15 @@ import math
 import os
 import re
 import shutil
+import signal
 import subprocess
+import sys
 
 import pytest
 
 from cli_kit import bin_dir, lightshaft, write_fog
 from exr_layers import read, write_rgb
-from local_farm import PATIENCE
+from local_farm import PATIENCE, ROOT
 
 
 def rows(path):
@@ -116,6 +118,72 @@ def test_a_set_of_scenes_has_one_table(tmp_path):
     assert (tmp_path / "out" / "b.svg").exists()
     fog, b = (tmp_path / "out" / "report.md").read_text().split("## b\n")
     assert "fog.0.exr and fog.1.exr, two independent references" in fog and "pictures of all other seeds" in b
+
+
+SHORT = ("--time", "60", "--spp", "2", "--seeds", "2")
+
+
+def test_entrants_are_called_as_the_user_called_them(tmp_path):
+    compare(tmp_path, "--integrators", "volpath,volpathmis", *SHORT)
+
+    assert [row["entrant"] for row in rows(tmp_path / "out" / "summary.csv")] == ["Lightshaft volpath", "Lightshaft volpathmis"]
+
+
+@pytest.mark.parametrize("integrators, told, ranked", [
+    (["volpath"], [], []),
+    (["volpath", "path"], ["the others are not measured: without --reference"], []),
+    (["volpath", "volpath_distant_mis"], [], ["Lightshaft volpath_distant_mis"]),
+])
+def test_an_entrant_that_is_killed_is_named_and_the_report_is_written(tmp_path, integrators, told, ranked):
+    """A program that stands for `lightshaft` kills the lanes of one entrant."""
+    program = tmp_path / "lightshaft"
+    program.write_text(f"""#!/bin/sh
+case "$*" in race-lane*--integrator=volpath" "*) kill -9 $$;; esac
+exec {bin_dir() / "lightshaft"} "$@"
+""")
+    program.chmod(0o755)
+    (tmp_path / "out").mkdir()
+    done = subprocess.run([sys.executable, "-B", ROOT / "python" / "src" / "lightshaft_command", "compare", "--time=60", "--spp=2", "--seeds=2", "--size=48x32",
+                           "--threads=1", "--clock=cpu", f"--report={tmp_path / 'out'}", *(f"--integrators={i}" for i in integrators), "--quiet=true", "--",
+                           write_fog(tmp_path)], capture_output=True, text=True, env={**os.environ, "LIGHTSHAFT_PROGRAMS": str(tmp_path)})
+
+    assert done.returncode == 1
+    first, *others = done.stderr.splitlines()
+    assert first == "lightshaft: error: fog: Lightshaft volpath: its process was killed by signal 9"
+    assert len(others) == len(told) and all(words in line for words, line in zip(told, others))
+    assert "Lightshaft volpath failed: its process was killed by signal 9" in (tmp_path / "out" / "report.md").read_text()
+    assert [row["entrant"] for row in rows(tmp_path / "out" / "summary.csv")] == ranked
+
+
+def test_scenes_may_have_any_name(tmp_path):
+    scene = write_fog(tmp_path)
+    for name in (b"--x.xml", b"fo\xffg.xml"):
+        shutil.copy(scene, os.fsencode(tmp_path) + b"/" + name)
+    done = subprocess.run([bin_dir() / "lightshaft", "compare", "--size", "48x32", "--threads", "1", "--clock", "cpu", "--report", "out", *SHORT, "--",
+                           b"--x.xml", b"fo\xffg.xml"], cwd=tmp_path, capture_output=True)  # fmt: skip
+
+    assert done.returncode == 0, done.stderr
+    assert b"--x: Lightshaft volpath: 2 samples" in done.stdout and b"fo?g: Lightshaft volpath: 2 samples" in done.stdout
+    assert (tmp_path / "out" / "fo_g.svg").exists() and "fo?g" in (tmp_path / "out" / "report.md").read_text()
+
+
+def test_a_flag_that_is_false_is_not_given(tmp_path):
+    assert "seed 1 of 2" in compare(tmp_path, *SHORT, "--quiet=false", quiet=False).stderr
+    assert "seed 1 of 2" not in compare(tmp_path, *SHORT, "--quiet=true", quiet=False).stderr
+
+
+@pytest.mark.parametrize("command", [["compare", "fog.xml", "--time", "60", "--report", "out"], ["farm", "up", "--on", "ssh"]])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_the_command_starts_ends_it_without_a_traceback(tmp_path, command, number):
+    def wait_for_python():
+        signal.signal(number, signal.SIG_DFL)  # a shell in the background lets its programs ignore SIGINT
+        signal.pthread_sigmask(signal.SIG_BLOCK, [number])
+        os.kill(os.getpid(), number)
+
+    write_fog(tmp_path)
+    done = subprocess.run([bin_dir() / "lightshaft", *command], cwd=tmp_path, preexec_fn=wait_for_python, capture_output=True, text=True, timeout=PATIENCE)
+
+    assert (done.returncode, done.stderr) == (1, "lightshaft: stopping\n")
 
 
 @pytest.mark.slow

@@ -56,3 +56,11 @@ def test_a_hungry_worker_ends_neither_redis_nor_the_coordinator():
     assert worker["oom_score_adj"] > max(SERVICES[name].get("oom_score_adj", 0) for name in ("redis", "coordinator"))
     # Docker's client of docker-compose 1.29 takes an int only, and a variable's value is text.
     assert isinstance(worker["pids_limit"], int) and worker["pids_limit"] > 256, "as many threads as a worker may have, and more"
+
+
+def test_the_engine_gets_every_folder_that_the_build_needs():
+    lists = (ROOT / "CMakeLists.txt").read_text().partition("if(LIGHTSHAFT_TESTS)")[0]
+    needed = {folder.partition("/")[0] for folder in re.findall(r"^add_subdirectory\((\S+)\)", lists, re.M)}
+    given = {line[1:] for line in (ROOT / ".dockerignore").read_text().splitlines() if line.startswith("!")}
+    assert {"core", "worker", "coordinator"} <= needed
+    assert needed <= given, f".dockerignore keeps {needed - given} from the engine"

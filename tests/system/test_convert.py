@@ -68,7 +68,7 @@ def test_files_from_elsewhere_come_into_the_folder(tmp_path):
 
     done = lightshaft("convert", scene, out / "two.xml")
 
-    assert "becomes" in done.stderr
+    assert "is renamed to" in done.stderr
     names = sorted(p.name for p in out.iterdir())
     assert len(names) == 3 and names[1] == "fog.vol" and names[0].endswith("-fog.vol"), names
     assert identity(out / "two.xml") == done.stdout.split()[1]
@@ -85,7 +85,7 @@ def test_nothing_is_overwritten_but_out_itself(tmp_path):
 
     assert "another folder" in lightshaft("convert", scene, out / "fog.xml", code=1).stderr
     assert (out / "fog.vol").read_bytes() == b"another one" and not (out / "fog.xml").exists()
-    assert "over itself" in lightshaft("convert", scene, scene, code=2).stderr
+    assert "is the scene itself" in lightshaft("convert", scene, scene, code=2).stderr
     assert scene.read_text() == FOG
     (out / "fog.vol").unlink()
     (out / "fog.xml").write_text("old")

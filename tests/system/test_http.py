@@ -1,4 +1,4 @@
-"""The coordinator's HTTP door, as the outside world meets it: real process, real sockets, bad manners.
+"""The coordinator's HTTP interface, as clients meet it: real process, real sockets, bad manners.
 
 Only Python's standard library. The deadlines under test are shortened with the coordinator's config file, so nothing
 here waits for more than a second or two, and nothing sleeps.

@@ -1,4 +1,4 @@
-"""Many jobs open at once, with workers that render: each must come to its end. Short rows of tests/bench/open_jobs.py."""
+"""Many jobs open at once, with workers that render: each must come to its end. Short rows of bench/open_jobs.py."""
 
 import pytest
 from local_farm import SCENE, wait_until

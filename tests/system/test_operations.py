@@ -266,7 +266,7 @@ def test_a_restored_coordinator_of_several_is_who_it_was_and_knows_users_and_wor
         flags = ["--shared", "--store", redis.url, "--blobs", tmp_path / "blobs"]
         with LocalFarm(tmp_path / "farm", flags=flags, tls=True, secrets=tmp_path / "secrets") as farm:
             farm.add_worker("--fake-delay", 10)
-            user = json.loads(farm.request("POST", "/api/v1/tokens", b'{"role": "submit", "user": "ann"}'))["token"]
+            user = farm.token_of("ann")
             job = farm.submit(SCENE, **SPEC)
             farm.wait_for_progress(job, 8)
             backup(farm, tmp_path / "backup.tar.gz", farm.secrets)

@@ -1,4 +1,4 @@
-"""tests/bench/race.py: a program that is none of ours races with us, well-behaved or not."""
+"""bench/race.py: a program that is none of ours races with us, well-behaved or not."""
 
 import csv
 import json
@@ -19,7 +19,7 @@ from racing import adapter, program
 from racing.adapter import Cost, Made, RaceError
 from racing.racers import next_run, next_turn
 
-ADAPTERS = ROOT / "tests" / "bench" / "adapters"
+ADAPTERS = ROOT / "bench" / "adapters"
 
 
 # ---- adapters, and what is believed of a program's claims ----
@@ -57,7 +57,7 @@ def test_adapters_are_refused_with_the_key_that_is_wrong(keys, said):
         parsed(**keys)
 
 
-def test_what_is_no_adapter_is_refused_with_its_file(tmp_path):
+def test_a_file_that_is_no_adapter_is_named(tmp_path):
     (tmp_path / "list.json").write_text("[]")
     with pytest.raises(RaceError, match="list.json: an adapter is a JSON object"):
         adapter.read(tmp_path / "list.json")
@@ -224,7 +224,7 @@ def other(folder):
 
 
 def race_command(folder, *arguments):
-    return [*map(str, [ROOT / "tests" / "bench" / "race.py", *arguments, "--threads", 1, "--clock", "cpu", "--report", folder / "out"])]
+    return [*map(str, [ROOT / "bench" / "race.py", *arguments, "--threads", 1, "--clock", "cpu", "--report", folder / "out"])]
 
 
 def race(folder, *arguments, code=0, scenes=()):

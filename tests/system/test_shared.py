@@ -231,8 +231,8 @@ def test_a_coordinator_that_knows_of_no_others_does_not_take_their_jobs(pair, re
 
 
 @pytest.mark.parametrize("flags, said", [
-    (["--shared"], "a place that all coordinators reach"),
-    (["--shared", "--store", "redis://127.0.0.1:1", "--blobs", "there", "--keep-unused-hours", "1"], "do not go together"),
+    (["--shared"], "storage that all coordinators reach"),
+    (["--shared", "--store", "redis://127.0.0.1:1", "--blobs", "there", "--keep-unused-hours", "1"], "cannot be combined"),
     (["--shared", "--store", "redis://127.0.0.1:1", "--blobs", "there"], "start Redis first"),
     (["--shared", "--store", "redis://127.0.0.1:1", "--blobs", "there", "--tls"], "the same --secrets FOLDER"),
 ])

@@ -18,10 +18,6 @@ def farm():
         yield farm
 
 
-def token_of(farm, user):
-    return json.loads(farm.request("POST", "/api/v1/tokens", json.dumps({"role": "submit", "user": user}).encode()))["token"]
-
-
 def connection(farm, text=b""):
     sock = socket.create_connection(("127.0.0.1", farm.http))
     sock.sendall(text)
@@ -33,7 +29,7 @@ def head(token, line, more=""):
 
 
 def test_unfinished_bodies_of_one_user_keep_nobody_out(farm):
-    mallory, bob = token_of(farm, "mallory"), token_of(farm, "bob")
+    mallory, bob = farm.token_of("mallory"), farm.token_of("bob")
     length = 32 << 20
     held = [connection(farm, head(mallory, "POST /api/v1/jobs", f"Content-Type: application/xml\r\nContent-Length: {length}\r\n")) for _ in range(8)]
 
@@ -104,7 +100,7 @@ def test_a_job_is_refused_while_the_database_is_locked_and_readyz_says_why(tmp_p
 
 def test_films_of_one_user_leave_room_for_others(tmp_path):
     with LocalFarm(tmp_path, flags=["--film-memory", "1G"]) as farm:
-        mallory, bob = token_of(farm, "mallory"), token_of(farm, "bob")
+        mallory, bob = farm.token_of("mallory"), farm.token_of("bob")
 
         def submit(token):  # 402 MB of film each
             return farm.request("POST", "/api/v1/jobs?spp=1&size=4096x2048", SCENE.encode(), "application/xml", token)

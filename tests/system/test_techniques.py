@@ -52,6 +52,29 @@ def test_inspect_foretells_what_the_reports_of_a_render_and_of_a_farm_name(scene
     assert "lamp_flights=&quot;-1&quot;" in (tmp_path / "a.html").read_text()
 
 
+def test_a_job_chooses_techniques_in_place_of_its_scene(scene, tmp_path):
+    def pixels(report):
+        return json.loads((tmp_path / report).read_text())["pixels_sha256"]
+
+    chosen = "--techniques=-equiangular,-path_reuse"
+    lightshaft("render", scene, chosen, "-o", tmp_path / "option.exr", "--report", tmp_path / "option.json")
+    with LocalFarm(tmp_path / "farm") as farm:
+        farm.add_workers(1, fake=False)
+        job = farm.submit(SCENE, techniques="-equiangular,-path_reuse")
+        farm.wait_for_job(job)
+        on_farm = farm.report(job)
+    off = '<integer name="equiangular" value="-1"/><integer name="path_reuse" value="-1"/>'
+    written = tmp_path / "written.xml"
+    written.write_text(SCENE.replace('value="4"/></integrator>', f'value="4"/>{off}</integrator>'))
+    lightshaft("render", written, "-o", tmp_path / "written.exr", "--report", tmp_path / "written.json")
+
+    assert names(json.loads((tmp_path / "option.json").read_text())) == []
+    assert pixels("option.json") == pixels("written.json") == on_farm["pixels_sha256"]
+    assert "match the seal" in lightshaft("verify", tmp_path / "option.exr", "--scene", scene, chosen).stdout
+    assert "--techniques" in lightshaft("verify", tmp_path / "option.exr", "--scene", scene, code=2).stderr
+    assert "path_reuse" in lightshaft("render", scene, "--techniques=-reuse", "-o", tmp_path / "no.exr", code=2).stderr
+
+
 def test_a_scene_that_uses_none_names_none(scene, tmp_path):
     off = '<integer name="equiangular" value="-1"/><integer name="path_reuse" value="-1"/>'
     scene.write_text(SCENE.replace('value="4"/></integrator>', f'value="4"/>{off}</integrator>'))
@@ -62,7 +85,7 @@ def test_a_scene_that_uses_none_names_none(scene, tmp_path):
 
 
 def test_the_script_tells_what_each_technique_costs_and_brings(scene):
-    script = [sys.executable, ROOT / "tests/bench/techniques.py", f"{scene}@16x12", "--seeds", "2", "--spp", "4", "--json", scene.with_suffix(".json")]
+    script = [sys.executable, ROOT / "bench/techniques.py", f"{scene}@16x12", "--seeds", "2", "--spp", "4", "--json", scene.with_suffix(".json")]
     page = subprocess.run(script, check=True, capture_output=True, text=True).stdout
     rows = json.loads(scene.with_suffix(".json").read_text())
 
@@ -71,7 +94,7 @@ def test_the_script_tells_what_each_technique_costs_and_brings(scene):
 
 
 def test_the_script_tells_what_learning_costs(scene):
-    script = [sys.executable, ROOT / "tests/bench/learning.py", f"{scene}@16x12", "--runs", "2"]
+    script = [sys.executable, ROOT / "bench/learning.py", f"{scene}@16x12", "--runs", "2"]
     *_, row = subprocess.run(script, check=True, capture_output=True, text=True).stdout.splitlines()
     name, techniques, load, learning, *shares = row.strip("| ").split(" | ")
 
@@ -82,7 +105,7 @@ def test_the_script_tells_what_learning_costs(scene):
 
 
 def test_the_script_tells_how_rendering_scales(scene):
-    script = [sys.executable, ROOT / "tests/bench/threads.py", f"{scene}@16x12", "--spp", "4", "--threads", "1,2,3"]
+    script = [sys.executable, ROOT / "bench/threads.py", f"{scene}@16x12", "--spp", "4", "--threads", "1,2,3"]
     head, _, row = subprocess.run(script, check=True, capture_output=True, text=True).stdout.splitlines()
     name, *figures = row.strip("| ").split(" | ")
 

@@ -169,7 +169,7 @@ def test_a_first_scene_with_warnings_is_rendered(tmp_path, leaves_nothing):
 
     up = Up(tmp_path, scene=scene)
 
-    assert not up.said("(?m)^(there is no )?first picture")[1], up.text()
+    assert not up.said("(?m)^(the )?first picture")[1], up.text()
     assert len(up.jobs()) == 1
     up.interrupt()
     up.ends()
@@ -181,7 +181,7 @@ def test_a_first_scene_that_is_refused_is_shown_with_the_reason(tmp_path, leaves
 
     up = Up(tmp_path, scene=scene)
 
-    up.said(r"(?m)^there is no first picture: .*\n.*broken\.xml")
+    up.said(r"(?m)^the first picture failed: .*\n.*broken\.xml")
     up.interrupt()
     up.ends()
 
@@ -193,7 +193,7 @@ def test_killed_programs_are_started_again_where_they_were(tmp_path, leaves_noth
     for program in ("worker", "coordinator"):
         old = up.child(f"lightshaft-{program}")
         os.kill(old, signal.SIGKILL)
-        up.said(f"the {program} ended by signal 9 .SIGKILL. and is started again")
+        up.said(f"the {program} ended by signal 9 .SIGKILL. and is restarted")
         wait_until(lambda: up.child(f"lightshaft-{program}") not in (None, old), f"there is a new {program}")
         wait_until(up.connected, f"a worker is connected, at the same address, after the {program} was killed")
 
@@ -211,12 +211,12 @@ def test_drained_workers_stay_away(tmp_path, leaves_nothing):
     for worker in up.connected():
         up.ask(f"/api/v1/workers/{worker['id']}", {"state": "draining"})
 
-    up.said("the worker was drained and has left")
+    up.said("the worker was drained and has ended")
     other.said("the worker was drained by the farm")
     other.ends()
     up.interrupt()
     up.ends()
-    assert "is started again" not in up.text() + other.text()
+    assert "is restarted" not in up.text() + other.text()
 
     again = Up(tmp_path, "--lan")
     assert wait_until(again.connected, "a new start has a worker")[0]["id"] != own["id"]
@@ -243,7 +243,7 @@ def test_what_cannot_be_written_on_a_full_disk_does_not_keep_it_from_starting(tm
 
     up = Up(tmp_path)
 
-    up.said("there is no first picture: .*doctor.json")
+    up.said("the first picture failed: .*doctor.json")
     wait_until(up.connected, "the worker has joined")
     assert not (home / "ports.json").exists()
     up.interrupt()
@@ -260,7 +260,7 @@ def test_nohup_keeps_it_when_the_terminal_closes(tmp_path, leaves_nothing):
     up.process.send_signal(signal.SIGHUP)
     os.kill(up.child("lightshaft-worker"), signal.SIGKILL)
 
-    up.said("the worker ended by signal 9 .SIGKILL. and is started again")
+    up.said("the worker ended by signal 9 .SIGKILL. and is restarted")
     up.interrupt()
     up.ends()
 
@@ -311,7 +311,7 @@ def test_no_proxy_sees_the_farms_token(tmp_path, leaves_nothing):
         address = f"http://127.0.0.1:{proxy.getsockname()[1]}"
         up = Up(tmp_path, environment={"http_proxy": address, "no_proxy": "farm.example", "NO_PROXY": ""})
 
-        said = up.said("(?m)^(there is no )?first picture")
+        said = up.said("(?m)^(the )?first picture")
 
         assert not said[1], up.text()
         assert "no_proxy=farm.example,127.0.0.1" in up.said("export .*")[0]
@@ -418,7 +418,7 @@ def test_a_wrong_code_is_refused_before_the_token_is_shown(tmp_path, leaves_noth
 
     assert "copy the whole line" in said["cut"]
     assert "is not the one that printed this code" in said["other farm"]
-    assert "does not know this code" in said["other token"]
+    assert "does not accept this code" in said["other token"]
     assert len(up.connected()) == 1
     up.interrupt()
     up.ends()

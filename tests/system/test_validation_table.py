@@ -74,7 +74,7 @@ def inspected(tmp_path, code, sensor="", phase="isotropic", values=""):
 def test_tabulated_phase_functions_are_refused_by_name(tmp_path):
     values = '<string name="values" value="1, 2, 1e6"/>'
     said = inspected(tmp_path, 2, phase="tabphase", values=values).stderr
-    assert "scene.xml:3:" in said and 'the phase "tabphase" is not supported: phase functions are "isotropic" and "hg"' in said
+    assert "scene.xml:3:" in said and 'the phase "tabphase" is not supported: only "isotropic" and "hg" are supported' in said
 
 
 def test_shutters_that_mean_nothing_are_warned_of(tmp_path):

@@ -28,7 +28,7 @@ def test_an_image_is_as_sealed(finished):
 
     done = lightshaft("verify", image, "--scene", scene, "--tiles", 2, "--seed", 5)
 
-    assert "2 of 2 tiles are as sealed (6 in the image" in done.stdout
+    assert "2 of 2 tiles match the seal (6 in the image" in done.stdout
     again = json.loads(lightshaft("verify", image, "--scene", scene, "--tiles", 2, "--seed", 5, "--json").stdout)
     assert again["verdict"] == "pass" and [t["spp"] for t in again["tiles"]] == [SPP, SPP]
     assert all(f"tile {t['tile']} [" in done.stdout for t in again["tiles"])  # the same choice
@@ -46,8 +46,8 @@ def test_a_seal_that_is_another_is_found(finished, tmp_path):
 
     done = lightshaft("verify", tmp_path / "forged.exr", "--scene", scene, "--tiles", 6, code=1)
 
-    assert "5 of 6 tiles are as sealed" in done.stdout
-    wrong = [line for line in done.stdout.splitlines() if "the image seals" in line]
+    assert "5 of 6 tiles match the seal" in done.stdout
+    wrong = [line for line in done.stdout.splitlines() if "the image's seal has" in line]
     assert len(wrong) == 1 and wrong[0].startswith("tile 3 [0,32 to 32,40)")
 
 
@@ -101,7 +101,7 @@ def test_an_image_that_was_only_packed_anew_is_as_sealed(layered, tmp_path):
 
     code, said = verify(scene, tmp_path / "same.exr", header, rows, "--tiles", "99")
 
-    assert code == 0 and "6 of 6 tiles are as sealed" in said and "all layers and headers are as sealed" in said
+    assert code == 0 and "6 of 6 tiles match the seal" in said and "all layers and headers match the seal" in said
 
 
 def test_a_change_of_any_layer_is_found(layered, tmp_path):
@@ -110,7 +110,7 @@ def test_a_change_of_any_layer_is_found(layered, tmp_path):
     for layer in rows:
         code, said = verify(scene, tmp_path / "changed.exr", header, with_layer_changed(rows, layer), "--tiles", "1")
 
-        assert code == 1 and f"not as sealed: layer {layer}\n" in said, f"{layer}: {code}, {said}"
+        assert code == 1 and f"differs from the seal: layer {layer}\n" in said, f"{layer}: {code}, {said}"
 
 
 def test_a_change_of_any_header_is_found(layered, tmp_path):
@@ -130,7 +130,7 @@ def test_a_change_of_any_header_is_found(layered, tmp_path):
             code, said = verify(scene, tmp_path / "changed.exr", without, rows, "--tiles", "1")
             assert code != 0 and f"header {name}" in said, f"without {name}: {said}"
     code, said = verify(scene, tmp_path / "changed.exr", {**header, "owner": ("string", b"me")}, rows, "--tiles", "1")
-    assert code == 1 and "not as sealed: header owner" in said
+    assert code == 1 and "differs from the seal: header owner" in said
 
 
 def test_an_image_without_its_seal_is_not_called_as_sealed(layered, tmp_path):
@@ -140,7 +140,7 @@ def test_an_image_without_its_seal_is_not_called_as_sealed(layered, tmp_path):
     code, said = verify(scene, tmp_path / "bare.exr", bare, rows, "--tiles", "1")
     told = json.loads(verify(scene, tmp_path / "bare.exr", bare, rows, "--tiles", "1", "--json")[1])
 
-    assert code == 1 and "layers and headers have no seal" in said and "1 of 1 tiles are as sealed" in said
+    assert code == 1 and "the image has no seal of its layers and headers" in said and "1 of 1 tiles match the seal" in said
     assert told["verdict"] == "unsealed" and told["contents"] == {"verdict": "unsealed", "changed": []}
 
 
@@ -151,8 +151,8 @@ def test_a_seal_made_anew_does_not_hide_a_pixel(layered, tmp_path):
 
         code, said = verify(scene, tmp_path / "forged.exr", resealed(header, changed), changed, "--tiles", "99")
 
-        assert code == 1 and "all layers and headers are as sealed" in said and "5 of 6 tiles are as sealed" in said
-        assert f"pixel {X},{Y} has another value in layer {layer} than its samples give" in said
+        assert code == 1 and "all layers and headers match the seal" in said and "5 of 6 tiles match the seal" in said
+        assert f"pixel {X},{Y} has another value in layer {layer} than its samples" in said
 
 
 def test_a_seal_made_anew_does_not_hide_an_error_once_all_tiles_are_rendered(layered, tmp_path):
@@ -162,7 +162,7 @@ def test_a_seal_made_anew_does_not_hide_an_error_once_all_tiles_are_rendered(lay
 
         code, said = verify(scene, tmp_path / "forged.exr", forged, rows, "--tiles", "99")
 
-        assert code == 1 and f"not as sealed: header lightshaft:{name}\n" in said and "6 of 6 tiles are as sealed" in said
+        assert code == 1 and f"differs from the seal: header lightshaft:{name}\n" in said and "6 of 6 tiles match the seal" in said
     # What no rendering can tell again is no safer than the seal: docs/guide/verify.md says so.
     forged = resealed({**header, "lightshaft:seconds": ("string", b"0.001")}, rows)
     assert verify(scene, tmp_path / "forged.exr", forged, rows, "--tiles", "99")[0] == 0
@@ -213,7 +213,7 @@ def test_tiles_that_an_interrupt_left_out_are_not_called_wrong(tmp_path):
     assert verify.returncode == 1
     told = [line for line in [first, *rest.splitlines()] if line.startswith("tile ")]
     assert all("800 samples: as sealed" in line for line in told)  # those that were rendered, and no others
-    assert f"{len(told)} of 6 tiles are as sealed, {6 - len(told)} were not rendered: stopped" in rest
+    assert f"{len(told)} of 6 tiles match the seal, {6 - len(told)} were not rendered because the run was stopped" in rest
 
 
 def test_an_interrupt_is_heard_before_there_is_anything_to_render(finished, tmp_path):

@@ -9,7 +9,7 @@ import zipfile
 
 import pytest
 from local_farm import ROOT, bin_dir
-from test_up import check_a_farm_of_two_machines, leaves_nothing  # noqa: F401
+from test_up import SCENE, check_a_farm_of_two_machines, leaves_nothing  # noqa: F401
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(bin_dir() != ROOT / "build" / "release" / "bin", reason="wheels are made of the release build")]
 # Every manylinux system has these libraries, the C and C++ runtime; the wheel brings all others.
@@ -71,7 +71,7 @@ def test_licences_and_bill_of_materials_cover_every_library(wheel):
     assert len(owners) > 20
     assert owners <= licensed == listed
     sources = {each["value"] for component in bill["components"] for each in component.get("properties", []) if each["name"] == "lightshaft:source-package"}
-    assert sources and sources == set(re.findall(r"https://snapshot\.debian\.org/package/([^/]+)/[0-9][^/]*/", notice))
+    assert sources and sources == set(re.findall(r"^(\S+) [0-9]\S*$", notice, re.M))
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +84,21 @@ def bath(tmp_path_factory):
 
 def test_it_renders_the_pixels_of_its_build(installed, bath, tmp_path):
     assert pixels(installed / "lightshaft", bath, tmp_path) == pixels(bin_dir() / "lightshaft", bath, tmp_path)
+
+
+def test_its_commands_find_its_other_programs_and_its_python(installed, tmp_path):
+    (tmp_path / "scene.xml").write_text(SCENE)
+    nowhere = {"PATH": "/nonexistent", "HOME": str(tmp_path)}
+
+    def lightshaft(*arguments, code=0):
+        done = subprocess.run([installed / "lightshaft", *map(str, arguments)], env=nowhere, capture_output=True, text=True)
+        assert done.returncode == code, done.stderr
+        return done.stdout + done.stderr
+
+    assert "--join-token FILE is needed" in lightshaft("farm", "up", "--on", "ssh", code=2)
+    lightshaft("compare", tmp_path / "scene.xml", "--time", 60, "--spp", 4, "--seeds", 2, "--report", tmp_path / "out")
+    assert (tmp_path / "out" / "index.html").exists()
+    assert "cases passed" in lightshaft("validate", "--quick", "--case", "N01-no*/grid/volpath")
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can hide this machine's libraries from a program")

@@ -86,7 +86,7 @@ def test_a_link_with_another_users_token_asks_before_it_replaces_a_session(farm,
 
     page.evaluate("void (location.hash = '#token=of-mallory')")
     page.wait("document.querySelector('main .toast button')")
-    page.evaluate("void [...document.querySelectorAll('main .toast button')].find((b) => b.innerText.includes('Go on')).click()")
+    page.evaluate("void [...document.querySelectorAll('main .toast button')].find((b) => b.innerText.includes('Continue')).click()")
     wait_until(lambda: farm.user == "mallory", "the session is the other user's")
 
 

@@ -58,12 +58,11 @@ SceneBuilder row_of_voxels(float density, double sigma, bool by_shadow) {
   return builder;
 }
 
-// If a voxel's density equals the majorant of its macro cell (a block of voxels with a common majorant), no
-// collision in the voxel is a null collision. If the medium does not scatter either, the probabilities of
-// scattering and of a null collision are both 0, and a division by their sum is 0 / 0. This renderer's
-// majorants are 4 ulps above the densities, so the probability of a null collision is never exactly 0. But
-// for densities of 2e-32 the 4 ulps are 1e-38, a denormal, and every thread of the renderer flushes denormals
-// to 0.
+// If a voxel's density equals the majorant of its macro cell, no collision in the voxel is a null collision.
+// If the medium does not scatter either, the probabilities of scattering and of a null collision are both 0,
+// and a division by their sum is 0 / 0. This renderer's majorants are 4 ulps above the densities, so the
+// probability of a null collision is never exactly 0. But for densities of 2e-32 the 4 ulps are 1e-38, a
+// denormal, and every thread of the renderer flushes denormals to 0.
 void null_collisions(Table& t) {
   for (const bool by_shadow : {false, true})
     for (const bool tiny : {false, true}) {

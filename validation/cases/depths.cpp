@@ -43,8 +43,8 @@ void nothing(Table& t) {
 
 // A medium that emits eps per length and has the extinction sigma, seen along a ray of length 1: the optical
 // depth tau equals sigma. The radiance is eps (1 - e^-tau) / sigma. The estimate has no variance, except in
-// those macro cells of grids (blocks of voxels with a common majorant) in which a tracker, an algorithm that
-// steps from collision to collision, samples free flights.
+// those macro cells of grids in which a tracker, an algorithm that steps from collision to collision, samples
+// free flights.
 void emission(Table& t) {
   const auto emitting = [](const Configuration& configuration, double tau) {
     SceneBuilder builder = unit_cube(configuration, rgb(tau));

@@ -46,9 +46,8 @@ void white_sky(Table& t) {
       if (warm) k.set_emission(m, rgb(1), true);
       k.container(CubeShape{}, {}, k.null(), m);
     });
-  // Some macro cells (blocks of voxels with a common majorant) are so dense that the optical depth is
-  // integrated voxel by voxel. In the others a tracker (an algorithm that steps from collision to collision)
-  // samples tentative collisions.
+  // Some macro cells are so dense that the optical depth is integrated voxel by voxel. In the others a
+  // tracker (an algorithm that steps from collision to collision) samples tentative collisions.
   add("dense-grid", [](SceneBuilder& k) {
     const VolumeIndex v = k.grid({12, 9, 7}, patchy(12 * 9 * 7, 6), kBox);
     k.container(CubeShape{}, {}, k.null(), k.heterogeneous(v, rgb(1), 30, .8));

@@ -1,5 +1,5 @@
-// Media given by grids: majorants (upper bounds of the density) far above the density, single dense voxels,
-// rays along the faces of voxels, and invalid densities.
+// Media given by grids: majorants far above the density, single dense voxels, rays along the faces of voxels,
+// and invalid densities.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -89,8 +89,7 @@ double depth_along(const std::array<int, 3>& n, const std::vector<float>& values
 
 void bounds_too_high(Table& t) {
   // A grid with sixteen voxels per side, all of density 1 except one voxel beside the ray, which is `times`
-  // times denser. The ray crosses macro cells (blocks of voxels with a common majorant) that contain this
-  // voxel, so its density is their majorant.
+  // times denser. The ray crosses macro cells that contain this voxel, so its density is their majorant.
   for (const bool shadow : {false, true}) {
     for (const double times : {1., 10., 1e4, 1e6}) {
       t.mean(

@@ -9,9 +9,9 @@
 #include <thread>
 #include <vector>
 
-#include "common/base/clock.h"
-#include "common/scene/analysis/prune.h"
-#include "common/scene/json/serialize.h"
+#include "core/base/clock.h"
+#include "core/scene/analysis/prune.h"
+#include "core/scene/json/serialize.h"
 #include "worker/render/render.h"
 
 namespace ls::cli {

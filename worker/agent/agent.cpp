@@ -5,10 +5,10 @@
 
 #include <algorithm>
 
-#include "common/base/failpoint.h"
-#include "common/base/log.h"
-#include "common/base/overloaded.h"
-#include "common/protocol/limits.h"
+#include "core/base/failpoint.h"
+#include "core/base/log.h"
+#include "core/base/overloaded.h"
+#include "util/protocol/limits.h"
 #include "worker/agent/agent_impl.h"
 
 namespace ls::worker {
@@ -295,11 +295,9 @@ std::optional<Result<void>> Agent::Impl::verdict() {
   if (!rendering && outbox.empty() && (outgoing.empty() || connection != Connection::up))
     return broken ? Result<void>(tl::unexpected<Error>(*broken)) : Result<void>{};
   if (clock.now() < drain_deadline) return std::nullopt;
-  return fail(
-      Errc::unavailable,
-      fmt::format("gave up draining after {:.0f} s: {} finished units could not be handed in; they will be "
-                  "rendered again elsewhere",
-                  seconds(options.drain_limit), outbox.size()));
+  return fail(Errc::unavailable, fmt::format("gave up draining after {:.0f} s: {} finished units could not "
+                                             "be delivered; other workers will render them again",
+                                             seconds(options.drain_limit), outbox.size()));
 }
 
 void Agent::Impl::record(const char* name, const trace::SpanContext& parent, TimePoint begin, TimePoint end,

@@ -1,6 +1,5 @@
 // The part of the worker that has no sockets and no renderer. It receives leases from the coordinator through
-// a CoordinatorLink. A lease is a list of units, each one tile and one round (range of samples), for this
-// worker to render. The agent fetches the files (blobs) of their jobs, calls a RenderBackend on its own
+// a CoordinatorLink. The agent fetches the files (blobs) of their jobs, calls a RenderBackend on its own
 // threads to render the units, and keeps every result until the coordinator has acknowledged it.
 //
 // Threads: run() is the control thread (connection, progress reports, timers). One loader thread fetches
@@ -16,11 +15,11 @@
 #include <cstdint>
 #include <memory>
 
-#include "common/base/clock.h"
-#include "common/base/error.h"
-#include "common/protocol/briefs.h"
-#include "common/protocol/messages.h"
-#include "common/trace/tracer.h"
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "util/protocol/briefs.h"
+#include "util/protocol/messages.h"
+#include "util/trace/tracer.h"
 #include "worker/agent/backend.h"
 #include "worker/agent/link.h"
 

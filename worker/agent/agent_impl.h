@@ -1,8 +1,7 @@
 // The agent's state and its threads (see agent.h). agent.cpp contains the control thread, agent_loader.cpp
-// the loader thread, agent_render.cpp the render threads. A unit, the smallest piece of work, is one tile and
-// one range of samples; a world is a scene that is ready to render. To drain means to finish the running
-// units, deliver all results and end. With a tracer (AgentOptions), the agent records trace spans: named time
-// intervals, each with a parent span.
+// the loader thread, agent_render.cpp the render threads. A world is a scene that is ready to render. To
+// drain means to finish the running units, deliver all results and end. With a tracer (AgentOptions), the
+// agent records trace spans: named time intervals, each with a parent span.
 #pragma once
 
 #include <algorithm>

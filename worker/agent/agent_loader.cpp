@@ -5,8 +5,8 @@
 #include <exception>
 #include <new>
 
-#include "common/base/log.h"
-#include "common/protocol/limits.h"
+#include "core/base/log.h"
+#include "util/protocol/limits.h"
 #include "worker/agent/agent_impl.h"
 
 namespace ls::worker {

@@ -1,5 +1,5 @@
-// The agent's render threads. Each takes one unit (one tile and one range of samples) at a time: the first
-// waiting unit of the leases, which are the lists of units assigned to this worker.
+// The agent's render threads. Each takes one unit at a time: the first waiting unit of the leases, which are
+// the lists of units assigned to this worker.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,8 +7,8 @@
 #include <new>
 #include <utility>
 
-#include "common/base/failpoint.h"
-#include "common/protocol/limits.h"
+#include "core/base/failpoint.h"
+#include "util/protocol/limits.h"
 #include "worker/agent/agent_impl.h"
 
 namespace ls::worker {

@@ -1,5 +1,5 @@
-// The interface through which the agent renders units (a unit is one tile and one range of samples). Its
-// implementations are the renderer in this process, the renderer in a child process, and the fake renderer.
+// The interface through which the agent renders units. Its implementations are the renderer in this process,
+// the renderer in a child process, and the fake renderer.
 #pragma once
 
 #include <sys/types.h>
@@ -15,9 +15,9 @@
 #include <string>
 #include <variant>
 
-#include "common/base/error.h"
-#include "common/image/film/partial.h"
-#include "common/protocol/messages.h"
+#include "core/base/error.h"
+#include "core/image/film/partial.h"
+#include "util/protocol/messages.h"
 #include "worker/render/render.h"
 
 namespace ls::worker {

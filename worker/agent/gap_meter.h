@@ -1,6 +1,6 @@
-// Measures how long render threads idle between two units (each one tile and one range of samples) of the
-// same job, from the last sample of one unit to the first sample of the next. The gaps are kept in a
-// histogram with eight steps per octave, beginning at a microsecond, so that quantiles are accurate to 10 %.
+// Measures how long render threads idle between two units of the same job, from the last sample of one unit
+// to the first sample of the next. The gaps are kept in a histogram with eight steps per octave, beginning at
+// a microsecond, so that quantiles are accurate to 10 %.
 #pragma once
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
-// The work that a worker holds: the units of its leases, and the results on their way to the coordinator. A
-// unit is one tile and one round (range of samples) to render. The classes have no locks and no clock.
+// The work that a worker holds: the units of its leases, and the results on their way to the coordinator. The
+// classes have no locks and no clock.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "common/protocol/messages.h"
+#include "util/protocol/messages.h"
 
 namespace ls::worker {
 

@@ -9,8 +9,8 @@
 #include <span>
 #include <vector>
 
-#include "common/base/error.h"
-#include "common/protocol/messages.h"
+#include "core/base/error.h"
+#include "util/protocol/messages.h"
 
 namespace ls::worker {
 

@@ -9,8 +9,8 @@
 #include <cerrno>
 #include <cstring>
 
-#include "common/base/log.h"
-#include "common/base/spawn.h"
+#include "core/base/log.h"
+#include "core/base/spawn.h"
 #include "worker/cache/cache_files.h"
 
 namespace ls::worker {

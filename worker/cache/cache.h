@@ -18,7 +18,7 @@
 #include <set>
 #include <span>
 
-#include "common/base/error.h"
+#include "core/base/error.h"
 #include "worker/agent/link.h"
 
 namespace ls::worker {

@@ -14,7 +14,7 @@
 #include <string>
 #include <utility>
 
-#include "common/base/spawn.h"
+#include "core/base/spawn.h"
 
 namespace ls::worker {
 namespace fs = std::filesystem;

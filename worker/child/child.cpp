@@ -8,10 +8,10 @@
 #include <map>
 #include <mutex>
 
-#include "common/base/check.h"
-#include "common/base/log.h"
-#include "common/base/program_output.h"
-#include "common/base/safe_text.h"
+#include "core/base/check.h"
+#include "core/base/log.h"
+#include "core/base/program_output.h"
+#include "core/base/safe_text.h"
 #include "worker/child/process.h"
 #include "worker/child/protocol.h"
 
@@ -38,7 +38,7 @@ std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {
 // If this many children in a row exit before they are ready, the backend is broken.
 constexpr int kUnreadyChildren = 5;
 // Longest time from a child's start to its hello. This includes the computations that determine the numeric
-// class (machines of one class render the same bits).
+// class.
 constexpr Duration kStartLimit = std::chrono::minutes(2);
 // Longest time that the child may take to answer after the agent has set a slot's stop flag, or the stop flag
 // of a build; then it is killed
@@ -275,7 +275,7 @@ tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const
                                                          std::uint64_t number) {
   const std::string text = child::to_text(job);
   if (text.size() > child::kTextBytes)
-    return unit_failure("the job names more files than the render child can be told of");
+    return unit_failure("the the job names more files than a message to the render child holds");
   const TimePoint deadline = clock_.now() + options_.prepare_limit;
   bool too_long = false;
   std::optional<TimePoint> stop_since;

@@ -1,6 +1,6 @@
 // A RenderBackend that runs the renderer in a child process. If a scene crashes the renderer, hangs it or
-// uses up all memory, the worker loses only that unit (one tile and one range of samples) and continues. The
-// child is this same executable, started with other arguments by posix_spawn.
+// uses up all memory, the worker loses only that unit and continues. The child is this same executable,
+// started with other arguments by posix_spawn.
 //
 // When the child dies, the unit at fault is the one whose thread received the signal or made no progress. The
 // units on other threads are rendered again by the next child and do not count as failed. If it is unknown
@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "common/base/clock.h"
-#include "common/base/error.h"
+#include "core/base/clock.h"
+#include "core/base/error.h"
 #include "worker/agent/backend.h"
 
 namespace ls::worker {

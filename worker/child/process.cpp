@@ -15,7 +15,7 @@
 #include <cstring>
 #include <string_view>
 
-#include "common/base/spawn.h"
+#include "core/base/spawn.h"
 
 namespace ls::worker::child {
 namespace {

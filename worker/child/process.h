@@ -13,10 +13,10 @@
 #include <thread>
 #include <vector>
 
-#include "common/base/clock.h"
-#include "common/base/error.h"
-#include "common/base/program_output.h"
-#include "common/base/spawn.h"
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "core/base/program_output.h"
+#include "core/base/spawn.h"
 #include "worker/child/child.h"
 #include "worker/child/protocol.h"
 

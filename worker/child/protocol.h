@@ -1,24 +1,24 @@
 // The protocol between agent and render child. Requests and replies are structs of fixed size over a socket
 // pair per channel: one channel for control and one for each slot (render thread). Each slot has an area of
-// shared memory, which holds the pixel sums of its finished unit (one tile and one range of samples), and
-// the pixel and number of the sample that it is rendering. Agent and child are the same executable, so plain
-// structs suffice. A malicious scene may take over the child: the agent uses no size or index that the child
-// has written without checking it, and the shared memory is sealed, so that its size cannot change.
+// shared memory, which holds the pixel sums of its finished unit, and the pixel and number of the sample that
+// it is rendering. Agent and child are the same executable, so plain structs suffice. A malicious scene may
+// take over the child: the agent uses no size or index that the child has written without checking it, and
+// the shared memory is sealed, so that its size cannot change.
 #pragma once
 
 #include <atomic>
 #include <climits>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <string_view>
 #include <type_traits>
 
-#include "common/base/error.h"
-#include "common/image/frame/frame.h"
-#include "common/image/frame/rounds.h"
-#include "common/protocol/limits.h"
+#include "core/base/error.h"
+#include "core/image/frame/frame.h"
+#include "core/image/frame/rounds.h"
+#include "util/protocol/limits.h"
+#include "util/sandbox/channel.h"
 #include "worker/child/child.h"
 #include "worker/render/render.h"
 
@@ -90,12 +90,6 @@ struct alignas(64) Shared {
   }
 };
 static_assert(alignof(Slot) <= alignof(Shared));
-
-// Block until all bytes are sent or received; false: the other side has closed the channel. Meanwhile they
-// call `watch`, if given, about every 50 ms.
-using Watch = std::function<void()>;
-bool send_all(int fd, const void* data, std::size_t bytes, const Watch& watch = {});
-bool receive_all(int fd, void* data, std::size_t bytes, const Watch& watch = {});
 
 // Converts a LocalJob (a job whose files are on this machine) to the text of a `prepare` request, and back.
 std::string to_text(const LocalJob& job);

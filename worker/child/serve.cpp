@@ -145,7 +145,7 @@ class Server {
       const auto it = jobs_.find(request.job);
       if (it != jobs_.end()) job = it->second;
     }
-    if (!job) return refused(reply, UnitFailure{.reason = "the render child was not told of this job"});
+    if (!job) return refused(reply, UnitFailure{.reason = "the render child does not know this job"});
     const LeaseUnit unit{request.tile, request.round, request.rect, request.samples};
     auto rendered = backend_.render_marked(*job, unit, slot.stop, &slot.where);
     if (slot.stop) {

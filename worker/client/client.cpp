@@ -8,11 +8,11 @@
 #include <mutex>
 #include <set>
 
-#include "common/base/clock.h"
-#include "common/base/guarded.h"
-#include "common/protocol/limits.h"
+#include "core/base/clock.h"
+#include "core/base/guarded.h"
 #include "proto/convert.h"
 #include "proto/farm.grpc.pb.h"
+#include "util/protocol/limits.h"
 
 namespace ls::worker {
 namespace pb = ::lightshaft::farm::v1;

@@ -10,8 +10,8 @@
 #include <mutex>
 #include <vector>
 
-#include "common/base/clock.h"
-#include "common/base/parse_number.h"
+#include "core/base/clock.h"
+#include "core/base/parse_number.h"
 #include "worker/fake/fake_pixels.h"
 
 namespace ls::worker {

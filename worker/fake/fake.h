@@ -1,14 +1,14 @@
 // The fake renderer, for tests of everything but rendering, and for load tests of a farm. Its result for a
-// unit (one tile and one range of samples) is a pure function of the job's seed, the pixels and the samples
-// (worker/fake/fake_pixels.h). It opens no scene file.
+// unit is a pure function of the job's seed, the pixels and the samples (worker/fake/fake_pixels.h). It opens
+// no scene file.
 #pragma once
 
 #include <memory>
 #include <string>
 #include <string_view>
 
-#include "common/base/clock.h"
-#include "common/base/error.h"
+#include "core/base/clock.h"
+#include "core/base/error.h"
 #include "worker/agent/backend.h"
 
 namespace ls::worker {

@@ -19,8 +19,8 @@
 #include <cstdint>
 #include <cstring>
 
-#include "common/image/aov/identifiers.h"
-#include "common/image/film/partial.h"
+#include "core/image/aov/identifiers.h"
+#include "core/image/film/partial.h"
 
 namespace ls {
 
@@ -66,7 +66,7 @@ inline std::array<double, 3> fake_sample(std::uint64_t pixel_seed, int x, int y,
   return rgb;
 }
 
-// Returns the round that contains a sample; common/image/frame/rounds.h defines the rounds.
+// Returns the round that contains a sample; core/image/frame/rounds.h defines the rounds.
 inline RoundIndex fake_round(std::uint64_t sample) {
   if (sample < 2) return 0;
   if (sample < 64) return static_cast<RoundIndex>(std::bit_width(sample) - 1);

@@ -3,45 +3,25 @@
 // first. It is killed after SECONDS, and may take BYTES of memory.
 #include <fmt/format.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <csignal>
 #include <cstring>
 #include <exception>
 #include <new>
 #include <string>
 
-#include "common/base/parse_number.h"
-#include "common/base/spawn.h"
-#include "common/image/reference/exchange.h"
-#include "common/image/reference/reference.h"
-#include "common/sandbox/call_filter.h"
-#include "common/sandbox/sandbox.h"
+#include "core/base/parse_number.h"
+#include "core/base/spawn.h"
+#include "core/image/reference/exchange.h"
+#include "core/image/reference/reference.h"
+#include "util/sandbox/sandbox.h"
 
 namespace {
 
 using ls::reference::Header;
 using ls::reference::Outcome;
-
-void confine(unsigned seconds, std::uint64_t bytes) {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  const rlimit no_core{0, 0};
-  ::setrlimit(RLIMIT_CORE, &no_core);
-#if !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)  // sanitizers reserve more memory than any limit allows
-  const rlimit memory{bytes, bytes};
-  ::setrlimit(RLIMIT_DATA, &memory);
-#else
-  (void)bytes;
-#endif
-  ::alarm(seconds);
-  ls::enter_sandbox({});
-  ls::forbid_processes();
-}
 
 template <std::size_t N>
 void put(char (&to)[N], const std::string& text) {
@@ -92,7 +72,8 @@ int main(int argc, char** argv) {
   if (asked.magic != ls::reference::kMagic || asked.exr_bytes > size ||
       ls::reference::shared_bytes(asked.exr_bytes, asked.width, asked.height) > size)
     return 2;
-  confine(*seconds, *bytes);
+  ::alarm(*seconds);
+  ls::shut_in_helper(*bytes);
   decode(static_cast<std::byte*>(mapped));
   return 0;
 }

@@ -9,14 +9,14 @@
 #include <string>
 #include <vector>
 
-#include "common/base/digest.h"
-#include "common/base/error.h"
-#include "common/image/film/health.h"
-#include "common/image/frame/frame.h"
-#include "common/image/frame/rounds.h"
-#include "common/job/settings.h"
-#include "common/job/techniques.h"
-#include "common/scene/scene.h"
+#include "core/base/digest.h"
+#include "core/base/error.h"
+#include "core/image/film/health.h"
+#include "core/image/frame/frame.h"
+#include "core/image/frame/rounds.h"
+#include "core/job/settings.h"
+#include "core/job/techniques.h"
+#include "core/scene/scene.h"
 
 namespace ls::render {
 
@@ -46,7 +46,7 @@ struct Breadcrumb {
 };
 
 struct TileResult {
-  // The tile's planes, as in Partial::sums (common/image/film/partial.h): six of colour, then those of the
+  // The tile's planes, as in Partial::sums (core/image/film/partial.h): six of colour, then those of the
   // requested AOVs
   std::vector<float> sums;
   // The problems of samples, by cause: their number, and the pixels and samples at which they occurred.

@@ -1,7 +1,7 @@
-// The farm is a state machine. It decides which worker renders which units (a unit is one round, that is
-// range of samples, of one tile), which results are folded (added to the job's image) and when, and when a
-// job ends. Its effects depend only on events and time: it does no I/O and has no threads, no clock, no log.
-// It is not thread-safe; the service guards it with one mutex.
+// The farm is a state machine. It decides which worker renders which units, which results are folded (added
+// to the job's image) and when, and when a job ends. Its effects depend only on events and time: it does no
+// I/O and has no threads, no clock, no log. It is not thread-safe; the service guards it with one mutex.
+// Terms: docs/reference/glossary.md.
 //
 // Usage: effects = farm.handle(event, now). `now` must not decrease from call to call.
 //
@@ -21,10 +21,10 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/error.h"
 #include "coordinator/domain/effect.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/domain/farm_figures.h"
+#include "core/base/error.h"
 
 namespace ls::coordinator {
 
@@ -32,8 +32,8 @@ namespace ls::coordinator {
 // time that is not positive, a time that is too long, or a focus outside the frame.
 Result<void> check_plan(const JobPlan& plan);
 
-// Returns a text that names a numeric class (a set of machines that compute the same bits) for people, such
-// as "3f2a9c11d0e4 (armv8-a:gcc-14.2.0:embree-4.3.3)".
+// Returns a text that names a numeric class for people, such as "3f2a9c11d0e4
+// (armv8-a:gcc-14.2.0:embree-4.3.3)".
 std::string class_in_words(const Digest& numeric_class, const std::string& platform);
 
 // How the service should handle a result that has arrived
@@ -42,7 +42,7 @@ struct Wanted {
     yes,          // verify it against `samples`, make it durable, then raise UnitAccepted
     duplicate,    // its unit has an accepted result already: verify it and raise UnitAccepted, since the farm
                   // compares the two, but do not store it
-    other_class,  // its numeric class (machines that compute the same bits) is not that of the job
+    other_class,  // its numeric class is not that of the job
     no            // not needed: acknowledge it to the worker and drop it
   };
   Verdict verdict = Verdict::no;

@@ -1,6 +1,5 @@
-// Leases units to workers and takes them back. A unit is one round (range of samples) of one tile; a lease is
-// a list of units that is assigned to one worker. Only these functions change which leases exist, which units
-// they hold, and how much leased work each worker has.
+// Leases units to workers and takes them back. Only these functions change which leases exist, which units
+// they hold, and how much leased work each worker has. Terms: docs/reference/glossary.md.
 #include <algorithm>
 #include <limits>
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/image/frame/frame.h"
 #include "coordinator/domain/farm/farm_state.h"
+#include "core/image/frame/frame.h"
 
 namespace ls::coordinator {
 namespace {

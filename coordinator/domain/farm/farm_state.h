@@ -1,8 +1,6 @@
 // The state of the farm, and its reaction to each event. The functions are grouped by subject into the files
-// farm_jobs, farm_workers, farm_units, farm_leases, schedule, farm_stop and farm_trust (.cpp). A unit is one
-// round (range of samples) of one tile; a lease is a list of units that is assigned to one worker. A job that
-// is pinned to a numeric class (machines that compute the same bits) is rendered only by workers of this
-// class.
+// farm_jobs, farm_workers, farm_units, farm_leases, schedule, farm_stop and farm_trust (.cpp). A job that is
+// pinned to a numeric class is rendered only by workers of this class. Terms: docs/reference/glossary.md.
 #pragma once
 
 #include <deque>

@@ -1,5 +1,5 @@
-// The farm's reaction to results and failures of units (a unit is one round of one tile): when results are
-// folded (added to the image), and when a job fails.
+// The farm's reaction to results and failures of units: when results are folded (added to the image), and
+// when a job fails.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,8 +13,8 @@ void Farm::State::pin(Job& job, const Digest& numeric_class) {
   job.numeric_class = numeric_class;
   job.pinned_at = now;
   effects.emplace_back(JobPinned{job.plan.brief.job, numeric_class});
-  // The job has a numeric class (set of machines that compute the same bits) now. So workers of this class
-  // with may_begin == false, which get no units of jobs without a class, may take its units.
+  // The job has a numeric class now. So workers of this class with may_begin == false, which get no units of
+  // jobs without a class, may take its units.
   for (const WorkerIndex index : workers.wanting_work()) {
     const Worker& worker = workers.at(index);
     if (!worker.may_begin && worker.numeric_class == numeric_class) work_appeared = pinned_for_others = true;

@@ -1,8 +1,7 @@
-// Decides which worker gets which units next; a unit is one round (range of samples) of one tile. Higher
-// priorities go first, users get equal shares, and a user's jobs go one after the other (fair_share.h).
-// Within a job lower rounds go first, so that a preview of the whole image is available early. Idle workers
-// go before busy ones, and among them those that have loaded the job's world. Leases (lists of units that are
-// assigned to one worker) shrink near the end of a job.
+// Decides which worker gets which units next. Higher priorities go first, users get equal shares, and a
+// user's jobs go one after the other (fair_share.h). Within a job lower rounds go first, so that a preview of
+// the whole image is available early. Idle workers go before busy ones, and among them those that have loaded
+// the job's world. Leases shrink near the end of a job. Terms: docs/reference/glossary.md.
 #include <algorithm>
 #include <limits>
 
@@ -172,8 +171,8 @@ Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
   return too_early(job, worker, *code, 0, 0) ? Takes::later : Takes::now;
 }
 
-// Decides whether the worker may take the first lease of a job, and so pin it to its numeric class (machines
-// that compute the same bits). Four preferences decide:
+// Decides whether the worker may take the first lease of a job, and so pin it to its numeric class. Four
+// preferences decide:
 // 1. A worker that has not given back this job's units without a result, if one of another class is there.
 // 2. A worker that had no leases of this job in vain (PassedOver), if an idle worker of another class is one.
 // 3. A class of which a result was accepted before, if an idle worker has it: anybody can announce a class.

@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <exception>
 
-#include "common/base/log.h"
-#include "common/base/parse_number.h"
-#include "common/base/safe_text.h"
-#include "common/protocol/limits.h"
-#include "common/scene/limits.h"
 #include "coordinator/http/api/content_coding.h"
 #include "coordinator/http/api/handlers.h"
+#include "core/base/log.h"
+#include "core/base/parse_number.h"
+#include "core/base/safe_text.h"
+#include "core/scene/limits.h"
+#include "util/protocol/limits.h"
 
 namespace ls::http {
 namespace {

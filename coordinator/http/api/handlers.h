@@ -2,9 +2,9 @@
 // thread pool that its route names (Route::executor), possibly by several threads concurrently.
 #pragma once
 
-#include "common/job/settings.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/routes.h"
+#include "core/job/settings.h"
 
 namespace ls::http {
 
@@ -74,13 +74,12 @@ Response submitted(Api& api, const JobId& id);
 // priority is allowed.
 std::optional<Response> refuse_priority(const Api& api, const Caller& caller, int priority);
 
-// Reads a job's spec (the settings in its submission: samples, size, seed, ...) from query parameters, as in
-// POST /api/v1/jobs?spp=64&size=320x240&define=NAME=VALUE&aov=a,b with an application/xml body. Keys: spp,
-// target_error, target_layer, time, seed, size, integrator, priority, float, denoise, frames, max_workers,
-// max_units, memory, numeric_class, reference, aov and tags (comma lists), define (may be repeated). The key
-// named by `also` is ignored. Any other key, a repeated key, or a wrong value is an error that names the key.
-// Keys that the query lacks keep their values in `base`, the JSON of a spec. The query's definitions are
-// added to those of `base`; if both define a name, the query's value counts. (Defined in spec_query.cpp.)
+// Reads a job's spec from query parameters, as in POST /api/v1/jobs?spp=64&size=320x240&define=NAME=VALUE&
+// aov=a,b with an application/xml body. The table in core/job/describe.h has the parameters; `define` may
+// be repeated. The key named by `also` is ignored. Any other key, a repeated key, or a wrong value is an
+// error that names the key. Keys that the query lacks keep their values in `base`, the JSON of a spec. The
+// query's definitions are added to those of `base`; if both define a name, the query's value counts. (Defined
+// in spec_query.cpp.)
 Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, const std::string& base = "{}");
 
 }  // namespace ls::http

@@ -4,21 +4,20 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <limits>
 
-#include "common/base/parse_number.h"
-#include "common/job/limits.h"
-#include "common/scene/limits.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/message/json_read.h"
-#include "coordinator/views/views.h"
+#include "coordinator/views/describe_change.h"
+#include "core/base/parse_number.h"
+#include "core/job/spec_draft.h"
+#include "core/scene/limits.h"
 
 namespace ls::http {
 namespace {
 
+using coordinator::JobChange;
 using coordinator::JobsAsked;
 using coordinator::SubmitRequest;
 using nlohmann::json;
@@ -80,50 +79,13 @@ Result<SubmitRequest> from_xml(const Request& request) {
 }
 
 // Reads all changes in the body of a PATCH, so that an error in one is found before any is applied.
-Result<coordinator::JobChange> read_change(std::string_view text) {
-  using coordinator::JobState;
-  const auto body = read_object(text, {"state", "priority", "spp", "target_error", "focus", "after"});
+Result<JobChange> read_change(std::string_view text) {
+  const auto body = parse_json(text, "the body");
   if (!body) return tl::unexpected(body.error());
-  if (body->empty())
+  auto change = job::read_object<JobChange>(*body, "change");
+  if (change && body->empty())
     return bad_argument(
-        "the body changes nothing; possible: state, priority, spp, target_error, focus, after");
-  coordinator::JobChange change;
-  if (const auto target = body->find("target_error"); target != body->end()) {
-    if (!target->is_number() || !(target->get<double>() > 0))
-      return bad_argument("'target_error' must be a positive number");
-    change.target_error = target->get<double>();
-  }
-  if (const auto state = body->find("state"); state != body->end()) {
-    for (const JobState possible : {JobState::paused, JobState::running, JobState::cancelled})
-      if (*state == std::string(to_string(possible))) change.state = possible;
-    if (!change.state) return bad_argument("'state' must be \"paused\", \"running\" or \"cancelled\"");
-  }
-  if (const auto priority = body->find("priority"); priority != body->end()) {
-    if (!priority->is_number_integer() || std::abs(priority->get<double>()) > kMaxPriority)
-      return bad_argument(fmt::format("'priority' must be a whole number from -{0} to {0}", kMaxPriority));
-    change.priority = priority->get<int>();
-  }
-  if (const auto spp = body->find("spp"); spp != body->end()) {
-    if (!spp->is_number_unsigned() || spp->get<std::uint64_t>() == 0)
-      return bad_argument("'spp' must be a whole number: the new total per pixel");
-    change.spp = spp->get<std::uint64_t>();
-  }
-  if (const auto focus = body->find("focus"); focus != body->end()) {
-    const auto pixel = [](const json& v) {
-      return v.is_number_unsigned() && v.get<std::uint64_t>() <= std::numeric_limits<int>::max();
-    };
-    const bool rect =
-        focus->is_array() && focus->size() == 4 && std::all_of(focus->begin(), focus->end(), pixel);
-    if (!rect && !focus->is_null())
-      return bad_argument("'focus' must be [x0, y0, x1, y1] in whole pixels, or null to render all alike");
-    change.focus =
-        rect ? std::optional(PixelRect{(*focus)[0], (*focus)[1], (*focus)[2], (*focus)[3]}) : std::nullopt;
-  }
-  if (const auto after = body->find("after"); after != body->end()) {
-    const auto spec = job_spec_of({{"after", *after}});
-    if (!spec) return tl::unexpected(spec.error());
-    change.after = spec->after;
-  }
+        fmt::format("the body changes nothing; possible: {}", fmt::join(job::names_of<JobChange>(), ", ")));
   return change;
 }
 
@@ -205,9 +167,11 @@ Response get_jobs(Api& api, const Request& request, const Params&) {
 
 Response post_again(Api& api, const Request& request, const JobId& id) {
   if (const auto owner = api.coordinator().owner(id); !owner) return problem(owner.error());
-  const auto body = read_object(request.body, {"spp", "target_error", "time", "seed", "priority", "after"});
+  const auto body = parse_json(request.body, "the body");
   if (!body) return problem(body.error());
-  const auto changes = job_spec_of(*body);
+  job::SpecDraft draft(job::Form::json);
+  if (auto ok = draft.add(*body, job::goes_with_again); !ok) return problem(ok.error());
+  const auto changes = draft.finish();
   if (!changes) return problem(changes.error());
   if (auto refused = refuse_priority(api, request.caller, changes->priority)) return std::move(*refused);
   if (auto refused = refuse_after(api, request.caller, changes->after)) return std::move(*refused);

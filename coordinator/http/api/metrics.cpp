@@ -93,18 +93,20 @@ void write_jobs(std::string& out, std::span<const coordinator::JobView> jobs) {
   }
   LabelledValues states;
   for (const JobState state : kStates) states.emplace_back(to_string(state), by_state[state]);
-  labelled(out, "lightshaft_jobs", "Jobs by state.", "state", states);
-  single(out, "lightshaft_units_planned", "Units of unfinished jobs.", planned);
-  single(out, "lightshaft_units_done", "Units of unfinished jobs that are folded.", done);
+  labelled(out, "lightshaft_jobs", "Number of jobs in each state.", "state", states);
+  single(out, "lightshaft_units_planned", "Number of units that the unfinished jobs consist of.", planned);
+  single(out, "lightshaft_units_done",
+         "Number of units of unfinished jobs that have been added to the image.", done);
   single(out, "lightshaft_queued_core_seconds",
-         "Predicted CPU seconds of units that wait for a worker, of jobs that are not paused.", queued);
-  single(out, "lightshaft_eta_seconds", "Predicted wall seconds to finish all jobs whose rate is known.",
-         eta);
-  single(out, "lightshaft_core_seconds", "CPU seconds that workers spent on the jobs kept here.",
-         core_seconds);
-  single(out, "lightshaft_nonfinite_samples", "Samples counted as non-finite; zero on healthy jobs.",
-         health.nonfinite);
-  single(out, "lightshaft_majorant_violations", "Densities above their bound; zero on healthy jobs.",
+         "Predicted CPU seconds of all units that wait for a worker. Paused jobs do not count.", queued);
+  single(out, "lightshaft_eta_seconds",
+         "Predicted seconds until all jobs are done. Jobs whose rate is unknown do not count.", eta);
+  single(out, "lightshaft_core_seconds",
+         "CPU seconds that workers have spent on the jobs of this coordinator.", core_seconds);
+  single(out, "lightshaft_nonfinite_samples",
+         "Number of samples that were not finite. Healthy jobs have none.", health.nonfinite);
+  single(out, "lightshaft_majorant_violations",
+         "How often a medium's density exceeded its upper bound. Healthy jobs have none.",
          health.majorant_violations);
 }
 
@@ -117,17 +119,21 @@ void write_workers(std::string& out, std::span<const coordinator::WorkerView> wo
     threads += static_cast<std::uint64_t>(worker.threads);
     fake += worker.fake;
   }
-  labelled(out, "lightshaft_workers", "Workers by state.", "state", {by_state.begin(), by_state.end()});
-  single(out, "lightshaft_worker_threads", "Render threads of connected workers.", threads);
-  single(out, "lightshaft_workers_fake", "Connected workers that make their pixels up.", fake);
+  labelled(out, "lightshaft_workers", "Number of workers in each state.", "state",
+           {by_state.begin(), by_state.end()});
+  single(out, "lightshaft_worker_threads", "Number of render threads of the connected workers.", threads);
+  single(out, "lightshaft_workers_fake", "Number of connected fake workers, which invent their pixels.",
+         fake);
 }
 
 void write_leases(std::string& out, const coordinator::FarmFigures& f) {
-  single(out, "lightshaft_leases", "Leases that workers hold.", f.leases_now);
-  single(out, "lightshaft_units_leased", "Units of these leases.", f.units_leased_now);
+  single(out, "lightshaft_leases", "Number of leases that workers hold now.", f.leases_now);
+  single(out, "lightshaft_units_leased", "Number of units that are leased now.", f.units_leased_now);
   single(out, "lightshaft_units_lent", "Older name of lightshaft_units_leased.", f.units_leased_now);
-  single(out, "lightshaft_leases_granted_total", "Leases given to workers.", f.leases_granted);
-  single(out, "lightshaft_units_leased_total", "Units of these leases.", f.units_leased);
+  single(out, "lightshaft_leases_granted_total", "Number of leases that workers have received.",
+         f.leases_granted);
+  single(out, "lightshaft_units_leased_total", "Number of units that have been leased to workers.",
+         f.units_leased);
   single(out, "lightshaft_units_lent_total", "Older name of lightshaft_units_leased_total.", f.units_leased);
   // Causes that freed no unit are listed, too, with the value 0: Prometheus computes the rate of a counter
   // only from values that it has seen, so a counter that first appeared with 1 would lose that event.
@@ -136,15 +142,16 @@ void write_leases(std::string& out, const coordinator::FarmFigures& f) {
     const auto count = f.units_freed.find(cause);
     freed.emplace_back(word, count == f.units_freed.end() ? 0 : count->second);
   }
-  labelled(
-      out, "lightshaft_units_freed_total",
-      "Units that a worker had and did not hand in, by cause; those that are still wanted go to another.",
-      "cause", freed);
+  labelled(out, "lightshaft_units_freed_total",
+           "Number of leased units that came back without a result, by cause. Units that are still needed "
+           "are leased again.",
+           "cause", freed);
 }
 
 void write_results(std::string& out, const coordinator::FarmFigures& f) {
   labelled(out, "lightshaft_results_total",
-           "Results that workers handed in. equal, differing: a second one of a unit, against the first.",
+           "Number of results from workers, by what became of them. `equal` and `differing` compare a second "
+           "result of a unit with the first.",
            "verdict",
            {{"accepted", f.accepted},
             {"equal", f.equal},
@@ -152,54 +159,61 @@ void write_results(std::string& out, const coordinator::FarmFigures& f) {
             {"unwanted", f.unwanted},
             {"refused", f.refused},
             {"not_stored", f.not_stored}});
-  single(out, "lightshaft_units_folded_total", "Units folded into images.", f.folded);
+  single(out, "lightshaft_units_folded_total", "Number of units that have been added to images.", f.folded);
   single(out, "lightshaft_fold_lag_seconds_total",
-         "Seconds from a result's arrival to its fold, summed over lightshaft_units_folded_total.",
+         "Sum over all units added to images: seconds from the arrival of the result until it was added.",
          f.fold_lag_seconds);
-  single(out, "lightshaft_results_arrived", "Results that are being checked and stored.", f.arrived_now);
-  single(out, "lightshaft_results_arrived_bytes", "Memory that these take.", f.arrived_bytes);
-  single(out, "lightshaft_results_waiting", "Accepted results that wait for an earlier round of their tile.",
-         f.waiting_now);
-  single(out, "lightshaft_background_writes", "Writes that wait for the disk.", f.background_writes_now);
+  single(out, "lightshaft_results_arrived", "Number of results that are being verified and stored now.",
+         f.arrived_now);
+  single(out, "lightshaft_results_arrived_bytes",
+         "Memory that results take while they are verified and stored.", f.arrived_bytes);
+  single(out, "lightshaft_results_waiting",
+         "Number of accepted results that wait for an earlier round of their tile.", f.waiting_now);
+  single(out, "lightshaft_background_writes", "Number of writes that wait for the disk.",
+         f.background_writes_now);
   single(out, "lightshaft_chores", "Older name of lightshaft_background_writes.", f.background_writes_now);
-  single(out, "lightshaft_result_bytes_total", "Bytes of results from workers.", f.result_bytes);
+  single(out, "lightshaft_result_bytes_total", "Bytes of results received from workers.", f.result_bytes);
   single(out, "lightshaft_blob_bytes_total", "Bytes of blobs sent to workers.", f.blob_bytes);
 }
 
 void write_audits(std::string& out, const coordinator::AuditFigures& a) {
   labelled(out, "lightshaft_audits_total",
-           "Results chosen to be rendered again by another worker, and what came of it.", "verdict",
-           {{"asked", a.asked}, {"equal", a.equal}, {"differ", a.differ}, {"dropped", a.dropped}});
-  single(out, "lightshaft_workers_quarantined_total", "Workers found to render wrong pixels.",
+           "Number of audits, by outcome. An audit renders a unit again on another worker and compares the "
+           "results.",
+           "verdict", {{"asked", a.asked}, {"equal", a.equal}, {"differ", a.differ}, {"dropped", a.dropped}});
+  single(out, "lightshaft_workers_quarantined_total",
+         "Number of workers that were quarantined because they rendered wrong pixels.",
          a.workers_quarantined);
   single(out, "lightshaft_workers_barred_total", "Older name of lightshaft_workers_quarantined_total.",
          a.workers_quarantined);
   single(out, "lightshaft_tiles_discarded_total",
-         "Tiles rendered again since such a worker had a hand in them.", a.tiles_discarded);
+         "Number of tiles that were rendered again because a quarantined worker had rendered part of them.",
+         a.tiles_discarded);
 }
 
 void write_webhooks(std::string& out, const coordinator::WebhookFigures& w) {
   labelled(out, "lightshaft_webhook_sendings_total",
-           "Attempts to tell a receiver of a job's event; a failed one is tried again later.", "result",
+           "Number of attempts to send an event to a webhook. A failed attempt is repeated later.", "result",
            {{"taken", w.delivered}, {"failed", w.failed_attempts}});
-  single(out, "lightshaft_webhooks_given_up_total", "Events that a receiver never took.", w.given_up);
-  single(out, "lightshaft_webhooks_waiting", "Events that receivers have still to take.", w.waiting);
+  single(out, "lightshaft_webhooks_given_up_total",
+         "Number of events that were given up because the webhook never accepted them.", w.given_up);
+  single(out, "lightshaft_webhooks_waiting", "Number of events that wait to be sent to webhooks.", w.waiting);
 }
 
 void write_traces(std::string& out, const trace::Figures& f) {
-  labelled(
-      out, "lightshaft_trace_spans_total",
-      "Spans that the collector of traces took, those that it refused or did not answer for, and those left "
-      "out since too many waited.",
-      "result", {{"taken", f.sent}, {"refused", f.refused}, {"left out", f.left_out}});
+  labelled(out, "lightshaft_trace_spans_total",
+           "Number of trace spans: accepted by the collector, refused or not confirmed by it, and left out "
+           "because too many were waiting.",
+           "result", {{"taken", f.sent}, {"refused", f.refused}, {"left out", f.left_out}});
 }
 
 void write_process(std::string& out) {
   const ProcessFigures p = process_figures();
-  single(out, "process_resident_memory_bytes", "Memory of the coordinator.", p.resident_bytes);
-  single(out, "process_open_fds", "Files and sockets that it has open.", p.open_files);
-  single(out, "process_threads", "Its threads.", p.threads);
-  single(out, "process_cpu_seconds_total", "CPU time of it.", p.cpu_seconds);
+  single(out, "process_resident_memory_bytes", "Resident memory of the coordinator in bytes.",
+         p.resident_bytes);
+  single(out, "process_open_fds", "Number of files and sockets that the coordinator has open.", p.open_files);
+  single(out, "process_threads", "Number of threads of the coordinator.", p.threads);
+  single(out, "process_cpu_seconds_total", "CPU time of the coordinator in seconds.", p.cpu_seconds);
 }
 
 }  // namespace
@@ -225,22 +239,27 @@ Response get_metrics(Api& api, const Request&, const Params&) {
   write_results(out, farm);
   write_audits(out, coordinator.audits());
   write_process(out);
-  single(out, "lightshaft_events_total", "Id of the last event.", coordinator.last_event_id());
-  head(out, "lightshaft_http_requests_total", "Requests answered.");
+  single(out, "lightshaft_events_total", "Number of events so far, which is also the id of the last one.",
+         coordinator.last_event_id());
+  head(out, "lightshaft_http_requests_total", "Number of requests that have been answered.");
   for (const auto& [key, count] : counters.requests())
     fmt::format_to(std::back_inserter(out),
                    "lightshaft_http_requests_total{{method=\"{}\",code=\"{}\"}} {}\n", to_string(key.first),
                    key.second, count);
-  single(out, "lightshaft_http_connections", "Open HTTP connections.", counters.connections.load());
-  single(out, "lightshaft_http_event_streams", "Open event streams.", counters.event_streams.load());
-  single(out, "lightshaft_http_slow_readers_total", "Event streams closed because the reader was too slow.",
+  single(out, "lightshaft_http_connections", "Number of open HTTP connections.", counters.connections.load());
+  single(out, "lightshaft_http_event_streams", "Number of open event streams.",
+         counters.event_streams.load());
+  single(out, "lightshaft_http_slow_readers_total",
+         "Number of event streams that were closed because the client read too slowly.",
          counters.events_dropped.load());
-  single(out, "lightshaft_http_body_bytes_total", "Bytes of request bodies.", counters.body_bytes.load());
+  single(out, "lightshaft_http_body_bytes_total", "Bytes of request bodies received.",
+         counters.body_bytes.load());
   if (const auto webhooks = api.webhooks()) write_webhooks(out, *webhooks);
   if (const auto traces = api.traces()) write_traces(out, *traces);
   if (const auto store = coordinator.store_status(); !store.mirror.empty()) {
-    single(out, "lightshaft_redis_up", "1 while Redis answers.", store.trouble.empty() ? 1 : 0);
-    single(out, "lightshaft_redis_jobs_behind", "Jobs of which Redis has not been told all.", store.behind);
+    single(out, "lightshaft_redis_up", "1 if Redis responds, else 0.", store.trouble.empty() ? 1 : 0);
+    single(out, "lightshaft_redis_jobs_behind", "Number of jobs whose latest state is not in Redis yet.",
+           store.behind);
   }
   return text_response(200, "text/plain; version=0.0.4; charset=utf-8", std::move(out));
 }

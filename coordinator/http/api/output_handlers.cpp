@@ -5,12 +5,12 @@
 #include <charconv>
 #include <cmath>
 
-#include "common/base/parse_number.h"
-#include "common/report/job_page.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/message/json_read.h"
 #include "coordinator/views/views.h"
+#include "core/base/parse_number.h"
+#include "util/report/job_page.h"
 
 namespace ls::http {
 namespace {

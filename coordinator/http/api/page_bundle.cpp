@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/digest.h"
+#include "core/base/digest.h"
 
 namespace ls::http {
 namespace {

@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-#include "common/base/digest.h"
+#include "core/base/digest.h"
 
 namespace ls::http {
 

@@ -2,9 +2,9 @@
 
 #include <array>
 
-#include "common/scene/limits.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/message/limits.h"
+#include "core/scene/limits.h"
 
 namespace ls::http {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <utility>
 
-#include "common/base/digest.h"
 #include "coordinator/http/api/content_coding.h"
 #include "coordinator/http/api/page_bundle.h"
+#include "core/base/digest.h"
 
 namespace ls::http {
 namespace {

@@ -2,12 +2,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "common/base/parse_number.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/auth/auth.h"
 #include "coordinator/http/message/json_read.h"
 #include "coordinator/views/views.h"
+#include "core/base/parse_number.h"
 
 namespace ls::http {
 namespace {

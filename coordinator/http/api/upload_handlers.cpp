@@ -8,11 +8,11 @@
 #include <cstring>
 #include <system_error>
 
-#include "common/base/parse_number.h"
-#include "common/base/spawn.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/bundle/bundle.h"
 #include "coordinator/http/message/json_read.h"
+#include "core/base/parse_number.h"
+#include "core/base/spawn.h"
 
 namespace ls::http {
 namespace {

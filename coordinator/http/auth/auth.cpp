@@ -6,11 +6,11 @@
 #include <charconv>
 #include <nlohmann/json.hpp>
 
-#include "common/base/check.h"
-#include "common/base/clock.h"
-#include "common/base/digest.h"
-#include "common/base/secret.h"
 #include "coordinator/http/message/limits.h"
+#include "core/base/check.h"
+#include "core/base/clock.h"
+#include "core/base/digest.h"
+#include "core/base/secret.h"
 
 namespace ls::http {
 namespace {

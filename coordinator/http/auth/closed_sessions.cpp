@@ -11,14 +11,14 @@
 #include <fstream>
 #include <optional>
 
-#include "common/base/digest.h"
-#include "common/base/log.h"
-#include "common/base/parse_number.h"
-#include "common/base/secret.h"
-#include "common/base/spawn.h"
 #include "coordinator/http/auth/token_registry.h"
 #include "coordinator/http/message/limits.h"
 #include "coordinator/http/message/message.h"
+#include "core/base/digest.h"
+#include "core/base/log.h"
+#include "core/base/parse_number.h"
+#include "core/base/secret.h"
+#include "core/base/spawn.h"
 
 namespace ls::http {
 namespace {

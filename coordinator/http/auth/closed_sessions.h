@@ -10,8 +10,8 @@
 #include <string_view>
 #include <utility>
 
-#include "common/base/error.h"
-#include "common/base/guarded.h"
+#include "core/base/error.h"
+#include "core/base/guarded.h"
 
 namespace ls::http {
 

@@ -13,9 +13,9 @@
 #include <cstring>
 #include <utility>
 
-#include "common/base/check.h"
-#include "common/base/log.h"
-#include "common/base/secret.h"
+#include "core/base/check.h"
+#include "core/base/log.h"
+#include "core/base/secret.h"
 
 namespace ls::http {
 namespace {

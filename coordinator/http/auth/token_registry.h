@@ -12,11 +12,11 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/digest.h"
-#include "common/base/error.h"
-#include "common/base/guarded.h"
-#include "common/base/spawn.h"
 #include "coordinator/http/message/message.h"
+#include "core/base/digest.h"
+#include "core/base/error.h"
+#include "core/base/guarded.h"
+#include "core/base/spawn.h"
 
 namespace ls::http {
 

@@ -13,8 +13,8 @@
 #include <cstring>
 #include <string_view>
 
-#include "common/base/safe_text.h"
 #include "coordinator/http/message/limits.h"
+#include "core/base/safe_text.h"
 
 namespace ls::http {
 namespace {

@@ -11,7 +11,7 @@
 #include <stop_token>
 #include <string>
 
-#include "common/base/error.h"
+#include "core/base/error.h"
 
 namespace ls::http {
 

@@ -9,11 +9,11 @@
 #include <set>
 #include <vector>
 
-#include "common/base/safe_text.h"
-#include "common/job/limits.h"
-#include "common/scene/xml/source_text.h"
 #include "coordinator/http/message/json_read.h"
 #include "coordinator/http/message/limits.h"
+#include "core/base/safe_text.h"
+#include "core/base/text/utf8.h"
+#include "core/job/limits.h"
 
 namespace ls::http {
 namespace {
@@ -334,9 +334,8 @@ Result<std::string> normal_name(std::string_view name) {
   if (name.empty()) return wrong("is no name (or one in an unknown encoding: names are UTF-8)");
   if (name.size() > kMaxAssetName)
     return wrong(fmt::format("has a name of more than {} bytes", kMaxAssetName));
-  if (scene::find_invalid_utf8(name) != std::string_view::npos) return wrong("has a name that is not UTF-8");
-  if (scene::find_control(name) != std::string_view::npos ||
-      name.find_first_of("\t\r\n") != std::string_view::npos)
+  if (find_invalid_utf8(name) != std::string_view::npos) return wrong("has a name that is not UTF-8");
+  if (find_control(name) != std::string_view::npos || name.find_first_of("\t\r\n") != std::string_view::npos)
     return wrong("has control characters in its name");
   if (name.find('\\') != std::string_view::npos)
     return wrong("has a backslash in its name: folders are separated by /");

@@ -9,11 +9,11 @@
 #include <string>
 #include <string_view>
 
-#include "common/base/digest.h"
-#include "common/base/error.h"
 #include "coordinator/http/bundle/archive.h"
 #include "coordinator/store/blobs/blob_store.h"
 #include "coordinator/views/views.h"
+#include "core/base/digest.h"
+#include "core/base/error.h"
 
 namespace ls::http {
 

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "common/base/digest.h"
-#include "common/base/error.h"
+#include "core/base/digest.h"
+#include "core/base/error.h"
 
 namespace ls::http {
 

@@ -14,9 +14,9 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "common/base/overloaded.h"
-#include "common/base/safe_text.h"
 #include "coordinator/http/message/limits.h"
+#include "core/base/overloaded.h"
+#include "core/base/safe_text.h"
 
 namespace ls::http {
 namespace {

@@ -13,9 +13,9 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/error.h"
-#include "common/base/spawn.h"
-#include "common/scene/diagnostic.h"
+#include "core/base/error.h"
+#include "core/base/spawn.h"
+#include "core/scene/diagnostic.h"
 
 namespace ls::http {
 

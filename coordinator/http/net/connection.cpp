@@ -14,8 +14,8 @@
 #include <exception>
 #include <utility>
 
-#include "common/base/log.h"
 #include "coordinator/http/message/message.h"
+#include "core/base/log.h"
 
 namespace ls::http {
 

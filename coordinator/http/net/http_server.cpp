@@ -12,9 +12,9 @@
 #include <mutex>
 #include <thread>
 
-#include "common/base/log.h"
-#include "common/base/parse_number.h"
 #include "coordinator/http/net/connection.h"
+#include "core/base/log.h"
+#include "core/base/parse_number.h"
 
 namespace ls::http {
 namespace {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "common/base/error.h"
 #include "coordinator/http/api/api.h"
+#include "core/base/error.h"
 
 namespace ls::http {
 

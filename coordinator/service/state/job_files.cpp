@@ -5,7 +5,7 @@
 #include <functional>
 #include <set>
 
-#include "common/base/log.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 namespace {

@@ -58,8 +58,8 @@ struct JobEntry {
   bool unloaded = false;
   // True if a user removed the job, or another coordinator owns it: nothing more is stored for it
   bool removed = false;
-  // True while the numeric class (machines that compute the same bits) that the job is pinned to is not
-  // stored yet. Until it is, no results of the job are stored.
+  // True while the numeric class that the job is pinned to is not stored yet. Until it is, no results of the
+  // job are stored.
   bool pin_unsaved = false;
   // The job's open audits (units that are rendered again for comparison), as the text last written to disk
   // (store/log/audit_file.h)
@@ -84,10 +84,10 @@ struct JobEntry {
   double fold_seconds = 0;    // seconds on the job's clock when a result was last added to the image
   std::string trouble;        // why the job does not continue, as a text for the user; empty: no problem
   std::uint64_t resumes = 0;  // how often a pause of the job was ended since the coordinator started
-  // For each leased unit (tile and round), the workers that it is leased to; for display
+  // For each leased unit, the workers that it is leased to; for display
   std::map<std::pair<TileIndex, RoundIndex>, std::vector<WorkerId>> leased;
-  // Only while a restart adds results to the image again: for the unit (tile and round) of each of these
-  // results, the seconds on the job's clock when the result was stored
+  // Only while a restart adds results to the image again: for the unit of each of these results, the seconds
+  // on the job's clock when the result was stored
   std::map<std::pair<TileIndex, RoundIndex>, double> replay_at;
   std::unique_ptr<JobTrace> trace;  // null: the job is not traced
 };

@@ -1,5 +1,5 @@
-// JobTrace: records the trace spans of one job, of its leases (lists of units that are assigned to one
-// worker), and of steps such as storing a result. A unit is one tile and one round of samples.
+// JobTrace: records the trace spans of one job, of its leases, and of steps such as storing a result. Terms:
+// docs/reference/glossary.md.
 #include "coordinator/service/state/job_trace.h"
 
 #include <fmt/format.h>
@@ -134,9 +134,8 @@ void JobTrace::result(const UnitResult& r, const WorkerId& worker, TimePoint che
       static_cast<std::int64_t>(std::min<std::uint64_t>(r.held_unix_ns, static_cast<std::uint64_t>(now_ns)));
   auto open = leases_.find(r.lease);
   if (open == leases_.end() && !r.lease.value.starts_with(tracing_.lease_prefix + "-")) {
-    // An earlier process of the coordinator granted this lease (a list of units assigned to one worker) and
-    // ended before it recorded the lease's span. At most kMaxFormerLeases such leases are recorded, since a
-    // lying worker can name any lease.
+    // An earlier process of the coordinator granted this lease and ended before it recorded the lease's span.
+    // At most kMaxFormerLeases such leases are recorded, since a lying worker can name any lease.
     if (former_leases_ >= kMaxFormerLeases) return;
     ++former_leases_;
     OpenLease former{.worker = worker.value, .start_ns = held_ns > 0 ? held_ns : ns(checked)};
@@ -145,8 +144,8 @@ void JobTrace::result(const UnitResult& r, const WorkerId& worker, TimePoint che
   // If a lying worker names another worker's lease, the result is not counted for that lease.
   const bool foreign = open != leases_.end() && open->second.worker != worker.value;
   if (open != leases_.end() && !foreign) {
-    // The worker may have had the unit (one tile and one round) before this lease began: under an earlier
-    // lease, which ended when the worker's connection broke. The span then starts at that earlier time.
+    // The worker may have had the unit before this lease began: under an earlier lease, which ended when the
+    // worker's connection broke. The span then starts at that earlier time.
     if (held_ns > 0) open->second.start_ns = std::min(open->second.start_ns, held_ns);
     open->second.start_ns = std::max(open->second.start_ns, start_ns_);
     open->second.end_ns = now_ns;

@@ -1,6 +1,6 @@
 // The trace spans that the coordinator records for one job: the job from its submission to its end, the
-// leases (lists of units that are assigned to one worker), and steps such as adding a result to the image or
-// writing the final image. A job that is not traced has no JobTrace.
+// leases, and steps such as adding a result to the image or writing the final image. A job that is not traced
+// has no JobTrace.
 //
 // The ids of the trace and of the job's span are derived from the job's record, and the id of a lease's span
 // also from the lease's id. So another coordinator, or this one after a restart, continues the same trace.
@@ -14,10 +14,10 @@
 #include <utility>
 #include <vector>
 
-#include "common/protocol/messages.h"
-#include "common/trace/tracer.h"
 #include "coordinator/domain/effect.h"
 #include "coordinator/store/jobs/job_store.h"
+#include "util/protocol/messages.h"
+#include "util/trace/tracer.h"
 
 namespace ls::coordinator {
 

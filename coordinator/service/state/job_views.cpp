@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include "common/base/clock.h"
 #include "coordinator/admission/admission.h"
 #include "coordinator/domain/limits.h"
 #include "coordinator/service/state/prerequisites.h"
+#include "core/base/clock.h"
 
 namespace ls::coordinator {
 namespace {

@@ -1,6 +1,6 @@
 // Makes the views of jobs, sequences (jobs with frames) and workers that clients see (views/views.h), with
-// predictions of when jobs will be done. A unit is one round (range of samples) of one tile; a worker renders
-// it on one thread.
+// predictions of when jobs will be done. Terms: docs/reference/glossary.md. Terms:
+// docs/reference/glossary.md.
 #pragma once
 
 #include <optional>
@@ -9,11 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include "common/image/error/convergence.h"
 #include "coordinator/domain/farm/farm.h"
 #include "coordinator/service/state/job_table.h"
 #include "coordinator/service/state/worker_entry.h"
 #include "coordinator/views/views.h"
+#include "core/image/error/convergence.h"
 
 namespace ls::coordinator {
 
@@ -76,8 +76,8 @@ struct SequenceFacts {
 // sequence's error is the mean over the pixels of all frames that have an error estimate; its interval treats
 // these estimates as independent. The cost of the remaining frames is extrapolated from the work so far: CPU
 // seconds, and the time in which a worker loads a frame. The remaining time assumes as many cores and workers
-// as the sequence's limits allow and its units (rounds of tiles) can keep busy. It is not less than the
-// remaining frames take at the rate of the last ones.
+// as the sequence's limits allow and its units can keep busy. It is not less than the remaining frames take
+// at the rate of the last ones.
 JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frames);
 
 FrameView frame_view(const JobView& frame);

@@ -8,9 +8,9 @@
 #include <optional>
 #include <utility>
 
-#include "common/base/log.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/views/views.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include "common/base/clock.h"
-#include "common/base/failpoint.h"
-#include "common/base/log.h"
-#include "common/base/safe_text.h"
+#include "core/base/clock.h"
+#include "core/base/failpoint.h"
+#include "core/base/log.h"
+#include "core/base/safe_text.h"
 
 namespace ls::coordinator {
 namespace {

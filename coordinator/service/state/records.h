@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "common/base/guarded.h"
 #include "coordinator/base/work_queue.h"
 #include "coordinator/service/state/job_table.h"
+#include "core/base/guarded.h"
 
 namespace ls::coordinator {
 
@@ -32,9 +32,9 @@ class Records {
   // As with put(), retry() tries again what could not be stored.
   void put_together(const std::function<void()>& changes);
   bool puts_together() const { return together_ != nullptr; }
-  // Stores the numeric class (machines that compute the same bits) that the job is pinned to, if it is not
-  // stored yet. After a restart a class that was not stored would be forgotten, and the job could be pinned
-  // to another one. So until it is stored, the job waits and none of its results is accepted.
+  // Stores the numeric class that the job is pinned to, if it is not stored yet. After a restart a class that
+  // was not stored would be forgotten, and the job could be pinned to another one. So until it is stored, the
+  // job waits and none of its results is accepted.
   Result<void> put_pin(const EntryPtr& entry);
   void add_quarantined(QuarantinedWorker worker) { quarantined_.push_back(std::move(worker)); }
   // Stores the quarantined workers that are not stored yet. Until they are, no result may be stored.

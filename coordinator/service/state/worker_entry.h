@@ -1,6 +1,5 @@
 // A worker in the coordinator's memory, and its connection. Both are guarded by the service's mutex
-// (service/core.h), except for members that are marked otherwise. A lease is a list of units (rounds of
-// tiles) that is assigned to one worker.
+// (service/core.h), except for members that are marked otherwise.
 #pragma once
 
 #include <atomic>
@@ -11,9 +10,9 @@
 #include <string>
 #include <utility>
 
-#include "common/base/clock.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/views/worker_session.h"
+#include "core/base/clock.h"
 
 namespace ls::coordinator {
 

@@ -14,8 +14,8 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "common/base/safe_text.h"
-#include "common/base/spawn.h"
+#include "core/base/safe_text.h"
+#include "core/base/spawn.h"
 
 namespace ls::coordinator {
 namespace {
@@ -118,7 +118,7 @@ Result<void> VideoEncoder::wait_for(int fd, short events) {
       return fail(Errc::unavailable,
                   until == asked_.until
                       ? "the time for one video is up: ask for fewer frames or a smaller size"
-                      : "ffmpeg does not go on; it was killed");
+                      : "ffmpeg made no progress; it was killed");
     std::array<pollfd, 2> watched = {pollfd{errors_.fd(), POLLIN, 0}, pollfd{fd, events, 0}};
     const int ready = ::poll(watched.data(), 2, static_cast<int>(std::min<std::int64_t>(left, 60'000)));
     if (ready < 0 && errno != EINTR)

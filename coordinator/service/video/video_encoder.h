@@ -13,10 +13,10 @@
 #include <stop_token>
 #include <string>
 
-#include "common/base/clock.h"
-#include "common/base/error.h"
-#include "common/image/frame/frame.h"
 #include "coordinator/store/files.h"
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "core/image/frame/frame.h"
 
 namespace ls::coordinator {
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "common/base/digest.h"
-#include "common/base/error.h"
+#include "core/base/digest.h"
+#include "core/base/error.h"
 
 namespace ls::coordinator {
 

@@ -15,8 +15,8 @@
 #include <set>
 #include <shared_mutex>
 
-#include "common/base/clock.h"
 #include "coordinator/store/blobs/blob_store.h"
+#include "core/base/clock.h"
 
 namespace ls::coordinator {
 

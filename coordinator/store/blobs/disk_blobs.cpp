@@ -8,9 +8,9 @@
 #include <cerrno>
 #include <system_error>
 
-#include "common/base/log.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/store/files.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 namespace {
@@ -173,12 +173,10 @@ tl::unexpected<Error> DiskBlobs::set_aside(const Digest& digest, const FileStamp
     return fail(Errc::unavailable, fmt::format("{}; {}; remove the file and upload it again", what,
                                                errno_error("move it aside to", to).message));
   log_error("blob=" + digest.hex(), fmt::format("damaged, moved aside to {}; check this disk", to.string()));
-  return fail(
-      Errc::failed_precondition,
-      fmt::format(
-          "{}; it is out of the way now ({}) and counts as missing: upload the file again, or hand in "
-          "the same scene again with `lightshaft submit`",
-          what, to.filename().string()));
+  return fail(Errc::failed_precondition,
+              fmt::format("{}; it is out of the way now ({}) and counts as missing: upload the file again, "
+                          "or submit the same scene again with `lightshaft submit`",
+                          what, to.filename().string()));
 }
 
 Result<void> DiskBlobs::place(const Digest& digest, const std::filesystem::path& from) {

@@ -16,9 +16,9 @@
 #include <optional>
 #include <vector>
 
-#include "common/base/digest.h"
-#include "common/base/guarded.h"
 #include "coordinator/store/blobs/blob_store.h"
+#include "core/base/digest.h"
+#include "core/base/guarded.h"
 
 namespace ls::coordinator {
 

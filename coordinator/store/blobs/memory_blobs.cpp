@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <system_error>
 
-#include "common/base/overloaded.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/store/files.h"
+#include "core/base/overloaded.h"
 
 namespace ls::coordinator {
 namespace {

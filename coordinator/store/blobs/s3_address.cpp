@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <optional>
 
-#include "common/base/parse_number.h"
 #include "coordinator/store/blobs/s3_link.h"
+#include "core/base/parse_number.h"
 
 namespace ls::coordinator {
 namespace {

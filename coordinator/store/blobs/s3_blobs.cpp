@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "common/base/log.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 
@@ -216,12 +216,10 @@ Error S3Blobs::note_damaged(const Digest& digest, const Error& why) const {
   const std::lock_guard lock(mutex_);
   there_.erase(digest);
   if (object) damaged_[digest] = object->etag;
-  return {
-      Errc::failed_precondition,
-      fmt::format(
-          "what {} has for blob {} is damaged ({}) and counts as missing: upload the file again, or hand in "
-          "the same scene again with `lightshaft submit`",
-          link_.shown(), digest.hex(), why.message)};
+  return {Errc::failed_precondition,
+          fmt::format("what {} has for blob {} is damaged ({}) and counts as missing: upload the file again, "
+                      "or submit the same scene again with `lightshaft submit`",
+                      link_.shown(), digest.hex(), why.message)};
 }
 
 Result<void> S3Blobs::send(const Digest& digest) {

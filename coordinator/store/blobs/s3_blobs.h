@@ -15,10 +15,10 @@
 #include <set>
 #include <vector>
 
-#include "common/base/digest.h"
-#include "common/base/guarded.h"
 #include "coordinator/store/blobs/disk_blobs.h"
 #include "coordinator/store/blobs/s3_link.h"
+#include "core/base/digest.h"
+#include "core/base/guarded.h"
 
 namespace ls::coordinator {
 

@@ -11,9 +11,9 @@
 #include <memory>
 #include <mutex>
 
-#include "common/base/log.h"
-#include "common/base/safe_text.h"
 #include "coordinator/store/files.h"
+#include "core/base/log.h"
+#include "core/base/safe_text.h"
 
 namespace ls::coordinator {
 namespace {

@@ -12,9 +12,9 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/clock.h"
-#include "common/base/digest.h"
-#include "common/base/error.h"
+#include "core/base/clock.h"
+#include "core/base/digest.h"
+#include "core/base/error.h"
 
 namespace ls::coordinator {
 

@@ -8,10 +8,10 @@
 #include <system_error>
 #include <utility>
 
-#include "common/base/log.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/store/blobs/disk_blobs.h"
 #include "coordinator/store/files.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 
@@ -71,7 +71,7 @@ class UploadParts::Part final : public BlobStore::Upload {
  private:
   Result<void> my_turn(const Slot& slot) const {
     if (slot.turn == turn_ && !ended_) return {};
-    return fail(Errc::failed_precondition, "this upload has ended, or another request has gone on with it");
+    return fail(Errc::failed_precondition, "this upload has ended, or another request has continued it");
   }
   Result<void> publish() {
     auto got = from_start_ ? Result<Digest>(hash_.finish()) : sha256_file(path_);
@@ -131,7 +131,7 @@ Result<std::unique_ptr<BlobStore::Upload>> UploadParts::resume(const Digest& dig
                 fmt::format("all of blob {} is here and being checked", digest.hex()));
   if (there != offset)
     return fail(Errc::failed_precondition,
-                fmt::format("{} bytes of blob {} are here: go on from there, not from byte {}", there,
+                fmt::format("{} bytes of blob {} are here: continue there, not at byte {}", there,
                             digest.hex(), offset));
   auto file = File::open(path(digest), O_WRONLY | O_CREAT | O_APPEND);
   if (!file) return tl::unexpected(file.error());

@@ -14,14 +14,14 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/digest.h"
-#include "common/base/error.h"
-#include "common/base/id.h"
-#include "common/job/settings.h"
-#include "common/job/techniques.h"
-#include "common/protocol/messages.h"
 #include "coordinator/domain/job_state.h"
 #include "coordinator/views/views.h"
+#include "core/base/digest.h"
+#include "core/base/error.h"
+#include "core/base/id.h"
+#include "core/job/settings.h"
+#include "core/job/techniques.h"
+#include "util/protocol/messages.h"
 
 namespace ls::coordinator {
 
@@ -40,8 +40,8 @@ struct JobLocation {
   bool alive = false;
 };
 
-// Totals of a job over all its units (a unit is one tile with one range of samples). They are written when
-// the job ends, so that a restart does not have to read its partials (the encoded pixel sums of its units).
+// Totals of a job over all its units. They are written when the job ends, so that a restart does not have to
+// read its partials (the encoded pixel sums of its units).
 struct JobTotals {
   double render_seconds = 0;  // from the first ray until the last unit's sums were added to the image
   double core_seconds = 0;    // CPU time that workers spent on rendering
@@ -70,7 +70,7 @@ struct StoredJob {
   std::string owner;  // user name; empty: the administrator
   double submitted_unix = 0;
   // W3C `traceparent` of the span in which another program submitted the job; the job's spans belong to its
-  // trace (common/trace/span.h). Empty: there is none
+  // trace (util/trace/span.h). Empty: there is none
   std::string traceparent;
   Digest scene;  // digest of the scene's blob
   RenderSettings settings;
@@ -81,7 +81,7 @@ struct StoredJob {
   std::vector<std::string> warnings;
   bool reference_same_seed = false;  // true: its reference image was rendered with this scene and seed
   std::vector<std::string> features_used, features_left_out;
-  std::string needs;  // what the scene needs, as canonical JSON (common/scene/analysis/needs.h)
+  std::string needs;  // what the scene needs, as canonical JSON (core/scene/analysis/needs.h)
   // JSON for the report: which features of the renderer the scene needs and why, and which parts of the scene
   // are not rendered and why
   std::string analysis;
@@ -89,9 +89,8 @@ struct StoredJob {
   std::optional<StopReason> stopped;
   std::string error;
   std::optional<Digest> numeric_class;
-  // `build` and `platform` describe the numeric class (machines that compute the same bits) to which the job
-  // is pinned: the build of one of its workers, and that worker's machine and build in words. Both are from
-  // its WorkerHello.
+  // `build` and `platform` describe the numeric class to which the job is pinned: the build of one of its
+  // workers, and that worker's machine and build in words. Both are from its WorkerHello.
   std::string build, platform;
   bool fake = false;  // true if pinned to a fake worker; then only fake workers may render its units
   JobTotals totals;

@@ -4,9 +4,9 @@
 #include <atomic>
 #include <memory>
 
-#include "common/base/guarded.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/store/jobs/job_store.h"
+#include "core/base/guarded.h"
 
 namespace ls::coordinator {
 namespace {

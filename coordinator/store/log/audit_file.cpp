@@ -4,8 +4,8 @@
 
 #include <sstream>
 
-#include "common/protocol/limits.h"
 #include "coordinator/store/files.h"
+#include "util/protocol/limits.h"
 
 namespace ls::coordinator {
 namespace {

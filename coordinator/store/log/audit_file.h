@@ -1,8 +1,7 @@
 // The file FOLDER/audits, which lists the open audits of one job. In an audit another worker renders a unit
-// (one tile in one round of samples) again, and the results are compared. Each audit has one line: "TILE
-// ROUND", or "TILE ROUND WORKER DIGEST" (worker and digest of the second result) if the second result
-// differed and a third worker has to decide. The file is rewritten with every change, without sync: a power
-// failure may lose some audits, but no result.
+// again, and the results are compared. Each audit has one line: "TILE ROUND", or "TILE ROUND WORKER DIGEST"
+// (worker and digest of the second result) if the second result differed and a third worker has to decide.
+// The file is rewritten with every change, without sync: a power failure may lose some audits, but no result.
 #pragma once
 
 #include <filesystem>

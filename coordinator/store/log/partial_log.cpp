@@ -14,14 +14,14 @@
 #include <span>
 #include <utility>
 
-#include "common/base/log.h"
-#include "common/protocol/limits.h"
 #include "coordinator/base/limits.h"
+#include "core/base/log.h"
+#include "util/protocol/limits.h"
 
 namespace ls::coordinator {
 
 // Marks the start of a record of the partial log. A record holds one partial: the encoded pixel sums of one
-// unit, that is of one tile and one range of samples.
+// unit.
 constexpr std::uint32_t kPartialMagic = 0x3250534c;  // the text "LSP2" in the file
 
 // The header of a record. Its bytes in memory are written to the file unchanged, so numbers in the file are

@@ -1,9 +1,8 @@
 // The accepted partials of one job, in append-only files FOLDER/partials-NNN.seg, called segments. A partial
-// is the pixel sums, encoded as EXR, of one unit (one tile and one range of samples). Each partial has a
-// record: a header of fixed size with a checksum, the EXR bytes and, if the unit had bad samples, its health
-// (counts of bad samples) as text. Records written before sync() returned survive kill -9 and power loss; a
-// torn record behind them is detected at open() and cut off. Beside each full segment lies an index of its
-// headers, partials-NNN.idx.
+// is the pixel sums, encoded as EXR, of one unit. Each partial has a record: a header of fixed size with a
+// checksum, the EXR bytes and, if the unit had bad samples, its health (counts of bad samples) as text.
+// Records written before sync() returned survive kill -9 and power loss; a torn record behind them is
+// detected at open() and cut off. Beside each full segment lies an index of its headers, partials-NNN.idx.
 //
 // One thread may call append() and sync(); any thread may call read().
 #pragma once
@@ -15,10 +14,10 @@
 #include <span>
 #include <vector>
 
-#include "common/base/digest.h"
-#include "common/base/error.h"
-#include "common/protocol/messages.h"
 #include "coordinator/store/files.h"
+#include "core/base/digest.h"
+#include "core/base/error.h"
+#include "util/protocol/messages.h"
 
 namespace ls::coordinator {
 

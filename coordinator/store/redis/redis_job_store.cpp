@@ -4,9 +4,9 @@
 
 #include <random>
 
-#include "common/base/log.h"
 #include "coordinator/store/redis/redis_job_store_impl.h"
 #include "coordinator/store/redis/redis_pull.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 namespace {
@@ -126,10 +126,10 @@ void RedisJobStore::send_the_rest() {
 void RedisJobStore::set_trouble(State& state, const Result<void>& sent) {
   const std::string before = std::exchange(state.trouble, sent ? "" : sent.error().message);
   if (before.empty() && !sent)
-    log_warn("store=redis",
-             state.trouble + "; jobs go on, kept on this machine's disk, and Redis is told when it is back");
-  if (!before.empty() && sent)
-    log_info("store=redis", "Redis answers again and is being told what it missed");
+    log_warn(
+        "store=redis",
+        state.trouble + "; jobs continue, kept on this machine's disk, and Redis gets them when it is back");
+  if (!before.empty() && sent) log_info("store=redis", "Redis answers again and gets what it missed");
 }
 
 Result<void> RedisJobStore::send_once() {

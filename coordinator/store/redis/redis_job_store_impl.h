@@ -13,10 +13,10 @@
 #include <thread>
 #include <utility>
 
-#include "common/base/guarded.h"
-#include "common/base/log.h"
 #include "coordinator/store/redis/redis_job_store.h"
 #include "coordinator/store/redis/redis_pull.h"
+#include "core/base/guarded.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 

@@ -6,8 +6,8 @@
 
 #include <algorithm>
 
-#include "common/base/parse_number.h"
-#include "common/base/safe_text.h"
+#include "core/base/parse_number.h"
+#include "core/base/safe_text.h"
 
 namespace ls::coordinator {
 namespace {

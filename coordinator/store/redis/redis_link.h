@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/clock.h"
-#include "common/base/error.h"
+#include "core/base/clock.h"
+#include "core/base/error.h"
 
 struct redisContext;
 

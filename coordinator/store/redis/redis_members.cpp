@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "common/base/log.h"
 #include "coordinator/base/work_queue.h"
 #include "coordinator/store/redis/redis_pull.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 namespace {
@@ -261,7 +261,7 @@ Result<std::optional<TakenJob>> RedisMembers::take(const JobId& id, const std::s
   if (!fields) return tl::unexpected(fields.error());
   if (fields->number == -1)
     return fail(Errc::failed_precondition,
-                fmt::format("another coordinator goes on taking over the jobs of coordinator {}", dead));
+                fmt::format("another coordinator is still taking over the jobs of coordinator {}", dead));
   if (fields->items.empty()) return std::nullopt;
   auto job = parse_redis_job(*fields);
   // Redis has made this node the owner, but the job cannot be read. look_for_stranded() will try it again.
@@ -340,8 +340,10 @@ void RedisMembers::start() {
       const auto done = beat();
       const std::string before = std::exchange(trouble_, done ? "" : done.error().message);
       if (before.empty() && !done)
-        log_warn("store=redis",
-                 trouble_ + "; this coordinator's jobs go on, and nobody can be seen or taken over from");
+        log_warn(
+            "store=redis",
+            trouble_ +
+                "; this coordinator's jobs continue, but no other coordinator can be seen or taken over");
     };
     act();
     every(options_.beat, token, act);

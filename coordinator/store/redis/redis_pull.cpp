@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <map>
 
-#include "common/base/log.h"
 #include "coordinator/store/redis/redis_records.h"
+#include "core/base/log.h"
 
 namespace ls::coordinator {
 namespace {

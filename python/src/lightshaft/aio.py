@@ -46,7 +46,7 @@ class AsyncFarm:
         return f"<AsyncFarm {self._address.url}>"
 
     async def close(self) -> None:
-        """Closes the connections; `with AsyncFarm() as farm` does so by itself."""
+        """Closes the connections. `with AsyncFarm() as farm` does this automatically."""
         await self._transport.close()
 
     async def submit(
@@ -60,14 +60,14 @@ class AsyncFarm:
         camera: str | None = None,
         **spec: Unpack[models.JobSpec],
     ) -> AsyncJob:
-        """Hands in a scene with the files that it names.
+        """Submits a scene with the files that it names.
 
-        `scene`: the path of an XML file, of a stage of USD or of an archive (.zip, .tar, .tar.gz), a string
-        of XML, or a dictionary as for Mitsuba's load_dict, which may hold arrays. Files are looked for in
-        `folder` (default: that of the scene's file, else the working directory); files outside of it are
-        sent only if they lie in one of the folders `allow`. `assets`: {name in the scene: path or bytes},
-        which go first. `camera`: of a stage that has several, the path of one. The rest are the job's
-        settings (models.JobSpec): spp, target_error, time, size, denoise, aov, ... `reference` may be a path.
+        `scene`: the path of an XML file, a USD stage or an archive (.zip, .tar, .tar.gz); or a string of XML; or a
+        dictionary as for Mitsuba's load_dict, which may contain arrays. Files are searched in `folder` (default: the
+        folder of the scene's file, else the working directory). Files outside of it are sent only if they are in one
+        of the folders `allow`. `assets`: {name in the scene: path or bytes}; they override files on the disk.
+        `camera`: the path of the camera, for a stage with several. All other arguments are settings of the job
+        (models.JobSpec): spp, target_error, time, size, denoise, aov, ... `reference` may be a path.
         """
         answer = await self._transport.run(
             submission.submit(scene, spec, submission.Options(name, folder, allow, assets, camera))
@@ -77,7 +77,7 @@ class AsyncFarm:
         return await self.job(answer["id"])
 
     async def job(self, id: str) -> AsyncJob:
-        """The job, sequence or frame with this id."""
+        """Returns the job, sequence or frame with this id."""
         return AsyncJob(self._transport, await self._transport.run(steps.get_job(id)))
 
     async def jobs(
@@ -90,11 +90,12 @@ class AsyncFarm:
         limit: int | None = None,
         offset: int | None = None,
     ) -> list[AsyncJob]:
-        """The jobs of the farm, in order of submission; a sequence is one job.
+        """Lists the jobs of the farm in order of submission; a sequence is one job.
 
-        `state`: only those in this state or these, such as 'running'. `search`: only those with this text in
-        their name or id. `owner`: only those of this user. `sort`: 'submitted', 'name', 'progress', 'relmse',
-        ...; '-submitted' is the newest first. `limit`, `offset`: at most so many, without the first ones.
+        `state`: only jobs in this state, or in one of these states, such as 'running'. `search`: only jobs with this
+        text in their name or id. `owner`: only jobs of this user. `sort`: 'submitted', 'name', 'progress', 'relmse',
+        ...; '-submitted' puts the newest first. `limit` and `offset`: return at most `limit` jobs and skip the first
+        `offset`.
         """
         filters = {
             "state": state,
@@ -109,7 +110,7 @@ class AsyncFarm:
         ]
 
     async def workers(self) -> list[models.Worker]:
-        """The workers of the farm, and what each does."""
+        """Lists the workers of the farm and their present work."""
         return await self._transport.run(steps.listed("/api/v1/workers", "workers"))
 
 
@@ -121,7 +122,7 @@ class AsyncJob(JobState):
         self._transport = transport
 
     async def refresh(self) -> models.Job:
-        """Asks the farm again; state, progress and view are then those of now."""
+        """Fetches the job's state from the farm again, and updates state, progress and view."""
         return self._keep(await self._transport.run(steps.get_job(self.id)))
 
     async def wait(self, progress: Progress = None, timeout: float | None = None) -> AsyncJob:
@@ -132,84 +133,83 @@ class AsyncJob(JobState):
         return self
 
     async def live(self, interval: float = watching.LIVE_SECONDS) -> AsyncJob:
-        """In a notebook: shows picture and curve, anew while they change, and returns when the job is
-        done."""
+        """Shows picture and curve in a notebook, updates them, and returns when the job is done."""
         self._keep(await self._transport.run(watching.live(self.id, interval)))
         return self
 
     async def image(self, layer: str = "color") -> Array:
-        """(height, width, 3), linear RGB as float32: the image, or another layer ('denoised'), as far as it
-        has come."""
+        """Returns the image, or another layer ('denoised'), as an array (height, width, 3) of linear RGB in
+        float32. Works while the job renders."""
         return await self._transport.run(jobs_of.image(self.id, layer))
 
     async def layers(self) -> dict[str, Array]:
-        """All layers of the image by name: 'color', 'stderr', 'spp', those asked for by `aov`, and
+        """Returns all layers of the image by name: 'color', 'stderr', 'spp', the layers requested by `aov`, and
         'denoised'."""
         return await self._transport.run(jobs_of.layers(self.id))
 
     async def png(self, exposure: float = 0, denoised: bool = False) -> bytes:
-        """The image as a PNG file, brightened by `exposure` stops; `denoised`: its denoised layers."""
+        """Returns the image as a PNG file, brightened by `exposure` stops. `denoised`: use the denoised layers."""
         return await self._transport.run(jobs_of.png(self.id, exposure, denoised))
 
     async def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the image as OpenEXR, with all layers and the header that tells how it was made."""
+        """Writes the image as OpenEXR, with all layers and with a header that describes its origin."""
         await self._transport.run(jobs_of.save(self.id, path))
 
     async def report(self) -> models.Report:
-        """How the image was made, what it cost and how large its error is. Verdict.of(report) is the verdict
-        in it."""
+        """Returns the report: how the image was made, what it cost and how large its error is. Verdict.of(report)
+        is its verdict."""
         return await self._transport.run(jobs_of.report(self.id))
 
     async def convergence(self) -> Curve:
-        """{column: values at each checkpoint}: seconds, core_seconds, spp, relmse, ... NaN where there is
-        no value."""
+        """Returns {column: values at each checkpoint}: seconds, core_seconds, spp, relmse, ... NaN marks missing
+        values."""
         return await self._transport.run(snapshot.get_curve(self.id))
 
     async def tiles(self) -> list[models.Tile]:
-        """The tiles of the image: where they lie, their samples, error and workers."""
+        """Lists the tiles of the image with their position, samples, error and workers."""
         return await self._transport.run(jobs_of.tiles(self.id))
 
     async def log(self) -> str:
-        """What happened to the job, a line for each event."""
+        """Returns the job's log, one line for each event."""
         return await self._transport.run(jobs_of.log(self.id))
 
     async def snapshot(self) -> Snapshot:
-        """Picture, figures and curve as they are now, which a notebook shows."""
+        """Returns the present picture, figures and curve, as a notebook shows them."""
         return await self._transport.run(snapshot.take(self.id))
 
     async def frames(self) -> list[AsyncJob]:
-        """Of a sequence: its frames, which are jobs."""
+        """Lists the frames of a sequence. Each frame is a job."""
         return [
             AsyncJob(self._transport, await self._transport.run(steps.get_job(id)))
             for id in jobs_of.frame_ids(await self.refresh())
         ]
 
     async def pause(self) -> AsyncJob:
-        """Hands out no more of the job; workers finish what they have begun."""
+        """Pauses the job. Workers finish the units that they have started."""
         return await self._change({"state": "paused"})
 
     async def resume(self) -> AsyncJob:
-        """Goes on with a paused job."""
+        """Continues a paused job."""
         return await self._change({"state": "running"})
 
     async def cancel(self) -> AsyncJob:
-        """Ends the job for good; its image stays as far as it has come."""
+        """Cancels the job for good. Its image so far is kept."""
         return await self._change({"state": "cancelled"})
 
     async def prioritise(self, priority: int) -> AsyncJob:
-        """Puts the job before all of a lower priority; 0 is the default."""
+        """Sets the priority. Jobs of higher priority are rendered first; the default is 0."""
         return await self._change({"priority": priority})
 
     async def wait_for(self, *jobs: str | JobState) -> AsyncJob:
-        """Lets the job begin when these jobs are done, by their ids or as AsyncJob objects; without any, it waits
-        no more. `submit(after=[...])` says so from the first."""
+        """Makes the job wait until these jobs are done, given by their ids or as AsyncJob objects. Without arguments
+        the job stops waiting. `submit(after=[...])` does the same from the beginning."""
         return await self._change(
             {"after": [job.id if isinstance(job, JobState) else job for job in jobs]}
         )
 
     async def extend(self, *, spp: int | None = None, target_error: float | None = None) -> AsyncJob:
-        """Goes on to `spp` samples per pixel in all, or to a smaller error: the pixels of a job that had it
-        from the first."""
+        """Extends the job to a total of `spp` samples per pixel, or to a smaller target error. The pixels are
+        those of a job that was submitted with this setting."""
         self._keep(await self._transport.run(jobs_of.extend(self.id, spp, target_error)))
         return self
 

@@ -1,4 +1,4 @@
-"""What can go wrong, one class for each kind of problem. All of them are LightshaftError."""
+"""The exceptions of this package, one class for each kind of problem. All of them derive from LightshaftError."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Diagnostic:
 
 
 class LightshaftError(Exception):
-    """Anything that this package reports. `file`, `line` and `column` are those of the first diagnostic."""
+    """Any error of this package. `file`, `line` and `column` are those of the first diagnostic."""
 
     def __init__(
         self, message: str, *, diagnostics: Sequence[Diagnostic] = (), status: int | None = None
@@ -50,7 +50,7 @@ class LightshaftError(Exception):
         self.message = message
         self.diagnostics = tuple(diagnostics)
         self.status = status
-        """The HTTP status, if the farm answered."""
+        """The HTTP status, if the farm responded."""
 
     def _first(self) -> Diagnostic | None:
         errors = [d for d in self.diagnostics if d.severity == "error"]
@@ -73,8 +73,8 @@ class LightshaftError(Exception):
 
     @property
     def path(self) -> str | None:
-        """Of a scene that was submitted as a dictionary: the keys that lead to the first error; of a stage
-        of USD, the path of the prim."""
+        """For a scene that was submitted as a dictionary: the keys that lead to the first error. For a USD stage:
+        the path of the prim."""
         first = self._first()
         return first.path or None if first else None
 
@@ -83,32 +83,31 @@ class LightshaftError(Exception):
 
 
 class SceneWarning(UserWarning):
-    """What the farm found odd in a scene that it took, such as a parameter that has no effect."""
+    """A warning about an accepted scene, such as a parameter that has no effect."""
 
 
 class SceneRejected(LightshaftError):
-    """The scene is wrong; `diagnostics` has every error with its place."""
+    """The scene has errors. `diagnostics` has all of them with their places."""
 
 
 class SceneDictError(SceneRejected):
-    """A dictionary cannot be made into a scene; `path` is the place within it."""
+    """A dictionary cannot be converted to a scene. `path` is the place of the error."""
 
 
 class StageRejected(SceneRejected):
-    """A stage of USD cannot be made into a scene; `path` is that of the first prim that is wrong."""
+    """A USD stage cannot be converted to a scene. `path` is the first prim with an error."""
 
 
 class RequestRejected(LightshaftError):
-    """The farm cannot do what was asked: an option that it does not know, or a value out of range."""
+    """The farm rejected the request: an unknown option, or a value out of range."""
 
 
 class FileRefused(LightshaftError):
-    """A file that the scene names is not sent: it cannot be read, or lies outside the folders that may be
-    sent."""
+    """A file of the scene cannot be sent: it is unreadable, or outside of the allowed folders."""
 
 
 class Unauthorised(LightshaftError):
-    """No token, or one that the farm does not know."""
+    """The request has no token, or one that the farm does not accept."""
 
 
 class Forbidden(LightshaftError):
@@ -116,24 +115,23 @@ class Forbidden(LightshaftError):
 
 
 class NotFound(LightshaftError):
-    """There is no such job, frame or image."""
+    """The job, frame or image does not exist."""
 
 
 class Conflict(LightshaftError):
-    """Not possible in the state that the job, or the farm, is in."""
+    """The request is not possible in the present state of the job or the farm."""
 
 
 class FarmBusy(LightshaftError):
-    """The farm answers, but cannot serve this request for now (or has no room left). Trying again later may
-    help."""
+    """The farm responds but cannot serve this request now, or is full. Trying again later may help."""
 
 
 class FarmUnreachable(LightshaftError):
-    """No answer: the address is wrong, the farm is down, or the network is broken."""
+    """The farm does not respond: the address is wrong, the farm is down, or the network is broken."""
 
 
 class BadAnswer(LightshaftError):
-    """What answered is no Lightshaft coordinator, or sends more than an answer may have."""
+    """The response does not come from a Lightshaft coordinator, or is too large."""
 
 
 class JobFailed(LightshaftError):
@@ -145,7 +143,7 @@ class JobCancelled(JobFailed):
 
 
 class WaitTimeout(LightshaftError, TimeoutError):
-    """The job had not ended within the time that wait() was given. It goes on."""
+    """The job did not end within the time limit of wait(). It continues to render."""
 
 
 class MissingPackage(LightshaftError):
@@ -174,7 +172,7 @@ TOKEN_HINT = (
 
 
 def error_of(status: int, problem: Any, body: bytes, url: str) -> LightshaftError:
-    """The exception of an answer that is no success. `problem` is its JSON, or None if it has none."""
+    """Returns the exception for a response that is an error. `problem` is its JSON, or None."""
     kind = BY_STATUS.get(status, BadAnswer)
     if not isinstance(problem, dict):
         shown = body[:MAX_SHOWN].decode("utf-8", "replace")

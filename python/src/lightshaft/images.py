@@ -20,12 +20,8 @@ Array = npt.NDArray[Any]
 
 
 def decode_layers(data: bytes) -> dict[str, Array]:
-    """{layer: its values}: (h, w) of one channel, (h, w, n) of more, which stand in the order R G B A, X Y
-    Z or U V.
-
-    Halves become float32, which has all of their values; counts stay integers. The colour is called
-    'color'.
-    """
+    """Returns {layer: values}, with shape (h, w) for one channel and (h, w, n) for more. Channels are in the order
+    R G B A, X Y Z or U V. Halves become float32 without loss; counts stay integers. The colour is called 'color'."""
     try:
         _check_size(OpenEXR.File(io.BytesIO(data), header_only=True).header())
         channels = OpenEXR.File(io.BytesIO(data), separate_channels=True).channels()
@@ -59,7 +55,7 @@ def _check_size(header: Mapping[str, Any]) -> None:
         and width * height * len(channels) <= MAX_VALUES
     ):
         raise BadAnswer(
-            f"the image claims {width} x {height} pixels and {len(channels)} channels, more than a farm makes"
+            f"the image claims {width} x {height} pixels and {len(channels)} channels, more than a farm's images have"
         )
     if any(channel.xSampling != 1 or channel.ySampling != 1 for channel in channels):
         raise BadAnswer(

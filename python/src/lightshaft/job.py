@@ -1,4 +1,4 @@
-"""What can be done with a job, as steps, and what is known of it. Job and AsyncJob run them."""
+"""The operations on a job, as steps, and its state. Job and AsyncJob run the steps."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from .steps import Call, Steps, ask_json, change_job, fetch, get_job, job_path, 
 
 @dataclasses.dataclass(frozen=True)
 class Verdict:
-    """What to think of the figures of an image, of a job or of its report."""
+    """How far the error figures of an image can be trusted, from a job or from its report."""
 
     kind: str
     """early, converging, fast, heavy_tail or bias_floor."""
     words: str
     trusted: bool
-    """False: don't trust the figures yet; the words say why."""
+    """False: the figures cannot be trusted yet; the words say why."""
     advice: str | None
-    """What to do then, with the command; None: nothing is needed."""
+    """What to do in that case, with the command; None: nothing needs to be done."""
 
     @staticmethod
     def of(told: Mapping[str, Any]) -> Verdict | None:
-        """The verdict in a job's view or in a report; None: there is none yet."""
+        """Returns the verdict of a job's view or of a report. None: there is none yet."""
         found = told.get("verdict")
         if isinstance(found, str):  # a report has its parts under keys of their own
             found = {
@@ -51,7 +51,7 @@ class Verdict:
 
 
 class JobState:
-    """The id of a job, and its figures as they were when the farm was last asked."""
+    """The id of a job, and its state when the farm was last queried."""
 
     def __init__(self, view: models.Job) -> None:
         self._view = view
@@ -62,27 +62,27 @@ class JobState:
 
     @property
     def view(self) -> models.Job:
-        """All that the farm told last; refresh() asks again."""
+        """Everything that the farm last sent about the job. refresh() fetches it again."""
         return self._view
 
     @property
     def state(self) -> str:
-        """queued, running, paused, done, failed or cancelled."""
+        """The state: queued, running, paused, done, failed or cancelled."""
         return self._view["state"]
 
     @property
     def progress(self) -> float:
-        """From 0 to 1."""
+        """The progress, from 0 to 1."""
         return self._view["progress"]
 
     @property
     def name(self) -> str:
-        """What lists call the job: the name of its scene, if no other was given."""
+        """The name of the job in lists. The default is the name of its scene."""
         return str(self._view.get("name") or "")
 
     @property
     def verdict(self) -> Verdict | None:
-        """What to think of the figures; None: nothing is known yet."""
+        """How far the error figures can be trusted. None: there are no figures yet."""
         return Verdict.of(self._view)
 
     def __repr__(self) -> str:
@@ -105,7 +105,7 @@ def save(job: str, path: str | os.PathLike[str]) -> Steps[None]:
 
 
 def _write(path: pathlib.Path, data: bytes) -> None:
-    """Whole or not at all."""
+    """Writes the whole file or nothing."""
     handle, aside = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -157,7 +157,7 @@ def extend(job: str, spp: int | None, target_error: float | None) -> Steps[model
 
 
 def matching(filters: Mapping[str, Any]) -> Steps[list[models.Job]]:
-    """The jobs of a farm that the filters of GET /jobs choose; those that are None choose nothing."""
+    """Lists the jobs of a farm that match the filters of GET /jobs. Filters that are None are ignored."""
     given = {
         key: value if isinstance(value, (str, int, float)) else ",".join(value)
         for key, value in filters.items()

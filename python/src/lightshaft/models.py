@@ -8,34 +8,35 @@ class Layers(TypedDict):
     """Width and height of level 0."""
     max_level: int
     max_side: int
-    """Pixels on a side of one request."""
+    """Largest width and height of one request, in pixels."""
     max_pixels: int
-    """Pixels of level 0 that one request may stand for."""
+    """Largest number of level 0 pixels that one request may cover."""
     layers: list["LayersLayers"]
 
 
 class LayersLayers(TypedDict):
     name: str
-    """`rgb`; `stderr`, the standard error of each value of it; `error`, the relative standard error of a
-    pixel; `spp`, its samples; AOVs."""
+    """Name of the layer. `rgb` is the image, `stderr` the standard error of each of its values, `error` the
+    relative standard error of each pixel, `spp` the number of samples; the others are AOVs."""
     channels: list[str]
-    """Of a cryptomatte `id0`, `coverage0` and so on: the three identifiers with the largest coverage."""
+    """Names of the channels. A cryptomatte has `id0`, `coverage0` and so on: the three identifiers with the
+    largest coverage."""
     format: Literal["half", "float"]
     blocks: Literal["mean", "error_of_mean", "root_mean_square", "first"]
-    """How the pixels of a block become one in levels above 0."""
+    """How the pixels of a block are combined into one pixel in levels above 0."""
     names: NotRequired[Union[dict[str, str], None]]
-    """Of a cryptomatte: name -> identifier, eight hexadecimal digits of the float's bits. null: not
-    known."""
+    """Names of a cryptomatte, each with its identifier: the float's bits as eight hexadecimal digits. null:
+    unknown."""
 
 
 class Problem(TypedDict):
-    """RFC 9457."""
+    """An error as in RFC 9457."""
     type: str
     title: str
     status: int
     detail: str
     diagnostics: NotRequired[list["ProblemDiagnostics"]]
-    """Of a scene that was refused."""
+    """The errors in a refused scene."""
 
 
 class ProblemDiagnostics(TypedDict):
@@ -45,9 +46,9 @@ class ProblemDiagnostics(TypedDict):
     column: int
     text: str
     source_line: NotRequired[str]
-    """The line itself; empty if there is none."""
+    """The line of the scene file. Empty if there is none."""
     length: NotRequired[int]
-    """Characters to underline from the column on."""
+    """Number of characters to underline, from the column on."""
 
 
 class Token(TypedDict):
@@ -56,264 +57,301 @@ class Token(TypedDict):
     role: Literal["admin", "submit", "read", "join"]
     user: str
     of_file: bool
-    """The file `token` or `join-token` of the data folder: replaced by deleting it, not revoked."""
+    """True for the tokens in the files `token` and `join-token` of the data folder. They are replaced by
+    deleting the file, and cannot be revoked."""
     token: NotRequired[str]
-    """In the answer that made it only."""
+    """The token itself. Present only in the answer that creates it."""
 
 
 class JobSpec(TypedDict):
     spp: NotRequired[int]
+    """Samples per pixel; the scene's number if spp, a target error and a time are all missing. With a
+    target error, no pixel gets more samples than this. A job that is submitted again without the three
+    keeps those of the earlier job."""
     target_error: NotRequired[float]
-    """relMSE"""
+    """The job ends when the estimated relMSE of its image is at most this. Tiles that need more samples for
+    it get more."""
     target_layer: NotRequired[Literal["raw", "denoised"]]
-    """Whose relMSE target_error means: that of the image as rendered (raw, the default), or that of its
-    denoised layers, which are then made. 409 if the coordinator has no Open Image Denoise."""
+    """The image whose error is compared with the target error: the image as rendered (raw) or its denoised
+    layers (denoised). With "denoised" the image is denoised. 409 if the coordinator has no Open Image
+    Denoise."""
     time: NotRequired[float]
-    """seconds"""
+    """The job ends this many seconds after its first ray."""
     seed: NotRequired[int]
-    size: NotRequired[Union[tuple[int, int], list[int]]]
-    """[width, height]"""
-    integrator: NotRequired[str]
-    aov: NotRequired[list[str]]
-    """Further layers of the image (docs/reference/aovs.md)."""
-    defines: NotRequired[dict[str, str]]
-    priority: NotRequired[int]
-    float: NotRequired[bool]
-    denoise: NotRequired[bool]
-    """Also write the layers denoised.R, G, B, with their own error in the report. 409 if the coordinator
-    has no Open Image Denoise."""
-    tags: NotRequired[list[str]]
-    max_workers: NotRequired[int]
-    """At most so many workers hold units of it at once."""
-    max_units: NotRequired[int]
-    """At most so many units of it are lent at once."""
-    memory: NotRequired[int]
-    """Bytes of memory that a worker must have; without it, as many as the job's files have."""
-    numeric_class: NotRequired[str]
-    """Only workers of this numeric class render it, by the beginning of its digits or of its platform:
-    armv8-a, say."""
-    after: NotRequired[list[str]]
-    """Ids of jobs that must be done before this one begins. A frame waits for the frame of its number in a
-    sequence of the same frames, and for all frames of another. Unknown jobs are refused with 400, those
-    that have failed or were cancelled with 409."""
+    """Number from which all random numbers follow; another seed gives other noise. Without it, the seed is
+    0."""
     frames: NotRequired[str]
-    """A sequence: FIRST-LAST, or FIRST-LASTxSTEP; at most 10000 frames. In the names of files a run of #
-    stands for the frame's number, zero-padded to its length, and $frame is defined to be it. Frame N has
-    the seed `seed` + N. `time` and `target_error` hold for each frame. All frames are read, and all files
-    checked, before the job is taken."""
+    """The frames of a sequence, such as 1-10 or, for every second frame, 1-10x2; # in the names of files
+    and $frame in the scene stand for the frame's number. Each frame is an image of its own; a sequence has
+    at most 10000 frames. A run of # is replaced by the number with as many digits. Frame N has the seed
+    `seed` + N. `time` and `target_error` apply to each frame. All frames are read, and all files checked,
+    before the job is accepted."""
+    size: NotRequired[Union[tuple[int, int], list[int]]]
+    """Size of the image in pixels, instead of the size in the scene."""
+    integrator: NotRequired[str]
+    """Integrator, instead of the one in the scene. Possible are volpath, volpath_distant_mis, path,
+    whitted."""
+    techniques: NotRequired[str]
+    """Sampling techniques that are used (+NAME) or not used (-NAME), for debugging. Possible are
+    equiangular, exponential, camera_points, lamp_directions, lamp_flights, light_vertices, light_tree,
+    path_reuse, shadow_roulette, sky_samples, path_splitting, sky_portals, local_lights. Without it, they
+    are chosen for the scene. Every image is right with any of them; only its noise differs."""
+    aov: NotRequired[list[str]]
+    """Further layers of the image (docs/reference/aovs.md). Possible are albedo, coverage,
+    denoising_albedo, denoising_normal, depth, direct, emission, geo_normal, indirect, material_id,
+    multiple, normal, position, shape_id, single, surface, uv, volume."""
+    defines: NotRequired[dict[str, str]]
+    """Values of the scene's $NAME parameters."""
+    priority: NotRequired[int]
+    """Jobs with a higher priority are rendered first. With a token of the role `submit`, at most the value
+    of the coordinator's option `--user-priority`."""
+    float: NotRequired[bool]
+    """The image has 32-bit numbers instead of 16-bit numbers."""
+    denoise: NotRequired[bool]
+    """The image also has the layers denoised.R, denoised.G and denoised.B, whose error is in the report.
+    Needs Open Image Denoise (deploy/install-denoiser.sh); 409 if the coordinator does not have it."""
+    tags: NotRequired[list[str]]
+    """Only workers that have all of these tags render the job."""
+    max_workers: NotRequired[int]
+    """At most this many workers render the job at the same time."""
+    max_units: NotRequired[int]
+    """At most this many units of the job are assigned to workers at the same time."""
+    memory: NotRequired[int]
+    """Only workers with at least this many bytes of memory render the job. Without it, or if the job's
+    files are larger, the workers need as much memory as the files have bytes."""
+    numeric_class: NotRequired[str]
+    """Only workers of this numeric class render the job: the beginning of its digest or of its platform,
+    such as armv8-a. `lightshaft workers` shows the classes."""
+    after: NotRequired[list[str]]
+    """Ids of jobs that must be done before this job begins. A frame of a sequence waits only for the frame
+    with the same number if the other job is a sequence of the same frames; otherwise it waits for the whole
+    job. A job that does not exist is an error (400), and so is one that has failed or was cancelled
+    (409)."""
     reference: NotRequired[str]
-    """SHA-256 of a blob: the right image, an EXR of the job's size, which every checkpoint is compared
-    with. The square of its layers stderr.R, stderr.G, stderr.B, where it has them, is subtracted from the
-    squared difference. It must be independent of the job: of another seed."""
+    """SHA-256 of the blob of a reference image, with which every checkpoint is compared. The reference is
+    an EXR of the job's size. If it has the layers stderr.R, stderr.G and stderr.B, their square is
+    subtracted from the squared difference. It must be independent of the job, so it must have another seed.
+    On the command line, `--reference FILE` uploads the file."""
 
 
 class Video(TypedDict):
     state: Literal["none", "waiting", "making", "ready", "failed"]
     fps: Union[float, None]
-    """Asked; null: there is no video."""
+    """Frames per second. null: there is no video."""
     exposure: Union[float, None]
-    """Asked, in stops."""
+    """Exposure in stops."""
     layer: Union[str, None]
-    """Asked: rgb or denoised."""
+    """The layer that the video shows: rgb or denoised."""
     frames: int
-    """That it has."""
+    """Number of frames in the finished video."""
     frames_done: int
-    """That are in it so far."""
+    """Number of frames that are encoded so far."""
     bytes: Union[int, None]
-    """Of a video that is ready."""
+    """Size of the finished video."""
     error: Union[str, None]
-    """Why it failed."""
+    """Why the video failed."""
 
 
 class JobChange(TypedDict):
     state: NotRequired[Literal["paused", "running", "cancelled"]]
+    """The job pauses, is rendered further, or ends for good."""
     priority: NotRequired[int]
+    """Jobs with a higher priority are rendered first. With a token of the role `submit`, at most the value
+    of the coordinator's option `--user-priority`."""
     spp: NotRequired[int]
-    """The new total. A job whose end is decided gets it in all its tiles, and has no target error or time
-    any more."""
+    """The new total of samples per pixel. If the job has reached its end, all its tiles get this many
+    samples, and it has no target error or time any more."""
     target_error: NotRequired[float]
-    """Of a job that has one. A smaller one goes on where a larger one ended, to the same pixels as with the
-    smaller one from the first. Not together with `spp`."""
+    """The new target error of a job that has one. A smaller target continues a job that has reached a
+    larger one; the pixels are the same as with the smaller target from the beginning. Not together with
+    `spp`."""
     after: NotRequired[list[str]]
-    """The jobs that it waits for from now on, instead of those before; []: for none. A job that would wait
-    for itself, directly or by way of others, is refused with 400. One that has begun is refused with 409:
-    pause it instead. Of a sequence, the frames that have begun go on, and the others wait."""
+    """Ids of the jobs that must be done before this job begins; [] for none. They replace the earlier ones.
+    A job that would wait for itself, directly or through other jobs, is an error (400), and so is a job
+    that has begun (409): pause it instead. Frames of a sequence that have begun continue, and the others
+    wait."""
     focus: NotRequired[Union[list[int], None]]
-    """[x0, y0, x1, y1] in pixels, x1 and y1 excluded: the tiles that these pixels lie in get the next
-    samples before all others. null: all tiles are treated alike again. It changes the order of the work
-    alone; an image by spp or target_error has the same bits with and without it. Kept with the job. Of a
-    sequence: of all its frames."""
+    """Rectangle [x0, y0, x1, y1] in pixels, without x1 and y1, whose tiles get the next samples before all
+    others; null for none. It changes only the order of the work: an image that ends by `spp` or
+    `target_error` has the same bits with and without it. It is stored with the job, and applies to all
+    frames of a sequence."""
 
 
 class Job(TypedDict):
     id: str
     name: NotRequired[str]
-    """Scene file."""
+    """File name of the scene, or the name given at submission."""
     owner: NotRequired[str]
-    """User whose token handed it in; empty: the admin, or a version before there were users."""
+    """User whose token submitted the job. Empty: the admin."""
     state: Literal["queued", "running", "paused", "done", "failed", "cancelled"]
     stopped: NotRequired[Union[str, None]]
-    """Why it went no further: spp, error, time; user: cancelled."""
+    """Why the job ended: spp, error, time, or user (it was cancelled)."""
     progress: float
     spp: int
-    """Asked."""
+    """Samples per pixel that the job asks for."""
     spp_asked: NotRequired[Union[int, None]]
-    """null: its target error or its time ends it, and spp is only the most that any pixel gets."""
+    """Samples per pixel that the submission asked for. null: a target error or time limit ends the job, and
+    spp is only an upper limit for each pixel."""
     target_error: NotRequired[Union[float, None]]
-    """relMSE, asked."""
+    """Target error, as relMSE."""
     target_layer: NotRequired[Union[str, None]]
-    """Whose relMSE target_error means: raw or denoised; null: there is no target."""
+    """The layer that must reach target_error: raw or denoised. null: the job has no target."""
     denoised_check: NotRequired[Union["JobDenoisedCheck", None]]
-    """When the error of the denoised layers was last compared with the target."""
+    """The last comparison of the denoised layers' error with the target."""
     denoise: NotRequired[bool]
-    """The image also gets the layers denoised.R, G, B."""
+    """True if the image also gets the layers denoised.R, denoised.G and denoised.B."""
     spp_done: NotRequired[float]
-    """Mean over pixels."""
+    """Samples per pixel so far, averaged over the pixels."""
     rmse: NotRequired[Union[float, None]]
-    """Estimated."""
+    """Estimated from the image itself."""
     rmse_ci95: NotRequired[Union[list[float], None]]
-    """[low, high] for the error of this very image; null also for jobs of earlier versions."""
+    """[low, high]: the 95 % interval of the error of this image. null: unknown."""
     relmse: Union[float, None]
-    """Estimated."""
+    """Estimated from the image itself."""
     relmse_ci95: Union[list[float], None]
-    """[low, high] for the error of this very image."""
+    """[low, high]: the 95 % interval of the error of this image."""
     reference: NotRequired[Union["JobReference", None]]
-    """True error against the reference at the last checkpoint."""
+    """True error: the difference from the reference at the last checkpoint."""
     reference_same_seed: NotRequired[bool]
-    """The reference was rendered of this scene with this seed: its noise is the image's own, the true
-    figures say nothing, and no verdict is drawn from them."""
+    """True if the reference was rendered from this scene with this seed. It then has the same noise as the
+    image, so its error figures mean nothing. No verdict is drawn from them."""
     verdict: NotRequired[Union["JobVerdict", None]]
-    """What to think of the figures; null: none yet."""
+    """How far the error figures can be trusted, in words. null: there are none yet."""
     few_hits: NotRequired[Union[int, None]]
-    """Pixels that too few samples have brought light to."""
+    """Number of pixels where too few samples found light."""
     pixels_without_samples: NotRequired[Union[int, None]]
-    """Pixels of tiles that nothing has come of yet; null: not known."""
+    """Number of pixels in tiles without results. null: unknown."""
     slope: NotRequired[Union[float, None]]
-    """Of log relMSE over log core seconds, about -1; null: too few checkpoints."""
+    """Slope of log relMSE over log core seconds, normally about -1. null: there are too few checkpoints."""
     slope_ci95: NotRequired[Union[list[float], None]]
-    """[low, high] for slope."""
+    """[low, high]: the 95 % interval of slope."""
     efficiency_per_core: NotRequired[Union[float, None]]
     """1 / (relmse x core seconds) at the last checkpoint."""
     eta_seconds: Union[float, None]
-    """Predicted time left."""
+    """Predicted seconds until the job ends."""
     eta_ci95: NotRequired[Union[list[float], None]]
-    """[low, high] for eta_seconds, where it is the target error that ends the job."""
+    """[low, high]: the 95 % interval of eta_seconds, for a job that ends at a target error."""
     eta_with_more: NotRequired[Union["JobEtaWithMore", None]]
-    """Predicted time left with more workers like those there are; null where they would not help."""
+    """Predicted time left with more workers like the present ones. null: more workers would not help."""
     eta_with_8_more: NotRequired[Union[float, None]]
-    """seconds of eta_with_more; goes with the next version."""
+    """seconds of eta_with_more. Deprecated; the next version removes it."""
     eta_with_8_more_ci95: NotRequired[Union[list[float], None]]
-    """ci95 of eta_with_more; goes with the next version."""
+    """ci95 of eta_with_more. Deprecated; the next version removes it."""
     error: Union[str, None]
-    """Why it failed, or stands still."""
+    """Why the job failed or does not progress."""
     after: NotRequired[list["JobAfter"]]
-    """The jobs that it waits for and that are not done yet; it is `queued` and gets no worker before they
-    are. Of a sequence: those of its first frame that waits."""
+    """The jobs that this job waits for and that are not done yet. Until they are done it is `queued` and
+    gets no worker. For a sequence: those of its first waiting frame."""
     waits_for: NotRequired[Union[str, None]]
-    """The same in a sentence. If one of them has failed, was cancelled or removed, the sentence says what
-    to do, and is in `error`, too."""
+    """The same as `after`, in a sentence. If one of those jobs failed, was cancelled or was removed, the
+    sentence says what to do, and is also in `error`."""
     denoised: NotRequired[Union["JobDenoised", None]]
-    """Error of the denoised layers of a job that is done; null: it has none, or is a sequence."""
+    """Error of the denoised layers of a job that is done. null: the job has no denoised layers, or is a
+    sequence."""
     warnings: NotRequired[list[str]]
     fake: NotRequired[bool]
-    """Fake workers (--fake) make its pixels up: it is no picture of the scene."""
+    """True if fake workers (--fake) computed the pixels. The image does not show the scene."""
     size: NotRequired[list[int]]
-    """[width, height]"""
+    """[width, height] in pixels."""
     tile: NotRequired[int]
     priority: NotRequired[int]
     focus: NotRequired[Union[list[int], None]]
-    """[x0, y0, x1, y1]: the pixels whose tiles get the next samples first; null: all tiles are treated
-    alike. Of a sequence: that of all frames, if they have the same."""
+    """[x0, y0, x1, y1]: tiles in this rectangle get the next samples first. null: all tiles are treated
+    alike. For a sequence: the rectangle of all frames, if it is the same."""
     max_workers: NotRequired[Union[int, None]]
-    """Asked."""
+    """Largest number of workers that may render the job at once."""
     max_units: NotRequired[Union[int, None]]
-    """Asked."""
+    """Largest number of units of the job that may be leased at once."""
     memory_bytes: NotRequired[int]
-    """That a worker must have, at least."""
+    """Memory that a worker must at least have to get units of the job."""
     numeric_class: NotRequired[Union[str, None]]
-    """The class that it is pinned to; null: none yet."""
+    """The numeric class whose workers render the job. null: not decided yet."""
     platform: NotRequired[Union[str, None]]
-    """Processor, compiler and Embree of that class."""
+    """Processor, compiler and Embree version of that class."""
     class_share: NotRequired[Union["JobClassShare", None]]
-    """How much of the farm can take it: the workers of the class that it is pinned to, and their threads,
-    of all that are connected; share is that of the threads, null if nobody is connected. Null of a job that
-    is pinned to no class yet or has ended, and of a sequence."""
+    """How much of the farm can render the job: the connected workers of its numeric class and their
+    threads, beside those of all classes. `share` is the class's share of all threads, null if no worker is
+    connected. null for a job without a class, for one that has ended, and for a sequence."""
     units_done: NotRequired[int]
     units_total: NotRequired[int]
     elapsed_seconds: NotRequired[float]
     core_seconds: NotRequired[float]
-    """CPU time of workers for its units."""
+    """CPU seconds that workers spent on the job's units."""
     queued_core_seconds: NotRequired[float]
-    """Predicted CPU time of its units that no worker holds; 0 also if nothing was measured yet."""
+    """Predicted CPU seconds of the units that no worker holds. 0 also if nothing was measured yet."""
     time: NotRequired["TimeSplit"]
     submitted_unix: NotRequired[float]
     sequence: NotRequired[Union[str, None]]
-    """Of a frame: the job that it belongs to."""
+    """For a frame: the id of its sequence."""
     frame: NotRequired[Union[int, None]]
-    """Of a frame: its number."""
+    """For a frame: its number."""
     frames: NotRequired[Union["Frames", None]]
-    """Of a sequence. Its other figures are of all frames together: sums, means over pixels (errors: over
-    the frames that have some), and elapsed_seconds from the first ray of any frame to the last fold."""
+    """For a sequence: its frames. The other figures of a sequence combine all frames: sums, and means over
+    pixels (errors: over the frames that have them). elapsed_seconds runs from the first ray of any frame to
+    the last result."""
     health: NotRequired["Health"]
 
 
 class JobDenoisedCheck(TypedDict):
-    """When the error of the denoised layers was last compared with the target."""
+    """The last comparison of the denoised layers' error with the target."""
     spp: NotRequired[float]
-    """Mean over pixels, then."""
+    """Samples per pixel at that time, averaged over the pixels."""
     relmse: NotRequired[float]
-    """Estimated."""
+    """Estimated from the image itself."""
     at_most: NotRequired[Union[float, None]]
-    """Upper end of the 95 % interval, which is compared; null: it is not known."""
+    """Upper end of the 95 % interval, which is compared with the target. null: unknown."""
 
 
 class JobReference(TypedDict):
-    """True error against the reference at the last checkpoint."""
+    """True error: the difference from the reference at the last checkpoint."""
     rmse: NotRequired[float]
     relmse: NotRequired[float]
     flip: NotRequired[Union[float, None]]
     below_noise: NotRequired[bool]
-    """relmse is less than three standard errors of the reference's own noise: less than can be told, not
-    0."""
+    """True if relmse is less than three standard errors of the reference's own noise. The true error is
+    then too small to measure, not 0."""
     rmse_below_noise: NotRequired[bool]
-    """The same of rmse."""
+    """True if the true RMSE is hidden by the reference's own noise."""
 
 
 class JobVerdict(TypedDict):
-    """What to think of the figures; null: none yet."""
+    """How far the error figures can be trusted, in words. null: there are none yet."""
     kind: NotRequired[Literal["early", "converging", "fast", "heavy_tail", "bias_floor"]]
     words: NotRequired[str]
     trusted: NotRequired[bool]
-    """false: don't trust yet, the words say why; the intervals mean little."""
+    """False if the error figures cannot be trusted yet. The words say why, and the intervals mean
+    little."""
     advice: NotRequired[Union[str, None]]
-    """What a user can do where the figures are not trusted, with the command; null: nothing is needed."""
+    """What a user can do if the figures are not trusted, with the command. null: nothing needs to be
+    done."""
 
 
 class JobEtaWithMore(TypedDict):
-    """Predicted time left with more workers like those there are; null where they would not help."""
+    """Predicted time left with more workers like the present ones. null: more workers would not help."""
     workers: NotRequired[int]
-    """How many more."""
+    """Number of additional workers."""
     seconds: NotRequired[float]
     ci95: NotRequired[Union[list[float], None]]
-    """[low, high] for seconds, as eta_ci95."""
+    """[low, high]: the 95 % interval of seconds."""
 
 
 class JobAfter(TypedDict):
     id: NotRequired[str]
     state: NotRequired[Union[str, None]]
-    """null: there is no such job any more."""
+    """State of that job. null: it has been removed."""
 
 
 class JobDenoised(TypedDict):
-    """Error of the denoised layers of a job that is done; null: it has none, or is a sequence."""
+    """Error of the denoised layers of a job that is done. null: the job has no denoised layers, or is a
+    sequence."""
     relmse: NotRequired[float]
     relmse_ci95: NotRequired[Union[list[float], None]]
 
 
 class JobClassShare(TypedDict):
-    """How much of the farm can take it: the workers of the class that it is pinned to, and their threads,
-    of all that are connected; share is that of the threads, null if nobody is connected. Null of a job that
-    is pinned to no class yet or has ended, and of a sequence."""
+    """How much of the farm can render the job: the connected workers of its numeric class and their
+    threads, beside those of all classes. `share` is the class's share of all threads, null if no worker is
+    connected. null for a job without a class, for one that has ended, and for a sequence."""
     workers: NotRequired[int]
     of_workers: NotRequired[int]
     threads: NotRequired[int]
@@ -322,48 +360,50 @@ class JobClassShare(TypedDict):
 
 
 class TimeSplit(TypedDict):
-    """Where the time went, in core seconds: of the workers, but for merge. After a kill of the coordinator
-    all but render may lack what was counted since the job's record was last stored."""
+    """How the time was spent, in core seconds. All of it is workers' time except `merge`. If the
+    coordinator was killed, times other than `render` may lack what was not stored before."""
     load: float
-    """Getting the job's files."""
+    """Fetching the job's files."""
     build: float
-    """Reading them and making worlds of them."""
+    """Reading the files and building worlds from them."""
     render: float
-    """CPU time of units: core_seconds."""
+    """Rendering: CPU time of units, the same as core_seconds."""
     transfer: float
-    """Packing results."""
+    """Encoding results."""
     merge: float
-    """Of the coordinator: checking and folding results."""
+    """Checking results and adding them to the image, on the coordinator."""
     idle: float
-    """Render threads standing still between two units of the job."""
+    """Idle time of render threads between two units of the job."""
 
 
 class Health(TypedDict):
-    """Of what is in the image. All zero and without causes on a healthy job."""
+    """Problems with numbers in the samples of the image. All counts are zero and there are no causes if the
+    job is healthy."""
     clean: bool
     nonfinite: int
-    """Rejected samples: counted, contributing zero, staying in the count of samples."""
+    """Samples that were not finite. They are rejected: they add zero to the image but count as samples."""
     negative: int
-    """Samples below zero; they are kept."""
+    """Samples below zero. They are kept."""
     majorant_violations: int
-    """Densities met above their bound."""
+    """Places where a medium's density exceeded its upper bound."""
     causes: list["HealthCauses"]
 
 
 class HealthCauses(TypedDict):
     cause: str
-    """not_a_number, infinite, too_large, negative_density, ..."""
+    """not_a_number, infinite, too_large, negative_density and others."""
     effect: Literal["rejected", "kept", "input"]
-    """input: the scene's, changed before rendering; it has no pixel."""
+    """What happened to the sample. `input` means that the scene was changed before rendering; it has no
+    pixel."""
     count: int
     text: str
-    """A sentence for a person."""
+    """The cause in a sentence."""
     frame: Union[int, None]
-    """Of a sequence: the first frame that has it; first and replay are of that one."""
+    """For a sequence: the first frame with this problem. `first` and `replay` refer to it."""
     first: list["HealthCausesFirst"]
-    """The first eight, row by row, then by sample."""
+    """The first eight places, ordered by row and then by sample."""
     replay: Union[str, None]
-    """The command that renders the first of them again."""
+    """Command that renders the first of these samples again."""
 
 
 class HealthCausesFirst(TypedDict):
@@ -373,22 +413,23 @@ class HealthCausesFirst(TypedDict):
 
 class Frames(TypedDict):
     range: str
-    """As asked: 1-10, 1-10x2."""
+    """The frames as submitted, such as 1-10 or 1-10x2."""
     total: int
     done: int
     running: int
     failed: int
     cancelled: int
     current: int
-    """The frame to look at: the first that is being rendered, else the last that there is something of."""
+    """The frame that is most interesting now: the first that is being rendered, or else the last that has
+    an image."""
     list: NotRequired[list["FramesList"]]
-    """Ascending; in GET /api/v1/jobs/{id} only."""
+    """All frames in ascending order. Only in GET /api/v1/jobs/{id}."""
 
 
 class FramesList(TypedDict):
     frame: NotRequired[int]
     id: NotRequired[str]
-    """The frame is a job of this id, and has its own events."""
+    """Id of the frame, which is a job with its own events."""
     state: NotRequired[Literal["queued", "running", "paused", "done", "failed", "cancelled"]]
     progress: NotRequired[float]
     spp_done: NotRequired[float]
@@ -399,11 +440,11 @@ class FramesList(TypedDict):
 class Tile(TypedDict):
     tile: NotRequired[int]
     rect: NotRequired[list[int]]
-    """[x0, y0, x1, y1], the end outside."""
+    """[x0, y0, x1, y1] in pixels; x1 and y1 are exclusive."""
     rounds: NotRequired[int]
     spp: NotRequired[int]
     relmse: NotRequired[Union[float, None]]
-    """Estimated, of the tile; null before its first sample."""
+    """Estimated error of the tile. null until it has samples."""
     workers: NotRequired[list[str]]
 
 
@@ -422,9 +463,10 @@ class Worker(TypedDict):
     build: NotRequired[str]
     numeric_class: NotRequired[str]
     platform: NotRequired[Union[str, None]]
-    """Processor, compiler and Embree of that class; null: not told."""
+    """Processor, compiler and Embree version of the worker's numeric class. null: the worker did not send
+    it."""
     fake: NotRequired[bool]
-    """It makes pixels up (--fake) instead of rendering, for tests of the farm."""
+    """True for a fake worker (--fake): it invents pixels instead of rendering, for tests of a farm."""
     threads: NotRequired[int]
     tags: NotRequired[list[str]]
     state: NotRequired[Literal["connected", "draining", "lost", "sick", "gone"]]
@@ -434,201 +476,206 @@ class Worker(TypedDict):
     cpu_seconds: NotRequired[float]
     rss_bytes: NotRequired[int]
     memory_bytes: NotRequired[int]
-    """That it may use; 0: not told."""
+    """Memory that the worker may use. 0: the worker did not send it."""
     last_seen_seconds: NotRequired[float]
 
 
 class Report(TypedDict):
     job: NotRequired[str]
     name: NotRequired[str]
-    """Scene file."""
+    """File name of the scene, or the name given at submission."""
     state: NotRequired[Literal["queued", "running", "paused", "done", "failed", "cancelled"]]
     error: NotRequired[Union[str, None]]
-    """Why it failed."""
+    """Why the job failed."""
     scene: NotRequired[str]
-    """SHA-256 of the scene as workers get it."""
+    """SHA-256 of the scene as workers receive it."""
     size: NotRequired[list[int]]
-    """[width, height]"""
+    """[width, height] in pixels."""
     seed: NotRequired[int]
     integrator: NotRequired[str]
     max_depth: NotRequired[int]
-    """Path segments at most; -1: unlimited."""
+    """Largest number of segments of a path. -1: unlimited."""
     rr_depth: NotRequired[int]
-    """First depth at which Russian roulette may act."""
+    """The first depth at which Russian roulette may end a path."""
     spp_asked: NotRequired[Union[int, None]]
-    """Samples per pixel that were asked for, by the job or by its scene; null: its target error or its time
-    ends it."""
+    """Samples per pixel that the job or its scene asks for. null: a target error or a time limit ends the
+    job."""
     time_asked: NotRequired[Union[float, None]]
-    """Seconds since the first ray that were asked for."""
+    """Time limit that the job asks for, in seconds since the first ray."""
     build: NotRequired[str]
-    """Of the worker that the job was pinned with."""
+    """Build of the worker that decided the job's numeric class."""
     platform: NotRequired[Union[str, None]]
-    """Processor, compiler and Embree of the numeric class."""
+    """Processor, compiler and Embree version of the numeric class."""
     fake: NotRequired[bool]
-    """Fake workers (--fake) made its pixels up: it is no picture of the scene."""
+    """True if fake workers (--fake) computed the pixels. The image does not show the scene."""
     warnings: NotRequired[list[str]]
     submitted_unix: NotRequired[float]
     target_error: NotRequired[Union[float, None]]
-    """relMSE that was asked for."""
+    """Target error that the job asks for, as relMSE."""
     target_layer: NotRequired[Union[str, None]]
-    """Whose relMSE that is: raw or denoised; null: there is no target."""
+    """The layer that must reach target_error: raw or denoised. null: the job has no target."""
     denoised_checks: NotRequired[list["ReportDenoisedChecks"]]
-    """Of a job whose target is that of the denoised layers: each comparison with it. The job ends when the
-    upper end is at most the target twice in succession."""
+    """For a target of the denoised layers: all comparisons with it. The job ends when `at_most` is not
+    above the target twice in a row."""
     forecast: NotRequired[Union["ReportForecast", None]]
-    """What it costs to come down to the target (asked: true) or, where that is reached or there is none, to
-    half of relmse."""
+    """Predicted cost of reaching the target (`asked` is true) or, if the target is reached or there is
+    none, of halving relmse."""
     spp: float
     samples: int
     load_seconds: float
     render_seconds: float
-    """First ray to last fold."""
+    """Seconds from the first ray until the last result was added to the image."""
     core_seconds: float
     time: NotRequired["TimeSplit"]
     denoised: NotRequired[Union["ReportDenoised", None]]
-    """Of a job with `denoise` that has ended: the denoised image."""
+    """The denoised image of a job with `denoise` that has ended."""
     adaptive: NotRequired[bool]
-    """It had a target error: tiles have as many samples as their errors asked for, spp is the mean over
-    pixels."""
+    """True if the job had a target error. Each tile then has as many samples as its error required, and spp
+    is the mean over the pixels."""
     note: NotRequired[str]
-    """What to know of an image that was stopped by its error (a small bias) or by time."""
+    """What a reader should know about an image that was stopped by its error (it has a small bias) or by
+    time."""
     peak_rss_bytes: int
     rmse: Union[float, None]
-    """Estimated."""
+    """Estimated from the image itself."""
     rmse_ci95: NotRequired[Union[list[float], None]]
-    """[low, high] for the error of this very image."""
+    """[low, high]: the 95 % interval of the error of this image."""
     relmse: Union[float, None]
-    """Estimated."""
+    """Estimated from the image itself."""
     relmse_ci95: Union[list[float], None]
     mean: NotRequired[Union[list[float], None]]
     """Mean of the image in R, G and B."""
     mean_ci95: NotRequired[Union[list[list[float]], None]]
-    """95 % interval [low, high] of the right mean in R, G and B; null while the error is not trusted, and
-    where rare bright light may be missing."""
+    """95 % interval [low, high] of the true mean in R, G and B. null while the error is not trusted, and if
+    rare bright light may be missing."""
     relmse_16: NotRequired[Union[float, None]]
     """relMSE of the means over squares of 16 x 16 pixels."""
     relmse_16_ci95: NotRequired[Union[list[float], None]]
-    """[low, high] for the error of this very image; null where mean_ci95 is, and where few squares carry
-    the error."""
+    """95 % interval [low, high] of relmse_16; null if mean_ci95 is null or if most of the error is in a few
+    of the 16 x 16 squares."""
     pixels_without_samples: NotRequired[int]
-    """The figures of the error are of the other pixels."""
+    """Number of pixels without samples. The error figures are those of the other pixels."""
     slope: NotRequired[Union[float, None]]
-    """Of log relMSE over log core seconds, about -1; null: too few checkpoints."""
+    """Slope of log relMSE over log core seconds, normally about -1. null: there are too few checkpoints."""
     slope_ci95: NotRequired[Union[list[float], None]]
-    """[low, high] for slope."""
+    """[low, high]: the 95 % interval of slope."""
     trend: NotRequired[str]
     """The slope in words."""
     efficiency: NotRequired[Union[float, None]]
-    """1 / (relmse x render_seconds), on `threads` threads."""
+    """1 / (relmse x render_seconds), with as many threads as `threads` says."""
     efficiency_per_core: NotRequired[Union[float, None]]
     """1 / (relmse x core_seconds)."""
     threads: NotRequired[Union[float, None]]
-    """That rendered, in the mean: core_seconds / render_seconds."""
+    """Mean number of threads that rendered: core_seconds / render_seconds."""
     nonfinite_samples: int
     negative_samples: NotRequired[int]
     majorant_violations: NotRequired[int]
     clamped_values: NotRequired[int]
-    """Above 65504, the largest half; 0 with float."""
+    """Number of values above 65504, the largest half, which were clamped. 0 for images in float."""
     health: NotRequired["Health"]
     pixels_sha256: Union[str, None]
-    """Of a sequence: SHA-256 over the 32 bytes of each frame's, in order, once all are done."""
+    """SHA-256 of the pixels. For a sequence: SHA-256 over the digests (32 bytes each) of all frames in
+    order, once all are done."""
     features_used: list[str]
     features_left_out: list[str]
     techniques: NotRequired[list["ReportTechniques"]]
-    """What the workers' integrator did besides directions and next-event estimation at vertices to find
-    light. What each costs and brings: tests/bench/techniques.py."""
+    """The techniques by which the workers' integrator looked for light, besides sampling directions and
+    next-event estimation at vertices. bench/techniques.py measures each."""
     needs: NotRequired[Union[dict[str, Any], None]]
-    """What the scene needs of the renderer, as flags and counts; null for jobs of earlier versions."""
+    """What the scene needs of the renderer, as flags and counts. null for jobs of earlier versions."""
     analysis: NotRequired[Union[dict[str, Any], None]]
-    """parts: [{part, used, why, bytes}] of the renderer, bytes being those of the files that the part
-    reads; left_out: [{what, why, count, bytes}], what no pixel depends on and was therefore neither stored
-    nor sent."""
+    """`parts`: the parts of the renderer, each with `part`, `used`, `why` and `bytes`, the size of the
+    files that it reads. `left_out`: what no pixel depends on and was therefore neither stored nor sent,
+    each with `what`, `why`, `count` and `bytes`."""
     numeric_class: Union[str, None]
     stopped: Union[str, None]
     verdict: NotRequired[str]
-    """What to think of the figures, in words."""
+    """How far the error figures can be trusted, in words."""
     verdict_kind: NotRequired[Literal["early", "converging", "fast", "heavy_tail", "bias_floor"]]
     trusted: NotRequired[bool]
-    """false: don't trust yet, the verdict says why; the intervals mean little."""
+    """False if the error figures cannot be trusted yet. The verdict says why, and the intervals mean
+    little."""
     advice: NotRequired[Union[str, None]]
-    """What a user can do where the figures are not trusted, with the command; null: nothing is needed."""
+    """What a user can do if the figures are not trusted, with the command. null: nothing needs to be
+    done."""
     few_hits_pixels: NotRequired[Union[int, None]]
-    """Pixels that too few samples have brought light to; magenta in error.png."""
+    """Number of pixels where too few samples found light. They are magenta in error.png."""
     true_rmse: NotRequired[float]
-    """With a reference, its own noise subtracted. Of the last checkpoint, as true_relmse and true_flip."""
+    """With a reference: the difference from it at the last checkpoint, with the reference's own noise
+    subtracted. true_relmse and true_flip are of the same checkpoint."""
     true_relmse: NotRequired[float]
     true_flip: NotRequired[Union[float, None]]
     """Mean HDR-FLIP."""
     true_rmse_below_noise: NotRequired[bool]
-    """As reference.rmse_below_noise."""
+    """True if the true RMSE is hidden by the reference's own noise."""
     true_relmse_below_noise: NotRequired[bool]
     """As reference.below_noise."""
     reference: NotRequired[Union[dict[str, Any], None]]
-    """digest, the figures above as rmse, relmse and flip, and the reference's own noise_rmse and
-    noise_relmse, null where it brings no layers of errors. below_noise: the image differs from it by no
-    more than its own noise (relmse is less than three standard errors, relmse_stderr, above 0), so that the
-    true error is less than can be told; rmse_below_noise: the same of rmse, by mse_stderr, the standard
-    error of its square. Both standard errors are null where noise_relmse is. same_seed: it was rendered of
-    this scene with this seed, so that its noise is the image's own: the true figures say nothing, and no
-    verdict is drawn from them."""
+    """The reference image: its digest, the true errors rmse, relmse and flip, and its own noise as
+    noise_rmse and noise_relmse (null if it has no layers of errors). below_noise: relmse is less than three
+    standard errors (relmse_stderr) above 0, so the image differs from the reference by no more than the
+    reference's noise, and the true error is too small to measure. rmse_below_noise: the same for rmse, by
+    mse_stderr, the standard error of its square. Both standard errors are null if noise_relmse is.
+    same_seed: the reference was rendered from this scene with this seed, so it has the same noise as the
+    image; the true errors then mean nothing, and no verdict is drawn from them."""
     frames: NotRequired[list[dict[str, Any]]]
-    """Of a sequence: frame, job, state, and these figures of each. Its convergence is empty: every frame
-    has its own."""
+    """For a sequence: each frame with its job, its state and the figures above. `convergence` of a sequence
+    is empty, since every frame has its own."""
     convergence: list["ReportConvergence"]
 
 
 class ReportDenoisedChecks(TypedDict):
     spp: NotRequired[float]
-    """Mean over pixels, then."""
+    """Samples per pixel at that time, averaged over the pixels."""
     relmse: NotRequired[float]
-    """Estimated."""
+    """Estimated from the image itself."""
     at_most: NotRequired[Union[float, None]]
-    """Upper end of the 95 % interval; null: it is not known."""
+    """Upper end of the 95 % interval. null: unknown."""
 
 
 class ReportForecast(TypedDict):
-    """What it costs to come down to the target (asked: true) or, where that is reached or there is none, to
-    half of relmse."""
+    """Predicted cost of reaching the target (`asked` is true) or, if the target is reached or there is
+    none, of halving relmse."""
     target: NotRequired[float]
     asked: NotRequired[bool]
     spp: NotRequired[float]
-    """Mean samples per pixel there."""
+    """Samples per pixel at that point, averaged over the pixels."""
     core_seconds: NotRequired[float]
-    """Still to spend."""
+    """Core seconds still to spend."""
     core_seconds_ci95: NotRequired[list[float]]
 
 
 class ReportDenoised(TypedDict):
-    """Of a job with `denoise` that has ended: the denoised image."""
+    """The denoised image of a job with `denoise` that has ended."""
     by: NotRequired[str]
     """Name and version of the denoiser."""
     seconds: NotRequired[float]
-    """that denoising took"""
+    """Seconds that denoising took."""
     rmse: NotRequired[float]
-    """Estimated from the two halves of the samples, see docs/design/denoising.md."""
+    """Estimated from the two halves of the samples; see docs/design/denoising.md."""
     rmse_ci95: NotRequired[Union[list[float], None]]
-    """95 % interval; null where so few pixels carry the noise that it is not known"""
+    """95 % interval. null: so few pixels carry the noise that it is unknown."""
     relmse: NotRequired[float]
     relmse_ci95: NotRequired[Union[list[float], None]]
-    """95 % interval; null where so few pixels carry the noise that it is not known"""
+    """95 % interval. null: so few pixels carry the noise that it is unknown."""
     true_rmse: NotRequired[float]
-    """Against the job's reference, if it has one."""
+    """Difference from the job's reference, if it has one."""
     true_relmse: NotRequired[float]
     true_relmse_stderr: NotRequired[float]
-    """from the reference's own noise"""
+    """Standard error of true_relmse that the reference's own noise causes."""
     error: NotRequired[str]
-    """Why there is no denoised image; then nothing else stands here."""
+    """Why there is no denoised image. The other members are then missing."""
 
 
 class ReportTechniques(TypedDict):
     name: NotRequired[str]
     what: NotRequired[str]
     off: NotRequired["ReportTechniquesOff"]
-    """Parameter of the scene's integrator that switches it off."""
+    """Parameter of the scene's integrator that switches the technique off."""
 
 
 class ReportTechniquesOff(TypedDict):
-    """Parameter of the scene's integrator that switches it off."""
+    """Parameter of the scene's integrator that switches the technique off."""
     parameter: NotRequired[str]
     value: NotRequired[str]
 
@@ -638,40 +685,41 @@ class ReportConvergence(TypedDict):
     core_seconds: NotRequired[float]
     spp: NotRequired[float]
     rmse: NotRequired[Union[float, None]]
-    """Estimated."""
+    """Estimated from the image itself."""
     rmse_ci95: NotRequired[Union[list[float], None]]
-    """Of this checkpoint; missing in jobs of earlier versions."""
+    """95 % interval at this checkpoint. Missing in jobs of earlier versions."""
     relmse: NotRequired[Union[float, None]]
-    """Estimated."""
+    """Estimated from the image itself."""
     relmse_ci95: NotRequired[Union[list[float], None]]
     true_rmse: NotRequired[float]
-    """With a reference."""
+    """Difference from the reference, if the job has one."""
     true_relmse: NotRequired[float]
     true_flip: NotRequired[Union[float, None]]
-    """At doubling samples and at the end."""
+    """Computed each time the samples have doubled, and at the end."""
     true_rmse_below_noise: NotRequired[bool]
-    """With a reference: less than its own noise lets one tell."""
+    """True if the difference from the reference is too small to be distinguished from the reference's own
+    noise."""
     true_relmse_below_noise: NotRequired[bool]
     forecast: NotRequired[dict[str, Any]]
-    """With a target error, at doubling samples: what was predicted there. core_seconds still to spend,
-    core_seconds_ci95 [low, high], and the spp at the target."""
+    """For a job with a target error, each time the samples have doubled: the prediction at that time.
+    core_seconds still to spend, their interval core_seconds_ci95 [low, high], and spp at the target."""
 
 
 class WhoAmIAnswer(TypedDict):
     role: Literal["admin", "submit", "read"]
     user: str
     version: str
-    """Of the coordinator's program."""
+    """Version of the coordinator."""
 
 
 class ListJobsAnswer(TypedDict):
     jobs: list["Job"]
     total: int
-    """Jobs that were asked for, on all pages."""
+    """Number of selected jobs on all pages together."""
     states: dict[str, int]
-    """How many jobs this token may see in each state, whatever was asked for."""
+    """Number of jobs in each state that this token may see, whether selected or not."""
     owners: list[str]
-    """Of all jobs that this token may see."""
+    """Owners of all jobs that this token may see."""
 
 
 class SubmitJobAnswer(TypedDict):
@@ -679,7 +727,8 @@ class SubmitJobAnswer(TypedDict):
     url: str
     warnings: list[str]
     reference_same_seed: NotRequired[bool]
-    """The reference was rendered of this scene with this seed: the true figures will say nothing."""
+    """True if the reference was rendered from this scene with this seed. It then has the same noise as the
+    image, so its error figures mean nothing."""
 
 
 class SubmitAgainAnswer(TypedDict):
@@ -687,7 +736,8 @@ class SubmitAgainAnswer(TypedDict):
     url: str
     warnings: list[str]
     reference_same_seed: NotRequired[bool]
-    """The reference was rendered of this scene with this seed: the true figures will say nothing."""
+    """True if the reference was rendered from this scene with this seed. It then has the same noise as the
+    image, so its error figures mean nothing."""
 
 
 class GetTilesAnswer(TypedDict):
@@ -701,17 +751,19 @@ class ListTokensAnswer(TypedDict):
 class ListWorkersAnswer(TypedDict):
     workers: list["Worker"]
     join: NotRequired["ListWorkersAnswerJoin"]
-    """How further workers join."""
+    """How another worker can join."""
 
 
 class ListWorkersAnswerJoin(TypedDict):
-    """How further workers join."""
+    """How another worker can join."""
     address: NotRequired[str]
-    """HOST:PORT of the workers' port: as the coordinator listens, or as its operator says."""
+    """HOST:PORT of the workers' port: the address on which the coordinator listens, or the one that its
+    operator configured."""
     tls: NotRequired[bool]
-    """Workers need the authority's certificate, and a certificate of their own with its key."""
+    """True if workers connect over TLS. They then need the certificate of the farm's authority, and a
+    certificate and key of their own."""
     token_file: NotRequired[str]
-    """On the coordinator's machine; for admins."""
+    """Path of the file with the join token, on the coordinator's machine. Shown to admins only."""
 
 
 class MissingBlobsAnswer(TypedDict):

@@ -1,4 +1,4 @@
-"""Writes the arrays of a dictionary as the files that they stand for."""
+"""Writes the arrays of a scene dictionary as files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ATTRIBUTE = re.compile("(?!face_normals$)(vertex|face)_[A-Za-z0-9_]{1,64}")  # n
 
 
 class NoFile(ValueError):
-    """What is wrong with the array under `key`."""
+    """An error in the array under `key`."""
 
     def __init__(self, key: str, text: str) -> None:
         super().__init__(text)
@@ -29,17 +29,17 @@ class NoFile(ValueError):
 
 
 def file_of(kind: str, values: Mapping[str, Any]) -> tuple[bytes, str, set[str]] | None:
-    """The file that a plugin would read, the ending of its name, and the keys that it stands for; None if
+    """Returns the file that a plugin would read, its suffix, and the keys that the file replaces. Returns None if
     the plugin has no arrays."""
     keys = _array_keys(kind, values)
     if not keys:
         return None
     if "filename" in values:
-        raise NoFile(keys[0], "there is a 'filename', too: give one of the two")
+        raise NoFile(keys[0], "there is also a 'filename': give only one of the two")
     if kind == "ply":
         return _ply({key: values[key] for key in keys}), ".ply", set(keys)
     if len(keys) > 1:
-        raise NoFile(keys[1], f"there is an array {keys[0]!r}, too: give one of the two")
+        raise NoFile(keys[1], f"there is also an array {keys[0]!r}: give only one of the two")
     data, ending = (_grid if kind == "gridvolume" else _image)(keys[0], values[keys[0]])
     return data, ending, set(keys)
 
@@ -55,13 +55,13 @@ def _array_keys(kind: str, values: Mapping[str, Any]) -> list[str]:
 
 
 def _array(key: str, value: Any, kinds: str = "fiu") -> Array:
-    """Also of what NumPy can read, such as a Bitmap, a VolumeGrid or a TensorXf of Mitsuba."""
+    """Converts to an array whatever NumPy can read, such as a Bitmap, VolumeGrid or TensorXf of Mitsuba."""
     try:
         array = np.asarray(value)
     except Exception as error:  # whatever a foreign object raises
-        raise NoFile(key, f"a {type(value).__name__} is no array: {error}") from error
+        raise NoFile(key, f"a {type(value).__name__} is not an array: {error}") from error
     if array.dtype.kind not in kinds or array.size == 0:
-        raise NoFile(key, f"an array of numbers is wanted, not one of {array.dtype} and shape {array.shape}")
+        raise NoFile(key, f"this must be an array of numbers, not of {array.dtype} and shape {array.shape}")
     return array
 
 
@@ -69,12 +69,13 @@ def _floats(key: str, array: Array) -> Array:
     with np.errstate(over="ignore"):
         floats = np.ascontiguousarray(array, dtype="<f4")
     if not np.isfinite(floats).all():
-        raise NoFile(key, "a number is infinite, none (nan), or too large for single precision")
+        raise NoFile(key, "a number is infinite, not a number (nan), or too large for single precision")
     return floats
 
 
 def _image(key: str, value: Any) -> tuple[bytes, str]:
-    """Bytes and words are an image of 8 and 16 bits, which is sRGB unless it is `raw`; floats are linear."""
+    """Encodes an image. Integers become an image of 8 or 16 bits, which is sRGB unless it is `raw`; floats are
+    linear."""
     array = _array(key, value)
     if array.ndim == 2:
         array = array[..., None]
@@ -88,7 +89,7 @@ def _image(key: str, value: Any) -> tuple[bytes, str]:
     if whole:
         return _png(array), ".png"
     if array.dtype.kind != "f":
-        raise NoFile(key, f"an image is of floats, uint8 or uint16, not of {array.dtype}")
+        raise NoFile(key, f"an image must have floats, uint8 or uint16, not {array.dtype}")
     return _exr(_floats(key, array)), ".exr"
 
 
@@ -171,7 +172,7 @@ def _ply(values: Mapping[str, Any]) -> bytes:
 
 
 def _rows(key: str, value: Any, widths: tuple[int, ...], kinds: str = "fiu") -> Array:
-    """A row for each vertex or face. Numbers in one row, as Mitsuba has them, are taken apart."""
+    """Returns one row for each vertex or face. A flat list of numbers, as in Mitsuba, is divided into rows."""
     array = _array(key, value, kinds)
     if array.ndim == 1:
         width = widths[0]
@@ -179,7 +180,7 @@ def _rows(key: str, value: Any, widths: tuple[int, ...], kinds: str = "fiu") -> 
             array = array.reshape(-1, width)
     if array.ndim != 2 or array.shape[1] not in widths:
         wanted = " or ".join(f"(n, {width})" for width in widths)
-        raise NoFile(key, f"an array of shape {wanted} is wanted, not {array.shape}")
+        raise NoFile(key, f"an array of shape {wanted} is needed, not {array.shape}")
     return array
 
 

@@ -1,8 +1,7 @@
 """Makes the XML of a scene from a dictionary in the style of Mitsuba's mi.load_dict.
 
-Each element stands on a line of its own, and SceneText remembers which keys led to it: an error that the
-farm reports for a line is told as one of the dictionary. Arrays become files beside the XML
-(scene_arrays.py), named by their content.
+Each element is on a line of its own, and SceneText remembers its keys: so an error that the farm reports for a line
+can be reported for the dictionary. Arrays become files beside the XML (scene_arrays.py), named by their content.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ class SceneText:
 
 
 def scene_of_dict(scene: Mapping[str, Any]) -> SceneText:
-    """The scene as Mitsuba XML. SceneDictError names the keys that lead to what cannot be a scene."""
+    """Returns the scene as Mitsuba XML. Raises SceneDictError with the keys of an impossible value."""
     if scene.get("type") != "scene":
         raise _wrong(
             "", f"the outermost dictionary must have 'type': 'scene', not {scene.get('type')!r}"
@@ -71,15 +70,14 @@ class _Writer:
         self.paths.append(path)
 
     def write(self, depth: int, parent: str, key: Any, value: Any, names_it: bool = False) -> None:
-        """`names_it`: objects directly in the scene are called by their keys, and can be referred to by
-        them."""
+        """Writes an object. `names_it`: top-level objects get their keys as ids, and can be referred to by them."""
         if not isinstance(key, str):
             raise _wrong(parent, f"keys must be strings, not {key!r}")
         path = f"{parent}.{key}" if parent else key
         if depth > MAX_NESTING:
             raise _wrong(
                 path,
-                f"dictionaries stand within each other more than {MAX_NESTING} deep (does one hold itself?)",
+                f"dictionaries are nested more than {MAX_NESTING} deep (does one contain itself?)",
             )
         if isinstance(value, Mapping):
             self.write_dict(depth, path, key, value, names_it)
@@ -143,7 +141,7 @@ class _Writer:
         self.add(depth, path, f"</{element}>")
 
     def with_files(self, path: str, kind: str, values: dict[str, Any]) -> dict[str, Any]:
-        """The values with the name of a file in the place of arrays."""
+        """Replaces arrays by the names of their files."""
         try:
             made = file_of(kind, values)
         except NoFile as error:
@@ -171,15 +169,15 @@ class _Writer:
             self.write_array(depth, path, key, value)
 
     def write_array(self, depth: int, path: str, key: str, value: Any) -> None:
-        """Three numbers are a point or a vector, which the format takes for each other; 9 or 16 are a
-        transform."""
+        """Writes three numbers as a point or vector, which the format does not distinguish, and 9 or 16 numbers as
+        a transform."""
         given = getattr(value, "matrix", value)
         try:
             array = np.asarray(given, dtype=np.float64)
         except (TypeError, ValueError):
             raise _wrong(
                 path,
-                f"a {type(value).__name__} cannot stand here: only dictionaries, numbers, strings, three "
+                f"a {type(value).__name__} is not possible here: use only dictionaries, numbers, strings, three "
                 "numbers, and transforms (4 x 4 numbers, or an object with a .matrix)",
             ) from None
         if array.ndim == 3 and array.shape[-1] == 1:  # a transform of Dr.Jit, with one entry
@@ -197,7 +195,7 @@ class _Writer:
         else:
             raise _wrong(
                 path,
-                f"an array of shape {array.shape} cannot stand here: three numbers are a point or vector, "
+                f"an array of shape {array.shape} is not possible here: three numbers are a point or vector, "
                 "4 x 4 a transform; a colour is {'type': 'rgb', 'value': ...}; images are the 'data' of a "
                 "'bitmap' or 'envmap', grids that of a 'gridvolume', and a mesh is a 'ply' with "
                 "'vertex_positions' and 'faces'",
@@ -219,11 +217,11 @@ def _numbers(path: str, value: Any, counts: tuple[int, ...]) -> list[float]:
     try:
         array = np.asarray(value, dtype=np.float64).ravel()
     except (TypeError, ValueError):
-        raise _wrong(path, f"numbers are wanted here, not {str(value)[:80]!r}") from None
+        raise _wrong(path, f"numbers are needed here, not {str(value)[:80]!r}") from None
     if array.size not in counts:
-        raise _wrong(path, f"{' or '.join(map(str, counts))} numbers are wanted here, not {array.size}")
+        raise _wrong(path, f"{' or '.join(map(str, counts))} numbers are needed here, not {array.size}")
     if not np.isfinite(array).all():
-        raise _wrong(path, "a number is infinite or none (nan)")
+        raise _wrong(path, "a number is infinite or not a number (nan)")
     return [float(x) for x in array]
 
 
@@ -232,7 +230,8 @@ def _number(value: float) -> str:
 
 
 def _quoted(path: str, text: str) -> str:
-    """As an attribute. `$` is escaped: in a dictionary it stands for itself and names no parameter."""
+    """Quotes a value as an attribute. `$` is escaped, because in a dictionary it is an ordinary character and
+    names no parameter."""
     if FORBIDDEN.search(text):
-        raise _wrong(path, f"{text[:80]!r} has characters that no scene can have")
+        raise _wrong(path, f"{text[:80]!r} has characters that are not allowed in scenes")
     return quoteattr(text.replace("$", "\\$"))

@@ -1,9 +1,9 @@
 """Finds the files that a scene names, so that they can be sent with it.
 
-A file is looked for as the coordinator will look for it: included files beside the file that includes them,
-all others in the folders of <path> elements and beside the scene. What is not found is left out: the farm
-then reports it, with its place in the scene. A scene may come from anywhere, so that nothing is sent that
-lies outside the folder of the scene (links followed) and the folders that the caller allows.
+A file is searched as the coordinator does it: included files beside the file that includes them, all others in the
+folders of <path> elements and beside the scene. Missing files are skipped here; the farm reports them with their
+place in the scene. Since a scene may come from anywhere, only files in the folder of the scene (after following
+links) and in the folders that the caller allows are sent.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ PathLike = str | os.PathLike[str]
 
 @dataclasses.dataclass(frozen=True)
 class Source:
-    """The bytes of a file to send: on disk, or in memory."""
+    """The bytes of a file to send, on disk or in memory."""
 
     digest: str
     size: int
@@ -74,7 +74,7 @@ class Source:
 
 
 def _open_regular(path: pathlib.Path) -> BinaryIO:
-    """Without waiting for a pipe's other end."""
+    """Opens a regular file without waiting for the other end of a pipe."""
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     file = open(os.open(path, flags), "rb")
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
@@ -99,11 +99,9 @@ def read_scene(path: pathlib.Path) -> bytes:
 
 
 def written_otherwise(folder: pathlib.Path, name: str) -> pathlib.Path | None:
-    """The file `name` in `folder`, or the one that it means although none is called exactly so.
-
-    Such a name has backslashes between its folders, as on Windows, or its letters and accents are composed
-    otherwise than on this disk (macOS stores them apart). None: there is no such file, or there are several.
-    """
+    """Finds the file `name` in `folder`, or the only file that it can mean. The name may have backslashes between
+    its folders, as on Windows, or letters and accents that are composed differently on this disk (macOS separates
+    them). None: there is no such file, or there are several."""
     place = folder / name
     if os.path.exists(place):  # Path.exists() raises for names that are too long
         return place
@@ -132,21 +130,22 @@ def _names_in(folder: pathlib.Path) -> list[str]:
 
 
 def unpacked(text: bytes, name: str) -> bytes:
-    """The text of a scene file that may be packed by gzip, at most one byte more than a scene may have."""
+    """Returns the text of a scene file, unpacked if it is a gzip file, with at most one byte more than the limit
+    for scenes."""
     if not text.startswith(b"\x1f\x8b"):
         return text
     unpacker = zlib.decompressobj(wbits=31)  # 31: the largest window, in the format of gzip
     try:
         plain = unpacker.decompress(text, MAX_SCENE_BYTES + 1)
     except zlib.error as error:
-        raise FileRefused(f"{name} is packed by gzip, and damaged: {error}") from None
+        raise FileRefused(f"{name} is a damaged gzip file: {error}") from None
     if not unpacker.eof and len(plain) <= MAX_SCENE_BYTES:
-        raise FileRefused(f"{name} is packed by gzip, and cut short")
+        raise FileRefused(f"{name} is a gzip file that was cut short")
     return plain
 
 
 class Folders:
-    """Where files are taken from: `folder` for names that are relative, and what else the caller allows."""
+    """The folders that files may come from: `folder` for relative names, and those that the caller allows."""
 
     def __init__(
         self,
@@ -160,7 +159,8 @@ class Folders:
         self.sources: dict[str, Source] = {}  # by the name that the farm knows them by
 
     def find(self, place: str) -> bool:
-        """Whether the file is there; then it will be sent. FileRefused if it is there and must not be."""
+        """Returns True if the file exists; it will then be sent. Raises FileRefused if it exists but must not be
+        sent."""
         if place in self.sources:
             return True
         if len(self.sources) >= MAX_FILES:
@@ -191,7 +191,7 @@ class Folders:
         if not any(real.is_relative_to(root) for root in self._roots):
             raise FileRefused(
                 f"the scene names {place}, which is {real} and lies outside {self._roots[0]}; "
-                f"if it is to be sent, allow its folder: submit(..., allow=[{str(real.parent)!r}])"
+                f"to send it, allow its folder: submit(..., allow=[{str(real.parent)!r}])"
             )
         return real
 
@@ -202,7 +202,7 @@ class Folders:
 
 
 def join(folder: str, name: str) -> str:
-    """The name of a file as the farm writes it, with '.' and '..' resolved."""
+    """Returns a file name as the farm writes it, with '.' and '..' resolved."""
     joined = name if name.startswith("/") or not folder else f"{folder}/{name}"
     parts: list[str] = []
     for part in joined.split("/"):
@@ -218,7 +218,7 @@ def join(folder: str, name: str) -> str:
 def find_files(
     text: bytes, folders: Folders, defines: Mapping[str, str] | None = None, frames: str | None = None
 ) -> dict[str, Source]:
-    """All files that the scene names and that are there."""
+    """Finds all existing files that the scene names."""
     parsed: dict[str, list[Element]] = {}
     for frame in frame_numbers(frames):
         _Finder(folders, dict(defines or {}), frame, parsed).find(text)
@@ -226,7 +226,7 @@ def find_files(
 
 
 def frame_numbers(frames: str | None) -> Iterator[int | None]:
-    """Of a range such as 1-10x2. None: there is no range, or what is given is none."""
+    """Returns the frame numbers of a range such as 1-10x2. None: there is no range, or it is malformed."""
     match = re.fullmatch(r"(\d{1,7})(?:-(\d{1,7})(?:x(\d{1,7}))?)?", frames or "")
     if not match:  # the farm says what is wrong with it
         yield None
@@ -256,7 +256,8 @@ class _Finder:
             self._first([*(join(path, name) for path in self._paths), join("", name)])
 
     def _first(self, places: list[str]) -> str | None:
-        """The first place that has a file. One that must not be sent counts only if no other has it."""
+        """Returns the first place that has the file. A place from which it must not be sent counts only if there
+        is no other."""
         refused: FileRefused | None = None
         for place in places:
             try:
@@ -305,7 +306,7 @@ class _Finder:
         return ahead + re.sub("#+" if one_by_one else "##+", lambda run: str(self._frame).zfill(len(run[0])), rest)
 
     def _filled(self, value: str) -> str:
-        """With its parameters put in: after a $ stands the longest name that is defined."""
+        """Inserts the parameters: each $ is followed by the longest name that is defined."""
         if "$" not in value:
             return value
 
@@ -322,8 +323,8 @@ class _Finder:
 
 
 def _elements(text: bytes) -> list[Element]:
-    """The elements that can name files, in the order in which they begin; as far as the text can be read
-    (the farm reports the rest)."""
+    """Returns the elements that can name files, in document order. It stops at malformed text, which the farm will
+    report."""
     found: list[Element] = []
     parser = expat.ParserCreate()
 

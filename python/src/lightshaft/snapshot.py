@@ -1,5 +1,4 @@
-"""A job as it is at one moment, as notebooks show it: its figures, its picture and the curve of its
-error."""
+"""The state of a job at one moment, as notebooks show it: its figures, its picture and the curve of its error."""
 
 from __future__ import annotations
 
@@ -33,21 +32,21 @@ def get_curve(job: str) -> Steps[Curve]:
 
 
 def parse_curve(text: str) -> Curve:
-    """{column: its values}; NaN where there is none."""
+    """Returns {column: values}. NaN marks missing values."""
     try:
         rows = list(csv.reader(io.StringIO(text)))
     except csv.Error:
-        raise BadAnswer("the farm's table of errors is not one") from None
+        raise BadAnswer("the farm's table of errors is malformed") from None
     names = rows[0] if rows else []
     if len(rows) > MAX_ROWS or any(len(row) != len(names) for row in rows if row):
-        raise BadAnswer("the farm's table of errors is not one")
+        raise BadAnswer("the farm's table of errors is malformed")
     try:
         return {
             name: np.array([float(row[i] or "nan") for row in rows[1:] if row])
             for i, name in enumerate(names)
         }
     except ValueError:
-        raise BadAnswer("the farm's table of errors has something that is no number") from None
+        raise BadAnswer("the farm's table of errors has an entry that is not a number") from None
 
 
 def take(job: str) -> Steps[Snapshot]:
@@ -76,7 +75,7 @@ def of_view(view: models.Job) -> Steps[Snapshot]:
 
 
 def summary(view: models.Job) -> str:
-    """One line for people, as the progress of a wait shows it."""
+    """Returns one line for people, like the progress of wait()."""
     parts = [
         f"{view['state']} {100 * _figure(view.get('progress')):.0f} %",
         f"{_figure(view.get('spp_done')):.4g} samples per pixel",
@@ -145,7 +144,7 @@ class Snapshot:
         )
 
     def _curve_svg(self) -> str:
-        """relMSE over core seconds, both logarithmic."""
+        """Draws relMSE over core seconds, both on logarithmic axes."""
         x, y = (
             np.asarray(self.curve.get(name, []), dtype=float) for name in ("core_seconds", "relmse")
         )
@@ -178,6 +177,6 @@ class Snapshot:
 
 
 def _spread(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """From 0 to 1."""
+    """Scales values to the range from 0 to 1."""
     low, width = values.min(), np.ptp(values)
     return (values - low) / width if width > 0 else np.full(values.shape, 0.5)

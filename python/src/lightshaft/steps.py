@@ -34,20 +34,20 @@ DIGESTS_PER_QUESTION = 10_000
 class Call:
     method: str
     target: str
-    """Path and query, or after a redirect the whole address."""
+    """Path and query; after a redirect, the whole address."""
     body: bytes | None = None
     content_type: str = "application/json"
     headers: Mapping[str, str] = dataclasses.field(default_factory=dict)
     max_bytes: int = MAX_JSON_BYTES
     seconds: float = CALL_SECONDS
-    """By which all of the answer must have come."""
+    """Time by which the whole response must have arrived."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Reply:
     status: int
     headers: Mapping[str, str]
-    """Names in lower case."""
+    """Header names in lower case."""
     body: bytes
     url: str
     """That was asked."""
@@ -68,10 +68,10 @@ Steps: TypeAlias = Generator[Step, Any, T]
 
 
 def ask(call: Call) -> Steps[Reply]:
-    """The answer, whatever its status; redirects are followed.
+    """Returns the response, whatever its status, and follows redirects.
 
-    A coordinator sends requests for a job on to the one that has it. Both belong to the farm that the token
-    is for; but what was asked with TLS is never sent on without.
+    A coordinator redirects requests for a job to the coordinator that owns it. Both belong to the same farm and
+    accept the same token. A request over TLS is never redirected to a connection without TLS.
     """
     for _ in range(MAX_REDIRECTS + 1):
         reply: Reply = yield call
@@ -83,11 +83,11 @@ def ask(call: Call) -> Steps[Reply]:
             reply.url.startswith("http://") and target.startswith("http://")
         ):
             raise BadAnswer(
-                f"{reply.url} sends this on to an address that is not https; no token goes there; let the "
-                "coordinators name each other by https (--public-http)"
+                f"{reply.url} redirects this request to an address without https, which must not get the token; "
+                "give the coordinators https addresses with --public-http"
             )
         call = dataclasses.replace(call, target=target)
-    raise BadAnswer(f"{reply.url} sends this on more than {MAX_REDIRECTS} times")
+    raise BadAnswer(f"{reply.url} redirects this request more than {MAX_REDIRECTS} times")
 
 
 def succeed(call: Call) -> Steps[Reply]:
@@ -123,7 +123,7 @@ def post_json(path: str, body: Mapping[str, Any], method: str = "POST") -> Steps
 
 
 def fetch(path: str) -> Steps[bytes]:
-    """A file, as images are."""
+    """Fetches a file, such as an image."""
     reply = yield from succeed(Call("GET", path, max_bytes=MAX_IMAGE_BYTES, seconds=DOWNLOAD_SECONDS))
     return reply.body
 
@@ -145,7 +145,7 @@ class Retry:
         self._last_answer, self._pause = time.monotonic(), 0.0
 
     def pause(self, error: LightshaftError) -> Pause:
-        """The pause before the next attempt; raises the error if there should be none."""
+        """Returns the pause before the next attempt. Raises the error if there should be no further attempt."""
         lasting = isinstance(error, FarmBusy) and error.status == 507
         if (
             lasting
@@ -197,7 +197,7 @@ def _checked(steps: Steps[dict[str, Any]]) -> Steps[models.Job]:
 
 
 def _describes_a_job(view: dict[str, Any]) -> bool:
-    """Whether what this package reads of a job has the kinds that the OpenAPI document gives it."""
+    """Returns True if the members that this package reads have the types of the OpenAPI document."""
 
     def number(value: object) -> bool:
         return value is None or isinstance(value, (int, float))

@@ -1,4 +1,4 @@
-"""Submits a scene: finds its files, sends those that the farm lacks, and hands in the job."""
+"""Submits a scene: finds its files, sends those that the farm does not have, and submits the job."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ Scene: TypeAlias = str | os.PathLike[str] | Mapping[str, Any]
 
 @dataclasses.dataclass(frozen=True)
 class Options:
-    """What submit() is told besides the scene and the job's settings."""
+    """Arguments of submit() other than the scene and the job's settings."""
 
     name: str | None = None
     folder: PathLike | None = None
@@ -58,7 +58,7 @@ class Prepared:
     scene: Source
     files: Mapping[str, Source]
     text_of: Callable[[str], SceneText | None] = lambda file: None
-    """By the name of a scene file: its text, if it was made from a dictionary or a stage."""
+    """The text of each scene file that was made from a dictionary or a stage."""
     warnings: tuple[str, ...] = ()
 
 
@@ -95,7 +95,7 @@ def _with_id(answer: Mapping[str, Any]) -> models.SubmitJobAnswer:
 
 
 def _archive_of(scene: Any) -> tuple[pathlib.Path, str] | None:
-    """The path and the media type of an archive; None if the scene is none."""
+    """Returns the path and the media type of an archive, or None if the scene is not an archive."""
     if not isinstance(scene, (str, os.PathLike)) or str(scene).lstrip("\ufeff \t\r\n").startswith("<"):
         return None
     path = pathlib.Path(scene)
@@ -108,10 +108,10 @@ def _archive_of(scene: Any) -> tuple[pathlib.Path, str] | None:
 def _submit_archive(
     path: pathlib.Path, kind: str, settings: dict[str, Any], options: Options
 ) -> Steps[models.SubmitJobAnswer]:
-    """A scene with all its files in one archive is unpacked by the farm; what it takes is checked there."""
+    """Submits an archive of a scene and all its files. The farm unpacks and checks it."""
     for option in ("name", "folder", "allow", "assets", "camera"):
         if getattr(options, option):
-            raise RequestRejected(f"{path} is an archive, which has all its files: {option} means nothing")
+            raise RequestRejected(f"{path} is an archive, which contains all its files: {option} has no effect")
     yield from _send_reference(settings)
     query = _as_query(path, _as_json(settings))
     source = yield from work(lambda: Source.of_file(path))
@@ -140,16 +140,16 @@ def _as_query(path: pathlib.Path, spec: Mapping[str, Any]) -> str:
 def warnings_of(answer: models.SubmitJobAnswer) -> list[str]:
     texts = [text for text in answer.get("warnings", []) if isinstance(text, str)]
     if answer.get("reference_same_seed"):
-        texts.append("the reference has this scene and this seed: the true errors will mean nothing")
+        texts.append("the reference was rendered from this scene with this seed: the true errors will mean nothing")
     return texts
 
 
 def prepare(scene: Scene, spec: Mapping[str, Any], options: Options) -> Prepared:
-    """The scene's text, and its files with their digests."""
+    """Returns the text of the scene, and its files with their digests."""
     if isinstance(scene, (str, os.PathLike)) and os.fspath(scene).lower().endswith(STAGES):
         return _prepare_stage(scene, spec, options)
     if options.camera is not None:
-        raise RequestRejected("camera= chooses among the cameras of a stage of USD; this scene is none")
+        raise RequestRejected("camera= is only for USD stages, and this scene is not one")
     dictionary = None
     if isinstance(scene, Mapping):
         dictionary = scene_of_dict(scene)
@@ -187,7 +187,7 @@ def _prepare_stage(scene: PathLike, spec: Mapping[str, Any], options: Options) -
     from . import usd  # only now: it needs packages that are optional
 
     if options.assets:
-        raise RequestRejected("assets= does not go with a stage of USD, which finds its files itself")
+        raise RequestRejected("assets= cannot be used with a USD stage, which finds its files itself")
     frames, given = spec.get("frames"), spec.get("size")
     size = None
     if isinstance(given, (list, tuple)) and len(given) == 2:  # else the farm says what it wants
@@ -206,20 +206,19 @@ def _prepare_stage(scene: PathLike, spec: Mapping[str, Any], options: Options) -
 
 
 def _as_json(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """Numbers of NumPy and tuples as JSON has them."""
+    """Converts NumPy's numbers and tuples to JSON."""
 
     def plain(value: Any) -> Any:
         if hasattr(value, "tolist"):
             return value.tolist()
-        raise RequestRejected(f"a {type(value).__name__} cannot be the setting of a job")
+        raise RequestRejected(f"a {type(value).__name__} cannot be a setting of a job")
 
     loaded: dict[str, Any] = json.loads(json.dumps(spec, default=plain))
     return loaded
 
 
 def _with_paths(error: SceneRejected, prepared: Prepared) -> SceneRejected:
-    """The places in XML that was made from a dictionary or a stage mean nothing to its author: tell the
-    keys, or the prim."""
+    """Replaces line numbers by keys or prims in errors about XML that was generated from a dictionary or a stage."""
 
     def told(d: Diagnostic) -> Diagnostic:
         text = prepared.text_of(d.file)
@@ -231,7 +230,7 @@ def _with_paths(error: SceneRejected, prepared: Prepared) -> SceneRejected:
 
 
 def _send_reference(spec: dict[str, Any]) -> Steps[None]:
-    """`reference` may also be the path of an image, which is sent before the job."""
+    """Sends the reference before the job if `reference` is the path of an image."""
     given = spec.get("reference")
     if given is None or re.fullmatch("[0-9a-f]{64}", str(given)):
         return
@@ -248,7 +247,7 @@ def _send_missing(sources: Mapping[str, Source]) -> Steps[None]:
         )
         missing = answer.get("missing")
         if not isinstance(missing, list):
-            raise BadAnswer("the farm's answer does not say which files it lacks")
+            raise BadAnswer("the farm's answer does not say which files it needs")
         for digest in missing:
             if (
                 isinstance(digest, str) and digest in sources
@@ -266,7 +265,8 @@ def _send(source: Source) -> Steps[None]:
 
 
 def _send_in_parts(path: str, source: Source) -> Steps[None]:
-    """From where an earlier attempt ended. After a broken connection it goes on where the farm says."""
+    """Sends the file from where an earlier attempt ended. After a broken connection, continues where the farm
+    says."""
     retry = Retry()
     reached = -1
     while True:
@@ -286,13 +286,13 @@ def _send_in_parts(path: str, source: Source) -> Steps[None]:
             pause = retry.pause(error)
         else:  # another request has gone on with the upload: ask again where
             pause = retry.pause(
-                FarmBusy(f"the upload of {path} does not go on: is it sent from elsewhere, too?")
+                FarmBusy(f"the upload of {path} makes no progress: does another program upload it too?")
             )
         yield pause
 
 
 def _send_rest(path: str, source: Source, offset: int, retry: Retry) -> Steps[bool]:
-    """Whether all of it has arrived; False: the farm has another place to go on."""
+    """Returns True if everything has arrived, and False if the farm wants another part."""
     while True:
         begin, size = offset, min(UPLOAD_PART_BYTES, source.size - offset)
         data = yield from work(lambda: source.read(begin, size))

@@ -1,4 +1,4 @@
-"""Sends the requests of steps: one transport that waits, one for event loops."""
+"""Sends the requests of steps. There are two transports: one that blocks, and one for event loops."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ CONNECT_SECONDS, STALL_SECONDS = 15.0, 60.0
 
 
 class Address:
-    """Where the farm is, and what shows who asks. Of several coordinators, the one that answered last is
-    asked first."""
+    """The addresses and the credentials of a farm. The coordinator that responded last is tried first."""
 
     def __init__(self, url: str | None, token: str | None, ca: str | os.PathLike[str] | None) -> None:
         given = url or os.environ.get("LIGHTSHAFT_URL", "")
         if not given:
             raise RequestRejected(
-                "where is the farm? Give Farm(url) or set LIGHTSHAFT_URL, http://localhost:8080 say"
+                "the farm's address is missing: use Farm(url) or set LIGHTSHAFT_URL, for example http://localhost:8080"
             )
         self._ca = ca or os.environ.get("LIGHTSHAFT_CA") or None
         self.urls = [_checked_url(part, self._ca is not None) for part in given.split(",")]
@@ -39,7 +38,7 @@ class Address:
         return self.urls[0]
 
     def options(self) -> dict[str, Any]:
-        """Of either client of httpx."""
+        """Returns the options of both kinds of httpx client."""
         verify: Any = True
         if self._ca is not None:
             try:
@@ -55,7 +54,7 @@ class Address:
         }
 
     def request(self, call: Call) -> dict[str, Any]:
-        """What httpx is to send."""
+        """Returns the arguments for httpx."""
         # Answers come as they are: a small one cannot grow when it is unpacked.
         headers = {"User-Agent": "lightshaft-python", "Accept-Encoding": "identity", **call.headers}
         if self.token:
@@ -66,7 +65,7 @@ class Address:
         return {"method": call.method, "url": url, "content": call.body, "headers": headers}
 
     def tries(self, call: Call) -> Iterator[dict[str, Any]]:
-        """The request to each coordinator in turn; the next is only asked if nothing was sent to the one
+        """Sends the request to each coordinator in turn. The next one is tried only if nothing was sent to the one
         before."""
         for tried in range(len(self.urls)):
             if tried:
@@ -75,8 +74,8 @@ class Address:
 
 
 def _checked_url(text: str, has_ca: bool) -> str:
-    """The address, whose beginning may be missing. Without it the token crosses no network in clear text:
-    http:// is for this machine only."""
+    """Completes and checks the address. The scheme may be missing; http:// is then assumed for this machine only,
+    so that the token is never sent unencrypted over a network."""
     url = text.strip().rstrip("/")
     if url and "://" not in url:
         local = url.startswith(("localhost", "127.", "[::1]"))
@@ -89,7 +88,7 @@ def _checked_url(text: str, has_ca: bool) -> str:
 
 
 class _Body:
-    """Collects an answer within its limits."""
+    """Collects a response within its limits."""
 
     def __init__(self, call: Call, response: httpx.Response) -> None:
         self._call, self._response = call, response
@@ -121,7 +120,7 @@ def _unreachable(url: Any, error: Exception) -> FarmUnreachable:
     why = str(error) or type(error).__name__
     return FarmUnreachable(
         f"{url} cannot be reached: {why}. Is a coordinator running there, and is the address right? "
-        "(`lightshaft jobs --to URL` asks the same; behind TLS of its own, give ca=FILE)"
+        "(`lightshaft jobs --to URL` tries the same; if it uses its own TLS certificate, give ca=FILE)"
     )
 
 

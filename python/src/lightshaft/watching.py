@@ -19,7 +19,7 @@ Progress: TypeAlias = Callable[[models.Job], Any] | bool | None
 
 
 def wait(job: str, progress: Progress, timeout: float | None) -> Steps[models.Job]:
-    """The job when it is done. It is asked for again over restarts of the coordinator."""
+    """Returns the job when it is done. Polls through restarts of the coordinator."""
     report = _printer() if progress is True else progress or None
 
     def show(view: models.Job) -> Steps[None]:
@@ -31,13 +31,13 @@ def wait(job: str, progress: Progress, timeout: float | None) -> Steps[models.Jo
 
 
 def live(job: str, interval: float) -> Steps[models.Job]:
-    """Shows the job below the cell that calls, anew whenever it has come further; ends when it has ended."""
+    """Shows the job below the calling cell and updates it until the job ends."""
     try:
         from IPython.display import display
     except ImportError:
         raise MissingPackage(
             "job.live() needs IPython: run it in a notebook, or pip install 'lightshaft[notebook]'; "
-            "job.wait(progress=True) needs nothing"
+            "job.wait(progress=True) does not need it"
         ) from None
     handle: Any = None
     shown: Any = None
@@ -74,7 +74,7 @@ def _follow(
             if view["state"] in snapshot.ENDED:
                 return _ended(view)
         if deadline is not None and time.monotonic() >= deadline:
-            raise WaitTimeout(f"job {job} has not ended within {timeout:g} s; it goes on")
+            raise WaitTimeout(f"job {job} has not ended within {timeout:g} s; it continues")
         yield pause
 
 
@@ -84,12 +84,12 @@ def _ended(view: models.Job) -> models.Job:
     why = f": {view['error']}" if view.get("error") else ""
     if view["state"] == "cancelled":
         raise JobCancelled(f"job {view['id']} was cancelled{why}")
-    raise JobFailed(f"job {view['id']} was given up{why}")
+    raise JobFailed(f"job {view['id']} has failed{why}")
 
 
 @dataclasses.dataclass(frozen=True)
 class Bar:
-    """The progress of a job in a notebook: a bar and a line."""
+    """Shows the progress of a job in a notebook as a bar and a line."""
 
     view: models.Job
 
@@ -106,8 +106,7 @@ class Bar:
 
 
 def _in_notebook() -> bool:
-    """Whether what this process prints is shown by a notebook, which shows the standard error stream as an
-    error."""
+    """Returns True if a notebook shows the output of this process. It shows the standard error stream as an error."""
     module = sys.modules.get("IPython")
     shell = module.get_ipython() if module is not None else None
     return shell is not None and hasattr(shell, "kernel")
@@ -130,8 +129,8 @@ def _displayed() -> Callable[[models.Job], None]:
 
 
 def _printer() -> Callable[[models.Job], None]:
-    """Shows a bar in a notebook. Elsewhere writes one line to the standard error stream, over and over in a
-    terminal, once for each change otherwise."""
+    """Shows a bar in a notebook. Otherwise writes to the standard error stream: one line that is rewritten in a
+    terminal, or one line for each change."""
     if _in_notebook():
         return _displayed()
     last = ""

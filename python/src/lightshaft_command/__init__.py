@@ -1,5 +1,5 @@
-"""The parts of the command `lightshaft` that are written in Python: `up` and `join`. They use Python's standard library only.
+"""The parts of the command `lightshaft` that are written in Python. They use only Python's standard library.
 
-The program `lightshaft` (cli/) starts this folder as a program. In a wheel (deploy/wheel.sh) it is the other way round: the
-command `lightshaft` begins here, and starts the programs that the wheel brings.
+The program `lightshaft` (cli/) runs this folder as a program. In a wheel (deploy/wheel.sh) the command `lightshaft`
+begins here instead, and starts the programs that the wheel contains.
 """

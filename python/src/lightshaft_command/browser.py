@@ -16,7 +16,7 @@ SILENCE = 10.0  # seconds after which a connection that says nothing is closed
 
 
 class _Server(http.server.ThreadingHTTPServer):
-    """Answers only this user: others can read the page's address among the arguments of the browser."""
+    """Answers only this user, because others can read the page's address among the arguments of the browser."""
 
     daemon_threads = True
 
@@ -25,17 +25,17 @@ class _Server(http.server.ThreadingHTTPServer):
 
 
 def open_address(address: str) -> str:
-    """Opens the address, which holds a token; says why not, or "".
+    """Opens an address that contains a token. Returns why it could not, or "".
 
-    Every user of this machine can read the arguments of programs. So the browser is started with the address of a page that
-    leads to the true one, and that answers once, and this user only.
+    Every user of this machine can read the arguments of programs. So the browser gets the address of a page that
+    redirects to the real one, once, and only for this user.
     """
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         return "there is no display"
     try:
         webbrowser.get()
     except webbrowser.Error:
-        return "no browser is found"
+        return "no browser was found"
     path = "/" + secrets.token_urlsafe(16)
     used = threading.Event()
 
@@ -52,7 +52,7 @@ def open_address(address: str) -> str:
             self.end_headers()
 
         def log_message(self, format: str, *args: object) -> None:
-            """Says nothing: the terminal is the farm's."""
+            """Prints nothing, because the terminal shows the farm's messages."""
 
     server = _Server(("127.0.0.1", 0), Once)
     threading.Thread(target=server.serve_forever, daemon=True).start()

@@ -1,4 +1,4 @@
-"""Programs that run as long as this one does: started again when they fail, and ended with it."""
+"""Programs that run as long as this one: they are restarted when they fail, and end with it."""
 
 import contextlib
 import ctypes
@@ -28,17 +28,16 @@ def say(text: str) -> None:
 
 
 def _begin() -> None:
-    """In a child: signals are not blocked, and the kernel ends it if this program is killed."""
+    """Runs in a child before its program: unblocks signals, and lets the kernel end the child if this program is
+    killed."""
     signal.pthread_sigmask(signal.SIG_SETMASK, set())
     _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def start(args: list[str], output: "int | IO[bytes] | None" = None, environment: dict[str, str] | None = None,
           errors: "IO[bytes] | None" = None) -> subprocess.Popen[bytes]:  # fmt: skip
-    """In a session of its own, so that Ctrl-C reaches only this program, which then ends the others in their order.
-
-    Errors go where the output goes, unless they have a file of their own.
-    """
+    """Starts the program in its own session, so that Ctrl-C reaches only this program, which then ends the others
+    in order. Errors go to the output unless they have their own file."""
     return subprocess.Popen(args, stdin=subprocess.DEVNULL, stdout=output, stderr=errors or (None if output is None else subprocess.STDOUT),
                             env=environment, start_new_session=True, preexec_fn=_begin)  # fmt: skip
 
@@ -48,12 +47,12 @@ def how_it_ended(code: int) -> str:
 
 
 def has_ended(process: subprocess.Popen[bytes]) -> bool:
-    """Without waiting for it, so that its id stays its own."""
+    """Checks for the end without reaping the process, so that its id is not reused."""
     return process.returncode is not None or os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
 
 
 def finish(process: subprocess.Popen[bytes]) -> int:
-    """Ends it, if it has not ended, and what is left of its session; its exit code."""
+    """Ends the program and what is left of its session. Returns its exit code."""
     if process.returncode is None:  # afterwards the id may be another program's
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
@@ -61,7 +60,8 @@ def finish(process: subprocess.Popen[bytes]) -> int:
 
 
 class Child:
-    """A program that is started again when it ends by itself; with `leaves` (what that means) not after it has ended well."""
+    """A program that is restarted when it ends unexpectedly. With `leaves` (what a normal end means), it is not
+    restarted after exit code 0."""
 
     def __init__(self, name: str, args: list[str], log: pathlib.Path, environment: dict[str, str] | None = None, leaves: str = ""):
         self.name, self.args, self.log, self.environment, self.leaves = name, args, log, environment, leaves
@@ -81,7 +81,7 @@ class Child:
         return "\n".join("  " + line for line in self.log.read_text(errors="replace").splitlines()[-8:])
 
     def look(self) -> None:
-        """Starts it again if it has ended. Problem: it ends again and again."""
+        """Restarts the program if it has ended. Raises Problem if it ends repeatedly."""
         if self.has_left:
             return
         if self._next_start is not None:
@@ -100,12 +100,13 @@ class Child:
         if self._quick_ends >= MOST_QUICK_ENDS:
             raise Problem(f"the {self.name} ended {how_it_ended(code)}, {MOST_QUICK_ENDS} times in a row; its log, {self.log}, ends:\n{self.last_lines()}")
         pause = min(2.0**self._quick_ends, MOST_PAUSE) if quick else 0.0
-        say(f"the {self.name} ended {how_it_ended(code)} and is started again (log: {self.log})")
+        say(f"the {self.name} ended {how_it_ended(code)} and is restarted (log: {self.log})")
         self._next_start = time.monotonic() + pause
 
 
 class Children:
-    """All of them, in the order of their start. Signals are blocked from its making on, and waited for in run()."""
+    """All child programs in the order of their start. Signals are blocked from the constructor on, and handled in
+    run()."""
 
     def __init__(self) -> None:
         signal.pthread_sigmask(signal.SIG_BLOCK, WAKES)
@@ -113,19 +114,20 @@ class Children:
         self.extra: subprocess.Popen[bytes] | None = None  # a program that runs once, beside them
 
     def wait(self, seconds: float) -> bool:
-        """Until something ends or the time is over; true if the user asks for the end."""
+        """Waits until something ends or the time is over. Returns True if the user requested the end."""
         woken = signal.sigtimedwait(WAKES, seconds)
         return woken is not None and woken.si_signo in ENDS
 
     def run(self, each_time: Callable[[], None]) -> None:
-        """Until the user asks for the end, or all have left."""
+        """Runs until the user requests the end or all programs have ended."""
         while not all(child.has_left for child in self.kept) and not self.wait(1.0):
             for child in self.kept:
                 child.look()
             each_time()
 
     def end(self) -> None:
-        """The last one first, each after it has finished what it must; a signal of the user meanwhile ends all at once."""
+        """Ends the programs in reverse order; each finishes its work first. Another signal from the user ends all
+        at once."""
         at_once = False
         running = [process for process in [*(child.process for child in self.kept), self.extra] if process]
         for process in reversed(running):

@@ -1,4 +1,4 @@
-"""Whose the ends of TCP connections on this machine are, as the kernel tells it."""
+"""Finds the owners of TCP connections on this machine in the kernel's tables."""
 
 import contextlib
 import os
@@ -18,7 +18,8 @@ def _rows() -> Iterator[list[str]]:
 
 
 def user_of(here: tuple[str, int], there: tuple[str, int]) -> int | None:
-    """The user whose end of an IPv4 connection `here` is; None also for one that is closed, of which the kernel says nothing true."""
+    """Returns the user who owns the IPv4 connection that ends at `here`. Returns None also for a closed
+    connection, for which the kernel's entry is wrong."""
     mapped = f"{0:016X}{int.from_bytes(bytes([0, 0, 255, 255]), sys.byteorder):08X}"  # a socket of IPv6 that uses IPv4
 
     def shown(address: tuple[str, int]) -> str:
@@ -31,7 +32,7 @@ def user_of(here: tuple[str, int], there: tuple[str, int]) -> int | None:
 
 
 def listens(process: int, port: int) -> bool:
-    """Whether a process of this user accepts connections at a port."""
+    """Returns True if a process of this user accepts connections at a port."""
     own = set()
     for file in pathlib.Path(f"/proc/{process}/fd").glob("*"):
         with contextlib.suppress(OSError):

@@ -1,9 +1,10 @@
-"""How a second machine joins a farm: `lightshaft up --lan` answers on a port of its own, `lightshaft join` asks there.
+"""Lets a second machine join a farm: `lightshaft up --lan` answers on a port of its own, to which `lightshaft
+join` connects.
 
-The code that `up` prints has this port, the digest (SHA-256) of the certificate of the farm's authority, and the join token.
-The joining machine first fetches that certificate and compares its digest: so it knows whom it talks to before it shows the
-token, and nobody between the two can read the token or answer in the farm's place. For the token it then gets the port for
-workers, and a worker's certificate and key.
+The code that `up` prints contains this port, the digest (SHA-256) of the certificate of the farm's authority, and the
+join token. The joining machine first fetches that certificate and compares its digest. So it knows the other side
+before it sends the token, and nobody in between can read the token or answer instead of the farm. In return for the
+token it gets the address of the workers' port, and a worker's certificate and key.
 """
 
 import base64
@@ -46,17 +47,17 @@ class Code:
         except (binascii.Error, ValueError):
             raw = b""
         if len(raw) != 2 + 2 * DIGEST:
-            raise Problem("the code is not one that `lightshaft up --lan` prints: copy the whole line that it printed")
+            raise Problem("this is not a code of `lightshaft up --lan`: copy the whole line that it printed")
         return Code(int.from_bytes(raw[:2], "big"), raw[2 : 2 + DIGEST], raw[2 + DIGEST :].hex())
 
 
 def digest_of(certificate: bytes) -> bytes:
-    """Of a certificate as DER: PEM may hold more than the one certificate that is looked at."""
+    """Returns the digest of a certificate as DER, because PEM may contain several certificates."""
     return hashlib.sha256(certificate).digest()
 
 
 class _Hurried(ssl.SSLSocket):
-    """Hears a call until PATIENCE is over: who sends a byte now and then gets no more time than others."""
+    """Reads a request within PATIENCE seconds in total, however slowly its bytes arrive."""
 
     deadline = 0.0
 
@@ -69,7 +70,7 @@ class _Hurried(ssl.SSLSocket):
 
 
 class Enrolment(http.server.ThreadingHTTPServer):
-    """Answers joining machines in threads of its own, until this program ends."""
+    """Answers joining machines in separate threads until this program ends."""
 
     daemon_threads = True
 
@@ -83,7 +84,7 @@ class Enrolment(http.server.ThreadingHTTPServer):
         return Code(self.server_port, digest_of(ssl.PEM_cert_to_DER_cert((self.tls / "ca.pem").read_text())), self.token)
 
     def process_request(self, request, client_address) -> None:  # type: ignore[no-untyped-def]
-        """Strangers can call as well, and each call that waited would hold an open file and a thread of this program."""
+        """Limits the calls at once: strangers can call too, and each waiting call holds an open file and a thread."""
         if not self._free.acquire(blocking=False):
             self.shutdown_request(request)
             return
@@ -94,7 +95,7 @@ class Enrolment(http.server.ThreadingHTTPServer):
             raise
 
     def process_request_thread(self, request, client_address) -> None:  # type: ignore[no-untyped-def]
-        """In a thread: a machine that says nothing holds up nobody else."""
+        """Handles the request in a thread, so that a silent machine does not delay others."""
         try:
             request.settimeout(PATIENCE)
             context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
@@ -134,7 +135,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def log_message(self, format: str, *args: object) -> None:
-        """Says nothing: the terminal is the farm's."""
+        """Prints nothing, because the terminal shows the farm's messages."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -154,17 +155,17 @@ def _ask(host: str, code: Code, path: str, context: ssl.SSLContext, headers: dic
     except ssl.SSLCertVerificationError as error:
         if error.verify_code in (NOT_YET_VALID, EXPIRED):
             raise Problem(f"the farm's certificate is not valid now ({error.verify_message}): compare the clocks of the two machines") from error
-        raise Problem(f"the farm's certificate does not fit {host}: {error.verify_message}; call the machine by a name or address that "
+        raise Problem(f"the farm's certificate does not fit {host}: {error.verify_message}; use a name or address that "
                       f"`lightshaft up --lan` printed, or start that with --name {host}") from error  # fmt: skip
     except (OSError, http.client.HTTPException, UnicodeError) as error:  # UnicodeError: of a host's name that cannot be one
-        raise Problem(f"no farm answers at {host}, port {code.port} ({error}): does `lightshaft up --lan` run there, and does its "
-                      "firewall let this port and the one for workers through?") from error  # fmt: skip
+        raise Problem(f"no farm answers at {host}, port {code.port} ({error}): check that `lightshaft up --lan` runs there, and that its "
+                      "firewall allows this port and the one for workers") from error  # fmt: skip
     finally:
         connection.close()
     if answer.status == 401:
-        raise Problem("the farm does not know this code: copy the line that its `lightshaft up --lan` prints now")
+        raise Problem("the farm does not accept this code: copy the line that its `lightshaft up --lan` prints now")
     if answer.status != 200:
-        raise Problem(f"{host}, port {code.port}, answers {answer.status}: that is no farm's port for joining")
+        raise Problem(f"{host}, port {code.port}, answers {answer.status}: it is not the port for joining a farm")
     return body
 
 
@@ -178,7 +179,7 @@ def join(host: str, code: Code) -> Joined:
     except ValueError:
         same = False
     if not same:
-        raise Problem(f"the farm at {host} is not the one that printed this code: its certificate is another")
+        raise Problem(f"the farm at {host} is not the one that printed this code: its certificate differs")
     # Nothing but what was compared is trusted: the answer may go on with the authority of whoever sent it.
     authority = ssl.DER_cert_to_PEM_cert(certificate)
     known = ssl.create_default_context(cadata=authority)
@@ -188,7 +189,7 @@ def join(host: str, code: Code) -> Joined:
 
 
 def own_addresses() -> list[str]:
-    """This machine's IPv4 addresses in networks, the one towards other machines first."""
+    """Lists this machine's IPv4 addresses. The address towards other machines comes first."""
     found: list[str] = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:

@@ -20,7 +20,8 @@ PATIENCE = 60.0  # seconds for one answer of the coordinator
 
 
 class FirstPicture:
-    """Its steps are programs that run one after the other, beside the farm. `home` keeps how far they came."""
+    """Runs the steps of the first picture, one program after the other, beside the farm. `home` stores how far
+    they came."""
 
     def __init__(self, children: Children, home: pathlib.Path, scene: pathlib.Path | None, farm: dict[str, str]):
         self.children, self.home, self.scene, self.farm = children, home, scene, farm
@@ -36,13 +37,13 @@ class FirstPicture:
         self.children.extra = None
         if running is not None and running.returncode != 0:
             why = self.errors.read_text(errors="replace").strip() if self.errors.exists() else ""
-            say(f"there is no first picture: a step of it ended {how_it_ended(running.returncode)}" + (f"\n{why}" if why else ""))
+            say(f"the first picture failed: a step ended {how_it_ended(running.returncode)}" + (f"\n{why}" if why else ""))
             self._steps = iter(())
             (self.home / "job").unlink(missing_ok=True)  # the next start tries again
         try:
             self.children.extra = next(self._steps, None)
         except OSError as error:  # a full disk; the farm goes on, so that jobs can be removed
-            say(f"there is no first picture: {error.filename or self.home}: {error.strerror or error}")
+            say(f"the first picture failed: {error.filename or self.home}: {error.strerror or error}")
             self._steps = iter(())
 
     def steps(self) -> Iterator[subprocess.Popen[bytes]]:
@@ -56,7 +57,7 @@ class FirstPicture:
             if not scene.exists():
                 maker = PACKAGE.parents[2] / "scenes" / "bath" / "make_bath.py"  # in a checkout
                 if not maker.exists():
-                    say("this installation brings no scene for a first picture: submit one of your own")
+                    say("this installation has no scene for a first picture: submit your own")
                     return
                 say("making the scene of the first picture")
                 yield start([sys.executable, "-B", str(maker), str(self.home / "bath")], subprocess.DEVNULL)
@@ -73,7 +74,7 @@ class FirstPicture:
             unfinished.replace(job)
             self.errors.unlink()
         identity = job.read_text().split()[0]
-        say("rendering the first picture; the dashboard shows how it comes")
+        say("rendering the first picture; the dashboard shows its progress")
         yield start([lightshaft, "watch", identity], None, environment)
         self.fetch(identity)
 

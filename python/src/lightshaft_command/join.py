@@ -1,4 +1,4 @@
-"""`lightshaft join`: a worker on this machine for the farm of another one, until Ctrl-C."""
+"""`lightshaft join`: runs a worker on this machine for a farm on another one, until Ctrl-C."""
 
 import argparse
 import os
@@ -15,7 +15,8 @@ VARIABLE = "LIGHTSHAFT_JOIN_CODE"
 
 
 def hide_code(args: argparse.Namespace) -> None:
-    """Starts this program anew with the code in its environment: every user of this machine can read its arguments."""
+    """Restarts this program with the code in its environment, because every user of this machine can read its
+    arguments."""
     words = ["--data", str(args.data), *(["--threads", str(args.threads)] if args.threads else [])]
     os.environ[VARIABLE] = args.code
     os.execv(sys.executable, [sys.executable, "-B", str(pathlib.Path(__file__).parent), "join", args.host, *words])
@@ -40,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
             start_worker(children, args, home, joined.address, code.token, home, "was drained by the farm")
             claimed.tell(joined.address)
             say(f"this machine renders for {joined.address} (log: {home / 'worker.log'})")
-            say("Ctrl-C ends it, after the worker has handed in what it has; Ctrl-C again at once")
+            say("Ctrl-C ends it, after the worker has sent its results; Ctrl-C again ends it at once")
             children.run(lambda: None)
             say("ending")
             children.end()

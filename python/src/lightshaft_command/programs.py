@@ -1,4 +1,4 @@
-"""Where the programs of Lightshaft are, and the commands of a wheel that start them."""
+"""Finds the programs of Lightshaft, and contains the commands of a wheel that start them."""
 
 import importlib.util
 import os
@@ -12,20 +12,37 @@ BUNDLED = PACKAGE / "programs" / "bin"  # in a wheel
 
 
 class Problem(Exception):
-    """What is wrong, and what to do: shown to the user without a traceback."""
+    """An error with advice, which the user sees without a traceback."""
+
+
+class Usage(Problem):
+    """The user's options or files are at fault."""
+
+
+class Rejected(Problem):
+    """A program of Lightshaft ended with an exit code and a message, `shown`."""
+
+    def __init__(self, code: int, shown: str):
+        super().__init__(shown.partition("\n")[0].removeprefix("lightshaft: error: "))
+        self.code, self.shown = code, shown
+
+
+def beside(name: str) -> pathlib.Path:
+    """Where a program is, if it is beside the `lightshaft` that started this, or in the wheel."""
+    return pathlib.Path(os.environ.get("LIGHTSHAFT_PROGRAMS") or BUNDLED) / name
 
 
 def find(name: str) -> str:
-    """A program: beside the `lightshaft` that started this, in the wheel, or in the PATH (Debian's packages)."""
-    beside = pathlib.Path(os.environ.get("LIGHTSHAFT_PROGRAMS") or BUNDLED) / name
-    found = str(beside) if beside.exists() else shutil.which(name)
+    """Finds a program: beside the `lightshaft` that started this, in the wheel, or in the PATH (Debian's packages)."""
+    here = beside(name)
+    found = str(here) if here.exists() else shutil.which(name)
     if not found:
-        raise Problem(f"there is no {name} in {beside.parent} and none in the PATH: build it, or install its package or Lightshaft's wheel")
+        raise Problem(f"{name} is neither in {here.parent} nor in the PATH: build it, or install its package or Lightshaft's wheel")
     return found
 
 
 def find_denoiser() -> None:
-    """Tells the programs where the wheel `pyoidn` (the wheel's extra `denoise`) has Open Image Denoise."""
+    """Sets the variable by which programs find Open Image Denoise in the wheel `pyoidn` (the extra `denoise`)."""
     if "LIGHTSHAFT_OIDN" in os.environ:
         return
     found = importlib.util.find_spec("pyoidn")
@@ -50,6 +67,7 @@ def lightshaft() -> int:
     find_denoiser()
     if len(sys.argv) > 1 and sys.argv[1] in COMMANDS:
         return run(sys.argv[1:])
+    os.environ["LIGHTSHAFT_PYTHON"] = sys.executable  # for the commands that the program leaves to Python
     _become("lightshaft")
 
 

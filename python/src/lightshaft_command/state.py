@@ -1,4 +1,4 @@
-"""The folder in which `lightshaft up` and `lightshaft join` keep what stays."""
+"""The folder in which `lightshaft up` and `lightshaft join` keep their state."""
 
 import contextlib
 import fcntl
@@ -20,7 +20,8 @@ class Claim:
         self._file = file
 
     def tell(self, where: str) -> None:
-        """Says to who comes second where the first one is. On a full disk nobody says it: the farm runs, so that jobs can be removed."""
+        """Writes the address of this farm for later starts of `up`. If the disk is full this is skipped: the farm
+        runs, so that jobs can be removed."""
         with contextlib.suppress(OSError):
             os.ftruncate(self._file.fileno(), 0)
             os.write(self._file.fileno(), (f"process {os.getpid()}" + (f", {where.split('#')[0]}" if where else "")).encode())
@@ -28,7 +29,8 @@ class Claim:
 
 @contextlib.contextmanager
 def claim(folder: pathlib.Path) -> Iterator[Claim]:
-    """Makes the folder, readable by this user only, and keeps others out of it. Problem: another one has it, or it cannot be used."""
+    """Makes the folder, readable by this user only, and locks it. Raises Problem if another process has it or if
+    it cannot be used."""
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         file = (folder / "in-use").open("a+")
@@ -39,7 +41,7 @@ def claim(folder: pathlib.Path) -> Iterator[Claim]:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             file.seek(0)
-            raise Problem(f"{folder} is in use ({file.read() or 'by a process that is starting'}): choose another folder with --data, or end that one") from None
+            raise Problem(f"{folder} is in use ({file.read() or 'by a process that is starting'}): choose another folder with --data, or end the other process") from None
         claimed = Claim(file)
         claimed.tell("")
         yield claimed

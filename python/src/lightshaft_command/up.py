@@ -1,4 +1,4 @@
-"""`lightshaft up`: a coordinator and a worker on this machine, until Ctrl-C."""
+"""`lightshaft up`: runs a coordinator and a worker on this machine, until Ctrl-C."""
 
 import argparse
 import contextlib
@@ -23,7 +23,7 @@ PATIENCE = 60.0  # seconds, after which it is said that the coordinator is still
 
 
 def free_port(host: str, wanted: int, given: int | None) -> int:
-    """The port to use: the given one, or the wanted one, or any if that is taken."""
+    """Returns the given port, or the wanted one, or any free port if that is in use."""
     port = wanted if given is None else given
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -38,7 +38,7 @@ def free_port(host: str, wanted: int, given: int | None) -> int:
 
 
 def start_coordinator(children: Children, args: argparse.Namespace, data: pathlib.Path, names: list[str]) -> dict[str, int]:
-    """Its ports, `http` and `grpc`."""
+    """Starts the coordinator. Returns its ports `http` and `grpc`."""
     host = "0.0.0.0" if args.lan else "127.0.0.1"
     home = data / "coordinator"
     tls = ["--tls", "--tls-names", ",".join(names)] if args.lan else []
@@ -75,10 +75,8 @@ def answers(port: int, tls: bool) -> bool:
 
 
 def has_started(children: Children, child: Child, file: pathlib.Path, port: int, tls: bool) -> bool:
-    """False if the program has ended instead. As long as it lives it may be reading what it had stored.
-
-    On a full disk it cannot write the file that tells of its start.
-    """
+    """Returns False if the program has ended. While it runs it may still be loading stored jobs. If the disk is
+    full it cannot write the file that shows that it has started."""
     patient_until = time.monotonic() + PATIENCE
     while not file.exists() and not (listens(child.process.pid, port) and answers(port, tls)):
         if children.wait(0.1):
@@ -92,7 +90,7 @@ def has_started(children: Children, child: Child, file: pathlib.Path, port: int,
 
 
 def farm_variables(args: argparse.Namespace, home: pathlib.Path, ports: dict[str, int]) -> dict[str, str]:
-    """By which the command `lightshaft` on this machine finds the farm."""
+    """Returns the environment variables by which `lightshaft` on this machine finds the farm."""
     found = {"LIGHTSHAFT_URL": f"{'https' if args.lan else 'http'}://127.0.0.1:{ports['http']}", "LIGHTSHAFT_TOKEN": (home / "token").read_text().strip()}
     if args.lan:
         found["LIGHTSHAFT_CA"] = str(home / "tls" / "ca.pem")
@@ -115,7 +113,7 @@ def start_worker(children: Children, args: argparse.Namespace, data: pathlib.Pat
 
 
 def show(args: argparse.Namespace, data: pathlib.Path, farm: dict[str, str]) -> str:
-    """Prints where the farm is; the address that signs in by itself."""
+    """Prints the addresses of the farm, including the one that signs in automatically."""
     home = data / "coordinator"
     address = f"{farm['LIGHTSHAFT_URL']}/#token={farm['LIGHTSHAFT_TOKEN']}"
     say(f"dashboard:        {address}")
@@ -126,14 +124,14 @@ def show(args: argparse.Namespace, data: pathlib.Path, farm: dict[str, str]) -> 
 
 
 def invite(data: pathlib.Path, names: list[str], ports: dict[str, int]) -> None:
-    """Lets other machines join, and prints the line that they type."""
+    """Lets other machines join, and prints the command for that."""
     home = data / "coordinator"
     port = free_port("0.0.0.0", JOINING, None)
     answering = enrolment.Enrolment(port, home / "tls", (home / "join-token").read_text().strip(), ports["grpc"])
     say(f"add a machine:    lightshaft join {names[0]} --code {answering.code()}")
     fingerprint = enrolment.digest_of(ssl.PEM_cert_to_DER_cert((home / "tls" / "server.pem").read_text())).hex(":").upper()
     say(f"                  ports {ports['http']} (dashboard), {ports['grpc']} and {answering.server_port} (workers) must pass this machine's firewall")
-    say(f"                  a browser warns once of the farm's own certificate; its SHA-256: {fingerprint}")
+    say(f"                  your browser will warn about the farm's own certificate, whose SHA-256 is: {fingerprint}")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -146,17 +144,17 @@ def run(args: argparse.Namespace) -> int:
             home = data / "coordinator"
             farm = farm_variables(args, home, ports)
             start_worker(children, args, data, f"127.0.0.1:{ports['grpc']}", (home / "join-token").read_text().strip(), home / "tls" if args.lan else None,
-                         "was drained and has left; the farm goes on, and has a worker of its own again at the next `lightshaft up`")  # fmt: skip
+                         "was drained and has ended; the farm continues, and the next `lightshaft up` starts a new worker")  # fmt: skip
             address = show(args, data, farm)
             claimed.tell(address)
             if args.lan:
                 invite(data, names, ports)
-            say(f"Ctrl-C ends the farm. What it has rendered stays in {data}, and `lightshaft up` goes on with it.")
+            say(f"Ctrl-C ends the farm. What it has rendered stays in {data}, and the next `lightshaft up` continues with it.")
             if not args.no_browser and (why := browser.open_address(address)):
                 say(f"open the dashboard's address in a browser yourself: {why}")
             picture = FirstPicture(children, data / "first", args.first_scene, farm)
             children.run(picture.go_on)
-            say("ending: the worker hands in what it has (Ctrl-C again ends everything at once)")
+            say("ending: the worker sends its results (Ctrl-C again ends everything at once)")
             children.end()
             say(f"the farm has ended; its state is in {data}")
     finally:

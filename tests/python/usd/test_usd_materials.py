@@ -328,7 +328,7 @@ def test_the_fallback_of_a_texture_takes_the_place_of_an_image_that_is_missing_o
         (tmp_path / "lost.png").write_bytes(content)
     output = texture(stage, "/look/t", "lost.png", fallback=Gf.Vec4f(0.3, 0.6, 0.2, 1))
     look(stage, diffuseColor=output)
-    with pytest.warns(lightshaft.SceneWarning, match="/look/t: .*the fallback of the shader is taken"):
+    with pytest.warns(lightshaft.SceneWarning, match="/look/t: .*the shader's fallback is used"):
         agree(middle(farm, stage, 16), (0.3, 0.6, 0.2))
 
 

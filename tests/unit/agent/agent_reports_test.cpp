@@ -36,7 +36,7 @@ class TimedBackend final : public RenderBackend {
   FakeClock& clock_;
 };
 
-TEST_F(AgentTest, TellsWhatLoadingTookOnceAndHowLongItsThreadStoodStillOrWaited) {
+TEST_F(AgentTest, ReportsLoadTimeOnceAndTheIdleTimeOfItsThreads) {
   start_with(std::make_unique<TimedBackend>(make_fake_backend({}), clock_));
   coordinator_.tell(assign("l-1", "j-1", tiles_up_to(5)));
   coordinator_.wait_for([](auto& c) { return c.results.size() == 5; });
@@ -52,13 +52,13 @@ TEST_F(AgentTest, TellsWhatLoadingTookOnceAndHowLongItsThreadStoodStillOrWaited)
   }
 }
 
-TEST(GapMeter, KnowsNothingOfNoGaps) {
+TEST(GapMeter, IsEmptyWithoutGaps) {
   const GapMeter gaps;
   EXPECT_EQ(gaps.count(), 0u);
   EXPECT_EQ(gaps.quantile(.5), 0);
 }
 
-TEST(GapMeter, SaysQuantilesToAStepOfItsHistogram) {
+TEST(GapMeter, QuantilesAreAccurateToOneStep) {
   GapMeter gaps;
   for (int i = 1; i <= 1000; ++i) gaps.add(i * 1e-5);  // 10 us to 10 ms
   EXPECT_EQ(gaps.count(), 1000u);
@@ -72,7 +72,7 @@ TEST(GapMeter, SaysQuantilesToAStepOfItsHistogram) {
   EXPECT_DOUBLE_EQ(gaps.quantile(1), 1e-2);
 }
 
-TEST(GapMeter, TakesWhatClocksMakeOfNoGapAtAllAndWhatNoBucketHolds) {
+TEST(GapMeter, HandlesNegativeGapsAndGapsBeyondTheLastBucket) {
   GapMeter gaps;
   gaps.add(-1e-7);
   gaps.add(1e9);
@@ -84,7 +84,7 @@ TEST(GapMeter, TakesWhatClocksMakeOfNoGapAtAllAndWhatNoBucketHolds) {
 const auto kLeaseSpan =
     trace::parse_traceparent("00-0af7651916cd43dd8448eb211c80319c-b7ad6b7169203331-01").value();
 
-TEST_F(AgentTest, RecordsWhatItDoesForALeaseBelowTheLeasesSpan) {
+TEST_F(AgentTest, RecordsItsSpansAsChildrenOfTheLeasesSpan) {
   test::SpanCollector collector;
   AgentOptions options;
   options.tracer = collector.tracer();
@@ -113,7 +113,7 @@ TEST_F(AgentTest, RecordsWhatItDoesForALeaseBelowTheLeasesSpan) {
   for (const UnitResult& result : coordinator_.results) EXPECT_GT(result.held_unix_ns, 0u);
 }
 
-TEST_F(AgentTest, RecordsNothingOfALeaseThatIsNotTraced) {
+TEST_F(AgentTest, RecordsNothingForAnUntracedLease) {
   test::SpanCollector collector;
   AgentOptions options;
   options.tracer = collector.tracer();

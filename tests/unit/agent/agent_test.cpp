@@ -35,7 +35,7 @@ TEST_F(AgentTest, RendersEveryUnitToTheRightBitsOnAnyNumberOfThreads) {
   }
 }
 
-TEST_F(AgentTest, SendsUnacknowledgedResultsAgainAfterAReconnectAndShowsItsOldId) {
+TEST_F(AgentTest, ResendsUnacknowledgedResultsWithItsOldIdAfterAReconnect) {
   coordinator_.acknowledge_results(false);
   start();
   coordinator_.tell(assign("l-1", "j-1", tiles_up_to(5)));
@@ -68,7 +68,7 @@ TEST_F(AgentTest, KeepsRenderingWhileDisconnectedUntilTheOutboxIsFull) {
   EXPECT_LE(coordinator_.results.size(), 4U);
 }
 
-TEST_F(AgentTest, HandsInTheUnitInHandAndReturnsTheRestOnDrain) {
+TEST_F(AgentTest, DeliversTheRunningUnitAndReturnsTheRestOnDrain) {
   start({}, {.delay = std::chrono::milliseconds(20)});
   coordinator_.tell(assign("l-1", "j-1", tiles_up_to(50)));
   coordinator_.wait_for([](auto& c) { return c.results.size() >= 2; });
@@ -82,7 +82,7 @@ TEST_F(AgentTest, HandsInTheUnitInHandAndReturnsTheRestOnDrain) {
   EXPECT_EQ(back.size() + tiles_of(coordinator_.results).size(), 50U);
 }
 
-TEST_F(AgentTest, DrainsWhenTheCoordinatorSaysSo) {
+TEST_F(AgentTest, DrainsOnTheCoordinatorsRequest) {
   start();
 
   coordinator_.tell(DrainNow{});
@@ -125,7 +125,7 @@ TEST_F(AgentTest, FailsWhenItHasNotJoinedWithinItsIdleLimit) {
   EXPECT_THAT(join().error().message, HasSubstr("did not join the coordinator within 60 s"));
 }
 
-TEST_F(AgentTest, GivesUpDrainingAfterItsLimitAndSaysWhatIsLost) {
+TEST_F(AgentTest, StopsDrainingAtItsLimitAndReportsWhatIsLost) {
   coordinator_.acknowledge_results(false);
   start({.drain_limit = std::chrono::seconds(5)});
   coordinator_.tell(assign("l-1", "j-1", {0}));
@@ -163,7 +163,7 @@ TEST_F(AgentTest, RendersTheOthersWhenOneLeaseIsCancelled) {
 }
 
 // Its only thread hangs in the first unit of the lease.
-TEST_F(AgentTest, GivesBackWhatItHasNotBegunOfALeaseThatIsRecalled) {
+TEST_F(AgentTest, ReturnsUnstartedUnitsOfARecalledLease) {
   start({}, {.fault = {FakeFault::Kind::hang, -1, 0}});
   coordinator_.tell(assign("l-1", "j-1", {0, 1, 2}));
   coordinator_.tell(assign("l-2", "j-1", {3}));
@@ -180,14 +180,14 @@ TEST_F(AgentTest, GivesBackWhatItHasNotBegunOfALeaseThatIsRecalled) {
   coordinator_.wait_for([](auto& c) { return tiles_of(c.results) == std::set<TileIndex>{3}; });
 }
 
-TEST_F(AgentTest, EndsWithTheCoordinatorsReasonWhenRefusedForGood) {
+TEST_F(AgentTest, EndsWithTheCoordinatorsReasonWhenPermanentlyRefused) {
   coordinator_.answer_hello_with(Refused{{Errc::unauthenticated, "wrong join token"}, false});
   start();
 
   EXPECT_EQ(join().error(), (Error{Errc::unauthenticated, "wrong join token"}));
 }
 
-TEST_F(AgentTest, ComesBackWhenRefusedForNow) {
+TEST_F(AgentTest, ReconnectsAfterATemporaryRefusal) {
   coordinator_.answer_hello_with(Refused{{Errc::unavailable, "starting"}, true});
   start();
   coordinator_.answer_hello_with(Welcome{WorkerId{"w-2"}, 1});
@@ -197,7 +197,7 @@ TEST_F(AgentTest, ComesBackWhenRefusedForNow) {
   EXPECT_TRUE(drain());
 }
 
-TEST_F(AgentTest, GoesOnAfterATransferThatWasCut) {
+TEST_F(AgentTest, ContinuesAfterABrokenTransfer) {
   coordinator_.cut_next_fetch();
   start();
 
@@ -207,7 +207,7 @@ TEST_F(AgentTest, GoesOnAfterATransferThatWasCut) {
   EXPECT_TRUE(drain());
 }
 
-TEST_F(AgentTest, ReportsOneUnitAndReturnsTheRestWhenAJobCannotBeLoaded) {
+TEST_F(AgentTest, ReportsOneFailureAndReturnsTheOtherUnitsIfAJobCannotBeLoaded) {
   start();
   AssignLease a = assign("l-1", "j-1", tiles_up_to(10));
   a.brief->assets.push_back({sha256(std::string_view("lost")), 4, "steam.vdb"});
@@ -221,7 +221,7 @@ TEST_F(AgentTest, ReportsOneUnitAndReturnsTheRestWhenAJobCannotBeLoaded) {
   EXPECT_EQ(coordinator_.returned[0].unrendered.size(), 9U);
 }
 
-TEST_F(AgentTest, TriesAUnitAgainThatItReportedAsFailed) {
+TEST_F(AgentTest, RendersAFailedUnitAgainIfRequested) {
   start();
   AssignLease a = assign("l-1", "j-1", {0});
   a.brief->assets.push_back({sha256(std::string_view("late")), 4, "late.vdb"});
@@ -237,7 +237,7 @@ TEST_F(AgentTest, TriesAUnitAgainThatItReportedAsFailed) {
   EXPECT_EQ(coordinator_.results[0].lease, LeaseId{"l-2"});
 }
 
-TEST_F(AgentTest, RefusesATileWhoseResultFitsNoMessage) {
+TEST_F(AgentTest, RefusesATileWhoseResultExceedsAMessage) {
   start();
   AssignLease a = assign("l-1", "j-1", {0});
   a.lease.units[0].rect = {0, 0, 400, 400};
@@ -250,7 +250,7 @@ TEST_F(AgentTest, RefusesATileWhoseResultFitsNoMessage) {
   EXPECT_THAT(coordinator_.failures[0].reason, HasSubstr("smaller tile"));
 }
 
-TEST_F(AgentTest, ReturnsALeaseOfAJobThatItWasNotToldAbout) {
+TEST_F(AgentTest, ReturnsALeaseOfAnUnknownJob) {
   start();
   AssignLease a = assign("l-1", "j-1", {0, 1});
   a.brief.reset();
@@ -265,7 +265,7 @@ TEST_F(AgentTest, ReturnsALeaseOfAJobThatItWasNotToldAbout) {
 std::size_t briefs_size() { return memory_of(*assign("l", "j-000", {0}).brief); }
 
 // The coordinator's side: leases of many jobs in turn, with a brief only if the worker does not remember it.
-TEST_F(AgentTest, RemembersTheJobsThatTheCoordinatorTakesToBeKnown) {
+TEST_F(AgentTest, RemembersTheJobsThatTheCoordinatorExpects) {
   constexpr int kJobs = 200, kLeases = 600;
   start();
   coordinator_.wait_for([](auto& c) { return c.hellos.size() == 1; });
@@ -288,7 +288,7 @@ TEST_F(AgentTest, RemembersTheJobsThatTheCoordinatorTakesToBeKnown) {
   EXPECT_EQ(coordinator_.results.size(), kLeases);
 }
 
-TEST_F(AgentTest, ForgetsTheJobsWhoseBriefsDoNotFitIntoItsMemoryAndSaysSo) {
+TEST_F(AgentTest, ForgetsJobsWhoseBriefsDoNotFitAndReportsThem) {
   AgentOptions options;
   options.brief_bytes = 2 * briefs_size();
   start(options);
@@ -310,7 +310,7 @@ TEST_F(AgentTest, ForgetsTheJobsWhoseBriefsDoNotFitIntoItsMemoryAndSaysSo) {
   EXPECT_TRUE(coordinator_.returned[0].unknown_job);
 }
 
-TEST_F(AgentTest, NamesItsLeasesOnceASecondWhileItWorks) {
+TEST_F(AgentTest, ReportsItsLeasesOnceASecond) {
   start({}, {.fault = {FakeFault::Kind::hang}});
   coordinator_.tell(assign("l-1", "j-1", {0}));
 

@@ -21,7 +21,7 @@ namespace {
 using testing::HasSubstr;
 using AgentInTrouble = AgentTest;
 
-TEST_F(AgentInTrouble, GivesUnitsBackThatAFullDiskKeepsFromBeingLoadedAndTriesAgain) {
+TEST_F(AgentInTrouble, ReturnsUnitsThatAFullDiskPreventsFromLoadingAndRetriesLater) {
   start();
   coordinator_.fail_fetches_with(Error{Errc::resource_exhausted, "no space left on the disk"});
   coordinator_.tell(assign("l-1", "j-1", tiles_up_to(10)));
@@ -38,7 +38,7 @@ TEST_F(AgentInTrouble, GivesUnitsBackThatAFullDiskKeepsFromBeingLoadedAndTriesAg
   EXPECT_TRUE(coordinator_.failures.empty());
 }
 
-TEST_F(AgentInTrouble, DoesNotAskAFullDiskAgainAtOnce) {
+TEST_F(AgentInTrouble, DoesNotRetryAFullDiskAtOnce) {
   start();
   coordinator_.fail_fetches_with(Error{Errc::resource_exhausted, "no space left on the disk"});
   coordinator_.tell(assign("l-1", "j-1", {0}));
@@ -71,7 +71,7 @@ class Exhausted final : public RenderBackend {
   const bool at_loading_;
 };
 
-TEST_F(AgentInTrouble, ReportsAUnitWhoseBackendRanOutOfMemoryAndLivesOn) {
+TEST_F(AgentInTrouble, ReportsAUnitThatRanOutOfMemoryAndContinues) {
   for (const bool at_loading : {true, false}) {
     start_with(std::make_unique<Exhausted>(at_loading));
     coordinator_.tell(assign("l-1", "j-1", {0}));
@@ -141,7 +141,7 @@ TEST_F(AgentThatBuilds, AbandonsTheWorldOfACancelledJob) {
   expect_that_only_tile_7_was_rendered();
 }
 
-TEST_F(AgentThatBuilds, AbandonsTheWorldOfALeaseThatIsTakenBack) {
+TEST_F(AgentThatBuilds, AbandonsTheWorldOfARecalledLease) {
   start_building(false);
 
   coordinator_.tell(CancelLease{LeaseId{"l-1"}});
@@ -150,7 +150,7 @@ TEST_F(AgentThatBuilds, AbandonsTheWorldOfALeaseThatIsTakenBack) {
   expect_that_only_tile_7_was_rendered();
 }
 
-TEST_F(AgentThatBuilds, GoesOnWithTheWorldOfAJobThatAnotherLeaseNeeds) {
+TEST_F(AgentThatBuilds, KeepsBuildingAWorldThatAnotherLeaseNeeds) {
   Building& backend = start_building(true);
   coordinator_.tell(assign("l-2", "j-1", {2}, 1));
 
@@ -167,7 +167,7 @@ TEST_F(AgentThatBuilds, GoesOnWithTheWorldOfAJobThatAnotherLeaseNeeds) {
 }
 
 // The id of the job that is being built is given to another job, whose units are no part of the failure.
-TEST_F(AgentThatBuilds, ReportsNoUnitOfAJobThatReplacedTheOneThatCannotBeBuilt) {
+TEST_F(AgentThatBuilds, ReportsNoFailureForAJobThatReplacedOneThatFailedToBuild) {
   Building& backend = start_building(true);
 
   coordinator_.tell(assign("l-2", "j-1", {7}, 2));
@@ -181,7 +181,7 @@ TEST_F(AgentThatBuilds, ReportsNoUnitOfAJobThatReplacedTheOneThatCannotBeBuilt) 
   expect_that_only_tile_7_was_rendered();
 }
 
-TEST_F(AgentThatBuilds, BuildsTheWorldOfAJobThatReplacedTheOneThatWasBuiltMeanwhile) {
+TEST_F(AgentThatBuilds, BuildsTheWorldOfAJobThatReplacedAnotherDuringItsBuild) {
   Building& backend = start_building(true);
 
   coordinator_.tell(assign("l-2", "j-1", {7}, 2));
@@ -228,7 +228,7 @@ class Broken final : public RenderBackend {
   std::atomic<bool> broken_{false};
 };
 
-TEST_F(AgentInTrouble, EndsWithABrokenBackendsErrorAfterGivingUnitsBackUnharmed) {
+TEST_F(AgentInTrouble, ReturnsItsUnitsAndEndsWithTheErrorOfABrokenBackend) {
   start_with(std::make_unique<Broken>());
   coordinator_.tell(assign("l-1", "j-1", tiles_up_to(10)));
 
@@ -240,7 +240,7 @@ TEST_F(AgentInTrouble, EndsWithABrokenBackendsErrorAfterGivingUnitsBackUnharmed)
   EXPECT_EQ(returned, 9U);
 }
 
-TEST_F(AgentInTrouble, GivesUnitsBackWhoseFilesNeverArriveWholeAndSaysWhy) {
+TEST_F(AgentInTrouble, ReturnsUnitsWhoseFilesNeverArriveIntactAndSaysWhy) {
   start();
   coordinator_.fail_fetches_with(Error{Errc::unavailable, "the line was cut"});
   coordinator_.tell(assign("l-1", "j-1", {0, 1}));
@@ -315,7 +315,7 @@ class NeedsItsFile final : public RenderBackend {
   std::set<WorldKey> worlds_;
 };
 
-TEST_F(AgentInTrouble, FetchesFilesAgainThatWereRemovedUnderARendererAndBlamesNobody) {
+TEST_F(AgentInTrouble, RefetchesFilesThatWereRemovedWhileRenderingWithoutFailingUnits) {
   const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "removed-scene";
   RemovableFiles files(path);
   NeedsItsFile backend;
@@ -341,7 +341,7 @@ TEST_F(AgentInTrouble, FetchesFilesAgainThatWereRemovedUnderARendererAndBlamesNo
 }
 
 // Two threads miss the file. Until the second one has said so, somebody has put the file back.
-TEST_F(AgentInTrouble, BlamesNobodyForAFileThatIsThereAgainWhenTheLastUnitThatMissedItEnds) {
+TEST_F(AgentInTrouble, DoesNotBlameTheJobIfAMissingFileReturnsBeforeTheLastUnitFails) {
   const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "removed-and-back";
   RemovableFiles files(path);
   NeedsItsFile backend;
@@ -390,7 +390,7 @@ class StepByStep final : public RenderBackend {
 };
 
 // Two jobs keep the worker busy without end, and two worlds are all that it keeps in memory.
-TEST_F(AgentInTrouble, AJobWhoseWorldHasNoRoomGetsItsTurnThoughOtherJobsNeverRunOut) {
+TEST_F(AgentInTrouble, JobWhoseWorldDoesNotFitGetsItsTurnAlthoughOtherJobsContinue) {
   auto backend = std::make_unique<StepByStep>();
   StepByStep& steps = *backend;
   start_with(std::move(backend));

@@ -48,7 +48,7 @@ TEST(HeldLeases, HoldsAUnitOnceWhenALaterLeaseNamesItAgain) {
   EXPECT_FALSE(table.take(any));
 }
 
-TEST(HeldLeases, ALeaseEndsWhenALaterOneHasTakenAllItsUnits) {
+TEST(HeldLeases, LeaseEndsWhenALaterOneHasAllItsUnits) {
   HeldLeases table;
   table.add(lease("a", kJob, {0, 1}), nothing_handed_in);
 
@@ -58,7 +58,7 @@ TEST(HeldLeases, ALeaseEndsWhenALaterOneHasTakenAllItsUnits) {
   EXPECT_EQ(table.progress()[0].lease, LeaseId{"b"});
 }
 
-TEST(HeldLeases, DoesNotRenderAgainWhatWaitsForItsAcknowledgementUnlessThatIsARefusal) {
+TEST(HeldLeases, RerendersAnUnacknowledgedUnitOnlyAfterARefusal) {
   HeldLeases table;
   table.add(lease("a", kJob, {0, 1}), [](const UnitKey&) { return true; });
 
@@ -93,7 +93,7 @@ TEST(HeldLeases, DropsRunningAndWaitingUnitsOfALease) {
   EXPECT_EQ(table.take(any)->key, key(2));
 }
 
-TEST(HeldLeases, ReturnsWhatWaitsAndKeepsWhatRuns) {
+TEST(HeldLeases, ReturnsWaitingUnitsAndKeepsRunningOnes) {
   HeldLeases table;
   table.add(lease("a", kJob, {0, 1}), nothing_handed_in);
   table.add(lease("b", kOther, {2}), nothing_handed_in);
@@ -106,7 +106,7 @@ TEST(HeldLeases, ReturnsWhatWaitsAndKeepsWhatRuns) {
   EXPECT_EQ(table.lease_count(), 0U);
 }
 
-TEST(HeldLeases, ReturnsOfOneLeaseWhatIsNotBegun) {
+TEST(HeldLeases, ReturnsUnstartedUnitsOfOneLease) {
   HeldLeases table;
   table.add(lease("a", kJob, {0, 1, 2}), nothing_handed_in);
   table.add(lease("b", kJob, {3}), nothing_handed_in);

@@ -43,7 +43,7 @@ struct Ring : ::testing::Test {
   }
 };
 
-TEST_F(Ring, GoesOnToTheNextWhenOneDoesNotWelcome) {
+TEST_F(Ring, ContinuesWithTheNextIfOneDoesNotWelcomeIt) {
   connect();
   EXPECT_EQ(a->connected, 1);
   a->observer->lost({Errc::unavailable, "refused"});
@@ -53,7 +53,7 @@ TEST_F(Ring, GoesOnToTheNextWhenOneDoesNotWelcome) {
   EXPECT_EQ(agent->lost_, 1);
 }
 
-TEST_F(Ring, TriesTheSameAgainAfterAStreamThatWasGoodAndThenTheNext) {
+TEST_F(Ring, RetriesTheSameCoordinatorAfterAGoodStreamAndThenTheNext) {
   connect();
   a->observer->received(Welcome{});
   a->observer->lost({Errc::unavailable, "killed"});
@@ -65,7 +65,7 @@ TEST_F(Ring, TriesTheSameAgainAfterAStreamThatWasGoodAndThenTheNext) {
   EXPECT_EQ(b->connected, 1);
 }
 
-TEST_F(Ring, AnIdleWorkerGoesOnAfterItsReportsAndTellsTheAgentOnce) {
+TEST_F(Ring, IdleWorkerMovesOnAfterItsReportsAndNotifiesTheAgentOnce) {
   connect();
   a->observer->received(Welcome{});
   for (int i = 0; i < kIdleReports; ++i) {
@@ -81,7 +81,7 @@ TEST_F(Ring, AnIdleWorkerGoesOnAfterItsReportsAndTellsTheAgentOnce) {
   EXPECT_EQ(b->connected, 1);
 }
 
-TEST_F(Ring, AWorkerWithWorkOrResultsToBeAcknowledgedStays) {
+TEST_F(Ring, WorkerWithWorkOrUnacknowledgedResultsStays) {
   connect();
   a->observer->received(Welcome{});
   ring.send(UnitResult{});

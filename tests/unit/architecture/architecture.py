@@ -1,6 +1,6 @@
 """The rules of the tree, as data and pure functions: {path: text} -> violations in words.
 
-Who may include whom, one door per library, and a few habits that review forgets. Every exception stands here with its
+Who may include whom, the only files that include a library, and a few habits that review forgets. Every exception stands here with its
 reason; an exception that is no longer needed is a violation too.
 """
 import dataclasses
@@ -9,23 +9,31 @@ import re
 
 CODE = (".h", ".cpp")
 CHECKED = (".h", ".cpp", ".proto", ".cmake", ".py", ".js", ".css", ".html", ".sh")
-FOLDERS = ("common", "proto", "worker", "coordinator", "validation", "compare", "cli", "web", "cmake", "deploy", "scenes", "tests")
+FOLDERS = ("core", "formats", "util", "proto", "worker", "coordinator", "validation", "compare", "cli", "web", "cmake", "deploy", "scenes", "tests", "bench")
 
 # ---- who may include whom ----
 # The longest prefix that fits a file names its area; an area may include itself, and the areas (or single files) listed.
 # "worker/*" are all areas under worker.
 # What all of the coordinator knows; what talks to its facade, and no further.
-COORDINATOR_BASE = ["common", "coordinator/base", "coordinator/domain", "coordinator/views"]
+COORDINATOR_BASE = ["core", "util", "coordinator/base", "coordinator/domain", "coordinator/views"]
 FACADE = COORDINATOR_BASE + ["coordinator/store/blobs/blob_store.h", "coordinator/service/coordinator.h"]
 AREAS = {
-    "common": [],
-    "proto": ["common"],
-    "worker/render": ["common"],
-    "worker": ["common", "worker/*"],
-    "worker/client": ["common", "worker", "proto"],
-    "coordinator/base": ["common"],
-    "coordinator/domain": ["common", "coordinator/base"],
-    "coordinator/views": ["common", "coordinator/base", "coordinator/domain"],
+    # It decides the bits of an image together with worker/render; both are what the build id covers.
+    "core": [],
+    # Foreign scene languages; workers do not link it.
+    "formats": ["core"],
+    # Reads them in a sandbox.
+    "formats/program": ["core", "util", "formats"],
+    "util": ["core"],
+    "proto": ["core", "util"],
+    "worker/render": ["core"],
+    # A program of its own, which renders nothing.
+    "worker/render/vdb": ["core", "util/sandbox/call_filter.h", "worker/render"],
+    "worker": ["core", "util", "worker/*"],
+    "worker/client": ["core", "util", "worker", "proto"],
+    "coordinator/base": ["core", "util"],
+    "coordinator/domain": ["core", "util", "coordinator/base"],
+    "coordinator/views": ["core", "util", "coordinator/base", "coordinator/domain"],
     "coordinator/store": COORDINATOR_BASE,
     # It folds partials out of the store's log.
     "coordinator/assemble": COORDINATOR_BASE + ["coordinator/store"],
@@ -33,56 +41,56 @@ AREAS = {
     # It wires domain, store and assembler together, and knows no network.
     "coordinator/service": COORDINATOR_BASE + ["coordinator/store", "coordinator/assemble", "coordinator/admission"],
     "coordinator/rpc": FACADE + ["proto"],
-    "coordinator/tls": ["common"],
+    "coordinator/tls": ["core"],
     "coordinator/http": FACADE,
     # It keeps what it must still send in files.
     "coordinator/webhooks": FACADE + ["coordinator/store"],
-    "coordinator": ["common", "coordinator/*"],
+    "coordinator": ["core", "util", "coordinator/*"],
     # `lightshaft render` is coordinator and worker in one process.
-    "cli": ["common", "worker/*", "coordinator/*", "validation", "compare"],
-    # The validation cases see no more than the renderer.
-    "validation": ["common", "worker/render"],
-    "compare": ["common", "worker/render", "validation"],
+    "cli": ["core", "formats", "util", "worker/*", "coordinator/*", "validation", "compare"],
+    # The validation cases see no more than the renderer; the program asks how many cores it may use.
+    "validation": ["core", "formats", "util", "worker", "worker/render"],
+    "compare": ["core", "formats", "util", "worker/render"],
 }
 # Made by the build.
 GENERATED = re.compile(r"^proto/\w+(\.grpc)?\.pb\.h$")
 
 
 @dataclasses.dataclass(frozen=True)
-class Door:
-    library: str
+class Library:
+    name: str
     headers: str  # regular expression of what is included
     files: str  # regular expression of the paths that may include it
     why: str
 
 
-EVERYWHERE = r"^(common|worker|coordinator|validation|compare|cli)/"
+EVERYWHERE = r"^(core|formats|util|worker|coordinator|validation|compare|cli)/"
 
-DOORS = [
-    Door("Embree", r"^embree\d?/", r"^worker/render/geometry/embree\.h$", "what differs between its versions"),
-    Door("OpenVDB", r"^(openvdb|nanovdb)/", r"^worker/render/vdb/", "a program of its own"),
-    Door("Blosc", r"^blosc\.h$", r"^worker/render/vdb/", "the same program"),
-    Door("OpenEXR", r"^(OpenEXR/|Imf\w*\.h|Iex\w*\.h|half\.h)", r"^common/image/exr/", "common/image/exr"),
-    Door("gRPC", r"^(grpc|grpcpp|grpc\+\+)/|^proto/\w+\.grpc\.pb\.h$", r"^(coordinator/rpc|worker/client)/", "the two ends of the stream"),
-    Door("protobuf", r"^google/protobuf/|^proto/\w+\.pb\.h$", r"^(coordinator/rpc|worker/client|proto)/", "proto and the two ends of the stream"),
-    Door("Boost", r"^boost/(?!math/|container/)", r"^coordinator/http/(net/|message/message\.cpp$)", "the HTTP server"),
-    Door("Boost.Math", r"^boost/math/", r"^validation/measure/hypothesis_tests\.cpp$", "the statistics of tests and races"),
-    Door("Boost.Container", r"^boost/container/", r"^worker/render/integrator/", "arrays of fixed capacity of the integrator"),
-    Door("libarchive", r"^archive(_entry)?\.h$", r"^coordinator/http/bundle/archive\.(h|cpp)$", "one file pair of the HTTP door"),
-    Door("SQLite", r"^sqlite3\.h$", r"^coordinator/store/", "the store"),
-    Door("hiredis", r"^hiredis/", r"^coordinator/store/redis/redis_link\.cpp$", "the link to Redis"),
-    Door("pugixml", r"^pugixml\.hpp$", r"^common/scene/", "the scene reader"),
-    Door("spdlog", r"^spdlog/", r"^common/base/log\.cpp$", "the log"),
-    Door("libpng", r"^png\.h$", r"^common/(assets/png_\w+|image/exr/preview)\.cpp$", "its decoder, and the preview"),
-    Door("libjpeg", r"^(jpeglib|turbojpeg)\.h$", r"^common/assets/jpeg_\w+\.cpp$", "its decoder"),
-    Door("stb", r"^(stb/)?stb_", r"^common/assets/hdr_\w+\.cpp$", "the HDR decoder"),
-    Door("OpenSSL", r"^openssl/", r"^(common/base/(digest|secret)|common/report/html|coordinator/http/(auth/token_registry|net/byte_stream)|coordinator/tls/tls_files)\.cpp$", "digests, tokens, TLS, Base64"),
-    Door("TBB", r"^(tbb|oneapi)/", r"^worker/render/", "the renderer"),
-    Door("CLI11", r"^CLI/", r"^cli/|/(main|options)\.cpp$|^common/command_line/(command|parse)\.cpp$", "the executables, and what describes their command lines"),
-    Door("libcurl", r"^curl/", r"^cli/|^coordinator/store/blobs/s3_link\.cpp$|^common/http/post\.cpp$", "the command line's client, the link to S3, and what posts webhooks and traces"),
-    Door("nlohmann-json", r"^nlohmann/(?!json_fwd)", EVERYWHERE, "our own code"),
+LIBRARIES = [
+    Library("Embree", r"^embree\d?/", r"^worker/render/geometry/embree\.h$", "what differs between its versions"),
+    Library("OpenVDB", r"^(openvdb|nanovdb)/", r"^worker/render/vdb/", "a program of its own"),
+    Library("Blosc", r"^blosc\.h$", r"^worker/render/vdb/", "the same program"),
+    Library("OpenEXR", r"^(OpenEXR/|Imf\w*\.h|Iex\w*\.h|half\.h)", r"^core/image/exr/", "core/image/exr"),
+    Library("gRPC", r"^(grpc|grpcpp|grpc\+\+)/|^proto/\w+\.grpc\.pb\.h$", r"^(coordinator/rpc|worker/client)/", "the two ends of the stream"),
+    Library("protobuf", r"^google/protobuf/|^proto/\w+\.pb\.h$", r"^(coordinator/rpc|worker/client|proto)/", "proto and the two ends of the stream"),
+    Library("Boost", r"^boost/(?!math/|container/)", r"^coordinator/http/(net/|message/message\.cpp$)", "the HTTP server"),
+    Library("Boost.Math", r"^boost/math/", r"^validation/measure/hypothesis_tests\.cpp$", "the statistics of tests"),
+    Library("Boost.Container", r"^boost/container/", r"^worker/render/integrator/", "arrays of fixed capacity of the integrator"),
+    Library("libarchive", r"^archive(_entry)?\.h$", r"^coordinator/http/bundle/archive\.(h|cpp)$", "one file pair of the HTTP server"),
+    Library("SQLite", r"^sqlite3\.h$", r"^coordinator/store/", "the store"),
+    Library("hiredis", r"^hiredis/", r"^coordinator/store/redis/redis_link\.cpp$", "the link to Redis"),
+    Library("pugixml", r"^pugixml\.hpp$", r"^formats/", "the scene readers"),
+    Library("spdlog", r"^spdlog/", r"^core/base/log\.cpp$", "the log"),
+    Library("libpng", r"^png\.h$", r"^core/(assets/png_\w+|image/exr/preview)\.cpp$", "its decoder, and the preview"),
+    Library("libjpeg", r"^(jpeglib|turbojpeg)\.h$", r"^core/assets/jpeg_\w+\.cpp$", "its decoder"),
+    Library("stb", r"^(stb/)?stb_", r"^core/assets/hdr_\w+\.cpp$", "the HDR decoder"),
+    Library("OpenSSL", r"^openssl/", r"^(core/base/(digest|secret)|util/report/html|coordinator/http/(auth/token_registry|net/byte_stream)|coordinator/tls/tls_files)\.cpp$", "digests, tokens, TLS, Base64"),
+    Library("TBB", r"^(tbb|oneapi)/", r"^worker/render/", "the renderer"),
+    Library("CLI11", r"^CLI/", r"^cli/|/(main|options)\.cpp$|^util/command_line/(command|parse)\.cpp$", "the executables, and what describes their command lines"),
+    Library("libcurl", r"^curl/", r"^cli/|^coordinator/store/blobs/s3_link\.cpp$|^util/http/post\.cpp$", "the command line's client, the link to S3, and what posts webhooks and traces"),
+    Library("nlohmann-json", r"^nlohmann/(?!json_fwd)", EVERYWHERE, "our own code"),
 ]
-# In tests a library may be needed as an oracle or to make broken files; doors bind the product.
+# In tests a library may be needed as an oracle or to make broken files; these rows bind the product.
 
 MAX_FILES = 30  # of C++ in a folder
 MAX_LINES = 800
@@ -90,16 +98,16 @@ LONG_FILES = {}  # path: reason
 
 MAX_SOURCES = 2  # of a class
 MAX_METHODS = 40  # of a class, nested ones apart
-STATE_MACHINE = "one state machine behind a narrow door, whose reactions to events are grouped by subject"
+STATE_MACHINE = "one state machine behind a narrow interface, whose reactions to events are grouped by subject"
 ONE_MEMO = "one memo of objects that are read once, for readers of many kinds"
 SPREAD_CLASSES = {
     ("coordinator/domain/farm", "Farm::State"): STATE_MACHINE,
-    ("common/scene/reader", "Reader"): ONE_MEMO,
+    ("formats/reader", "Reader"): ONE_MEMO,
     ("worker/agent", "Agent::Impl"): "one file for each of its threads",
 }
 WIDE_CLASSES = {
     ("coordinator/domain/farm/farm_state.h", "Farm::State"): STATE_MACHINE,
-    ("common/scene/reader/reader.h", "Reader"): ONE_MEMO,
+    ("formats/reader/reader.h", "Reader"): ONE_MEMO,
     ("coordinator/service/coordinator.h", "Coordinator"): "the facade: a function for each request of users, workers and operators",
     ("worker/render/integrator/path_tracer.h", "PathTracer"): "one path, in steps of a few lines that share its state",
     ("worker/render/lights/lights.h", "Lights"): "choosing, sampling and hitting lights, whose densities must agree",
@@ -112,14 +120,14 @@ LONE_INTERFACES = {
 }
 
 # Tests of real threads and sockets may bound their patience by a clock; those of the state machine have a fake one.
-CLOCK_READERS = re.compile(r"^common/base/clock\.(h|cpp)$|(^|/)main\.cpp$|^tests/(?!unit/domain/)")
+CLOCK_READERS = re.compile(r"^core/base/clock\.(h|cpp)$|(^|/)main\.cpp$|^tests/(?!unit/domain/)|^bench/")
 CLOCK_EXCEPTIONS = {
     "coordinator/http/net/connection.cpp": "deadlines of sockets, which Asio takes as points in time",
     "coordinator/rpc/rpc_server.cpp": "gRPC's Shutdown takes a point in time",
     "worker/fake/fake.cpp": "plays a slow renderer",
 }
 
-EXIT_CALLERS = re.compile(r"(^|/)main\.cpp$|^common/base/check\.cpp$")
+EXIT_CALLERS = re.compile(r"(^|/)main\.cpp$|^core/base/check\.cpp$")
 EXIT_EXCEPTIONS = {
     "worker/child/serve.cpp": "the render child when its agent is gone, with threads deep in a sample",
 }
@@ -173,7 +181,7 @@ def code(tree):
 
 
 def product(tree):
-    return {path: text for path, text in code(tree).items() if not path.startswith("tests/")}
+    return {path: text for path, text in code(tree).items() if not path.startswith(("tests/", "bench/"))}
 
 
 def within(path, prefix):
@@ -185,13 +193,13 @@ def folder(path):
 
 
 def module(path):
-    """A folder with all its rooms: "common/scene", "cli"."""
+    """A folder with all its subfolders: "core/scene", "cli"."""
     parts = folder(path).split("/")
     return parts[0] if parts[0] in ("cli", "validation", "compare") else "/".join(parts[:2])
 
 
-def door_of(name):
-    return next((door for door in DOORS if re.search(door.headers, name)), None)
+def library_of(name):
+    return next((library for library in LIBRARIES if re.search(library.headers, name)), None)
 
 
 def area_of(path):
@@ -267,39 +275,39 @@ def folder_cycles(tree):
                 yield f"{files[0][0]} includes {files[0][1]}: {name} and {to} include each other"
 
 
-def small_rooms(tree):
+def small_folders(tree):
     counts = {}
     for path in product(tree):
         counts[folder(path)] = counts.get(folder(path), 0) + 1
     for name, count in counts.items():
         if count > MAX_FILES:
-            yield f"{name} has {count} files; make rooms of at most {MAX_FILES} by subject"
+            yield f"{name} has {count} files; split it by subject into folders of at most {MAX_FILES}"
 
 
-def doors(tree):
+def libraries_are_included_in_one_place(tree):
     for path, text in product(tree).items():
         for name, _ in includes(text):
-            for door in DOORS:
-                if re.search(door.headers, name) and not re.search(door.files, path):
-                    yield f"{path} includes {name}: {door.library}'s one door is {door.why}"
+            for library in LIBRARIES:
+                if re.search(library.headers, name) and not re.search(library.files, path):
+                    yield f"{path} includes {name}: only {library.files} may include {library.name} ({library.why})"
 
 
-def library_types_stay_behind_their_doors(tree):
-    """A header that lets a library in is private: only .cpp files of its own module see it, or of the library's door."""
+def library_types_stay_in_their_module(tree):
+    """A header that includes a library is private: only .cpp files of its own module may include it, or files that may include the library."""
     files = product(tree)
     names = {path: [name for name, _ in includes(text)] for path, text in files.items()}
-    heavy = {}  # header -> the door whose library it shows, itself or through another
+    heavy = {}  # header -> the library that it includes, itself or through another
     while True:
-        found = {path: door for path in names if path.endswith(".h") and path not in heavy
-                 for name in names[path] for door in [heavy.get(name) or door_of(name)] if door}
+        found = {path: library for path in names if path.endswith(".h") and path not in heavy
+                 for name in names[path] for library in [heavy.get(name) or library_of(name)] if library}
         if not found:
             break
         heavy.update(found)
     for path, name in ((path, name) for path in names for name in names[path] if name in heavy):
-        door = heavy[name]
-        at_home = module(path) == module(name) or (door.files != EVERYWHERE and re.search(door.files, path))
+        library = heavy[name]
+        at_home = module(path) == module(name) or (library.files != EVERYWHERE and re.search(library.files, path))
         if not at_home:
-            yield f"{path} includes {name}, which brings {door.library} along"
+            yield f"{path} includes {name}, which brings {library.name} along"
 
 
 def headers_are_guarded(tree):
@@ -383,7 +391,7 @@ def interfaces_have_two_implementations(tree):
 
 
 def the_type_says_who_holds_the_lock(tree):
-    """A name that asks its callers to hold a lock is checked by nobody; Guarded<> (common/base/guarded.h) is."""
+    """A name that asks its callers to hold a lock is checked by nobody; Guarded<> (core/base/guarded.h) is."""
     for path, text in product(tree).items():
         for name in sorted(set(LOCKED_NAME.findall(without_texts(text)))):
             yield f"{path}: {name}: take a reference to the state of a Guarded<> instead of asking callers to hold a lock"
@@ -438,7 +446,7 @@ def tests_do_not_sleep(tree):
 def tests_assert_no_times(tree):
     """No test fails because the machine was slow: neither a clock nor the difference of two readings is asserted about."""
     for path, text in tree.items():
-        if not path.startswith("tests/") or path.startswith(("tests/bench/", "tests/unit/architecture/")) or path in TIMED_EXCEPTIONS:
+        if not path.startswith("tests/") or path.startswith("tests/unit/architecture/") or path in TIMED_EXCEPTIONS:
             continue
         timed = set()
         for number, line in enumerate(text.splitlines(), 1):
@@ -502,6 +510,6 @@ def constants_are_listed(tree):
             yield f"{CONSTANTS_PAGE} has a row for {number} in {path}, where it is not"
 
 
-RULES = [layering, quoted_includes_exist, include_cycles, folder_cycles, small_rooms, doors, library_types_stay_behind_their_doors, headers_are_guarded,
+RULES = [layering, quoted_includes_exist, include_cycles, folder_cycles, small_folders, libraries_are_included_in_one_place, library_types_stay_in_their_module, headers_are_guarded,
          short_files, classes_are_whole, narrow_classes, interfaces_have_two_implementations, the_type_says_who_holds_the_lock, names_of_a_library_do_not_clash, nothing_unfinished, clock_is_injected, tests_do_not_sleep, tests_assert_no_times, nobody_exits,
          exceptions_are_files, constants_are_listed]

@@ -15,7 +15,7 @@ import architecture
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 OUT = ROOT / "docs" / "design" / "folders.svg"
 WIDTH, HEIGHT, GAP, RISE = 168, 30, 14, 74  # of a box; between boxes of a row; between rows
-COLOURS = {"common": "#dce9f5", "worker": "#e3f1dd", "coordinator": "#fbe9d3", "validation": "#eee3f4", "compare": "#eee3f4", "cli": "#f7dfe3", "proto": "#e8e8e8"}
+COLOURS = {"core": "#dce9f5", "formats": "#e4ecf5", "util": "#eef2f6", "worker": "#e3f1dd", "coordinator": "#fbe9d3", "validation": "#eee3f4", "compare": "#eee3f4", "cli": "#f7dfe3", "proto": "#e8e8e8"}
 
 
 def reduced(graph):

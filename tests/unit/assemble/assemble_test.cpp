@@ -37,7 +37,7 @@ std::string refusal(const Verified& v) {
   return bad ? bad->error.message : "";
 }
 
-TEST(RoundErrors, ACheckpointDoesNotSeeRoundsAheadOfIt) {
+TEST(RoundErrors, CheckpointIgnoresLaterRounds) {
   RoundErrors errors(2, true);
   TileError e;
   e.pixels = 1;
@@ -70,7 +70,7 @@ TEST(RoundErrors, ACheckpointDoesNotSeeRoundsAheadOfIt) {
   EXPECT_EQ(loaded, errors);
 }
 
-TEST(RoundErrors, ARoundThatIsFoldedAgainTakesThePlaceOfItsFirstFold) {
+TEST(RoundErrors, RefoldedRoundReplacesItsFirstFold) {
   RoundErrors again(1, true), once(1, true);
   TileError e;
   e.relative.squares = 1;
@@ -101,7 +101,7 @@ void write_to(const std::filesystem::path& path, const Assembly& a, std::string_
   ASSERT_TRUE(file.commit());
 }
 
-TEST(Assembly, ASnapshotGivesTheSameFilmAndAnyDamageIsNoticed) {
+TEST(Assembly, SnapshotRestoresTheFilmAndDamageIsDetected) {
   TempFolder dir;
   const auto path = dir.path() / "film.snap";
   Assembly assembly(kGrid, false);
@@ -135,7 +135,7 @@ TEST(Assembly, ASnapshotGivesTheSameFilmAndAnyDamageIsNoticed) {
   EXPECT_TRUE(with(bytes));
 }
 
-TEST(Assembly, ASnapshotTakesEachTileAsItWasWhenItWasCopied) {
+TEST(Assembly, SnapshotHasEachTileAsOfItsCopy) {
   TempFolder dir;
   Assembly assembly(kGrid, false);
   ASSERT_TRUE(assembly.fold(0, 0, waiting(0, {0, 2})));
@@ -152,14 +152,14 @@ TEST(Assembly, ASnapshotTakesEachTileAsItWasWhenItWasCopied) {
   EXPECT_EQ(load_snapshot(dir.path() / "film.snap", kGrid, false, "f")->film(), first);
 }
 
-TEST(Assembly, APartialThatWaitsIsTakenForItsOwnRangeAlone) {
+TEST(Assembly, WaitingPartialCountsOnlyForItsOwnRange) {
   Assembly assembly(kGrid, false);
   assembly.hold(0, 2, waiting(0, {4, 6}));
   EXPECT_FALSE(assembly.take(0, 2, {4, 8}));
   EXPECT_TRUE(assembly.take(0, 2, {4, 6}));
 }
 
-TEST(Assembly, ADiscardedTileHasNoErrorAnyMore) {
+TEST(Assembly, DiscardedTileHasNoError) {
   Assembly assembly(kGrid, false);
   const std::vector<RoundIndex> first(kGrid.count(), 1);
   ASSERT_TRUE(assembly.fold(0, 0, waiting(0, {0, 2})));
@@ -171,7 +171,7 @@ TEST(Assembly, ADiscardedTileHasNoErrorAnyMore) {
   EXPECT_EQ(assembly.errors().at(first), one);
 }
 
-TEST(Assembly, PixelsThatWaitHaveABoundForAllJobsTogether) {
+TEST(Assembly, WaitingPartialsOfAllJobsShareAMemoryLimit) {
   const std::size_t before = WaitingBytes::all();
   constexpr std::size_t kEach = std::size_t{32} * 32 * 6 * sizeof(float);
   std::size_t kept = 0;
@@ -201,7 +201,7 @@ Health unhealthy(int x, std::uint64_t sample) {
   return h;
 }
 
-TEST(HealthTable, ALongerRangeOfARoundTakesThePlaceOfACutOne) {
+TEST(HealthTable, LongerRangeOfARoundReplacesATruncatedOne) {
   HealthTable table, at_once;
   table.folded(0, 0, {0, 2}, unhealthy(1, 0));
   table.folded(0, 1, {2, 4}, {});
@@ -221,7 +221,7 @@ TEST(HealthTable, ALongerRangeOfARoundTakesThePlaceOfACutOne) {
   EXPECT_EQ(table.total().nonfinite, 3u);
 }
 
-TEST(HealthTable, ADiscardedTileSaysNothingAndIsFoldedAgain) {
+TEST(HealthTable, DiscardedTileDoesNotCountUntilItIsFoldedAgain) {
   HealthTable table, at_once;
   table.folded(0, 0, {0, 2}, unhealthy(1, 0));
   table.folded(1, 0, {0, 2}, unhealthy(40, 0));
@@ -252,7 +252,7 @@ TEST(HealthTable, RefusesTextCutAnywhereAndOtherText) {
   EXPECT_TRUE(HealthTable::load(""));
 }
 
-TEST(Assembly, ASnapshotKeepsTheHealthOfWhatIsFolded) {
+TEST(Assembly, SnapshotKeepsTheHealthOfFoldedResults) {
   Assembly assembly(kGrid, false);
   WaitingPartial first = waiting(0, {0, 2});
   first.health = unhealthy(1, 0);
@@ -263,7 +263,7 @@ TEST(Assembly, ASnapshotKeepsTheHealthOfWhatIsFolded) {
   EXPECT_EQ(assembly.health().total(), first.health);
 }
 
-TEST(Assembly, ATailCutForFewerSamplesDoesNotCountForMore) {
+TEST(Assembly, TailOfFewerSamplesDoesNotCountForMore) {
   Assembly assembly(kGrid, false);
   for (TileIndex t = 0; t < kGrid.count(); ++t)
     for (RoundIndex r = 0; r < 3; ++r) ASSERT_TRUE(assembly.fold(t, r, waiting(t, cut_range(r, 6))));
@@ -271,7 +271,7 @@ TEST(Assembly, ATailCutForFewerSamplesDoesNotCountForMore) {
   EXPECT_EQ(assembly.rounds_for(8), std::vector<RoundIndex>(kGrid.count(), 2));
 }
 
-TEST(Verify, TakesWhatIsWantedAndOnlyThat) {
+TEST(Verify, AcceptsOnlyRequestedResults) {
   const UnitHeader expected = header(0, {4, 8});
   const Partial good = fake_partial(expected);
   EXPECT_EQ(std::get<Partial>(verify_result(result_of(good), expected, kGrid.frame)), good);
@@ -293,7 +293,7 @@ TEST(Verify, TakesWhatIsWantedAndOnlyThat) {
   EXPECT_NE(refusal(verify_result(clock, expected, kGrid.frame)), "");
 }
 
-TEST(Verify, KnowsAnHonestPartialOfACutRound) {
+TEST(Verify, AcceptsAPartialOfATruncatedRound) {
   const UnitHeader expected = header(0, {4, 8});
   const auto verified = verify_result(result_of(fake_partial(header(0, {4, 6}))), expected, kGrid.frame);
   ASSERT_TRUE(std::holds_alternative<OtherRange>(verified));
@@ -317,7 +317,7 @@ TEST(Report, HasEveryKeyOfTheContract) {
   EXPECT_EQ(j["stopped"], "spp");
 }
 
-TEST(Report, HasIntervalsOfAreasOnlyWhereTheErrorIsTrustedAndNoRareLightMayBeMissing) {
+TEST(Report, HasAreaIntervalsOnlyForTrustedErrorsWithoutRareLight) {
   ReportFacts facts;
   facts.error = ImageError{.settled = true, .trusted = true};
   facts.areas = AreaError{{1, 2, 3}, {.5, .25, .125}, .01, .005, .02};
@@ -341,7 +341,7 @@ TEST(Report, HasIntervalsOfAreasOnlyWhereTheErrorIsTrustedAndNoRareLightMayBeMis
   EXPECT_TRUE(report()["mean"].is_null());
 }
 
-TEST(Report, SaysWhatWasAskedFor) {
+TEST(Report, HasTheRequestedSettings) {
   ReportFacts facts;
   facts.job.settings.max_depth = 12;
   facts.job.settings.rr_depth = 3;
@@ -365,7 +365,7 @@ ReportFacts falling() {
   return facts;
 }
 
-TEST(Report, SaysWhatTheTargetWillCost) {
+TEST(Report, PredictsTheCostOfTheTarget) {
   ReportFacts facts = falling();
   facts.job.spec.target_error = 1.0 / 256;
   const auto j = nlohmann::json::parse(report_json(facts));
@@ -381,7 +381,7 @@ TEST(Report, SaysWhatTheTargetWillCost) {
   EXPECT_GE(f["core_seconds_ci95"][1], f["core_seconds"]);
 }
 
-TEST(Report, SaysWhatHalfTheErrorWouldCostWhereNoTargetIsAhead) {
+TEST(Report, ForecastsTheCostOfHalfTheErrorWithoutATarget) {
   ReportFacts reached = falling();
   reached.job.spec.target_error = .5;
   for (const ReportFacts& facts : {falling(), reached}) {

@@ -29,13 +29,13 @@ ReportFacts compared(double floor, std::optional<double> standard_error) {
 
 json told(const ReportFacts& facts) { return json::parse(report_json(facts)); }
 
-TEST(ReferenceReport, TellsAFloorOnlyAboveTheReferencesNoise) {
+TEST(ReferenceReport, ReportsAFloorOnlyAboveTheReferencesNoise) {
   EXPECT_EQ(told(compared(.01, {}))["verdict_kind"], "bias_floor");
   EXPECT_EQ(told(compared(.01, .002))["verdict_kind"], "bias_floor");  // the bias is five standard errors
   EXPECT_EQ(told(compared(.01, .003))["verdict_kind"], "converging");  // the bias is three standard errors
 }
 
-TEST(ReferenceReport, OfTheJobsOwnSeedDrawsNoVerdict) {
+TEST(ReferenceReport, SameSeedHasNoVerdict) {
   ReportFacts facts = compared(.01, 1e-6);
   facts.job.reference_same_seed = true;
 
@@ -47,7 +47,7 @@ TEST(ReferenceReport, OfTheJobsOwnSeedDrawsNoVerdict) {
   EXPECT_GT(header_figures(facts).at("true_relmse"), .01) << "it is told as before";
 }
 
-TEST(ReferenceReport, SaysWhatIsBelowItsNoise) {
+TEST(ReferenceReport, ReportsErrorsBelowItsNoise) {
   const ReportFacts facts = compared(0, .001);  // its error at the last checkpoint is 1 / 1024
   const json below = told(facts), without = told(compared(0, {}));
 

@@ -54,7 +54,7 @@ class StoredLayersTest : public ::testing::Test {
   Film rendered = film_without(1);
 };
 
-TEST_F(StoredLayersTest, AreThoseOfTheFilmInMemory) {
+TEST_F(StoredLayersTest, MatchTheFilmInMemory) {
   const auto stored = open();
   ASSERT_TRUE(stored);
   for (const PixelLayer& layer : pixel_layers(kStoredAovs))
@@ -66,7 +66,7 @@ TEST_F(StoredLayersTest, AreThoseOfTheFilmInMemory) {
     }
 }
 
-TEST_F(StoredLayersTest, OfHighLevelsDifferByNoMoreThanARoundingToHalf) {
+TEST_F(StoredLayersTest, HighLevelsDifferByAtMostARoundingToHalf) {
   const auto stored = open();
   ASSERT_TRUE(stored);
   const PixelLayer rgb = pixel_layer(kStoredAovs, "rgb").value();
@@ -83,7 +83,7 @@ TEST_F(StoredLayersTest, OfHighLevelsDifferByNoMoreThanARoundingToHalf) {
   }
 }
 
-TEST_F(StoredLayersTest, OfATileWithoutSamplesHideNoIdentifierOfItsNeighbours) {
+TEST_F(StoredLayersTest, EmptyTileHidesNoIdentifiersOfItsNeighbours) {
   rendered = film_without(0);
   keep();
   const auto stored = open();
@@ -117,7 +117,7 @@ TEST_F(StoredLayersTest, AreReadOnceForAllLayersOfASmallVersion) {
   EXPECT_FALSE(stored->pixels(layers[0], 0, kStoredWhole));
 }
 
-TEST_F(StoredLayersTest, OfAnotherJobOrADamagedFileAreNone) {
+TEST_F(StoredLayersTest, AnotherJobsOrDamagedFileIsRefused) {
   EXPECT_FALSE(SnapshotTiles::open(path, {{75, 51}, 32}, kStoredAovs, "f"));
   EXPECT_FALSE(SnapshotTiles::open(path, kStoredGrid, {}, "f"));
   EXPECT_FALSE(SnapshotTiles::open(path, kStoredGrid, kStoredAovs, "g"));

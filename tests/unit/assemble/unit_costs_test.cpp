@@ -7,7 +7,7 @@ namespace {
 
 using Rounds = std::vector<RoundIndex>;
 
-TEST(UnitCosts, OfACheckpointAreThoseOfItsUnitsAlone) {
+TEST(UnitCosts, CheckpointCountsOnlyItsUnits) {
   UnitCosts costs(2);
   costs.add(0, 0, 1);
   costs.add(0, 1, 2);
@@ -22,7 +22,7 @@ TEST(UnitCosts, OfACheckpointAreThoseOfItsUnitsAlone) {
   EXPECT_EQ(costs.until(Rounds{3, 3}), 1 + 8 + 2 + 16 + 4 + 32);
 }
 
-TEST(UnitCosts, OfAUnitRenderedAgainCountTwice) {
+TEST(UnitCosts, RerenderedUnitCountsTwice) {
   UnitCosts costs(1);
   costs.add(0, 0, 1);
   costs.add(0, 0, 2);
@@ -34,7 +34,7 @@ TEST(UnitCosts, OfAUnitRenderedAgainCountTwice) {
 
 // A checkpoint may include rounds without recorded cost: of a tile that stopped early, or a truncated last
 // round.
-TEST(UnitCosts, OfWhatIsNotThereAreNothing) {
+TEST(UnitCosts, MissingUnitsCostNothing) {
   UnitCosts costs(2);
   costs.add(0, 0, 1);
   EXPECT_EQ(costs.until(Rounds{4, 0}), 1);

@@ -21,11 +21,11 @@
 #include <iterator>
 #include <optional>
 
-#include "common/assets/grid_files.h"
-#include "common/assets/image.h"
-#include "common/assets/mesh.h"
-#include "common/base/file_form.h"
-#include "common/image/exr/memory.h"
+#include "core/assets/grid_files.h"
+#include "core/assets/image.h"
+#include "core/assets/mesh.h"
+#include "core/base/file_form.h"
+#include "core/image/exr/memory.h"
 #include "tests/unit/assets/hostile.h"
 
 namespace ls {
@@ -392,7 +392,7 @@ std::vector<Kind> kinds() {
 
 constexpr std::size_t kTries = 200;
 
-TEST(DamagedFiles, ACutIsRefusedOrToldOrLosesNothing) {
+TEST(DamagedFiles, TruncatedFileIsRefusedOrReportedOrComplete) {
   for (const Kind& k : kinds()) {
     SCOPED_TRACE(k.name);
     const Content whole = k.read(k.file_name, bytes_of(k.bytes));
@@ -418,7 +418,7 @@ TEST(DamagedFiles, ACutIsRefusedOrToldOrLosesNothing) {
   }
 }
 
-TEST(DamagedFiles, AChangedByteIsRefusedOrChangesNothingWhereThereIsAChecksum) {
+TEST(DamagedFiles, ChangedByteIsRefusedOrHarmlessInFormatsWithAChecksum) {
   std::mt19937 rng(11);
   for (const Kind& k : kinds()) {
     SCOPED_TRACE(k.name);
@@ -441,7 +441,7 @@ TEST(DamagedFiles, AChangedByteIsRefusedOrChangesNothingWhereThereIsAChecksum) {
   }
 }
 
-TEST(DamagedFiles, TheTableOfThePageIsThis) {
+TEST(DamagedFiles, PageMatchesTheTable) {
   constexpr std::string_view kBegin = "<!-- Made by DamagedFiles in assets_test; do not edit. -->\n",
                              kEnd = "<!-- End of what DamagedFiles made. -->\n";
   std::string table = "\n| format | cut short | a byte changed |\n|---|---|---|\n";

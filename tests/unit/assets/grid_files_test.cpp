@@ -1,4 +1,4 @@
-#include "common/assets/grid_files.h"
+#include "core/assets/grid_files.h"
 
 #include <gmock/gmock.h>
 
@@ -77,7 +77,7 @@ TEST(Vol, RefusesValuesThatAreNotFiniteWithTheirVoxel) {
   EXPECT_THAT(error(floats({0, 1, 2, 3, inf, 5})), HasSubstr("the voxel (0, 2, 0) is infinite"));
 }
 
-TEST(Vol, RefusesHeadersThatTheFileDoesNotBear) {
+TEST(Vol, RefusesHeadersThatExceedTheFile) {
   VolFile f = floats({0, 1, 2, 3, 4, 5});
   f.nx = 3;
   EXPECT_THAT(error(f),
@@ -146,7 +146,7 @@ TEST(RawGrid, IsReadInEitherOrder) {
   EXPECT_THAT(x->bbox_max, ElementsAre(1, 2, 3));
 }
 
-TEST(RawGrid, MakesNegativesZeroAndRefusesWhatIsNoNumberWithItsNode) {
+TEST(RawGrid, ClampsNegativeValuesAndRefusesNonNumbersNamingTheNode) {
   RawFile f;
   f.values[7] = -2;
   const auto g = decode_raw("g.bin", bytes_of(f.text()));
@@ -159,7 +159,7 @@ TEST(RawGrid, MakesNegativesZeroAndRefusesWhatIsNoNumberWithItsNode) {
   EXPECT_THAT(error(f), HasSubstr("the node (1, 0, 1) is infinite"));
 }
 
-TEST(RawGrid, RefusesHeadersThatTheFileDoesNotBear) {
+TEST(RawGrid, RefusesHeadersThatExceedTheFile) {
   RawFile f;
   f.nx = 3;
   EXPECT_THAT(error(f), HasSubstr("3 x 3 x 2 nodes need 72 bytes after the header, but 48 are there"));

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/error.h"
+#include "core/base/error.h"
 
 namespace ls::test {
 

@@ -1,4 +1,4 @@
-#include "common/assets/image.h"
+#include "core/assets/image.h"
 
 #include <gmock/gmock.h>
 #include <jpeglib.h>
@@ -9,7 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "common/image/exr/exr_file.h"
+#include "core/image/exr/exr_file.h"
 #include "tests/unit/assets/hostile.h"
 
 namespace ls {
@@ -124,7 +124,7 @@ std::string chunk(const std::string& name, const std::string& data) {
   return word(data.size()) + whole + word(sum);
 }
 
-TEST(Png, OpacitiesBeforeThePaletteAreTold) {
+TEST(Png, OpacityBeforeThePaletteIsReported) {
   const std::string start =
                         "\x89PNG\r\n\x1a\n" + chunk("IHDR", std::string("\0\0\0\1\0\0\0\1\10\3\0\0\0", 13)),
                     palette = chunk("PLTE", "abc"), opacities = chunk("tRNS", "\x7f"),
@@ -189,7 +189,7 @@ TEST(Jpeg, ReadsColourAndGrey) {
   EXPECT_EQ(grey->u8.size(), 81u);
 }
 
-TEST(Jpeg, RefusesTruncatedFilesInsteadOfPaddingThemAndSurvivesMutations) {
+TEST(Jpeg, RefusesTruncatedFilesAndSurvivesRandomMutations) {
   const std::string file = jpeg(32, 32, 3, 77);
   // If only the end marker is cut off, all pixels are there.
   EXPECT_LE(test::accepted_truncations(file, kJpeg), 2);
@@ -200,7 +200,7 @@ std::string with_segment(const std::string& file, std::size_t at, const std::str
   return file.substr(0, at) + bytes + file.substr(at);
 }
 
-TEST(Jpeg, WhatTheLibraryOnlyWarnsOfIsReadIfNoPixelIsLost) {
+TEST(Jpeg, FilesWithLibraryWarningsAreReadIfNoPixelIsLost) {
   const std::string file = jpeg(32, 32, 3, 77);
   const auto whole = decode_jpeg("a.jpg", bytes_of(file));
   ASSERT_TRUE(whole);
@@ -216,7 +216,7 @@ TEST(Jpeg, WhatTheLibraryOnlyWarnsOfIsReadIfNoPixelIsLost) {
   }
 }
 
-TEST(Jpeg, FourColoursAreNamed) {
+TEST(Jpeg, RefusesCmykByName) {
   jpeg_compress_struct c{};
   jpeg_error_mgr errors;
   c.err = jpeg_std_error(&errors);
@@ -349,14 +349,14 @@ TEST(Hdr, RefusesSizesThatTheFileCannotHold) {
   EXPECT_THAT(i.error().message, HasSubstr("too short for its size"));
 }
 
-TEST(Image, NamesTheFileWhenItIsOfNoKnownKind) {
+TEST(Image, NamesAFileOfUnknownFormat) {
   const auto i = decode_image("a.gif", bytes_of("GIF89a"));
   ASSERT_FALSE(i);
   EXPECT_THAT(i.error().message, HasSubstr("'a.gif'"));
   EXPECT_FALSE(load_image("/nonexistent/a.png", "a.png"));
 }
 
-TEST(Image, MorePixelsThanTheCallerWantsAreRefusedByTheirSize) {
+TEST(Image, ImageLargerThanTheCallersLimitIsRefused) {
   ExrPicture picture{{2, 2}, {}, {}};
   for (const char* c : {"R", "G", "B"}) picture.channels[c] = ExrFloat{{1, 2, 3, 4}};
   const auto exr = write_exr(picture);
@@ -399,23 +399,23 @@ TEST(Pfm, RowsRunFromTheBottom) {
   EXPECT_THAT(i->f32, ElementsAre(4, -5, 6e10f, 1, 2, 3));
 }
 
-TEST(Pfm, TheSignOfTheScaleIsTheByteOrder) {
+TEST(Pfm, SignOfTheScaleIsTheByteOrder) {
   EXPECT_THAT(decode_pfm_file(pfm("Pf\n2 1\n1\n", {1.5f, -2}, true))->f32, ElementsAre(1.5f, -2));
   EXPECT_THAT(decode_pfm_file(pfm("Pf 2 1 -1\n", {1.5f, -2}))->f32, ElementsAre(1.5f, -2));
 }
 
-TEST(Pfm, TheScaleIsAFactor) {
+TEST(Pfm, ScaleIsAFactor) {
   EXPECT_THAT(decode_pfm_file(pfm("Pf\n1 2\n-0.5\n", {3, 4}))->f32, ElementsAre(2, 1.5f));
 }
 
 // The byte after this blank belongs to the first value, even if it looks like another blank.
-TEST(Pfm, OneBlankEndsTheHeader) {
+TEST(Pfm, SingleBlankEndsTheHeader) {
   const auto i = decode_pfm_file(std::string("Pf\n1 1\n-1\n\x20\x0a\x80\x3f", 14));
   ASSERT_TRUE(i) << i.error().message;
   EXPECT_EQ(i->f32.at(0), 0x1.001440p+0f);  // 0x3f800a20
 }
 
-TEST(Pfm, WhatIsWrongIsTold) {
+TEST(Pfm, ReportsErrors) {
   EXPECT_THAT(pfm_error("PF\n0 1\n-1\n"),
               HasSubstr("'a.pfm': broken PFM image: its header has no believable"));
   EXPECT_THAT(pfm_error("PF\n-1 1\n-1\n"), HasSubstr("no believable width and height"));
@@ -428,7 +428,7 @@ TEST(Pfm, WhatIsWrongIsTold) {
   EXPECT_EQ(decode_pfm("a.pfm", bytes_of("PF\n2 2\n-1\n"), 3).error().code, Errc::resource_exhausted);
 }
 
-TEST(Pfm, NoDamageDoesHarm) {
+TEST(Pfm, SurvivesRandomDamage) {
   const auto plain = [](std::string_view name, std::span<const std::byte> file) {
     return decode_pfm(name, file, 1 << 16);
   };

@@ -3,7 +3,7 @@
 
 #include <initializer_list>
 
-#include "common/assets/image.h"
+#include "core/assets/image.h"
 #include "tests/unit/assets/hostile.h"
 
 namespace ls {
@@ -53,7 +53,7 @@ TEST(Bmp, RowsRunFromTheBottomUnlessTheHeightIsNegative) {
   }
 }
 
-TEST(Bmp, WhatIsNotUnderstoodIsRefusedByName) {
+TEST(Bmp, RefusesUnsupportedKindsByName) {
   const auto error = [](const std::string& file) {
     const auto r = decode(file);
     return r ? std::string() : r.error().message;
@@ -66,7 +66,7 @@ TEST(Bmp, WhatIsNotUnderstoodIsRefusedByName) {
   EXPECT_EQ(decode_bmp("a.bmp", bytes_of(bmp(24, 2)), 3).error().code, Errc::resource_exhausted);
 }
 
-TEST(Bmp, NoDamageDoesHarm) {
+TEST(Bmp, SurvivesRandomDamage) {
   const auto plain = [](std::string_view name, std::span<const std::byte> file) {
     return decode_bmp(name, file);
   };
@@ -110,9 +110,9 @@ TEST(Qoi, BeginsWithBlackAndWrapsAround) {
               ElementsAre(0, 0, 0, 255, 0, 1));
 }
 
-TEST(Qoi, LinearCodesAreToldFromThoseOfSrgb) { EXPECT_FALSE(decode_qoi_file(qoi(1, 1, 3, {0xc0}, 1))->srgb); }
+TEST(Qoi, DistinguishesLinearFromSrgb) { EXPECT_FALSE(decode_qoi_file(qoi(1, 1, 3, {0xc0}, 1))->srgb); }
 
-TEST(Qoi, WhatIsWrongIsTold) {
+TEST(Qoi, ReportsErrors) {
   EXPECT_THAT(qoi_error("qoif"), HasSubstr("'a.qoi': broken QOI image: its header"));
   EXPECT_THAT(qoi_error(qoi(1, 1, 5, {0xc0})), HasSubstr("its header"));
   EXPECT_THAT(qoi_error(qoi(1, 1, 3, {0xc0}, 2)), HasSubstr("its header"));
@@ -125,7 +125,7 @@ TEST(Qoi, WhatIsWrongIsTold) {
   EXPECT_EQ(decode_qoi("a.qoi", bytes_of(qoi(2, 2, 3, {0xc3})), 3).error().code, Errc::resource_exhausted);
 }
 
-TEST(Qoi, NoDamageDoesHarm) {
+TEST(Qoi, SurvivesRandomDamage) {
   const auto plain = [](std::string_view name, std::span<const std::byte> file) {
     return decode_qoi(name, file, 1 << 16);
   };
@@ -169,7 +169,7 @@ TEST(Tga, TrueColourIsBlueGreenRed) {
   EXPECT_THAT(i->u8, ElementsAre(3, 2, 1, 6, 5, 4, 9, 8, 7, 12, 11, 10));
 }
 
-TEST(Tga, RowsAndColumnsRunAsTheHeaderSays) {
+TEST(Tga, RowAndColumnOrderFollowsTheHeader) {
   const auto grey = [](std::uint8_t order) {
     const auto i = decode_tga_file(tga({.type = 3, .bits = 8, .order = order}, {1, 2, 3, 4}));
     EXPECT_TRUE(i) << i.error().message;
@@ -181,14 +181,14 @@ TEST(Tga, RowsAndColumnsRunAsTheHeaderSays) {
   EXPECT_THAT(grey(0x10), ElementsAre(4, 3, 2, 1));
 }
 
-TEST(Tga, FourBytesHaveAlphaIfTheHeaderSaysSo) {
+TEST(Tga, FourBytePixelsHaveAlphaIfTheHeaderSaysSo) {
   const TgaFields plain{.bits = 32, .width = 1, .height = 1},
       with{.bits = 32, .order = 0x28, .width = 1, .height = 1};
   EXPECT_THAT(decode_tga_file(tga(plain, {1, 2, 3, 4}))->u8, ElementsAre(3, 2, 1));
   EXPECT_THAT(decode_tga_file(tga(with, {1, 2, 3, 4}))->u8, ElementsAre(3, 2, 1, 4));
 }
 
-TEST(Tga, TwoBytesHaveFiveBitsAColour) {
+TEST(Tga, TwoBytesHaveFiveBitsPerColour) {
   // Red is 31 of 31, green 16, blue 1. In 8 bits these are 255, 16 * 255 / 31 = 131.6 and 8.2.
   const int low = (16 & 7) << 5 | 1, high = 31 << 2 | 16 >> 3;
   for (const std::uint8_t bits : {15, 16})
@@ -199,7 +199,7 @@ TEST(Tga, TwoBytesHaveFiveBitsAColour) {
               ElementsAre(255, 132, 8, 0, 255, 132, 8, 255));
 }
 
-TEST(Tga, ColoursMayBeNumbersOfAMap) {
+TEST(Tga, ReadsIndexedColours) {
   TgaFields h{.type = 1, .bits = 8, .map_first = 5, .map_count = 2, .map_bits = 24};
   EXPECT_THAT(decode_tga_file(tga(h, {1, 2, 3, 4, 5, 6, 5, 6, 6, 5}))->u8,
               ElementsAre(3, 2, 1, 6, 5, 4, 6, 5, 4, 3, 2, 1));
@@ -214,12 +214,12 @@ TEST(Tga, ColoursMayBeNumbersOfAMap) {
   EXPECT_THAT(tga_error(tga(h, {1, 2, 5, 0, 6, 0, 6, 0, 5, 0})), HasSubstr("not understood"));
 }
 
-TEST(Tga, AMapOfATrueColourImageIsPassedOver) {
+TEST(Tga, SkipsTheColourMapOfATrueColourImage) {
   const TgaFields h{.width = 1, .height = 1, .map_count = 2, .map_bits = 16};
   EXPECT_THAT(decode_tga_file(tga(h, {9, 9, 9, 9, 1, 2, 3}))->u8, ElementsAre(3, 2, 1));
 }
 
-TEST(Tga, RunsGoOnInTheNextRow) {
+TEST(Tga, RunsContinueInTheNextRow) {
   // A run of three pixels of one colour, then a packet of one plain pixel.
   EXPECT_THAT(decode_tga_file(tga({.type = 10}, {0x82, 1, 2, 3, 0x00, 4, 5, 6}))->u8,
               ElementsAre(3, 2, 1, 3, 2, 1, 3, 2, 1, 6, 5, 4));
@@ -233,7 +233,7 @@ TEST(Tga, RunsGoOnInTheNextRow) {
   EXPECT_THAT(decode_tga_file(tga({.type = 11, .bits = 8}, {0xff, 7}))->u8, ElementsAre(7, 7, 7, 7));
 }
 
-TEST(Tga, WhatIsNotUnderstoodIsRefusedByName) {
+TEST(Tga, RefusesUnsupportedKindsByName) {
   EXPECT_THAT(tga_error(tga({.type = 0}, {})),
               HasSubstr("'a.TGA': a TGA image of type 0 with 24 bits a pixel"));
   EXPECT_THAT(tga_error(tga({.type = 10, .bits = 8}, {})), HasSubstr("of type 10 with 8 bits"));
@@ -245,20 +245,20 @@ TEST(Tga, WhatIsNotUnderstoodIsRefusedByName) {
   EXPECT_EQ(decode_tga("a.tga", bytes_of(tga({}, {})), 3).error().code, Errc::resource_exhausted);
 }
 
-TEST(Tga, IsToldByItsNameAlone) {
+TEST(Tga, IsRecognisedByItsNameOnly) {
   const std::string file = tga({.width = 1, .height = 1}, {1, 2, 3});
   EXPECT_TRUE(decode_image("b.tga", bytes_of(file)));
   EXPECT_THAT(decode_image("b.dat", bytes_of(file)).error().message, HasSubstr("does not end in .tga"));
 }
 
 // The header claims more pixels than the file can contain at 128 pixels per packet, the longest run.
-TEST(Tga, HugeClaimsCostNoMemory) {
+TEST(Tga, HugeClaimedSizesCostNoMemory) {
   for (const std::uint8_t type : {2, 10})
     EXPECT_THAT(tga_error(tga({.type = type, .width = 16384, .height = 16384}, {1, 2, 3})),
                 HasSubstr("too short"));
 }
 
-TEST(Tga, NoDamageDoesHarm) {
+TEST(Tga, SurvivesRandomDamage) {
   const auto plain = [](std::string_view name, std::span<const std::byte> file) {
     return decode_tga(name, file, 1 << 16);
   };

@@ -1,4 +1,4 @@
-#include "common/assets/mesh.h"
+#include "core/assets/mesh.h"
 
 #include <gmock/gmock.h>
 #include <zlib.h>
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <map>
 
-#include "common/assets/mesh_parts.h"
+#include "core/assets/mesh_parts.h"
 #include "tests/unit/assets/hostile.h"
 
 namespace ls {
@@ -39,7 +39,7 @@ std::string obj_error(const std::string& text) {
 
 // A file can choose corners whose hashes collide if the hash has no secret. With a secret that the file does
 // not know, the same corners are spread over the table.
-TEST(Obj, CornersThatShareAPlaceWithoutASecretAreSpreadWithOne) {
+TEST(Obj, CornersThatCollideWithoutASecretAreSpreadWithOne) {
   constexpr std::size_t kPlaces = 10273, kCorners = 500;
   std::vector<Corner> chosen;
   for (std::int64_t v = 0; chosen.size() < kCorners; ++v)
@@ -76,7 +76,7 @@ TEST(Obj, CountsNegativeIndicesBackFromTheLast) {
   EXPECT_TRUE(m->normals.empty());
 }
 
-TEST(Obj, SharesOnlyCornersThatAreAlikeInEverything) {
+TEST(Obj, SharesOnlyIdenticalCorners) {
   const auto m = decode_obj(
       "q.obj", bytes_of("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 1\nf 1/1 2/1 3/1\nf 1/2 2/1 3/1\n"));
 
@@ -155,7 +155,7 @@ std::string replaced(std::string s, const std::string& what, const std::string& 
   return s.replace(s.find(what), what.size(), with);
 }
 
-TEST(Ply, ReadsAllThreeCodingsAlike) {
+TEST(Ply, ReadsAllThreeEncodingsTheSame) {
   for (const std::string& file : {kPlyAscii, ply_binary(false), ply_binary(true)}) {
     const auto m = decode_ply("q.ply", bytes_of(file));
 
@@ -294,7 +294,7 @@ TEST(Serialized, ReadsBothVersionsInBothPrecisions) {
   }
 }
 
-TEST(Serialized, ReadsOnlyWhatIsThere) {
+TEST(Serialized, DoesNotReadBeyondTheFile) {
   const auto m = decode_mesh(mesh({.flags = 0x10}));
 
   ASSERT_TRUE(m) << m.error().message;
@@ -319,7 +319,7 @@ TEST(Serialized, FindsEachOfSeveralMeshes) {
   }
 }
 
-TEST(Serialized, TellsOtherFilesAndVersions) {
+TEST(Serialized, ReportsOtherFilesAndVersions) {
   EXPECT_THAT(error_of("ply\n"), HasSubstr("no serialized mesh"));
   EXPECT_THAT(error_of(""), HasSubstr("no serialized mesh"));
   EXPECT_THAT(error_of(mesh({.version = 5})), HasSubstr("version 5"));
@@ -378,7 +378,7 @@ TEST(Serialized, SurvivesTruncationAndMutation) {
   });
 }
 
-TEST(Obj, AStatementGoesOnAfterABackslash) {
+TEST(Obj, BackslashContinuesAStatement) {
   const std::string joined = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
   const auto plain = decode_obj("m.obj", bytes_of(joined));
   ASSERT_TRUE(plain);
@@ -403,7 +403,7 @@ TEST(Obj, FacesOfOneOrTwoCornersAreLeftOut) {
   EXPECT_THAT(obj_error("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\nf 1 2"), HasSubstr("at least three corners"));
 }
 
-TEST(Obj, LinesMayEndInCarriageReturnsAndTheTextBeginWithAMark) {
+TEST(Obj, AcceptsCarriageReturnsAndAByteOrderMark) {
   const auto m = decode_obj("m.obj", bytes_of("\xef\xbb\xbf# old\rv 0 0 0\rv 1 0 0\rv 1 1 0\rf 1 2 3\r"));
 
   ASSERT_TRUE(m) << m.error().message;
@@ -422,7 +422,7 @@ std::string header_of(const std::string& faces, bool faces_first = false, int co
 }
 Result<MeshData> ply_of(const std::string& text) { return decode_ply("m.ply", bytes_of(text)); }
 
-TEST(Ply, TriangleStripsTurnEveryOtherTriangleAndEndAtMinusOne) {
+TEST(Ply, TriangleStripsFlipEverySecondTriangleAndEndAtMinusOne) {
   const auto m = ply_of(header_of("element tristrips 1\nproperty list int int vertex_indices\n") +
                         kPlyVertices + "8 0 1 3 2 -1 0 2 3\n");
 
@@ -435,7 +435,7 @@ TEST(Ply, TriangleStripsTurnEveryOtherTriangleAndEndAtMinusOne) {
   EXPECT_THAT(wrong.error().message, HasSubstr("tristrips 0 names vertex 9 of 4"));
 }
 
-TEST(Ply, FacesMayStandBeforeTheirVertices) {
+TEST(Ply, FacesMayPrecedeTheirVertices) {
   const auto m = ply_of(header_of("element face 1\nproperty list uchar int vertex_indices\n", true) +
                         "4 0 1 2 3\n" + kPlyVertices);
 
@@ -456,7 +456,7 @@ TEST(Ply, TextureCoordinatesOfCornersSplitVertices) {
   EXPECT_EQ(m->wrong_uv_faces, 0u);
 }
 
-TEST(Ply, TextureCoordinatesOfAWrongNumberAreCountedAndThoseOfAllCornersLeftOut) {
+TEST(Ply, WrongNumberOfTextureCoordinatesDropsThemWithACount) {
   const std::string faces = "3 0 1 2 6 0 0 .5 0 .5 1\n3 0 2 3 5 .25 0 .5 1 0\n3 0 1 3 8 0 0 0 0 0 0 0 0\n";
   const std::string lists =
       "element face 3\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\n";
@@ -478,7 +478,7 @@ TEST(Ply, TextureCoordinatesOfAWrongNumberAreCountedAndThoseOfAllCornersLeftOut)
 }
 
 // MeshLab writes empty lists for faces without a texture of their own.
-TEST(Ply, AnEmptyListOfTextureCoordinatesLeavesThoseOfTheVertices) {
+TEST(Ply, EmptyFaceTextureCoordinatesKeepThoseOfTheVertices) {
   const auto m = ply_of(
       "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
       "property float z\nproperty float s\nproperty float t\nelement face 1\n"
@@ -507,7 +507,7 @@ TEST(Ply, SplitVerticesKeepTheirNormalsAndAttributes) {
   EXPECT_THAT(m->attributes[0].values, ElementsAre(7, 8, 9, 7));
 }
 
-TEST(Ply, MayBeginWithAMarkAndHaveCarriageReturnsInItsHeader) {
+TEST(Ply, AcceptsAByteOrderMarkAndCarriageReturnsInItsHeader) {
   const std::string text =
       header_of("element face 1\nproperty list uchar int vertex_indices\n") + kPlyVertices + "4 0 1 2 3\n";
   std::string old = text;
@@ -521,7 +521,7 @@ TEST(Ply, MayBeginWithAMarkAndHaveCarriageReturnsInItsHeader) {
   }
 }
 
-TEST(Ply, NoDamageOfStripsAndCornersDoesHarm) {
+TEST(Ply, SurvivesDamagedStripsAndCorners) {
   for (const std::string& file :
        {header_of("element tristrips 1\nproperty list int int vertex_indices\n", true) +
             "8 0 1 3 2 -1 0 2 3\n" + kPlyVertices,
@@ -533,7 +533,7 @@ TEST(Ply, NoDamageOfStripsAndCornersDoesHarm) {
         expect_sound_mesh);
 }
 
-TEST(Serialized, AChangedByteIsFoundByItsChecksum) {
+TEST(Serialized, ChecksumDetectsAChangedByte) {
   const std::string file = file_of({mesh()});
   for (std::size_t at = 4; at < mesh().size(); ++at) {
     std::string changed = file;

@@ -1,9 +1,9 @@
 // Attributes of PLY meshes. All expected values are those of Mitsuba 3.9.1.
-#include "common/assets/mesh_parts.h"
+#include "core/assets/mesh_parts.h"
 
 #include <gmock/gmock.h>
 
-#include "common/assets/mesh.h"
+#include "core/assets/mesh.h"
 #include "tests/unit/assets/hostile.h"
 
 namespace ls {
@@ -26,7 +26,7 @@ std::vector<std::string> named(const Names& names) {
   return out;
 }
 
-TEST(PlyAttributes, AreColoursAndRunsOfNumberedOrLetteredNames) {
+TEST(PlyAttributes, AreColoursAndSeriesOfNumberedOrLetteredNames) {
   EXPECT_THAT(named({"x", "y", "z", "red", "green", "blue"}), ElementsAre("color 3 4 5"));
   EXPECT_THAT(named({"r", "foo_x", "g", "b", "a"}), ElementsAre("color 0 2 3", "foo 1"));
   EXPECT_THAT(named({"foo_x", "foo_y", "foo_z"}), ElementsAre("foo 0 1 2"));
@@ -35,7 +35,7 @@ TEST(PlyAttributes, AreColoursAndRunsOfNumberedOrLetteredNames) {
   EXPECT_THAT(named({"a_b_x"}), ElementsAre("a_b 0"));
 }
 
-TEST(PlyAttributes, AreNotWhatMitsubaLeavesOut) {
+TEST(PlyAttributes, ExcludePropertiesThatMitsubaIgnores) {
   EXPECT_THAT(named({"foo"}), IsEmpty());
   EXPECT_THAT(named({"foo_xy", "_x", "foo_y"}), IsEmpty());
   EXPECT_THAT(named({"foo_x", "foo_y"}), IsEmpty());
@@ -62,7 +62,7 @@ const char kSquares[] =
     "1 12\n"
     "5 4 0 1 2 3 0 32768 65535\n6 3 0 1 1 9 9 9\n7 4 1 4 5 2 65535 0 128\n";
 
-TEST(PlyAttributes, OfAFaceAreThoseOfItsTriangles) {
+TEST(PlyAttributes, FaceAttributesApplyToItsTriangles) {
   const std::vector<std::string> wanted{"vertex_color", "face_stamp", "face_c", "vertex_nothing"};
   const auto m = decode_ply("m.ply", bytes_of(kSquares), wanted);
 
@@ -83,7 +83,7 @@ TEST(PlyAttributes, OfAFaceAreThoseOfItsTriangles) {
               ElementsAre(1, 0, FloatNear(1.5117298e-4f, 1e-9f)));
 }
 
-TEST(PlyAttributes, OfBytesCountFromZeroTo255AndOtherWholeNumbersAreSrgbCodes) {
+TEST(PlyAttributes, IntegersAreSrgbCodesAndBytesRangeFrom0To255) {
   std::string file =
       "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
       "float "
@@ -113,7 +113,7 @@ TEST(PlyAttributes, OfBytesCountFromZeroTo255AndOtherWholeNumbersAreSrgbCodes) {
   EXPECT_FLOAT_EQ(find(*m, "vertex_d")->values[0], 64);
 }
 
-TEST(PlyAttributes, ThatNobodyWantsAreNotKept) {
+TEST(PlyAttributes, UnusedAttributesAreDropped) {
   const auto m = decode_ply("m.ply", bytes_of(kSquares));
 
   ASSERT_TRUE(m) << m.error().message;
@@ -131,7 +131,7 @@ void expect_whole(const MeshData& m) {
 
 // A file that is cut or changed must not give an attribute with fewer values than the mesh has vertices or
 // triangles.
-TEST(PlyAttributes, OfDamagedFilesAreWholeOrRefused) {
+TEST(PlyAttributes, DamagedFileHasAllAttributesOrIsRefused) {
   const std::string file = kSquares;
   const auto decode = [](std::string_view name, std::span<const std::byte> bytes) {
     return decode_ply(name, bytes, kWanted);
@@ -140,7 +140,7 @@ TEST(PlyAttributes, OfDamagedFilesAreWholeOrRefused) {
   test::survive_mutations(file, decode, expect_whole);
 }
 
-TEST(PlyAttributes, OfOneOfTwoListsOfFacesAreRefused) {
+TEST(PlyAttributes, AttributesOfOneOfTwoFaceListsAreRefused) {
   std::string file = kSquares;
   file.insert(file.find("end_header"), "element face 1\nproperty list uchar int vertex_indices\n");
   file += "3 0 1 2\n";

@@ -1,10 +1,10 @@
-#include "common/base/file_form.h"
+#include "core/base/file_form.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <zlib.h>
 
-#include "common/base/text/name_forms.h"
+#include "core/base/text/name_forms.h"
 
 namespace ls {
 namespace {
@@ -45,7 +45,7 @@ TEST(FileForm, DamagedGzipIsRefusedByName) {
   EXPECT_FALSE(plain_bytes("a.gz", whole + "rest"));
 }
 
-TEST(FileForm, WhatUnpacksToTooMuchIsRefused) {
+TEST(FileForm, TooLargeUnpackedSizeIsRefused) {
   const std::string bomb = gzipped(std::string(1 << 20, '\0'));
   ASSERT_LT(bomb.size(), 2000u);
 
@@ -56,14 +56,14 @@ TEST(FileForm, WhatUnpacksToTooMuchIsRefused) {
   EXPECT_TRUE(plain_bytes("a.gz", bomb, 1 << 20));
 }
 
-TEST(FileForm, APointerOfGitLfsIsKnownPackedOrNot) {
+TEST(FileForm, GitLfsPointerIsRecognisedPackedOrNot) {
   const std::string pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:ab\nsize 7\n";
   for (const std::string& file : {pointer, gzipped(pointer)})
     EXPECT_THAT(plain_bytes("a.ply", file).error().message, HasSubstr("'a.ply': is a pointer of Git LFS"));
   EXPECT_EQ(why_placeholder("version 3"), "");
 }
 
-TEST(FileForm, NamesAndMarks) {
+TEST(FileForm, RecognisesNamesAndByteMarks) {
   EXPECT_EQ(without_gz("a.vdb.gz"), "a.vdb");
   EXPECT_EQ(without_gz("a.vdb"), "a.vdb");
   EXPECT_EQ(without_mark("\xef\xbb\xbfv"), "v");

@@ -1,4 +1,4 @@
-#include "common/base/log.h"
+#include "core/base/log.h"
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ TEST(Log, WritesKeysAsMembersOfJson) {
                 {"job", "j-1"}, {"tile", "4"}, {"why", "a \"quoted\" reason"}, {"text", "unit\naccepted"}}));
 }
 
-TEST(Log, LetsNoTextFromOutsideBeginALineOrAKey) {
+TEST(Log, ForeignTextCannotBeginALineOrAKey) {
   const std::string name = "evil\n2026-01-01 error job=j-2 stolen";
 
   EXPECT_EQ(log_line(LogFormat::text, "worker=" + log_value(name), name).find('\n'), std::string::npos);
@@ -35,7 +35,7 @@ TEST(Log, LetsNoTextFromOutsideBeginALineOrAKey) {
 }
 
 // U+009B controls a terminal as ESC [ does; U+202E turns the letters after it around.
-TEST(Log, LetsNoTextFromOutsideControlTheTerminalOrTurnLettersAround) {
+TEST(Log, RemovesTerminalControlsAndDirectionMarksFromForeignText) {
   const std::string name =
       "a\xc2\x9b"
       "2Jb\xe2\x80\xae"
@@ -52,7 +52,9 @@ TEST(Log, LetsNoTextFromOutsideControlTheTerminalOrTurnLettersAround) {
   EXPECT_EQ(log_value("Größe"), "Größe");
 }
 
-TEST(Log, IsJsonWhateverBytesAPathHas) { EXPECT_NO_THROW(json_line("file=\xff\xfe", "cannot read '\xc3'")); }
+TEST(Log, IsValidJsonForPathsOfAnyBytes) {
+  EXPECT_NO_THROW(json_line("file=\xff\xfe", "cannot read '\xc3'"));
+}
 
 TEST(Log, KeepsTheFirstOfTwoEqualKeys) { EXPECT_EQ(json_line("job=a job=b", "")["job"], "a"); }
 

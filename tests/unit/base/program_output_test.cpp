@@ -1,5 +1,5 @@
 // What other programs write to our log, and what they inherit.
-#include "common/base/program_output.h"
+#include "core/base/program_output.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -14,7 +14,7 @@
 #include <fstream>
 #include <string>
 
-#include "common/base/spawn.h"
+#include "core/base/spawn.h"
 
 namespace ls {
 namespace {
@@ -38,7 +38,7 @@ TEST(OutputLines, AreCompleteAndClean) {
   EXPECT_EQ(lines.last(), "last");
 }
 
-TEST(OutputLines, AreNoLongerThanTheLimit) {
+TEST(OutputLines, AreTruncatedToTheLimit) {
   LineBudget budget;
   OutputLines lines(budget);
   const std::string whole(OutputLines::kLineBytes, 'a');
@@ -48,7 +48,7 @@ TEST(OutputLines, AreNoLongerThanTheLimit) {
   EXPECT_THAT(lines.take("c\nd\n", at(1)), ElementsAre(whole + " ...", "d"));
 }
 
-TEST(OutputLines, AreLimitedInNumberAndSayHowManyAreLeftOut) {
+TEST(OutputLines, AreLimitedAndCountTheOmittedOnes) {
   LineBudget budget;
   OutputLines lines(budget);
   std::string many;
@@ -63,7 +63,7 @@ TEST(OutputLines, AreLimitedInNumberAndSayHowManyAreLeftOut) {
   EXPECT_THAT(lines.end(at(12)), ElementsAre("(1 lines are left out here: it wrote too many)"));
 }
 
-TEST(LineBudget, IsSharedByProgramsThatFollowEachOtherAndNeverExceedsItsBurst) {
+TEST(LineBudget, SuccessiveProgramsShareTheBudgetAndNeverExceedItsBurst) {
   LineBudget budget;
   const auto spend_all = [&](int second) {
     int spent = 0;
@@ -96,7 +96,7 @@ HelperEnd run(const std::string& text, const std::atomic<bool>* stop = nullptr) 
   return end.value_or(HelperEnd{});
 }
 
-TEST(Helper, TellsItsEndAndItsLastWords) {
+TEST(Helper, ReportsItsEndAndItsLastOutput) {
   const HelperEnd end = run("echo first; echo 'out of \033[31mpaper' >&2; exit 3");
 
   ASSERT_TRUE(WIFEXITED(end.status));
@@ -104,7 +104,7 @@ TEST(Helper, TellsItsEndAndItsLastWords) {
   EXPECT_EQ(end.last_line, "out of  [31mpaper");
 }
 
-TEST(Helper, EndsThoughItsOutputStaysOpen) {
+TEST(Helper, EndsAlthoughItsOutputStaysOpen) {
   // The process in the background keeps the pipe open until this test's own end.
   const HelperEnd end = run("sleep 600 & echo $!");
 
@@ -118,7 +118,7 @@ TEST(Helper, EndsAfterItHasClosedItsOutput) {
   EXPECT_EQ(WEXITSTATUS(end.status), 4);
 }
 
-TEST(Helper, IsKilledWhenToldToStop) {
+TEST(Helper, IsKilledOnStop) {
   const std::atomic<bool> stop{true};
   const HelperEnd end = run("while :; do :; done", &stop);
 
@@ -134,7 +134,7 @@ TEST(Helper, HasNoTerminal) {
 }
 
 // The process has a terminal, as the leader of its session or not.
-TEST(Helper, HasNoTerminalThoughItsParentHasOne) {
+TEST(Helper, HasNoTerminalEvenIfItsParentHasOne) {
   for (const bool leads : {true, false}) {
     const Descriptor master(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC));
     ASSERT_EQ(::grantpt(master.fd), 0);

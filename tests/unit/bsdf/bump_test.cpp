@@ -87,7 +87,7 @@ TEST(BumpMap, SlopesAreTheDerivativesOfTheLuminance) {
     }
 }
 
-TEST(BumpMap, OfAnythingButABilinearBitmapThereIsNoSlope) {
+TEST(BumpMap, OnlyBilinearBitmapsHaveSlopes) {
   BitmapTexture nearest;
   nearest.filter = TextureFilter::nearest;
   const Bumped b({}, random_image(4, 4, 1), nearest);
@@ -95,7 +95,7 @@ TEST(BumpMap, OfAnythingButABilinearBitmapThereIsNoSlope) {
 }
 
 // With the height h = a u and a dp/du of length l, the surface rises by a / l per unit of length.
-TEST(BumpMap, TurnsTheNormalAsAnInclinedPlane) {
+TEST(BumpMap, ConstantSlopeTiltsTheNormalLikeAPlane) {
   const Scene gold = rough_metal(Microfacet::beckmann, .3, .3, kGoldEta, kGoldK);
   for (const double scale : {1., .25, -2.}) {
     const Bumped b(gold, ramp(8, 8, .3f, .8f), {}, scale);
@@ -132,7 +132,7 @@ TEST(BumpMap, RisesWithTheHeightsWhicheverWayUAndVRun) {
   }
 }
 
-TEST(BumpMap, WhereNothingSaysWhichWayUAndVRunIsFlat) {
+TEST(BumpMap, IsFlatWithoutTextureDirections) {
   const Bumped b(diffuse({.5, .5, .5}), ramp(8, 8, 1, 1));
   const UvPoint pole({.5f, .5f}, {0, 0, 0}, {1, 0, 0});
   const V3 up(0, 0, 1);
@@ -140,7 +140,7 @@ TEST(BumpMap, WhereNothingSaysWhichWayUAndVRunIsFlat) {
 }
 
 // A bump map inside a normal map: it must be evaluated in the frame that the normal map rotates.
-TEST(BumpMap, StandsInOtherMaps) {
+TEST(BumpMap, CanBeNestedInOtherMaps) {
   const Scene gold = rough_metal(Microfacet::beckmann, .4, .4, kGoldEta, kGoldK);
   Bumped b(gold, ramp(8, 8, .5f, 0));
   Scene& s = b.scene;
@@ -178,7 +178,7 @@ TEST(BumpMap, HeightsBelowZeroAreHeights) {
 }
 
 // One image as colour and as heights: as a colour it is not negative.
-TEST(BumpMap, AnImageMayBeColourToo) {
+TEST(BumpMap, MayUseAColourImage) {
   Scene s = diffuse({.5, .5, .5});
   s.assets.push_back({"heights.exr", {}, 0});
   s.textures.emplace_back(BitmapTexture{.file = {0}});

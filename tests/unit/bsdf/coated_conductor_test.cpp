@@ -182,7 +182,7 @@ TEST(CoatedConductor, SmoothOverSmoothIsTheExactSumOfAllInnerReflections) {
     }
 }
 
-TEST(CoatedConductor, WithoutContrastIsTheMetalAloneBitForBit) {
+TEST(CoatedConductor, CoatOfIndexOneEqualsTheBareMetal) {
   std::mt19937 rng(3);
   const auto uniform = [&] { return static_cast<float>(rng() >> 8) * 0x1p-24f; };
   for (const double alpha : {0., .2}) {
@@ -203,7 +203,7 @@ TEST(CoatedConductor, WithoutContrastIsTheMetalAloneBitForBit) {
 
 // Allows 5 standard errors. Where almost nothing is lost, all weights are near 1 and the standard error is
 // small.
-TEST(CoatedConductor, NeverGivesMoreThanItGets) {
+TEST(CoatedConductor, NeverReflectsMoreThanItReceives) {
   for (const double ior : {.7, 1.5, 2.4})
     for (const double coat : {0., .002, .1, 1.})
       for (const auto& [u, v] : {std::pair{0., 0.}, {.002, .002}, {.1, .1}, {.5, .5}, {.6, .1}}) {
@@ -221,7 +221,7 @@ TEST(CoatedConductor, NeverGivesMoreThanItGets) {
 // At small roughnesses the model must lose nothing, and all light must be near the mirror's direction. .0011
 // is just above the roughness of a mirror. Near the angle of total reflection inside the coat the lobe is
 // twice as wide.
-TEST(CoatedConductor, GoesOverIntoTheSmoothCase) {
+TEST(CoatedConductor, ConvergesToTheSmoothCase) {
   for (const double mu : {1., .6, .2}) {
     const V3 wo = direction(mu, 1);
     for (const auto& [coat, metal] : {std::pair{0., .0011}, {.0011, 0.}, {.0011, .0011}}) {
@@ -271,7 +271,7 @@ Deviation deviation(double coat, double u, double v, bool white) {
 }
 
 // The limits are those stated in docs/design/coated-metal.md.
-TEST(CoatedConductor, UnderASmoothCoatIsNearTheRandomWalk) {
+TEST(CoatedConductor, SmoothCoatMatchesARandomWalk) {
   for (const bool white : {true, false})
     for (const auto& [u, v] : {std::pair{.02, .02}, {.1, .1}, {.3, .3}, {.6, .6}, {.4, .1}}) {
       const Deviation d = deviation(0, u, v, white);
@@ -285,7 +285,7 @@ TEST(CoatedConductor, UnderASmoothCoatIsNearTheRandomWalk) {
     }
 }
 
-TEST(CoatedConductor, UnderARoughCoatIsRoughlyTheRandomWalk) {
+TEST(CoatedConductor, RoughCoatRoughlyMatchesARandomWalk) {
   for (const bool white : {true, false})
     for (const double coat : {.1, .3, .6})
       for (const double metal : {0., .1, .3, .6}) {
@@ -307,7 +307,7 @@ TEST(CoatedConductor, StaysFiniteAtEveryExtreme) {
         }
 }
 
-TEST(CoatedConductor, RefusesRoughnessesAndIndicesThatAreNone) {
+TEST(CoatedConductor, RefusesInvalidRoughnessesAndIndices) {
   for (const auto& b : {CoatedConductorBsdf{.coat_alpha = -1}, CoatedConductorBsdf{.alpha_u = NAN},
                         CoatedConductorBsdf{.int_ior = 0}, CoatedConductorBsdf{.eta = {-1, 0, 0}}}) {
     Scene s = coated(0, .1, .1, kGoldEta, kGoldK);
@@ -320,7 +320,7 @@ TEST(CoatedConductor, RefusesRoughnessesAndIndicesThatAreNone) {
   }
 }
 
-TEST(CoatedConductor, AlikeOnesAreTabulatedOnce) {
+TEST(CoatedConductor, EqualOnesShareATable) {
   const auto seconds = [](double alpha, int count) {
     return seconds_to_build(coated(alpha, alpha, alpha, kGoldEta, kGoldK), count);
   };

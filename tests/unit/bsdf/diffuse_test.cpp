@@ -65,7 +65,7 @@ TEST(DiffuseMaterials, LookTheSameFromEverywhereOnOneSide) {
   }
 }
 
-TEST(DiffuseMaterials, AreNotThoseThatDependOnTheView) {
+TEST(DiffuseMaterials, ExcludeViewDependentMaterials) {
   EXPECT_FALSE(is_diffuse(made([](Scene& s) {
     add(s, PlasticBsdf{.diffuse_reflectance = texture(s, .5), .specular_reflectance = texture(s, 1)});
   })));

@@ -21,7 +21,7 @@ double albedo(const Bench& b, const V3& wo, int n = 128) {
   return sum / 16 / n / n;
 }
 
-TEST(Energy, NoSurfaceGivesMoreThanItGets) {
+TEST(Energy, SurfacesNeverReflectMoreThanTheyReceive) {
   // Beckmann's rational masking exceeds the exact one by up to .35 % (see microfacet.h).
   for (const auto& [d, excess] : {std::pair{Microfacet::beckmann, .0035}, std::pair{Microfacet::ggx, 0.}})
     for (const double alpha : {1e-3, .01, .1, .5, 1.})
@@ -37,7 +37,7 @@ TEST(Energy, NoSurfaceGivesMoreThanItGets) {
 
 // A white rough dielectric loses only light that would meet a second microfacet. Radiance grows by eta^2 on
 // the way into the denser side, while energy does not, so weights are corrected by eta^2.
-TEST(Energy, ARoughDielectricLosesOnlyByMasking) {
+TEST(Energy, RoughDielectricLosesEnergyOnlyByMasking) {
   for (const auto& [d, excess] : {std::pair{Microfacet::beckmann, .0035}, std::pair{Microfacet::ggx, 0.}})
     for (const double alpha : {2e-3, .02, .1, .5, 1.})
       for (const double ior : {1.1, 1.5, 2.4})
@@ -53,14 +53,14 @@ TEST(Energy, ARoughDielectricLosesOnlyByMasking) {
 // The base returns all light that the coat does not reflect, because the coat's internal reflectance follows
 // from the same Fresnel formula. The tolerance of 1e-3 is for the grid of samples near grazing directions,
 // where the integrand ends in a square root.
-TEST(Energy, AWhiteSmoothPlasticKeepsAll) {
+TEST(Energy, WhiteSmoothPlasticLosesNoEnergy) {
   for (const double ior : {1.1, 1.5, 1.9, 2.4})
     for (const double mu : {1., .5, .1})
       EXPECT_NEAR(albedo(*bench(plastic(ior, 1, true, {1, 1, 1})), direction(mu, 1), 256), 1, 1e-3)
           << ior << " " << mu;
 }
 
-TEST(Energy, AWhiteDielectricKeepsAll) {
+TEST(Energy, WhiteDielectricLosesNoEnergy) {
   for (const double ior : {1.0001, 1.33, 1.5, 2.4, .7})
     for (const double mu : {1., .5, .05, -.05, -.6, -1.}) {
       const auto b = bench(glass(ior, 1));
@@ -74,7 +74,7 @@ TEST(Energy, AWhiteDielectricKeepsAll) {
     }
 }
 
-TEST(Energy, WhitePlasticStaysNearOneUnderASmoothCoatAndLosesByMaskingUnderARoughOne) {
+TEST(Energy, WhitePlasticLosesEnergyOnlyUnderARoughCoat) {
   // Coat and base are linked by Mitsuba's tables (64 nodes, a plain mean): their internal reflectance is .009
   // below the integral of .596, so the base loses up to 1 - (1 - .596) / (1 - .587) = 2.2 %.
   for (const auto d : {Microfacet::beckmann, Microfacet::ggx})
@@ -197,7 +197,7 @@ double quick_albedo(const Bench& b, const V3& wo) {
   return sum / kPoints;
 }
 
-TEST(Energy, NoRandomMaterialGivesMoreThanItGetsAtAnyAngle) {
+TEST(Energy, RandomMaterialsNeverReflectMoreThanTheyReceive) {
   for (const Kind& k : kKinds) {
     Dice dice(9);
     for (int i = 0; i < 60; ++i) {
@@ -277,7 +277,7 @@ TEST(Reciprocity, HoldsForRandomMaterialsAtAnyAngle) {
   }
 }
 
-TEST(Reciprocity, HoldsForPrincipledOnesFromTheFrontAndThroughGlass) {
+TEST(Reciprocity, HoldsForPrincipledSurfacesFromTheFrontAndThroughGlass) {
   Dice dice(11);
   for (int i = 0; i < 200; ++i) {
     PrincipledValues v;

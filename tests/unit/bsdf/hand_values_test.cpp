@@ -23,7 +23,7 @@ TEST(Fresnel, GivesTheTextbookValues) {
   EXPECT_LT(fresnel_dielectric(-critical * 1.001, 1.5).reflectance, 1);
 }
 
-TEST(Fresnel, ConductorsReflectEverythingWithoutARealIndex) {
+TEST(Fresnel, ZeroRealIndexReflectsEverything) {
   for (const float c : {0.f, 1e-7f, .3f, 1.f}) EXPECT_NEAR(fresnel_conductor(c, 0, 1), 1, 3e-7f) << c;
   for (const float c : {0.f, .5f, 1.f}) EXPECT_TRUE(std::isfinite(fresnel_conductor(c, 0, 0))) << c;
   // Normal incidence: ((n - 1)^2 + k^2) / ((n + 1)^2 + k^2).
@@ -57,7 +57,7 @@ TEST(Dielectric, ReflectsTotallyBeyondTheCriticalAngle) {
   EXPECT_EQ(s->weight, C3(1));
 }
 
-TEST(Dielectric, OfEqualIndicesIsNotThere) {
+TEST(Dielectric, EqualIndicesPassLightUnchanged) {
   const auto b = bench(glass(1.33, 1.33));
   for (const double mu : {1., .3, 1e-4, -1e-4, -.7}) {
     const V3 wo = direction(mu, .4);
@@ -79,7 +79,7 @@ TEST(Null, PassesLightUnchangedFromBothSides) {
   EXPECT_EQ(b->sample(wo, .3f, {.1f, .2f})->wi, -wo);
 }
 
-TEST(TwoSided, ShowsTheBackMaterialFromBehindAndOneSidedOnesAreBlackThere) {
+TEST(TwoSided, ShowsItsBackMaterialFromBehindWhereOneSidedSurfacesAreBlack) {
   Scene s = diffuse({.5, .5, .5});
   add(s, DiffuseBsdf{texture(s, .25)});
   add(s, TwoSidedBsdf{{0}, {1}});
@@ -94,7 +94,7 @@ TEST(TwoSided, ShowsTheBackMaterialFromBehindAndOneSidedOnesAreBlackThere) {
   EXPECT_FALSE(b->bsdfs.sample({0}, {0, 0}, down, .5f, {.3f, .4f}));
 }
 
-TEST(Build, RefusesWhatCannotBe) {
+TEST(Build, RefusesImpossibleMaterials) {
   const auto error = [](const Scene& s) {
     auto t = TextureTable::build(s, [](const Asset&) { return fail(Errc::not_found, "no file"); });
     const auto b = BsdfTable::build(s, *t);
@@ -122,7 +122,7 @@ TEST(Build, BringsReflectancesIntoRangeAndCountsThem) {
   EXPECT_EQ(b->eval(up, up).f_cos.z, 0);
 }
 
-TEST(Conductor, OfAHugeIndexReflectsEverything) {
+TEST(Conductor, HugeIndexReflectsEverything) {
   for (const double huge : {1e6, 1e12, 1e38, 1.7e308}) {
     for (const bool real : {true, false}) {
       const Rgb eta = real ? Rgb{huge, huge, huge} : Rgb{1, 1, 1},
@@ -145,7 +145,7 @@ TEST(Roughness, BelowTheSpecularLimitIsAMirror) {
   }
 }
 
-TEST(Roughness, HemisphericalReflectanceOfGgxAtRoughnessOneSeenFromAbove) {
+TEST(Roughness, HemisphericalReflectanceOfGgxAtRoughnessOneIsExactFromAbove) {
   // For mu = 1 and alpha = 1: D = 1 / pi, visible normals have the density cos / pi, and the masking of the
   // reflected direction is G1 = 2 z / (1 + z), with z = 2 c^2 - 1 for a normal at the cosine c. (G1 of the
   // viewer is 1, so separable and height-correlated Smith masking agree.) So E = int_{1/sqrt 2}^1 2 c G1 dc =
@@ -188,7 +188,7 @@ TEST(Beckmann, InverseErrorFunctionInverts) {
   for (double x = -.9999; x < 1; x += .0137) EXPECT_NEAR(std::erf(beckmann::erf_inverse(x)), x, 1e-6);
 }
 
-TEST(RoughPlastic, AlikeCoatsAreIntegratedOnce) {
+TEST(RoughPlastic, EqualCoatsAreIntegratedOnce) {
   const auto seconds = [](double alpha, int count) {
     return seconds_to_build(rough_plastic(Microfacet::ggx, alpha, 1.5, 1, false, {.5, .5, .5}), count);
   };

@@ -7,7 +7,7 @@
 namespace ls::render::test {
 namespace {
 
-TEST(MaterialLimits, ASceneMayNeedSoManyTablesAndNoMore) {
+TEST(MaterialLimits, NumberOfTablesIsLimited) {
   const Scene scene;
   const TextureTable textures;
   MaterialBuilder builder(scene, textures, {});

@@ -10,8 +10,8 @@
 #include <random>
 #include <string>
 
-#include "common/base/clock.h"
-#include "common/scene/schema/traits.h"
+#include "core/base/clock.h"
+#include "core/scene/schema/traits.h"
 #include "worker/render/bsdf/bsdf.h"
 
 namespace ls::render::test {

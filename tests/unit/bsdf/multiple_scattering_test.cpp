@@ -25,7 +25,7 @@ void expect_white(const Bench& b, const V3& wo, double tolerance, const std::str
 }
 
 // Seen from above, single scattering by GGX facets of roughness 1 reflects 1 - ln 2 of the light.
-TEST(MultipleScattering, WithoutItWhiteGgxOfRoughnessOneKeepsOneLessLogTwo) {
+TEST(MultipleScattering, WithoutItWhiteGgxOfRoughnessOneReflectsOneMinusLogTwo) {
   const auto b = bench(rough_metal(Microfacet::ggx, 1, 1, {0, 0, 0}, {1, 1, 1}));
   const SampledAlbedo e = sampled_albedo(*b, {0, 0, 1}, 40000);
   EXPECT_NEAR(e.mean, 1 - std::log(2.), 5 * e.error);
@@ -34,7 +34,7 @@ TEST(MultipleScattering, WithoutItWhiteGgxOfRoughnessOneKeepsOneLessLogTwo) {
 }
 
 // Tests the tables, and the quadrature behind them, against a quadrature with 16 times as many nodes.
-TEST(MultipleScattering, TablesKeepAllWithinTheirTolerance) {
+TEST(MultipleScattering, TablesConserveEnergyWithinTolerance) {
   static const Quadrature fine = gauss_legendre(400);
   for (const auto& [d, name] : kDistributions)
     for (const double alpha : {1e-3, .01, .1, .5, 1.}) {
@@ -64,7 +64,7 @@ TEST(MultipleScattering, TablesKeepAllWithinTheirTolerance) {
     }
 }
 
-TEST(MultipleScattering, AWhiteMetalKeepsAll) {
+TEST(MultipleScattering, WhiteMetalLosesNoEnergy) {
   for (const auto& [d, name] : kDistributions)
     for (const double alpha : kAlphas) {
       const auto b = bench(with_compensation(rough_metal(d, alpha, alpha, {0, 0, 0}, {1, 1, 1})));
@@ -73,7 +73,7 @@ TEST(MultipleScattering, AWhiteMetalKeepsAll) {
     }
 }
 
-TEST(MultipleScattering, AWhiteDielectricKeepsAllFromBothSides) {
+TEST(MultipleScattering, WhiteDielectricLosesNoEnergyFromEitherSide) {
   for (const auto& [d, name] : kDistributions)
     for (const double alpha : kAlphas) {
       const auto b = bench(with_compensation(rough_glass(d, alpha, alpha, 1.5, 1)));
@@ -83,7 +83,7 @@ TEST(MultipleScattering, AWhiteDielectricKeepsAllFromBothSides) {
     }
 }
 
-TEST(MultipleScattering, AWhitePlasticKeepsAll) {
+TEST(MultipleScattering, WhitePlasticLosesNoEnergy) {
   for (const auto& [d, name] : kDistributions)
     for (const double alpha : kAlphas) {
       const auto b = bench(with_compensation(rough_plastic(d, alpha, 1.5, 1, true, {1, 1, 1})));
@@ -108,7 +108,7 @@ Scene with_textured_roughness(Scene s) {
   return s;
 }
 
-TEST(MultipleScattering, AWhiteMetalOfThePrincipledMaterialKeepsAll) {
+TEST(MultipleScattering, WhitePrincipledMetalLosesNoEnergy) {
   for (const double roughness : {0., .5, 1.})
     for (const double metallic : {0., .5, 1.}) {
       Scene s = with_compensation(
@@ -129,7 +129,7 @@ TEST(MultipleScattering, AWhiteMetalOfThePrincipledMaterialKeepsAll) {
     }
 }
 
-TEST(MultipleScattering, WhiteGlassOfThePrincipledMaterialKeepsAllFromBothSides) {
+TEST(MultipleScattering, WhitePrincipledGlassLosesNoEnergyFromEitherSide) {
   for (const double roughness : {.3, 1.}) {
     const auto b = bench(white_principled(roughness, 1));
     for (const double mu : {1., .25, -.25, -1.})
@@ -137,7 +137,7 @@ TEST(MultipleScattering, WhiteGlassOfThePrincipledMaterialKeepsAllFromBothSides)
   }
 }
 
-TEST(MultipleScattering, OfATexturedRoughnessKeepsAllThatIsNotGrazing) {
+TEST(MultipleScattering, TexturedRoughnessLosesEnergyOnlyAtGrazingAngles) {
   for (const double roughness : {.11, .52, .98}) {
     const auto metal = bench(with_textured_roughness(white_principled(roughness))),
                glass = bench(with_textured_roughness(white_principled(roughness, 1)));
@@ -150,7 +150,7 @@ TEST(MultipleScattering, OfATexturedRoughnessKeepsAllThatIsNotGrazing) {
   }
 }
 
-TEST(MultipleScattering, OfAnisotropicPrincipledMaterialsIsRefused) {
+TEST(MultipleScattering, IsRefusedForAnisotropicPrincipledMaterials) {
   const Scene s = with_compensation(principled({.anisotropic = .3, .metallic = 1}));
   const auto textures =
       TextureTable::build(s, [](const Asset&) -> Result<ImageData> { return fail(Errc::not_found, ""); });
@@ -162,7 +162,7 @@ TEST(MultipleScattering, OfAnisotropicPrincipledMaterialsIsRefused) {
 
 // A metal that absorbs gains less from compensation than a white one, whether by its tint or by its index.
 // `gain` is summed as a series, in which each further bounce has the factor F (1 - E_mean).
-TEST(MultipleScattering, AMetalGainsByItsOwnReflectance) {
+TEST(MultipleScattering, MetalGainsByItsOwnReflectance) {
   const MicrofacetEnergy e = conductor_energy(Microfacet::ggx, .8);
   const float mu = .6f, missing = e.missing.at(mu), E = 1 / (1 + missing);
   double last = 0;
@@ -184,7 +184,7 @@ TEST(MultipleScattering, AMetalGainsByItsOwnReflectance) {
 
 // Compensation changes only values. Samples and their densities stay the same, so tests of them without
 // compensation apply.
-TEST(MultipleScattering, LeavesSamplingAlone) {
+TEST(MultipleScattering, DoesNotChangeSampling) {
   const Scene all[] = {rough_metal(Microfacet::ggx, .4, .4, kGoldEta, kGoldK),
                        rough_glass(Microfacet::beckmann, .3, .3, 1.5, 1),
                        principled({.roughness = .6, .metallic = .7}),
@@ -207,7 +207,7 @@ TEST(MultipleScattering, LeavesSamplingAlone) {
   }
 }
 
-TEST(MultipleScattering, OfTexturedOrUnequalRoughnessIsRefused) {
+TEST(MultipleScattering, IsRefusedForTexturedOrUnequalRoughness) {
   Scene s = rough_metal(Microfacet::ggx, .4, .3, kGoldEta, kGoldK);
   const TextureTable none;
   for (const bool textured : {false, true}) {
@@ -226,7 +226,7 @@ TEST(MultipleScattering, OfTexturedOrUnequalRoughnessIsRefused) {
   }
 }
 
-TEST(MultipleScattering, TablesAreAsGoodAsTheySay) {
+TEST(MultipleScattering, TablesAreWithinTheirStatedError) {
   const auto f = [](double x) { return std::sqrt(x) + (x > .3 ? .2 * (x - .3) : 0); };
   const CosineTable t(f, 1e-3);
   for (int i = 0; i <= 5000; ++i) {

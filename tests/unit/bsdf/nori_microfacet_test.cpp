@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/scene/read.h"
+#include "formats/read.h"
 #include "tests/unit/bsdf/materials.h"
 
 namespace ls::render::test {
@@ -65,14 +65,14 @@ void expect_model(const Bench& b, const Rgb& kd, double alpha, double n) {
     }
 }
 
-TEST(NoriMicrofacet, IsItsFormula) {
+TEST(NoriMicrofacet, MatchesItsFormula) {
   const auto b = bench(wearing(
       R"(<bsdf type="microfacet"><float name="alpha" value="0.3"/><float name="intIOR" value="1.8"/>
          <float name="extIOR" value="1.2"/><color name="kd" value="0.2 0.6 0.4"/></bsdf>)"));
   expect_model(*b, {.2, .6, .4}, .3, 1.5);
 }
 
-TEST(NoriMicrofacet, TakesEachPlaceOfItsTextureForItself) {
+TEST(NoriMicrofacet, EvaluatesItsTexturePerPoint) {
   ImageData image;
   image.width = image.height = 1;
   image.channels = 3;
@@ -85,7 +85,7 @@ TEST(NoriMicrofacet, TakesEachPlaceOfItsTextureForItself) {
   expect_model(*b, {.1, .3, .7}, .1, 1.5);
 }
 
-TEST(NoriMicrofacet, OfPeakAndHueIsTheTextureAgain) {
+TEST(NoriMicrofacet, PeakAndHueReproduceTheTexture) {
   Scene s;
   s.textures = {ConstantTexture{{.2, .5, .25}}, ConstantTexture{{0, 0, 0}}, CheckerboardTexture{{0}, {1}, {}},
                 PeakTexture{{2}}, PeakTexture{{2}, true}};

@@ -13,7 +13,7 @@ const V3 kAbove(0, 0, 1), kBelow(0, 0, -1);
 
 // At normal incidence the diffuse lobe is base / pi, because the retro-reflection is 0 there. The facets have
 // F0 = ((n - 1) / (n + 1))^2, D = 1 / (pi alpha^2) and alpha = roughness^2.
-TEST(Principled, AtNormalIncidenceIsTheHandMadeValue) {
+TEST(Principled, NormalIncidenceHasTheHandComputedValue) {
   const auto b = bench(principled({.roughness = .6}));
   const double D = 1 / (M_PI * std::pow(.36, 2));
   EXPECT_NEAR(b->eval(kAbove, kAbove).f_cos.x, .8 / M_PI + .04 * D / 4, 1e-6);
@@ -24,7 +24,7 @@ TEST(Principled, AtNormalIncidenceIsTheHandMadeValue) {
   EXPECT_FALSE(b->sample(kBelow, .3f, {.1f, .2f})) << "without spec_trans it has one side";
 }
 
-TEST(Principled, WhollyTransparentIsRoughGlassWithTheRootOfItsColour) {
+TEST(Principled, FullTransmissionIsRoughGlassWithTheRootOfItsColour) {
   const Rgb root{std::sqrt(.8), std::sqrt(.4), std::sqrt(.1)};
   const auto b = bench(principled({.roughness = .5, .spec_trans = 1, .eta = 1.5}));
   const auto glass = bench(rough_glass(Microfacet::ggx, .25, .25, 1.5, 1, {1, 1, 1}, root));
@@ -80,7 +80,7 @@ double albedo(const Bench& b, const V3& wo, bool sampled) {
 // The mean weight of samples must be the integral of the values. The tolerance of 5e-3 is for both grids near
 // grazing directions, and in the coat's lobe (alpha .07), which is .02 rad wide, while the 64 points per axis
 // of the random numbers are 1/64 apart.
-TEST(Principled, SamplesGiveBackTheIntegralOfTheValues) {
+TEST(Principled, SamplesReproduceTheIntegral) {
   for (const PrincipledValues& v :
        {PrincipledValues{}, metal_values(), cloth_values(), glass_values(), all_values()})
     for (const double mu : {.95, .4, -.5}) {
@@ -91,7 +91,7 @@ TEST(Principled, SamplesGiveBackTheIntegralOfTheValues) {
 
 // Facets without other lobes only lose light, by masking: the reflectances of Fresnel and Schlick are at most
 // 1.
-TEST(Principled, MetalAndGlassGiveNoMoreThanTheyGet) {
+TEST(Principled, MetalAndGlassNeverReflectMoreThanTheyReceive) {
   for (const double roughness : {.05, .3, 1.})
     for (const double mu : {1., .5, .05}) {
       const V3 wo = direction(mu, 1);
@@ -127,7 +127,7 @@ TEST(Principled, StaysFiniteAtEveryExtreme) {
       }
 }
 
-TEST(Principled, SaysWhatItNeeds) {
+TEST(Principled, ReportsItsNeeds) {
   const auto plain = bench(principled({})), stretched = bench(principled({.anisotropic = .1}));
   EXPECT_FALSE(plain->bsdfs.reads_uv({0}) || plain->bsdfs.anisotropic({0}) || passes_light(*plain));
   EXPECT_TRUE(stretched->bsdfs.anisotropic({0}) && plain->bsdfs.has_smooth({0}));

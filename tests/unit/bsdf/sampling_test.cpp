@@ -168,7 +168,7 @@ TEST(Sampling, FollowsItsDensity) {
 }
 
 // Tests single lobes, because a mixture of lobes is not one map of the unit square.
-TEST(Sampling, StretchesTheSquareByOneOverTheDensity) {
+TEST(Sampling, SamplingJacobianIsOneOverTheDensity) {
   const auto lobe = [](const Bench& b, const V3& wo, float u_lobe, const auto& chance) {
     return [&b, wo, u_lobe, chance](const V2& u) -> std::optional<ls::test::Mapped> {
       const auto s = b.sample(wo, u_lobe, u);

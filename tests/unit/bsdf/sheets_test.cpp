@@ -31,7 +31,7 @@ TEST(DiffuseTransmission, ReflectsOnTheSideOfTheViewerAndTransmitsToTheOther) {
   EXPECT_EQ(b->eval({0, 0, 1}, {1, 0, 0}).pdf, 0);
 }
 
-TEST(DiffuseTransmission, LetsNothingPassStraightOn) {
+TEST(DiffuseTransmission, PassesNoLightStraightOn) {
   const auto b = bench(leaf({.1, .2, .3}, {.6, .4, .2}));
   EXPECT_TRUE(b->bsdfs.has_smooth(b->bsdf));
   EXPECT_FALSE(passes_light(*b));
@@ -39,7 +39,7 @@ TEST(DiffuseTransmission, LetsNothingPassStraightOn) {
 
 // Reflectance and transmittance that add up to more than 1 are scaled to 1. The reader refuses such
 // constants, but cannot check images.
-TEST(DiffuseTransmission, OfMoreThanAllLightIsBroughtToAll) {
+TEST(DiffuseTransmission, SumAboveOneIsScaledToOne) {
   const auto constant = bench(leaf({.9, .5, .25}, {.9, .5, .25}));
   Scene s = leaf({1, 1, 1}, {1, 1, 1});
   s.textures.push_back(CheckerboardTexture{texture(s, Rgb{.9, .5, .25}), texture(s, Rgb{.9, .5, .25}), {}});
@@ -103,7 +103,7 @@ Shares shares(const Bench& b, const V3& wo) {
 // The shares differ from those of a smooth sheet by R' alpha tan, because facets are tilted by about alpha,
 // and by masking, which is of the order of alpha^2. The choice of the lobe by a lattice of 65,536 samples has
 // an error of some 1e-4.
-TEST(RoughSheet, GoesToTheSmoothSheetAsRoughnessGoes) {
+TEST(RoughSheet, ConvergesToTheSmoothSheet) {
   for (const auto d : {Microfacet::ggx, Microfacet::beckmann})
     for (const double mu : {1., .8, .5, -.7}) {
       const V3 wo = direction(mu, 1);
@@ -118,7 +118,7 @@ TEST(RoughSheet, GoesToTheSmoothSheetAsRoughnessGoes) {
     }
 }
 
-TEST(RoughSheet, BelowTheSpecularLimitIsTheSmoothOne) {
+TEST(RoughSheet, BelowTheSpecularLimitItIsTheSmoothSheet) {
   const auto smooth = bench(thin_glass(1.5, {.9, .8, .7}, {.5, .6, .7})),
              rough = bench(rough_sheet(Microfacet::ggx, 9e-4, 5e-4, 1.5, {.9, .8, .7}, {.5, .6, .7}));
   // The same roughness from a texture.
@@ -146,7 +146,7 @@ TEST(RoughSheet, BelowTheSpecularLimitIsTheSmoothOne) {
     }
 }
 
-TEST(RoughSheet, LetsNothingPassStraightOn) {
+TEST(RoughSheet, PassesNoLightStraightOn) {
   const auto constant = bench(rough_sheet(Microfacet::ggx, .3, .3, 1.5));
   EXPECT_FALSE(passes_light(*constant));
   EXPECT_EQ(constant->bsdfs.null_transmission(constant->bsdf, constant->at, {0, 0, 1}).probability, 0);
@@ -154,7 +154,7 @@ TEST(RoughSheet, LetsNothingPassStraightOn) {
 
 // With compensation for multiple scattering a white sheet loses no light. Without it, it loses as much as a
 // rough mirror, whatever its index.
-TEST(RoughSheet, OfWhiteGlassKeepsAllButWhatAMirrorLoses) {
+TEST(RoughSheet, WhiteGlassSheetLosesNoMoreThanAMirror) {
   for (const auto d : {Microfacet::beckmann, Microfacet::ggx})
     for (const double alpha : {.01, .1, .5, 1.})
       for (const double mu : {1., .7, .25, .03, -.6}) {

@@ -4,8 +4,8 @@
 
 #include <random>
 
-#include "common/scene/schema/describe_fields.h"
-#include "common/scene/schema/traits.h"
+#include "core/scene/schema/describe_fields.h"
+#include "core/scene/schema/traits.h"
 #include "tests/unit/bsdf/materials.h"
 
 namespace ls::render::test {
@@ -44,9 +44,9 @@ void expect_black_backs(std::type_identity<std::variant<Kinds...>>) {
   (ask.template operator()<Kinds>(), ...);
 }
 
-TEST(Sides, ThatTheSceneTakesForBlackAreBlack) { expect_black_backs(std::type_identity<Bsdf>{}); }
+TEST(Sides, SidesAssumedBlackAreBlack) { expect_black_backs(std::type_identity<Bsdf>{}); }
 
-TEST(Sides, OfGlassAndOfTwoSidedSurfacesAreSeen) {
+TEST(Sides, BothSidesOfGlassAndTwoSidedSurfacesAreVisible) {
   EXPECT_TRUE(shows_its_back(*plain<DielectricBsdf>()));
   EXPECT_TRUE(shows_its_back(*plain<TwoSidedBsdf>()));
   EXPECT_FALSE(shows_its_back(*plain<DiffuseBsdf>()));

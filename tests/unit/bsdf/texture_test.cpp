@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "common/scene/limits.h"
+#include "core/scene/limits.h"
 #include "worker/render/texture/texels.h"
 
 namespace ls::render {
@@ -140,7 +140,7 @@ TEST(Bitmap, RefusesAnImageWithoutPixels) {
   EXPECT_THAT(build_error(with(BitmapTexture{{0}}), {0, 0, 3, {}, {}, false}), HasSubstr("no pixels"));
 }
 
-TEST(Bitmap, LoadsAFileOnceHoweverManyTexturesUseIt) {
+TEST(Bitmap, LoadsAFileOnceForAllTextures) {
   Scene s = with(BitmapTexture{{0}});
   s.textures.push_back(BitmapTexture{{0}, TextureFilter::nearest});
   int loads = 0;
@@ -151,7 +151,7 @@ TEST(Bitmap, LoadsAFileOnceHoweverManyTexturesUseIt) {
   EXPECT_EQ(t->bytes(), 4u * 4 * 3 * sizeof(float));
 }
 
-TEST(Bitmap, DecodesAFileOnceInHoweverManyWaysItIsRead) {
+TEST(Bitmap, DecodesAFileOnceForAllUses) {
   Scene s = with(BitmapTexture{{0}});
   for (const bool raw : {true, false, true}) {
     BitmapTexture t{{0}, TextureFilter::nearest};
@@ -174,7 +174,7 @@ TEST(Bitmap, DecodesAFileOnceInHoweverManyWaysItIsRead) {
   }
 }
 
-TEST(Checkerboard, ChoosesAsMitsubaDoes) {
+TEST(Checkerboard, MatchesMitsuba) {
   const auto board = [](const UvTransform& to_uv) {
     Scene s;
     s.textures = {ConstantTexture{{0, 0, 0}}, ConstantTexture{{1, 1, 1}},
@@ -196,7 +196,7 @@ TEST(Checkerboard, ChoosesAsMitsubaDoes) {
 }
 
 // As in Mitsuba 3.9.1, where eval_1 gives 0.9 if eval gives 0.1.
-TEST(Checkerboard, IsTheOtherWayRoundAsANumber) {
+TEST(Checkerboard, IsInvertedAsANumber) {
   Scene s;
   s.textures = {ConstantTexture{{.1, .1, .1}}, ConstantTexture{{0, 1, 0}}, CheckerboardTexture{{0}, {1}, {}},
                 CheckerboardTexture{{2}, {0}, {}}, PeakTexture{{2}}};
@@ -218,7 +218,7 @@ TEST(Checkerboard, IsTheOtherWayRoundAsANumber) {
   EXPECT_FLOAT_EQ(t.number({0}, even), .1f);
 }
 
-TEST(Checkerboard, RefusesCirclesAndMissingTextures) {
+TEST(Checkerboard, RefusesCyclesAndMissingTextures) {
   Scene s;
   s.textures = {CheckerboardTexture{{1}, {1}, {}}, CheckerboardTexture{{0}, {0}, {}}};
   EXPECT_THAT(build_error(s), HasSubstr("circle"));
@@ -227,8 +227,8 @@ TEST(Checkerboard, RefusesCirclesAndMissingTextures) {
   EXPECT_THAT(build_error(with(BitmapTexture{{3}})), HasSubstr("file 3 of 1"));
 }
 
-// Textures may be nested as deeply as in files (common/scene/limits.h), and no deeper.
-TEST(Checkerboard, MayHoldOthersAsDeepAsTheReaderLetsThem) {
+// Textures may be nested as deeply as in files (core/scene/limits.h), and no deeper.
+TEST(Checkerboard, MayBeNestedUpToTheReadersLimit) {
   const auto chain = [](int n) {
     Scene s;
     for (std::uint32_t i = 1; i <= static_cast<std::uint32_t>(n); ++i)  // the outermost board first
@@ -240,7 +240,7 @@ TEST(Checkerboard, MayHoldOthersAsDeepAsTheReaderLetsThem) {
   EXPECT_THAT(build_error(chain(scene::kMaxReferenceDepth + 1)), HasSubstr("deep"));
 }
 
-TEST(Bitmap, AnOpacityIsTheAlphaChannelIfThatMasks) {
+TEST(Bitmap, OpacityIsTheAlphaChannelIfThereIsOne) {
   BitmapTexture opacity{{0}, TextureFilter::nearest};
   opacity.alpha = true;
   const V2 left(.25f, .5f), right(.75f, .5f);
@@ -278,7 +278,7 @@ TEST(Bitmap, ColoursOfOtherPrimariesBecomeLinearSrgb) {
   }
 }
 
-TEST(Bitmap, NumbersAndNormalsAreNoColoursToConvert) {
+TEST(Bitmap, NumbersAndNormalsAreNotColourConverted) {
   Scene normals = with(BitmapTexture{.file = {0}});
   normals.textures.push_back(ConstantTexture{{.5, .5, .5}});
   normals.bsdfs.emplace_back(DiffuseBsdf{{1}});
@@ -290,7 +290,7 @@ TEST(Bitmap, NumbersAndNormalsAreNoColoursToConvert) {
   EXPECT_EQ(table(opacity, wide_colour()).eval({0}, {.5f, .5f}), C3(.5f));
 }
 
-TEST(Bitmap, PrimariesOfNoColourSpaceMatterToColoursAlone) {
+TEST(Bitmap, InvalidPrimariesAffectOnlyColours) {
   ImageData image = wide_colour();
   image.to_srgb->fill(std::numeric_limits<float>::quiet_NaN());
   Scene colours = with(BitmapTexture{.file = {0}});
@@ -317,7 +317,7 @@ TEST(Bitmap, GivesOneChannelAsANumber) {
   }
 }
 
-TEST(Bitmap, ChannelsThatItLacksAreGreyOrOne) {
+TEST(Bitmap, MissingChannelsAreGreyOrOne) {
   BitmapTexture blue{{0}}, alpha{{0}};
   blue.channel = Channel::blue;
   alpha.channel = Channel::alpha;
@@ -327,7 +327,7 @@ TEST(Bitmap, ChannelsThatItLacksAreGreyOrOne) {
   EXPECT_EQ(table(with(alpha), ramp()).eval({0}, {0, 0}), C3(1));
 }
 
-TEST(Product, MultipliesAndCuts) {
+TEST(Product, MultipliesAndClamps) {
   Scene s;
   s.textures = {ConstantTexture{{.5, .25, 1}}, ConstantTexture{{.5, 1, .5}}, ProductTexture{{0}, {1}},
                 ProductTexture{{0}, {1}, .25}, ProductTexture{{2}, {1}, .3}};
@@ -341,7 +341,7 @@ TEST(Product, MultipliesAndCuts) {
 }
 
 // The mean decides how often a light is sampled, and whether it is one at all.
-TEST(Product, ThatIsMostlyCutIsNotBlackOnAverage) {
+TEST(Product, ClampedProductHasAPositiveMean) {
   Scene s;
   s.textures = {ConstantTexture{{1, 1, 1}}, ConstantTexture{{0, 0, 0}}, CheckerboardTexture{{0}, {1}, {}},
                 CheckerboardTexture{{2}, {1}, {}}, ProductTexture{{3}, {0}, .5}};
@@ -351,7 +351,7 @@ TEST(Product, ThatIsMostlyCutIsNotBlackOnAverage) {
   EXPECT_EQ(t.mean({4}), C3(.25f));
 }
 
-TEST(Product, RefusesCirclesAndWhatIsMissing) {
+TEST(Product, RefusesCyclesAndMissingTextures) {
   Scene s;
   s.textures = {ProductTexture{{1}, {1}}, ProductTexture{{0}, {0}}};
   EXPECT_THAT(build_error(s), HasSubstr("textures contain each other in a circle"));

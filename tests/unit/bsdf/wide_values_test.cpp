@@ -24,7 +24,7 @@ TEST(Plastic, InternalReflectanceIsTheClosedForm) {
   EXPECT_EQ(internal_diffuse_reflectance(1), 0);
 }
 
-TEST(Plastic, IsADiffuseBaseSeenTwiceThroughItsCoat) {
+TEST(Plastic, BaseIsAttenuatedTwiceByTheCoat) {
   const double n = 1.5, r = 1 - (1 - walsh(n)) / (n * n), through = .96 * .96 / (n * n) / M_PI;
   const auto linear = bench(plastic(1.5, 1, false, {.2, .5, .8}));
   const auto nonlinear = bench(plastic(1.5, 1, true, {.2, .5, .8}));
@@ -37,7 +37,7 @@ TEST(Plastic, IsADiffuseBaseSeenTwiceThroughItsCoat) {
   EXPECT_NEAR(coat->weight.x * coat->pdf, .04, 1e-7);
 }
 
-TEST(RoughDielectric, AtNormalIncidenceIsTheHandMadeValue) {
+TEST(RoughDielectric, NormalIncidenceHasTheHandComputedValue) {
   // With m = z, D = 1 / (pi alpha^2) and G = 1 the reflected value is F D / 4, and the refracted one (1 - F)
   // D / (1 - n)^2 (its density has the additional factor n^2).
   const double a = .3, D = 1 / (M_PI * a * a);
@@ -72,7 +72,7 @@ TEST(RoughDielectric, IsReciprocalUpToTheSquareOfTheIndex) {
   }
 }
 
-TEST(RoughDielectric, BecomesTheSmoothOneAsRoughnessGoes) {
+TEST(RoughDielectric, ConvergesToTheSmoothDielectric) {
   const auto smooth = bench(glass(1.5, 1));
   for (const auto d : {Microfacet::beckmann, Microfacet::ggx}) {
     const auto rough = bench(rough_glass(d, 1.5e-3, 1.5e-3, 1.5, 1));
@@ -106,7 +106,7 @@ TEST(RoughDielectric, StaysFiniteAtEveryExtreme) {
       }
 }
 
-TEST(ThinDielectric, SplitsLightAsASheetDoes) {
+TEST(ThinDielectric, MatchesASheetOfTwoInterfaces) {
   const auto b = bench(thin_glass(1.5, {1, .5, 1}, {1, 1, .25}));
   const double R = 2 * .04 / 1.04;
   for (const V3& w : {kUp, kDown}) {
@@ -125,7 +125,7 @@ TEST(ThinDielectric, SplitsLightAsASheetDoes) {
       << "grazing: a mirror";
 }
 
-TEST(Mask, LetsTheRestPass) {
+TEST(Mask, PassesTheRestOfTheLight) {
   const auto bare = bench(diffuse({.2, .5, .9})), b = bench(masked(diffuse({.2, .5, .9}), .25));
   EXPECT_TRUE(passes_light(*b) && b->bsdfs.has_smooth(b->bsdf));
   EXPECT_FALSE(passes_light(*bare));
@@ -142,7 +142,7 @@ TEST(Mask, LetsTheRestPass) {
   EXPECT_FALSE(sheet->bsdfs.has_smooth(sheet->bsdf));
 }
 
-TEST(Blend, IsTheMixture) {
+TEST(Blend, EqualsTheWeightedMixture) {
   const Scene a = diffuse({.2, .5, .9}), b = rough_metal(Microfacet::ggx, .3, .1, kGoldEta, kGoldK);
   const auto first = bench(a), second = bench(b), mixed = bench(blend(a, b, .25));
   EXPECT_TRUE(mixed->bsdfs.anisotropic(mixed->bsdf));
@@ -157,7 +157,7 @@ TEST(Blend, IsTheMixture) {
   EXPECT_TRUE(bench(blend(a, b, 0))->sample(wo, 0, {.2f, .3f}));
 }
 
-TEST(Blend, ChoosesAMirrorAsOftenAsItWeighs) {
+TEST(Blend, SamplesAMirrorInProportionToItsWeight) {
   Scene mirror;
   add(mirror, ConductorBsdf{{0, 0, 0}, {1, 1, 1}, texture(mirror, 1)});
   const auto b = bench(blend(diffuse({.5, .5, .5}), mirror, .25));
@@ -171,7 +171,7 @@ TEST(Blend, ChoosesAMirrorAsOftenAsItWeighs) {
   EXPECT_FLOAT_EQ(d->pdf, .75f * b->eval(kUp, d->wi).pdf / .75f);
 }
 
-TEST(Blend, OfNothingAndSomethingSamplesTheSomething) {
+TEST(Blend, BlendWithABlackBranchSamplesTheOther) {
   Scene s;
   add(s, NullBsdf{});
   const auto b = bench(blend(s, diffuse({.5, .5, .5}), .25));
@@ -183,7 +183,7 @@ TEST(Blend, OfNothingAndSomethingSamplesTheSomething) {
   }
 }
 
-TEST(Blend, OnBothSidesIsTheSameFromBoth) {
+TEST(Blend, TwoSidedBlendLooksTheSameFromBothSides) {
   const auto b = bench(
       two_sided(blend(diffuse({.2, .5, .9}), rough_metal(Microfacet::ggx, .3, .3, kGoldEta, kGoldK), .5)));
   const V3 up = direction(.6, 1), up2 = direction(.8, 2), down = direction(-.6, 1), down2 = direction(-.8, 2);
@@ -192,7 +192,7 @@ TEST(Blend, OnBothSidesIsTheSameFromBoth) {
   EXPECT_LT(b->sample(down, .1f, {.5f, .5f})->wi.z, 0);
 }
 
-TEST(NormalMap, OfTheSurfacesOwnNormalChangesNothing) {
+TEST(NormalMap, ConstantMapOfTheNormalChangesNothing) {
   const Scene metal = rough_metal(Microfacet::ggx, .3, .1, kGoldEta, kGoldK);
   const auto bare = bench(metal), b = bench(turned(metal, kUp));
   EXPECT_TRUE(b->bsdfs.anisotropic(b->bsdf) && b->bsdfs.has_smooth(b->bsdf));
@@ -203,7 +203,7 @@ TEST(NormalMap, OfTheSurfacesOwnNormalChangesNothing) {
   EXPECT_NEAR((b->sample(wo, .5f, {.3f, .6f})->wi - bare->sample(wo, .5f, {.3f, .6f})->wi).length(), 0, 1e-5);
 }
 
-TEST(NormalMap, TurnsTheCosineOfADiffuseSurfaceAndTheWayOfAMirror) {
+TEST(NormalMap, ChangesTheCosineOfADiffuseSurfaceAndTheDirectionOfAMirror) {
   const V3 n = direction(.8, 2);
   const auto b = bench(turned(diffuse({.5, .5, .5}), n));
   const V3 wi = direction(.9, 2.5);
@@ -224,7 +224,7 @@ TEST(NormalMap, TurnsTheCosineOfADiffuseSurfaceAndTheWayOfAMirror) {
   EXPECT_NEAR((two->wi - V3(m->wi.x, m->wi.y, -m->wi.z)).length(), 0, 1e-6);
 }
 
-TEST(NormalMap, TurnsTheDirectionsOfAnisotropyAlong) {
+TEST(NormalMap, RotatesTheDirectionsOfAnisotropy) {
   // The normal is turned about y: the tangent along u turns in the plane of x and z, and the other tangent
   // stays.
   const double a = .3;
@@ -241,7 +241,7 @@ TEST(NormalMap, TurnsTheDirectionsOfAnisotropyAlong) {
 // Where the image is not mirrored, dp/du, dp/dv and the normal are left-handed, since v points down: the
 // map's green then leans against dp/dv either way. Where it is mirrored, it does so with follow_mirroring
 // alone.
-TEST(NormalMap, LeansToTheTopOfAMirroredImageIfItIsToldTo) {
+TEST(NormalMap, FollowsAMirroredImageIfRequested) {
   const V3 n = direction(.8, .7);
   for (const bool follows : {false, true})
     for (const float dv : {-1.f, 1.f}) {
@@ -258,7 +258,7 @@ TEST(NormalMap, LeansToTheTopOfAMirroredImageIfItIsToldTo) {
 
 // As in Mitsuba 3.9.1: unscattered light is shadowed as reflected light would be, and there is none if the
 // direction is on different sides of the surface and of the mapped normal.
-TEST(NormalMap, ShadowsWhatPassesStraightOnAsWell) {
+TEST(NormalMap, AlsoShadowsLightThatPassesStraightOn) {
   const auto map = [](bool flips, bool shadows) {
     Scene s = masked(diffuse({.5, .5, .5}), .25);
     add(s, NormalMapBsdf{texture(s, Rgb{.85, .35, .75}), last(s), flips, shadows});  // (.7, -.3, .5)
@@ -281,7 +281,7 @@ TEST(NormalMap, ShadowsWhatPassesStraightOnAsWell) {
   EXPECT_EQ(null_transmission(*map(true, false), away).probability, .75f);
 }
 
-TEST(Nesting, FlagsFollowFromTheParts) {
+TEST(Nesting, FlagsDeriveFromTheParts) {
   Scene s = diffuse({.5, .5, .5});
   s.textures.push_back(CheckerboardTexture{{0}, {0}, {}});
   add(s, MaskBsdf{{1}, {0}});
@@ -292,7 +292,7 @@ TEST(Nesting, FlagsFollowFromTheParts) {
   EXPECT_FALSE(bench(masked(rough_glass(Microfacet::ggx, .3, .3, 1.5, 1), .5))->bsdfs.reads_uv({1}));
 }
 
-TEST(Nesting, WhatCannotBeIsRefused) {
+TEST(Nesting, ImpossibleNestingIsRefused) {
   const auto error = [](const Scene& s) {
     auto t = TextureTable::build(s, [](const Asset&) { return fail(Errc::not_found, "no file"); });
     const auto b = BsdfTable::build(s, *t);

@@ -84,7 +84,7 @@ TEST_F(Cache, FetchesABlobOnceAndKeepsItOverARestart) {
   EXPECT_THAT(open()->held(10), testing::ElementsAre(blob.digest));
 }
 
-TEST_F(Cache, GoesOnWithACutTransferFromWhereItWas) {
+TEST_F(Cache, ResumesABrokenTransfer) {
   const BlobRef blob = source_.add(std::string(100, 'x') + "y");
   source_.cut_after = 50;
 
@@ -96,7 +96,7 @@ TEST_F(Cache, GoesOnWithACutTransferFromWhereItWas) {
   EXPECT_THAT(source_.offsets, testing::ElementsAre(0, 56));
 }
 
-TEST_F(Cache, InterruptsATransferWhenToldToStop) {
+TEST_F(Cache, StopInterruptsATransfer) {
   const BlobRef blob = source_.add("the steam of a bath house");
   std::atomic<bool> stop{false};
   source_.meanwhile = [&] { stop = true; };
@@ -105,7 +105,7 @@ TEST_F(Cache, InterruptsATransferWhenToldToStop) {
   EXPECT_TRUE(open()->acquire(blob));
 }
 
-TEST_F(Cache, FetchesAgainWhatArrivedWrong) {
+TEST_F(Cache, RefetchesDamagedTransfers) {
   const BlobRef blob = source_.add("right");
   source_.lie = "wrong";
 
@@ -114,7 +114,7 @@ TEST_F(Cache, FetchesAgainWhatArrivedWrong) {
       << "so that the coordinator looks at its own";
 }
 
-TEST_F(Cache, WhatKeepsArrivingWrongIsTroubleThatMayPassAndNotTheJobsFault) {
+TEST_F(Cache, RepeatedlyDamagedTransfersAreATemporaryErrorAndDoNotFailTheJob) {
   const BlobRef blob = source_.add("right");
   source_.damaged = true;
 
@@ -143,7 +143,7 @@ TEST_F(Cache, FindsADamagedFileAndFetchesItAgain) {
   EXPECT_EQ(source_.offsets.size(), 2U);
 }
 
-TEST_F(Cache, EvictsTheLeastRecentlyUsedAndNeverWhatIsInUse) {
+TEST_F(Cache, EvictsTheLeastRecentlyUsedButNoFileInUse) {
   const auto cache = open(25);
   const BlobRef a = source_.add("aaaaaaaaaa"), b = source_.add("bbbbbbbbbb"), c = source_.add("cccccccccc");
   const auto in_use = cache->acquire(a).value();
@@ -155,7 +155,7 @@ TEST_F(Cache, EvictsTheLeastRecentlyUsedAndNeverWhatIsInUse) {
   EXPECT_EQ(content(in_use->path()), "aaaaaaaaaa");
 }
 
-TEST_F(Cache, RefusesWhatDoesNotFitBesideWhatIsInUse) {
+TEST_F(Cache, RefusesAFileThatDoesNotFitBesideThoseInUse) {
   const auto cache = open(15);
   const auto in_use = cache->acquire(source_.add("aaaaaaaaaa")).value();
 
@@ -165,7 +165,7 @@ TEST_F(Cache, RefusesWhatDoesNotFitBesideWhatIsInUse) {
   EXPECT_THAT(second.error().message, testing::HasSubstr("--cache-limit"));
 }
 
-TEST_F(Cache, RemovesNothingButItsOwnFiles) {
+TEST_F(Cache, RemovesOnlyItsOwnFiles) {
   const std::string digest = sha256(std::string_view("a thesis")).hex();
   const std::vector<fs::path> foreign = {folder_ / digest, folder_ / "kept" / digest,
                                          folder_ / "00" / "kept" / digest, folder_ / "partial" / "notes"};
@@ -182,7 +182,7 @@ TEST_F(Cache, RemovesNothingButItsOwnFiles) {
   EXPECT_EQ(cache->held(10).size(), 1U);
 }
 
-TEST_F(Cache, MakesItsFolderAgainAfterSomebodyHasRemovedOrEmptiedIt) {
+TEST_F(Cache, RecreatesItsFolderAfterItIsRemovedOrEmptied) {
   const BlobRef first = source_.add("the first"), second = source_.add("the second");
   const auto cache = open();
   EXPECT_TRUE(cache->acquire(first));
@@ -212,7 +212,7 @@ TEST_F(Cache, MarksItsFolderForBackups) {
   EXPECT_TRUE(content(folder_ / "CACHEDIR.TAG").starts_with("Signature: 8a477f597d28d172789f06886806bc55"));
 }
 
-TEST_F(Cache, CountsWhatCutTransfersHaveLeftAndRemovesItFirst) {
+TEST_F(Cache, PartialTransfersCountAndAreEvictedFirst) {
   const auto cache = open(115);
   const BlobRef kept = source_.add("kept");
   cache->acquire(kept).value();
@@ -239,7 +239,7 @@ TEST_F(Cache, HoldsTheLimitForABlobOfUnannouncedSize) {
   EXPECT_EQ(cache->acquire(larger).error().code, Errc::resource_exhausted);
 }
 
-TEST_F(Cache, RemovesWhatAWorkerThatIsGoneHadForItself) {
+TEST_F(Cache, RemovesPrivateFilesOfADeadWorker) {
   const BlobRef blob = source_.add(std::string(100, 'x'));
   open();
   const fs::path orphan = folder_ / "partial" / (blob.digest.hex() + ".Ab12Cd");
@@ -289,7 +289,7 @@ TEST_F(Cache, KeepsTheFileInUseWhenTwoWorkersFetchTheSameAtOnce) {
   EXPECT_EQ(content(in_use->path()), "aaaaaaaaaa");
 }
 
-TEST_F(Cache, ABlobThatTheCoordinatorLacksIsTroubleThatMayPassAndNotTheJobsFault) {
+TEST_F(Cache, MissingBlobOnTheCoordinatorIsATemporaryErrorAndDoesNotFailTheJob) {
   const auto file = open()->acquire({sha256(std::string_view("?")), 1, "x"});
 
   EXPECT_EQ(file.error().code, Errc::internal);

@@ -21,7 +21,7 @@
 #include <thread>
 #include <vector>
 
-#include "common/protocol/limits.h"
+#include "util/protocol/limits.h"
 #include "worker/child/protocol.h"
 #include "worker/child/serve.h"
 #include "worker/fake/fake.h"
@@ -80,7 +80,7 @@ TEST(Child, GivesTheSameBitsAsTheRendererInProcess) {
             direct->render(job, unit(0), kGoOn).value().partial);
 }
 
-TEST(Child, TellsOfTheHealthOfAUnit) {
+TEST(Child, ReportsTheHealthOfAUnit) {
   const auto child = backend("unwell,tile=1");
   const LocalJob job = job_with_seed(3);
 
@@ -93,7 +93,7 @@ TEST(Child, TellsOfTheHealthOfAUnit) {
   EXPECT_EQ(unhealthy.value().partial.sums, well.value().partial.sums);
 }
 
-TEST(Child, NamesSignalPixelAndSampleOfACrash) {
+TEST(Child, ReportsSignalPixelAndSampleOfACrash) {
   const auto child = backend("crash,tile=1");
   const LocalJob job = job_with_seed(3);
 
@@ -107,7 +107,7 @@ TEST(Child, NamesSignalPixelAndSampleOfACrash) {
   expect_right_pixels(child->render(job, unit(0), kGoOn), 3, 0);
 }
 
-TEST(Child, EndsAUnitThatHangs) {
+TEST(Child, UnitThatHangsFails) {
   const auto child = backend("hang,tile=1", 1, std::chrono::milliseconds(200));
 
   const auto failure = child->render(job_with_seed(3), unit(1), kGoOn).error();
@@ -118,7 +118,7 @@ TEST(Child, EndsAUnitThatHangs) {
 }
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-TEST(Child, EndsAUnitThatEatsMemory) {
+TEST(Child, UnitThatExceedsMemoryFails) {
   const auto child = backend("memory,tile=1");
 
   const auto failure = child->render(job_with_seed(3), unit(1), kGoOn).error();
@@ -139,7 +139,7 @@ TEST(Child, RendersInnocentUnitsAgainAfterACrashOfAnother) {
   for (int i = 0; i < 200; ++i) expect_right_pixels(child->render(job, unit(2), kGoOn), 5, 2);
 }
 
-TEST(Child, StopsAUnitWhenTold) {
+TEST(Child, StopsAUnitOnRequest) {
   const auto child = backend("hang,tile=1");
   std::atomic<bool> stop{false};
   std::jthread teller([&] { stop = true; });
@@ -147,27 +147,27 @@ TEST(Child, StopsAUnitWhenTold) {
   EXPECT_FALSE(child->render(job_with_seed(3), unit(1), stop));
 }
 
-TEST(Child, ComesBackAtOnceWhenShutDown) {
+TEST(Child, ShutdownReturnsAtOnce) {
   const auto child = backend("hang");
   std::jthread ender([&] { child->shutdown(); });
 
   EXPECT_FALSE(child->render(job_with_seed(3), unit(1), kGoOn));
 }
 
-TEST(Child, SaysWhyItCannotStart) {
+TEST(Child, ReportsWhyItCannotStart) {
   const auto made = make_child_backend({.executable = "/nonexistent/worker"});
 
   EXPECT_THAT(made.error().message, HasSubstr("/nonexistent/worker"));
 }
 
-TEST(Child, KillsARendererThatClosesItsEndAndLivesOn) {
+TEST(Child, KillsARendererThatClosesItsEndButKeepsRunning) {
   const auto child = backend("odd,closes");
 
   EXPECT_FALSE(child->render(job_with_seed(3), unit(0), kGoOn));
 }
 
 // The child answers nonsense on slot 0 as soon as it has been asked for a unit on both of its slots.
-TEST(Child, BlamesNonsenseOnTheSlotThatAnsweredIt) {
+TEST(Child, InvalidAnswerFailsTheUnitOfItsSlot) {
   const auto child = backend("odd,nonsense", 2);
   std::atomic<bool> stop{false};
   std::array<std::string, 2> reasons;
@@ -184,7 +184,7 @@ TEST(Child, BlamesNonsenseOnTheSlotThatAnsweredIt) {
   EXPECT_EQ(std::ranges::count(reasons, "the renderer answered nonsense"), 1) << reasons[0] << reasons[1];
 }
 
-TEST(Child, BlamesAClosedChannelOnItsSlot) {
+TEST(Child, ClosedChannelFailsTheUnitOfItsSlot) {
   const auto child = backend("odd,closes", 2);
   std::atomic<bool> stop{false};
   std::array<std::string, 2> reasons;
@@ -202,14 +202,14 @@ TEST(Child, BlamesAClosedChannelOnItsSlot) {
       << reasons[0] << reasons[1];
 }
 
-TEST(Child, CannotCutTheSharedMemoryShort) {
+TEST(Child, CannotShrinkTheSharedMemory) {
   const auto child = backend("odd,cuts");
 
   EXPECT_THAT(child->render(job_with_seed(3), unit(0), kGoOn).error().reason,
               HasSubstr("Operation not permitted"));
 }
 
-TEST(Child, HasASessionOfItsOwnAndWritesToAPipe) {
+TEST(Child, HasItsOwnSessionAndWritesToAPipe) {
   const auto child = backend("odd,tells");
 
   const std::string told = child->render(job_with_seed(3), unit(0), kGoOn).error().reason;
@@ -237,21 +237,21 @@ TEST(Child, LeavesNoProcessBehind) {
   EXPECT_THAT(state, AnyOf("", "Z", "X"));
 }
 
-TEST(Child, GivesNoReasonWithControlCharacters) {
+TEST(Child, ReasonsHaveNoControlCharacters) {
   const auto child = backend("odd,forges");
 
   EXPECT_EQ(child->render(job_with_seed(3), unit(0), kGoOn).error().reason,
             "bad  [31m 2026 info all is well");
 }
 
-TEST(Child, NamesNoPixelBesideTheImage) {
+TEST(Child, ReportsNoPixelOutsideTheImage) {
   const auto child = backend("odd,beside");
 
   EXPECT_FALSE(child->render(job_with_seed(3), unit(0), kGoOn).error().pixel);
 }
 
 // The agent believes no measurement that is longer than the time that it waited.
-TEST(Child, TakesNoMoreTimeThanPassed) {
+TEST(Child, ReportsNoMoreTimeThanPassed) {
   const auto child = backend("odd,slow");
 
   const auto rendered = child->render(job_with_seed(3), unit(0), kGoOn);
@@ -261,7 +261,7 @@ TEST(Child, TakesNoMoreTimeThanPassed) {
   EXPECT_EQ(rendered->wall_seconds, 0);  // it said NaN
 }
 
-TEST(Child, AbandonsAWorldWhenToldTo) {
+TEST(Child, AbandonsAWorldOnRequest) {
   const auto child = backend("odd,obeys");
   std::atomic<bool> stop{true};
 
@@ -271,7 +271,7 @@ TEST(Child, AbandonsAWorldWhenToldTo) {
 }
 
 // A child that builds on is killed, so that the next world can be built.
-TEST(Child, IsKilledWhenItBuildsOnThoughToldToStop) {
+TEST(Child, IsKilledIfItIgnoresAStopWhileBuilding) {
   const auto child = backend("odd,builds");
   std::atomic<bool> stop{true};
 
@@ -280,7 +280,7 @@ TEST(Child, IsKilledWhenItBuildsOnThoughToldToStop) {
   expect_right_pixels(child->render(job_with_seed(3), unit(0), kGoOn), 3, 0);
 }
 
-TEST(Child, EndsARendererThatStopsInTheMiddleOfAnAnswer) {
+TEST(Child, KillsARendererThatStopsDuringAnAnswer) {
   const auto child = backend("odd,half", 1, std::chrono::milliseconds(200));
 
   EXPECT_THAT(child->render(job_with_seed(3), unit(0), kGoOn).error().reason, HasSubstr("hung"));
@@ -296,7 +296,7 @@ TEST(Child, ReplacesARendererThatHangsWhenItFreesAScene) {
 
 // A coordinator whose data were replaced assigns a job's id to another job while a unit of the old one is
 // being rendered.
-TEST(Child, RendersTheNewOfTwoJobsOfOneIdAfterAUnitOfTheOldOneCameBetween) {
+TEST(Child, RendersTheNewerOfTwoJobsWithOneIdAfterAUnitOfTheOlderOne) {
   const auto child = backend("");
   const LocalJob old = job_with_seed(3);
   LocalJob other = job_with_seed(4);
@@ -312,7 +312,7 @@ TEST(Child, RendersTheNewOfTwoJobsOfOneIdAfterAUnitOfTheOldOneCameBetween) {
 
 // A scene that takes too long to build does not affect other jobs: those that are ready are rendered
 // meanwhile and afterwards.
-TEST(Child, RendersOtherJobsWhileAWorldIsBuiltWithoutEnd) {
+TEST(Child, RendersOtherJobsDuringAnEndlessBuild) {
   ChildOptions options{.arguments = {"--render-child", "1", "odd,builds"},
                        .prepare_limit = std::chrono::milliseconds(500)};
   const auto child = make_child_backend(options).value();
@@ -327,7 +327,7 @@ TEST(Child, RendersOtherJobsWhileAWorldIsBuiltWithoutEnd) {
   expect_right_pixels(child->render(job_with_seed(3), unit(0), kGoOn), 3, 0);
 }
 
-TEST(Child, IsToldOfAsManyFilesAsAJobMayHave) {
+TEST(Child, AcceptsAsManyFilesAsAJobMayHave) {
   const auto child = backend("");
   LocalJob job = job_with_seed(3);
   for (std::size_t i = 0; i < limits::kAssetsPerJob; ++i) {
@@ -339,7 +339,7 @@ TEST(Child, IsToldOfAsManyFilesAsAJobMayHave) {
   expect_right_pixels(child->render(job, unit(0), kGoOn), 3, 0);
 }
 
-TEST(Child, SeesNoSecretsOfTheAgentsEnvironment) {
+TEST(Child, EnvironmentHasNoSecretsOfTheAgent) {
   ::setenv("LIGHTSHAFT_TEST_CLOUD_KEY", "secret", 1);
   const auto made = make_child_backend({.arguments = {"--render-child", "1", "odd,environment"}});
   ::unsetenv("LIGHTSHAFT_TEST_CLOUD_KEY");
@@ -347,7 +347,7 @@ TEST(Child, SeesNoSecretsOfTheAgentsEnvironment) {
   EXPECT_TRUE(made) << made.error().message;
 }
 
-TEST(Child, SaysThatThereAreTooFewFileDescriptors) {
+TEST(Child, ReportsTooFewFileDescriptors) {
   rlimit before{};
   ::getrlimit(RLIMIT_NOFILE, &before);
   const int lowest_free = ::dup(0);
@@ -369,7 +369,7 @@ class ChildOfAFile : public testing::Test {
       std::filesystem::temp_directory_path() / fmt::format("ls-child-{}", ::getpid());
 };
 
-TEST_F(ChildOfAFile, IsBrokenWhenANewChildHasAnotherNumericClass) {
+TEST_F(ChildOfAFile, BreaksIfANewChildHasAnotherNumericClass) {
   const auto child = backend("class," + file_.string());
   EXPECT_FALSE(child->render(job_with_seed(3), unit(1), kGoOn));  // it crashes
   EXPECT_FALSE(child->broken());
@@ -381,7 +381,7 @@ TEST_F(ChildOfAFile, IsBrokenWhenANewChildHasAnotherNumericClass) {
   EXPECT_THAT(child->broken()->message, AllOf(HasSubstr("replaced"), HasSubstr("child_test")));
 }
 
-TEST_F(ChildOfAFile, IsBrokenWhenNewChildrenEndBeforeTheyAreReadyAgainAndAgain) {
+TEST_F(ChildOfAFile, BreaksIfNewChildrenRepeatedlyEndBeforeTheyAreReady) {
   const auto child = backend("class," + file_.string());
   EXPECT_FALSE(child->render(job_with_seed(3), unit(1), kGoOn));  // it crashes
   std::filesystem::remove(file_);
@@ -393,7 +393,7 @@ TEST_F(ChildOfAFile, IsBrokenWhenNewChildrenEndBeforeTheyAreReadyAgainAndAgain) 
 }
 
 // The new child fails as if there were not enough address space for a moment.
-TEST_F(ChildOfAFile, StartsAnotherAfterANewChildThatEndsBeforeItIsReady) {
+TEST_F(ChildOfAFile, ReplacesANewChildThatEndsBeforeItIsReady) {
   const auto child = backend("later," + file_.string());
   for (int i = 0; i < 10; ++i) {
     EXPECT_FALSE(child->render(job_with_seed(3), unit(1), kGoOn));  // it crashes

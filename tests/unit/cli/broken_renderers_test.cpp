@@ -96,13 +96,11 @@ void every_case_fails(double gain, bool Blind::*passes) {
   }
 }
 
-TEST(BrokenRenderers, ThatRenderBlackFailEveryCaseThatExpectsLight) { every_case_fails(0, &Blind::black); }
+TEST(BrokenRenderers, BlackImagesFailEveryCaseThatExpectsLight) { every_case_fails(0, &Blind::black); }
 
-TEST(BrokenRenderers, ThatRenderTwiceTheLightFailEveryCaseThatExpectsLight) {
-  every_case_fails(2, &Blind::twice);
-}
+TEST(BrokenRenderers, DoubledLightFailsEveryCaseThatExpectsLight) { every_case_fails(2, &Blind::twice); }
 
-TEST(BrokenRenderers, ArePassedByCasesThatHaveAPartnerWhichFails) {
+TEST(BrokenRenderers, CasesThatMissThemHaveAPartnerThatFails) {
   const Table table = all_cases();
   for (const Blind& b : kBlind)
     for (const double gain : {0., 2.}) {
@@ -115,7 +113,7 @@ TEST(BrokenRenderers, ArePassedByCasesThatHaveAPartnerWhichFails) {
 }
 
 // A correct renderer passes all cases, so the tests above do not fail just because every result fails.
-TEST(BrokenRenderers, AreToldFromARightOneByTheSameFigures) {
+TEST(BrokenRenderers, DifferFromARightRendererInTheSameFigures) {
   const Table table = all_cases();
   std::size_t measured = 0;
   for (std::size_t i = 0; i < table.cases().size(); ++i) {

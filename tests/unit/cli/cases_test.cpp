@@ -26,7 +26,7 @@ cli::ValidateCase judged(double got, double error, double band, double freedom =
   return c;
 }
 
-TEST(Equivalence, PassesOnlyIfTheIntervalLiesInTheBandAndCoversTheAnswer) {
+TEST(Equivalence, PassesOnlyIfTheIntervalIsInTheBandAndContainsTheAnswer) {
   EXPECT_TRUE(judged(2, .001, .003).passed());
   EXPECT_TRUE(judged(2.002, .001, .003).passed());
   EXPECT_FALSE(judged(2.004, .001, .003).passed()) << "inside the band, but far off by its own error";
@@ -47,7 +47,7 @@ TEST(Equivalence, MeasuresZByChanceAndByWhatIsAllowedWithoutIt) {
   EXPECT_EQ(judged(2.005, .003, .01, 1000, .004).allowance, .004);
 }
 
-TEST(Equivalence, HasALevelOfItsOwnForTheBand) {
+TEST(Equivalence, BandHasItsOwnLevel) {
   const auto judged_at = [](double off, double level, double band_level) {
     cli::ValidateCase c;
     c.expected = 1;
@@ -67,7 +67,7 @@ TEST(Equivalence, HasALevelOfItsOwnForTheBand) {
   EXPECT_TRUE(judged_at(.003, 1e-6, .9).passed());
 }
 
-TEST(Equivalence, QuantilesAreThoseOfTheTables) {
+TEST(Equivalence, QuantilesMatchTheTables) {
   EXPECT_NEAR(cli::student_quantile(.05, 10), 2.228139, 1e-6);
   EXPECT_NEAR(cli::student_quantile(.01, 1e9), 2.575829, 1e-5);
 }
@@ -88,21 +88,21 @@ Table one_case(double expected, double band) {
   return t;
 }
 
-TEST(Cases, ARightAnswerPassesAndOneThatIsOffByTheBandFails) {
+TEST(Cases, RightAnswerPassesAndAnAnswerOutsideTheBandFails) {
   const double right = std::exp(-.5);
   EXPECT_TRUE(run_cases(one_case(right, .01), {}).at(0).passed());
   EXPECT_FALSE(run_cases(one_case(right * 1.01, .01), {}).at(0).passed());
   EXPECT_FALSE(run_cases(one_case(right * .99, .01), {}).at(0).passed());
 }
 
-TEST(Cases, TakeThePathsThatTheirBandAsksFor) {
+TEST(Cases, UseAsManyPathsAsTheirBandNeeds) {
   const auto wide = run_cases(one_case(std::exp(-.5), .02), {}).at(0),
              narrow = run_cases(one_case(std::exp(-.5), .002), {}).at(0);
   EXPECT_GT(narrow.paths, 5 * wide.paths);
   EXPECT_TRUE(narrow.passed()) << narrow.why;
 }
 
-TEST(Cases, ASceneThatIsRefusedFails) {
+TEST(Cases, CaseWithARefusedSceneFails) {
   Table t;
   t.mean(
       "bad", "N0", "",
@@ -118,7 +118,7 @@ TEST(Cases, ASceneThatIsRefusedFails) {
 
 // A case about media fails if pruning removes its medium, since it would then pass whatever the renderer
 // does.
-TEST(Cases, AskNothingWhereTheirMediumIsLeftOut) {
+TEST(Cases, AreSkippedWithoutTheirMedium) {
   const auto nothing = [](bool grid) {
     SceneBuilder builder;
     const Configuration way{grid, false};
@@ -142,14 +142,14 @@ TEST(Cases, AskNothingWhereTheirMediumIsLeftOut) {
   EXPECT_TRUE(run_cases(other, {}).at(0).passed());
 }
 
-TEST(Cases, AreAskedForByPrefixOrGlob) {
+TEST(Cases, AreSelectedByPrefixOrGlob) {
   EXPECT_TRUE(asked_for("N03-slab/grid/volpath", ""));
   EXPECT_TRUE(asked_for("N03-slab/grid/volpath", "N03"));
   EXPECT_TRUE(asked_for("N03-slab/grid/volpath", "*grid*"));
   EXPECT_FALSE(asked_for("N03-slab/grid/volpath", "grid"));
 }
 
-TEST(Cases, HaveIdsAndRowsOfTheirOwn) {
+TEST(Cases, HaveUniqueIdsAndRows) {
   std::set<std::string> ids;
   const Table table = all_cases();
   for (const Case& c : table.cases()) {
@@ -158,7 +158,7 @@ TEST(Cases, HaveIdsAndRowsOfTheirOwn) {
   }
 }
 
-TEST(Cases, SayWhyTheirBandIsWiderThanOthers) {
+TEST(Cases, ExplainAWiderBand) {
   const Table table = all_cases();
   for (const Case& c : table.cases())
     EXPECT_EQ(c.options.band > kBand, !c.options.why_band.empty()) << c.id << ": " << c.options.band;
@@ -166,7 +166,7 @@ TEST(Cases, SayWhyTheirBandIsWiderThanOthers) {
 
 // The known values are eight digits of a point source's fluence, by quadrature of its Fourier transform, a
 // method that the tested code does not use.
-TEST(EndlessMedium, FluenceOfAPointIsThatOfItsFourierTransform) {
+TEST(EndlessMedium, PointHasTheFluenceOfTheFourierSolution) {
   constexpr double kRadii[] = {.25, 1, 2, 5};
   const std::map<double, std::array<double, 4>> known = {
       {.3, {1.1403563, .043133829, .0048538194, 5.4892674e-5}},
@@ -183,7 +183,7 @@ TEST(EndlessMedium, FluenceOfAPointIsThatOfItsFourierTransform) {
 // The fluence of a ball is the mean fluence of its points. Here the mean is taken by the midpoint rule over
 // radius and angle, since the tested code integrates over the angle in closed form. With 40 x 40 midpoints
 // (h = 1/40) of a function whose second derivatives are about 1, the relative error is about h^2 = 6e-4.
-TEST(EndlessMedium, FluenceOfABallIsTheMeanOfItsPoints) {
+TEST(EndlessMedium, BallHasTheMeanFluenceOfItsPoints) {
   constexpr double kRadius = .5, kDistance = 1, kAlbedo = .8;
   constexpr int kSteps = 40;
   double sum = 0, weight = 0;

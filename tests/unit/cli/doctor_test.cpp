@@ -52,7 +52,7 @@ Finding find(const std::vector<Finding>& findings, const std::string& name) {
   return found;
 }
 
-TEST(Doctor, IsContentWithAGoodMachineAndFarm) {
+TEST(Doctor, ReportsNoProblemsOnAGoodMachineAndFarm) {
   EXPECT_EQ(worst(judge_machine(good_machine())), Status::ok);
   EXPECT_EQ(worst(judge(good_farm())), Status::ok);
 }
@@ -64,7 +64,7 @@ struct MachineFault {
 };
 class MachineFaults : public ::testing::TestWithParam<MachineFault> {};
 
-TEST_P(MachineFaults, AreFoundOneByOneWithAdvice) {
+TEST_P(MachineFaults, AreReportedOneByOneWithAdvice) {
   MachineFacts facts = good_machine();
   GetParam().damage(facts);
 
@@ -107,7 +107,7 @@ struct FarmFault {
 };
 class FarmFaults : public ::testing::TestWithParam<FarmFault> {};
 
-TEST_P(FarmFaults, AreFoundWithAdviceAndAddress) {
+TEST_P(FarmFaults, AreReportedWithAdviceAndAddress) {
   FarmFacts facts = good_farm();
   GetParam().damage(facts);
 
@@ -159,7 +159,7 @@ INSTANTIATE_TEST_SUITE_P(
                   }}));
 
 // At some time between request and answer, the coordinator's clock was in [date, date + 1).
-TEST(ClockLead, IsTheLeastThatTheAnswerAllows) {
+TEST(ClockLead, IsTheSmallestThatTheAnswerAllows) {
   EXPECT_EQ(clock_lead(1000, 1000, 1000), 0);
   EXPECT_EQ(clock_lead(1000.75, 1000.75, 1000), 0);
   EXPECT_EQ(clock_lead(1000, 1004, 1003), 0) << "a slow answer hides a difference of seconds";
@@ -167,7 +167,7 @@ TEST(ClockLead, IsTheLeastThatTheAnswerAllows) {
   EXPECT_EQ(clock_lead(1000.5, 1001, 990), -9.5);
 }
 
-TEST(ClockLead, OfAMinuteIsTolerated) {
+TEST(ClockLead, OneMinuteIsTolerated) {
   FarmFacts facts = good_farm();
 
   facts.date = 1060;  // at least 59.5 s ahead
@@ -176,7 +176,7 @@ TEST(ClockLead, OfAMinuteIsTolerated) {
   EXPECT_EQ(find(judge(facts), "clock").status, Status::warning);
 }
 
-TEST(Doctor, AsksForNoTlsOnThisMachine) {
+TEST(Doctor, RequiresNoTlsForThisMachine) {
   FarmFacts facts = good_farm();
   for (const char* url : {"http://localhost:8080", "http://127.0.0.1:1", "http://[::1]:8080"}) {
     facts.url = url;

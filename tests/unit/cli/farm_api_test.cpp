@@ -41,14 +41,14 @@ TEST(Addresses, MayLeaveOutTheirScheme) {
   EXPECT_FALSE(HttpClient::open({.url = "ftp://farm"}));
 }
 
-TEST(Problem, SaysWhereATokenIsFound) {
+TEST(Problem, SaysWhereTheTokenIs) {
   const auto problem = problem_of({401, R"({"detail": "the token is wrong"})"});
 
   EXPECT_EQ(problem.error.code, Errc::unauthenticated);
   EXPECT_THAT(problem.error.message, HasSubstr("LIGHTSHAFT_TOKEN"));
 }
 
-TEST(Problem, StandsAnswersThatAreNoProblemDetails) {
+TEST(Problem, HandlesAnswersWithoutProblemDetails) {
   EXPECT_THAT(problem_of({502, "<html>Bad gateway" + std::string(5000, '!')}).error.message,
               testing::AllOf(HasSubstr("502"), HasSubstr("Bad gateway")));
   for (const char* body :
@@ -56,12 +56,12 @@ TEST(Problem, StandsAnswersThatAreNoProblemDetails) {
     EXPECT_FALSE(problem_of({500, body}).error.message.empty()) << body;
 }
 
-TEST(JobPath, EscapesWhatIsNoId) {
+TEST(JobPath, EscapesInvalidIds) {
   EXPECT_EQ(job_path("j-12ab"), "/api/v1/jobs/j-12ab");
   EXPECT_EQ(job_path("../x?y"), "/api/v1/jobs/..%2Fx%3Fy");
 }
 
-TEST(FarmTables, StandMissingAndWrongFields) {
+TEST(FarmTables, HandleMissingAndWrongFields) {
   const json jobs = json::parse(
       R"({"jobs": [{}, 5, {"id": 7, "progress": "x"}, {"id": "j-1", "progress": 0.5, "relmse": null}]})");
 
@@ -71,7 +71,7 @@ TEST(FarmTables, StandMissingAndWrongFields) {
   EXPECT_FALSE(job_text(json::object()).empty());
 }
 
-TEST(FarmTables, SayWhatIsFake) {
+TEST(FarmTables, MarkFakeWorkersAndJobs) {
   const auto tables = [](bool fake) {
     const json worker{{"name", "w"}, {"state", "connected"}, {"fake", fake}};
     const json job{{"id", "j-1"}, {"name", "fog.xml"}, {"fake", fake}};
@@ -95,14 +95,14 @@ TEST(FarmTables, NameTheClassAndItsShareOfTheFarm) {
   EXPECT_THAT(job_text({{"id", "j-1"}, {"class_share", nullptr}}), Not(HasSubstr("of the farm")));
 }
 
-TEST(FarmTables, LetNoNameReachTheTerminalsControls) {
+TEST(FarmTables, RemoveTerminalControlsFromNames) {
   const json jobs{{"jobs", {{{"id", "j-1"}, {"name", "a\x1b[2Jb\nc"}}}}};
 
   EXPECT_THAT(jobs_table(jobs), Not(HasSubstr("\x1b")));
   EXPECT_THAT(jobs_table(jobs), HasSubstr("a [2Jb c"));
 }
 
-TEST(HttpClient, RefusesAddressesAndTokensThatCannotBeMeant) {
+TEST(HttpClient, RefusesImpossibleAddressesAndTokens) {
   for (const char* url : {"ftp://farm", "file:///etc/passwd", "http://farm/ x", "http://farm\r\nX: y", ""})
     EXPECT_EQ(HttpClient::open({url, "", ""}).error().code, Errc::invalid_argument) << url;
   EXPECT_FALSE(HttpClient::open({"http://farm", "token\r\nX-Evil: 1", ""}));

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "cli/output/convergence_text.h"
-#include "common/job/health_notes.h"
+#include "core/job/health_notes.h"
 
 namespace ls::cli {
 namespace {
@@ -15,7 +15,7 @@ json job_with(const Health& health, std::optional<std::uint32_t> frame = {}) {
   return {{"health", json::parse(health_json(health, notes))}};
 }
 
-TEST(HealthLines, TellCausePlaceAndCommand) {
+TEST(HealthLines, ShowCausePlaceAndCommand) {
   Health health;
   health.add(HealthCause::infinite, 2, {3, 4, 5});
   health.add(HealthCause::negative_texel, 1);
@@ -28,7 +28,7 @@ TEST(HealthLines, TellCausePlaceAndCommand) {
   EXPECT_THAT(health_lines(job_with(health, 12))[0], testing::HasSubstr("first in frame 12 at pixel 3,4"));
 }
 
-TEST(HealthLines, SayNothingWhereAllIsWellOrNothingIsTold) {
+TEST(HealthLines, AreEmptyWithoutProblemsOrData) {
   for (const json& job :
        {job_with({}), json::object(), json{{"health", 3}}, json{{"health", {{"causes", "x"}}}}}) {
     EXPECT_TRUE(health_lines(job).empty()) << job;
@@ -37,7 +37,7 @@ TEST(HealthLines, SayNothingWhereAllIsWellOrNothingIsTold) {
 }
 
 // Whatever a farm answers, no line contains control characters, and the number of lines is limited.
-TEST(HealthLines, AreTextWhateverAFarmAnswers) {
+TEST(HealthLines, HandleAnyAnswerOfAFarm) {
   json causes = json::array();
   const json cause =
       json::parse(R"({"text":"a\u001b[2J\nb","first":[{"pixel":"x","sample":1}],"replay":"c\nrm x"})");

@@ -6,14 +6,14 @@
 #include <cerrno>
 
 #include "cli/local/instructions.h"
-#include "common/base/digest.h"
+#include "core/base/digest.h"
 
 namespace ls::cli {
 namespace {
 
 using testing::HasSubstr;
 
-TEST(InstructionCounter, CountsWhatThisThreadExecutesOrSaysWhyItCannot) {
+TEST(InstructionCounter, CountsThisThreadsInstructionsOrSaysWhyItCannot) {
   auto counter = InstructionCounter::open();
   if (!counter) {
     EXPECT_EQ(counter.error().code, Errc::unavailable);
@@ -38,7 +38,7 @@ int refusing() {
   return -1;
 }
 
-TEST(InstructionCounter, SaysOfAMachineWithoutOneOrThatHidesItWhatTheUserCanDo) {
+TEST(InstructionCounter, SaysWhatToDoOnMachinesWithoutACounterOrWithAHiddenOne) {
   for (int (*opener)() : {&refusing<EACCES>, &refusing<EPERM>}) {
     const auto hidden = InstructionCounter::open(opener);
     ASSERT_FALSE(hidden);
@@ -65,7 +65,7 @@ InstructionCounter showing(std::initializer_list<std::uint64_t> counts) {
 
 Digest rendered(const std::string& name) { return sha256(name); }
 
-TEST(MeasureVariants, DividesWhatWasExecutedBetweenTwoReadingsByThePaths) {
+TEST(MeasureVariants, DividesTheInstructionsBetweenTwoReadingsByThePaths) {
   const VariantBitsList all = measure_variants({"lean", "fat"}, 8, showing({100, 900, 1000, 2600}), rendered);
 
   ASSERT_EQ(all.all.size(), 2u);
@@ -76,7 +76,7 @@ TEST(MeasureVariants, DividesWhatWasExecutedBetweenTwoReadingsByThePaths) {
   EXPECT_EQ(all.uncounted, "");
 }
 
-TEST(MeasureVariants, SaysWhyInstructionsAreMissingAndStillComparesBits) {
+TEST(MeasureVariants, SaysWhyInstructionCountsAreMissingAndStillComparesBits) {
   const VariantBitsList none =
       measure_variants({"lean", "fat"}, 8, InstructionCounter::open(&refusing<ENOENT>), rendered);
   EXPECT_THAT(none.uncounted, HasSubstr("no counter of instructions"));
@@ -84,7 +84,7 @@ TEST(MeasureVariants, SaysWhyInstructionsAreMissingAndStillComparesBits) {
   EXPECT_EQ(none.all[1].instructions, std::nullopt);
 }
 
-TEST(MeasureVariants, LeavesOutTheFigureOfACounterThatFailsOrStandsStill) {
+TEST(MeasureVariants, LeavesOutCountsOfACounterThatFailsOrDoesNotMove) {
   const VariantBitsList failed = measure_variants({"lean", "fat"}, 8, showing({100, 900, 1000}), rendered);
   EXPECT_EQ(failed.all[0].instructions, 100.);
   EXPECT_EQ(failed.all[1].instructions, std::nullopt);

@@ -57,7 +57,7 @@ TEST_F(LocalLinkTest, IsWelcomedAndLeaves) {
   EXPECT_EQ(coordinator_->workers()[0].state, "lost");
 }
 
-TEST_F(LocalLinkTest, PassesARefusalOn) {
+TEST_F(LocalLinkTest, ForwardsARefusal) {
   LocalLink link(*coordinator_);
   WorkerHello other = hello();
   other.protocol = kProtocolVersion + 1;
@@ -74,7 +74,7 @@ TEST_F(LocalLinkTest, DropsWhatIsSentWithoutAConnection) {
   EXPECT_EQ(seen, 0);
 }
 
-TEST_F(LocalLinkTest, ShowsResultsToTheTapBeforeTheCoordinator) {
+TEST_F(LocalLinkTest, PassesResultsToTheTapBeforeTheCoordinator) {
   std::vector<UnitKey> seen;
   LocalLink link(*coordinator_, [&](const UnitResult& r) { seen.push_back(r.unit); });
   ASSERT_TRUE(link.connect(hello(), observer_));

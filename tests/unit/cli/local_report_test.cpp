@@ -10,7 +10,7 @@ nlohmann::json told(const LocalFacts& facts) {
   return local_report(R"({"name": "/home/someone/a.xml", "samples": 400})", facts).value_or(nullptr);
 }
 
-TEST(LocalReport, TellsWhatASampleTookInInstructionsWhereTheyAreCounted) {
+TEST(LocalReport, ReportsInstructionsPerSampleWhereTheyAreCounted) {
   LocalFacts facts;
   facts.instructions = 10'000'000;
 

@@ -47,7 +47,7 @@ TEST_F(LocalSceneTest, NamesEveryFileThatTheSceneNeeds) {
   EXPECT_EQ(scene->name, path);
 }
 
-TEST_F(LocalSceneTest, RefusesADefineThatNothingAsksFor) {
+TEST_F(LocalSceneTest, RefusesAnUnusedDefine) {
   const std::string path = write("main.xml", kMain);
   write("light.xml", kLight);
 
@@ -57,7 +57,7 @@ TEST_F(LocalSceneTest, RefusesADefineThatNothingAsksFor) {
   EXPECT_THAT(scene.error().diagnostics.at(0).text, testing::AllOf(HasSubstr("$pwoer"), HasSubstr("$power")));
 }
 
-TEST_F(LocalSceneTest, SaysWhatIsWrongWithTheFileItself) {
+TEST_F(LocalSceneTest, ReportsErrorsOfTheFileItself) {
   for (const auto& [path, text] : {std::pair((folder_ / "none.xml").string(), "no such file"),
                                    std::pair(folder_.string(), "regular file")}) {
     const auto scene = read_local_scene(path, {}, false);

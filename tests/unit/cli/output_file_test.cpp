@@ -26,7 +26,7 @@ class OutputFile : public testing::Test {
   fs::path folder_;
 };
 
-TEST_F(OutputFile, IsRefusedBeforeRenderingIfItsFolderTakesNoFiles) {
+TEST_F(OutputFile, IsRefusedBeforeRenderingIfItsFolderIsUnwritable) {
   const auto refused = check_output("-o", kClosed / "out.exr");
 
   ASSERT_FALSE(refused);
@@ -46,7 +46,7 @@ TEST_F(OutputFile, IsNotTouchedByTheCheck) {
   EXPECT_EQ(fs::file_size(folder_ / "out.exr"), 11U);
 }
 
-TEST_F(OutputFile, IsSavedElsewhereWhenItsFolderHasBecomeUnwritable) {
+TEST_F(OutputFile, IsSavedInAnotherFolderIfItsOwnBecameUnwritable) {
   const char* before = std::getenv("TMPDIR");
   const std::string kept = before ? before : "";
   ::setenv("TMPDIR", folder_.c_str(), 1);

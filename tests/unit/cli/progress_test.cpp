@@ -13,7 +13,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-TEST(ProgressLine, TellsShareRateErrorAndTimeLeft) {
+TEST(ProgressLine, ShowsShareRateErrorAndTimeLeft) {
   const ProgressFigures figures{"running", .426, 27.25, 3.14e6, .01234, 42.4, ""};
 
   const std::string line = progress_line(figures, 120);
@@ -25,7 +25,7 @@ TEST(ProgressLine, TellsShareRateErrorAndTimeLeft) {
 const ProgressFigures kForecast{"running", .426, 27.25,        3.14e6,           .01234, 252,
                                 "",        "",   {{186, 330}}, {{.0118, .0129}}, .001,   66};
 
-TEST(ProgressLine, TellsErrorAndForecastWithTheirIntervals) {
+TEST(ProgressLine, ShowsErrorAndForecastWithIntervals) {
   EXPECT_EQ(
       progress_line(kForecast, 200),
       " 42 % [######          ] 27.2 spp  3.14 M samples/s  relMSE 0.0123 (0.0118 to 0.0129), target 0.001  "
@@ -56,7 +56,7 @@ TEST(ProgressLine, KeepsErrorAndForecastOnANarrowTerminal) {
   EXPECT_EQ(progress_line(kForecast, 60), " 42 % 27.2 spp  relMSE 0.0123, target 0.001  4:12 left");
 }
 
-TEST(ProgressLine, OfAJobInDoubtPromisesNothing) {
+TEST(ProgressLine, UntrustedJobHasNoForecast) {
   ProgressFigures figures = kForecast;
   figures.doubtful = true;
 
@@ -68,7 +68,7 @@ TEST(ProgressLine, OfAJobInDoubtPromisesNothing) {
             " 42 % 27.2 spp  relMSE 0.0123 (don't trust yet)  at least 4:12 left");
 }
 
-TEST(ProgressLine, SamplesThatAreCountedTakeWhatTheyTakeInDoubtToo) {
+TEST(ProgressLine, TimeLeftOfAJobThatEndsBySamplesIsExactEvenIfUntrusted) {
   ProgressFigures figures = kForecast;
   figures.doubtful = true;
   figures.target_error.reset();
@@ -76,7 +76,7 @@ TEST(ProgressLine, SamplesThatAreCountedTakeWhatTheyTakeInDoubtToo) {
   EXPECT_EQ(progress_line(figures, 70), " 42 % 27.2 spp  relMSE 0.0123 (don't trust yet)  4:12 left");
 }
 
-TEST(ProgressLine, LeavesOutWhatIsNotKnown) {
+TEST(ProgressLine, LeavesOutUnknownFigures) {
   const std::string line = progress_line({"queued", 0, 0, 0, {}, {}, "no worker is connected"}, 120);
 
   EXPECT_THAT(line, HasSubstr("queued"));
@@ -91,7 +91,7 @@ TEST(ProgressLine, FitsTheTerminal) {
     EXPECT_LT(progress_line(figures, columns).size(), static_cast<std::size_t>(columns));
 }
 
-TEST(ProgressLine, StandsImpossibleFigures) {
+TEST(ProgressLine, HandlesImpossibleFigures) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(progress_line({"running", nan, 1, 1, nan, nan, ""}, 120), HasSubstr("  0 % ["));
   EXPECT_THAT(progress_line({"running", 7, 1, 1, {}, {}, ""}, 120), HasSubstr("100 % [################]"));

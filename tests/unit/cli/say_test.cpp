@@ -7,7 +7,7 @@
 #include <new>
 
 #include "cli/output/progress.h"
-#include "common/base/safe_text.h"
+#include "core/base/safe_text.h"
 
 namespace ls::cli {
 namespace {
@@ -35,7 +35,7 @@ TEST(ExitCode, IsTheUsersFaultOnlyIfTheInputIsWrong) {
     EXPECT_EQ(code(errc), kFailed) << to_string(errc);
 }
 
-TEST(RunGuarded, TellsOfExceptionsInsteadOfAborting) {
+TEST(RunGuarded, ReportsExceptionsInsteadOfAborting) {
   int code = 0;
   const std::string memory =
       said([&] { code = run_guarded("merge", []() -> int { throw std::bad_alloc(); }); });
@@ -59,7 +59,7 @@ TEST(PlainText, KeepsLettersOfAllLanguages) {
   EXPECT_EQ(plain_text(text), text);
 }
 
-TEST(PlainText, TakesAwayWhatATerminalWouldObey) {
+TEST(PlainText, RemovesTerminalControls) {
   EXPECT_EQ(plain_text("a\x1b[2Jb\nc\rd\x7f"), "a [2Jb c d ");
   EXPECT_EQ(plain_text("a\xc2\x9b"
                        "2Jb"),

@@ -6,7 +6,6 @@
 
 #include "cli/farm/farm_tables.h"
 #include "cli/local/local_scene.h"
-#include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
 
 namespace ls::cli {
@@ -60,24 +59,13 @@ TEST_F(SequenceTest, EveryMissingFileIsNamedWithItsFrame) {
   EXPECT_EQ(all.error().diagnostics[1].place.line, 3);
 }
 
-TEST_F(SequenceTest, ANameWithHashesAsksForFramesWhereThereAreNone) {
+TEST_F(SequenceTest, FileNameWithHashesIsRefusedWithoutFrames) {
   const auto scene = read_local_scene(write("main.xml", kScene), {}, false);
   ASSERT_FALSE(scene);
   EXPECT_THAT(scene.error().diagnostics.at(0).text, HasSubstr("--frames"));
 }
 
-TEST_F(SequenceTest, FramesAreReadFromTheOption) {
-  JobOptions options;
-  options.frames = "1-10";
-  EXPECT_EQ(options.parse()->frames, (FrameRange{1, 10, 1}));
-  options.frames = "10-1";
-  EXPECT_THAT(options.parse().error().message, HasSubstr("--frames '10-1'"));
-  options.frames = "1-10";
-  options.defines = {"frame=3"};
-  EXPECT_THAT(options.parse().error().message, HasSubstr("-D frame"));
-}
-
-TEST_F(SequenceTest, ManyFramesNeedManyNames) {
+TEST_F(SequenceTest, FrameFilesNeedDifferentNames) {
   const std::string one = (folder_ / "out.exr").string(), many = (folder_ / "out_##.exr").string();
   EXPECT_THAT(check_numbered("-o", one, {1, 2, 1}).error().message, HasSubstr("out_####.exr"));
   EXPECT_TRUE(check_numbered("-o", one, {2, 2, 1}));
@@ -87,7 +75,7 @@ TEST_F(SequenceTest, ManyFramesNeedManyNames) {
   EXPECT_FALSE(check_outputs("-o", many, FrameRange{1, 2, 1})) << "the second one's name is a folder's";
 }
 
-TEST(SequenceTables, ShowFramesAndWhatIsWrongWithThem) {
+TEST(SequenceTables, ShowFramesAndTheirErrors) {
   const auto job =
       nlohmann::json::parse(R"({"id": "j-1", "state": "running", "name": "s.xml", "frames": {"range": "1-2",
     "total": 2, "done": 1, "failed": 1, "cancelled": 0, "list": [{"frame": 1, "state": "done", "progress": 1},

@@ -15,7 +15,7 @@ namespace ls::cli {
 namespace {
 
 // Critical values of Student's t and of chi-square, to the digits of the usual tables.
-TEST(ValidateStats, TailsAreThoseOfTheTables) {
+TEST(ValidateStats, TailsMatchTheTables) {
   EXPECT_NEAR(student_tails(1, 1), .5, 1e-12);
   EXPECT_NEAR(student_tails(2.228139, 10), .05, 1e-6);
   EXPECT_NEAR(student_tails(-3.169273, 10), .01, 1e-6);
@@ -45,7 +45,7 @@ TEST(ValidateStats, ChiSquareMergesRareCellsAndFindsSamplesWithoutDensity) {
 }
 
 // The significance levels that Nori prints for the level .01 and 4, 3 and 2 references.
-TEST(ValidateStats, SidakIsNoris) {
+TEST(ValidateStats, SidakCorrectionMatchesNori) {
   EXPECT_NEAR(sidak(.01, 4), .00250943, 1e-8);
   EXPECT_NEAR(sidak(.01, 3), .00334451, 1e-8);
   EXPECT_NEAR(sidak(.01, 2), .00501256, 1e-8);
@@ -63,7 +63,7 @@ ValidateCase judged(double expected, double got, double error, double rounding =
   return c;
 }
 
-TEST(ValidateTable, AVerdictIsByProbability) {
+TEST(ValidateTable, VerdictUsesTheProbability) {
   EXPECT_TRUE(judged(1, 1.02, .01).passed());
   EXPECT_FALSE(judged(1, 1.03, .01).passed());
   EXPECT_NEAR(judged(1, 1.03, .01).z, 3, 1e-9);
@@ -84,7 +84,7 @@ TEST(ValidateTable, JsonHasEveryCaseAndTheCounts) {
   EXPECT_TRUE(j["cases"][1].contains("why"));
 }
 
-TEST(ValidateFile, ABsdfIsSeenFromTheAngleThatIsAsked) {
+TEST(ValidateFile, BsdfIsSeenFromTheRequestedAngle) {
   // A conductor with index 1.5 that absorbs nothing reflects as a smooth dielectric boundary does. The
   // references are Fresnel's formulas at 0 and 60 degrees.
   test::SceneBuilder builder;

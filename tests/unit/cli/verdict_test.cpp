@@ -35,7 +35,7 @@ json untrusted_job() {
   return job;
 }
 
-TEST(Verdict, IsInDoubtByItsKindOrByItsWordAlone) {
+TEST(Verdict, IsUntrustedByKindOrFlag) {
   const auto doubtful = [](const char* verdict) {
     return verdict_of({{"verdict", json::parse(verdict)}}).doubtful;
   };
@@ -49,7 +49,7 @@ TEST(Verdict, IsInDoubtByItsKindOrByItsWordAlone) {
   EXPECT_FALSE(verdict_of(json::object()).doubtful);
 }
 
-TEST(Verdict, OfAJobInDoubtSaysSoOnce) {
+TEST(Verdict, UntrustedJobSaysSoOnce) {
   const auto words = [](const char* text) {
     return verdict_of({{"verdict", {{"kind", "early"}, {"words", text}, {"trusted", false}}}}).words;
   };
@@ -60,7 +60,7 @@ TEST(Verdict, OfAJobInDoubtSaysSoOnce) {
   EXPECT_EQ(words("a\x1b[2Jb"), "don't trust yet: a [2Jb");
 }
 
-TEST(ShownJob, TellsAllOfItsErrorsFigures) {
+TEST(ShownJob, ShowsAllErrorFigures) {
   json job = some_job();
   job["reference"] = {{"rmse", 0.0319}, {"relmse", 0.00443}, {"flip", 0.0271}};
   job["few_hits"] = 12;
@@ -76,7 +76,7 @@ TEST(ShownJob, TellsAllOfItsErrorsFigures) {
     EXPECT_THAT(shown, ContainsRegex(row));
 }
 
-TEST(ShownJob, NeverTellsNoughtOfWhatAReferenceCannotTell) {
+TEST(ShownJob, NeverShowsZeroForAnErrorBelowTheReferencesNoise) {
   json job = some_job();
   job["reference"] = {{"rmse", 0}, {"relmse", 0}, {"below_noise", true}, {"rmse_below_noise", true}};
 
@@ -89,7 +89,7 @@ TEST(ShownJob, NeverTellsNoughtOfWhatAReferenceCannotTell) {
   EXPECT_THAT(same, ContainsRegex("true relMSE +0 \\(not to be trusted: one seed\\)"));
 }
 
-TEST(ShownJob, LeavesOutWhatIsNotKnown) {
+TEST(ShownJob, LeavesOutUnknownFigures) {
   const std::string shown = job_text({{"id", "j-1"}, {"reference", nullptr}, {"few_hits", nullptr}});
 
   for (const char* row :
@@ -97,7 +97,7 @@ TEST(ShownJob, LeavesOutWhatIsNotKnown) {
     EXPECT_THAT(shown, Not(HasSubstr(row)));
 }
 
-TEST(ShownJob, InDoubtHasNoIntervalsAndTakesAtLeastSoLong) {
+TEST(ShownJob, UntrustedJobHasNoIntervalsAndAMinimumTime) {
   const std::string shown = job_text(untrusted_job());
 
   for (const char* row : {"relMSE +0.00418 \\(don't trust yet\\)", "RMSE +0.031 \\(don't trust yet\\)",
@@ -109,14 +109,14 @@ TEST(ShownJob, InDoubtHasNoIntervalsAndTakesAtLeastSoLong) {
   EXPECT_THAT(shown, Not(HasSubstr("-1.06"))) << "of the slope";
 }
 
-TEST(ShownJob, SamplesThatAreCountedTakeWhatTheyTakeInDoubtToo) {
+TEST(ShownJob, TimeLeftOfAJobThatEndsBySamplesIsExactEvenIfUntrusted) {
   json job = untrusted_job();
   job["target_error"] = nullptr;
   EXPECT_THAT(job_text(job), Not(HasSubstr("at least")));
   EXPECT_THAT(jobs_table({{"jobs", {job}}}), Not(HasSubstr("at least")));
 }
 
-TEST(ShownJob, SaysWhatEndsIt) {
+TEST(ShownJob, ShowsWhatEndsIt) {
   const auto samples = [](const char* fields) {
     json job = json::parse(fields);
     job.update({{"spp", 65536}, {"spp_done", 88}});
@@ -132,13 +132,13 @@ TEST(ShownJob, SaysWhatEndsIt) {
   EXPECT_THAT(samples("{}"), HasSubstr("88 of 65536")) << "an older coordinator";
 }
 
-TEST(JobsTable, MarksWhatIsNotToBeTrusted) {
+TEST(JobsTable, MarksUntrustedJobs) {
   EXPECT_THAT(jobs_table({{"jobs", {untrusted_job()}}}),
               ContainsRegex("at least 4:12 +bath.xml \\(don't trust its error yet\\)"));
   EXPECT_THAT(jobs_table({{"jobs", {some_job()}}}), Not(HasSubstr("trust")));
 }
 
-TEST(ProgressOfAJob, IsInDoubtWithItsVerdict) {
+TEST(ProgressOfAJob, IsUntrustedWithItsVerdict) {
   EXPECT_TRUE(progress_of(untrusted_job()).doubtful);
   EXPECT_FALSE(progress_of(some_job()).doubtful);
 }
@@ -150,7 +150,7 @@ std::string said_at_the_end(json job, bool quiet) {
   return testing::internal::GetCapturedStderr();
 }
 
-TEST(WatchedJob, SaysItsErrorAtItsEnd) {
+TEST(WatchedJob, ReportsItsErrorAtTheEnd) {
   EXPECT_EQ(said_at_the_end(some_job(), false), "relMSE 0.00418 (0.0039 to 0.00448)\n");
   json compared = some_job();
   compared["reference"] = {{"relmse", 0.00443}, {"flip", 0.0271}};
@@ -163,7 +163,7 @@ TEST(WatchedJob, SaysItsErrorAtItsEnd) {
   EXPECT_EQ(said_at_the_end({{"id", "j-1"}}, false), "") << "there is nothing to tell";
 }
 
-TEST(WatchedJob, SaysADoubtAlsoQuietly) {
+TEST(WatchedJob, QuietModeReportsDoubt) {
   for (const bool quiet : {false, true})
     EXPECT_EQ(said_at_the_end(untrusted_job(), quiet), std::string("relMSE 0.00418: ") + kWords + "\n");
   EXPECT_EQ(said_at_the_end({{"verdict", {{"trusted", false}, {"words", "all is black"}}}}, false),
@@ -172,7 +172,7 @@ TEST(WatchedJob, SaysADoubtAlsoQuietly) {
 
 constexpr const char* kAdvice = "still noisy; render on: lightshaft extend j-1 --spp 2048";
 
-TEST(ShownJob, InDoubtSaysWhatToDo) {
+TEST(ShownJob, UntrustedJobHasAdvice) {
   json job = untrusted_job();
   job["verdict"]["advice"] = kAdvice;
 
@@ -193,7 +193,7 @@ TEST(ShownJob, HasTheErrorOfTheDenoisedLayersFirst) {
   EXPECT_THAT(job_text(job), HasSubstr("0.0005 (a few pixels carry its noise: no interval)"));
 }
 
-TEST(ShownJob, SaysForWhichJobItWaitsAndOnceIfThatIsItsError) {
+TEST(ShownJob, NamesTheJobItWaitsForOnceEvenIfThatIsItsError) {
   json job = some_job();
   job["waits_for"] = "waits for job j-0, which is running";
   EXPECT_THAT(job_text(job), ContainsRegex("waits +waits for job j-0, which is running"));
@@ -221,7 +221,7 @@ TEST(ReportSummary, HasTheErrorOfTheDenoisedLayersFirst) {
               HasSubstr(", denoised relMSE 0.01 (0.009 to 0.011); as rendered relMSE 0.39 (0.2 to 0.8)"));
 }
 
-TEST(LocalReport, RendersOnByTheCommandThatMadeIt) {
+TEST(LocalReport, HasTheCommandThatContinuesIt) {
   const auto report = local_report(
       R"({"job": "j-7", "name": "/home/anna/ball.xml", "advice": "still noisy; render on: lightshaft extend j-7 --spp 256"})",
       {.instructions = fail(Errc::unavailable, "no counter")});
@@ -230,7 +230,7 @@ TEST(LocalReport, RendersOnByTheCommandThatMadeIt) {
   EXPECT_EQ((*report)["advice"], "still noisy; render on: lightshaft render ball.xml --spp 256");
 }
 
-TEST(ReportSummary, OfAnImageInDoubtHasNoInterval) {
+TEST(ReportSummary, UntrustedImageHasNoInterval) {
   json report = json::parse(R"({"spp": 64, "render_seconds": 9, "relmse": 0.39, "relmse_ci95": [0.2, 0.8],
     "trusted": false, "verdict_kind": "early", "verdict": "no sample has found light",
     "forecast": {"target": 0.2, "core_seconds": 60, "core_seconds_ci95": [50, 80]}})");
@@ -244,7 +244,7 @@ TEST(ReportSummary, OfAnImageInDoubtHasNoInterval) {
   EXPECT_THAT(report_summary(report), HasSubstr("relMSE 0.39 (0.2 to 0.8); 0.2 would cost 1:00 more"));
 }
 
-TEST(ReportSummary, SaysWhatTheReferenceCannotTell) {
+TEST(ReportSummary, ReportsErrorsBelowTheReferencesNoise) {
   json report = json::parse(R"({"spp": 64, "render_seconds": 9, "relmse": 0.39, "true_relmse": 0,
     "true_relmse_below_noise": true, "reference": {"same_seed": false}})");
 

@@ -4,7 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "common/command_line/command.h"
+#include "util/command_line/command.h"
 
 namespace ls {
 namespace {
@@ -21,7 +21,7 @@ const CommandOption& option(const Command& command, const std::string& name) {
   return none;
 }
 
-TEST(CommandLine, IsDescribedAsTheProgramReadsIt) {
+TEST(CommandLine, DescriptionMatchesTheParser) {
   CLI::App app("A program.", "program");
   app.footer("The end.");
   CLI::App* sub = app.add_subcommand("list", "lists");
@@ -58,7 +58,7 @@ Command with_help(const std::string& help) {
   return {"program", "A program.", "", {{{"--option"}, "N", {}, help, "", false, false}}, {}};
 }
 
-TEST(ManPage, KeepsSignsThatTroffReadsAsItsOwn) {
+TEST(ManPage, EscapesCharactersThatTroffInterprets) {
   const std::string page = man_page(with_help(".sh is a file\n'quoted' C:\\dir --x"), "1.0", "2026-01-31");
 
   EXPECT_THAT(page, HasSubstr("\n\\&.sh is a file\n\\&'quoted' C:\\edir \\-\\-x\n"));

@@ -1,5 +1,5 @@
 // Messages on wrong usage, and the help.
-#include "common/command_line/parse.h"
+#include "util/command_line/parse.h"
 
 #include <gmock/gmock.h>
 
@@ -41,13 +41,13 @@ class Usage : public ::testing::Test {
   unsigned number_ = 7;
 };
 
-TEST_F(Usage, SuggestsTheCommandThatWasMeant) {
+TEST_F(Usage, SuggestsTheMeantCommand) {
   EXPECT_EQ(message({"rendr", "scene.xml"}), "program has no command 'rendr'; did you mean 'render'?");
 }
-TEST_F(Usage, SuggestsTheCommandOfACommand) {
+TEST_F(Usage, SuggestsSubcommands) {
   EXPECT_EQ(message({"token", "revok"}), "program token has no command 'revok'; did you mean 'revoke'?");
 }
-TEST_F(Usage, SuggestsTheOptionThatWasMeant) {
+TEST_F(Usage, SuggestsTheMeantOption) {
   EXPECT_EQ(message({"render", "scene.xml", "--sp", "4"}),
             "program render has no option --sp; did you mean '--spp'?");
 }
@@ -55,14 +55,14 @@ TEST_F(Usage, SuggestsTheOptionOfAValueWithEqualsSign) {
   EXPECT_EQ(message({"render", "scene.xml", "--spo=4"}),
             "program render has no option --spo; did you mean '--spp'?");
 }
-TEST_F(Usage, SuggestsTheOnlyOptionThatBeginsSo) {
+TEST_F(Usage, SuggestsTheOnlyOptionWithThisPrefix) {
   EXPECT_EQ(message({"render", "scene.xml", "--target", ".1"}),
             "program render has no option --target; did you mean '--target-error'?");
 }
-TEST_F(Usage, SuggestsNothingForWhatIsLikeNoOther) {
+TEST_F(Usage, SuggestsNothingForUnrelatedWords) {
   EXPECT_EQ(message({"render", "scene.xml", "--wavelength"}), "program render has no option --wavelength");
 }
-TEST_F(Usage, NamesAnArgumentTooMany) {
+TEST_F(Usage, NamesAnExtraArgument) {
   EXPECT_EQ(message({"render", "scene.xml", "other.xml"}), "program render takes no argument 'other.xml'");
 }
 TEST_F(Usage, LeavesOtherErrorsToTheParser) {

@@ -1,6 +1,6 @@
 // Compares the estimated error of denoised images with their true error; the noise is synthetic, so the true
 // error can be computed. Also tests the denoised image of a film.
-#include "common/denoise/denoised_image.h"
+#include "util/denoise/denoised_image.h"
 
 #include <gtest/gtest.h>
 
@@ -99,7 +99,7 @@ void expect_right_on_average(const Denoise& denoise, double DenoisedError::*esti
   EXPECT_LT(5 * error, .05 * size) << "too few trials to tell";
 }
 
-TEST(DenoisedError, IsRightOnAverageWhateverTheDenoiserDoes) {
+TEST(DenoisedError, IsUnbiasedForEveryDenoiser) {
   for (const Denoise& denoise : kDenoisers) {
     expect_right_on_average(denoise, &DenoisedError::mse, &Trial::mse);
   }
@@ -111,7 +111,7 @@ TEST(DenoisedError, IsRightOnAverageWhateverTheDenoiserDoes) {
 // A correct 95 % interval covers the true error in 463 or more of 500 trials with a probability of 0.995: the
 // number of covered trials is binomial with mean 475 and standard deviation 4.87. Intervals that are too wide
 // also pass.
-TEST(DenoisedError, HasAnIntervalThatCovers) {
+TEST(DenoisedError, IntervalCoversTheTrueError) {
   constexpr int kTrials = 500;
   for (const Denoise& denoise : kDenoisers) {
     int covered = 0;

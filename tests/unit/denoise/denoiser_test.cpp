@@ -1,5 +1,5 @@
 // The denoising program, with fake libraries instead of Open Image Denoise (tests/support/fake_oidn.cpp).
-#include "common/denoise/denoiser.h"
+#include "util/denoise/denoiser.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ NoisyImage image(float first) {
   return out;
 }
 
-TEST(Denoiser, DenoisesEachImageWithItsOwnGuides) {
+TEST(Denoiser, UsesTheGuidesOfEachImage) {
   const auto denoiser = Denoiser::find(2, fake("blurs"));
   ASSERT_TRUE(denoiser) << denoiser.error().message;
   EXPECT_EQ(denoiser->name(), "Open Image Denoise 2.99.7");
@@ -47,7 +47,7 @@ TEST(Denoiser, DenoisesEachImageWithItsOwnGuides) {
   }
 }
 
-TEST(Denoiser, SaysHowToGetALibraryThatIsNotThere) {
+TEST(Denoiser, SaysHowToInstallAMissingLibrary) {
   const auto denoiser = Denoiser::find(1, "/no/such/libOpenImageDenoise.so.2");
 
   ASSERT_FALSE(denoiser);
@@ -63,14 +63,14 @@ TEST(Denoiser, RefusesVersion1) {
   EXPECT_THAT(denoiser.error().message, HasSubstr("version 2 is needed"));
 }
 
-TEST(Denoiser, SaysThatItsOwnProgramIsMissing) {
+TEST(Denoiser, ReportsItsMissingProgram) {
   const auto denoiser = Denoiser::find(1, fake("blurs"), "/no/such/lightshaft-denoise");
 
   ASSERT_FALSE(denoiser);
   EXPECT_THAT(denoiser.error().message, HasSubstr("/no/such/lightshaft-denoise: No such file"));
 }
 
-TEST(Denoiser, EndsALibraryThatHangs) {
+TEST(Denoiser, StopsALibraryThatHangs) {
   const auto denoiser =
       Denoiser::find(1, fake("hangs"), program_beside_us("lightshaft-denoise"), /*least_seconds=*/1);
   ASSERT_TRUE(denoiser) << denoiser.error().message;
@@ -89,7 +89,7 @@ struct Fault {
 };
 class DenoiserFault : public ::testing::TestWithParam<Fault> {};
 
-TEST_P(DenoiserFault, IsAnErrorAndNothingMore) {
+TEST_P(DenoiserFault, IsReportedAsAnError) {
   const auto denoiser = Denoiser::find(1, fake(GetParam().library));
   ASSERT_TRUE(denoiser) << denoiser.error().message;
   const std::vector<NoisyImage> images = {image(0)};

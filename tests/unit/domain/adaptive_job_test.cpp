@@ -5,7 +5,7 @@
 namespace ls::coordinator {
 namespace {
 
-TEST(Adaptive, TilesEndWhereTheirErrorsSayWhoeverRendersThem) {
+TEST(Adaptive, TilesStopByTheirErrorsWhicheverWorkerRenders) {
   const auto expected = stop_at_once(uneven_plan(.01).grid, kMaxSppWithoutLimit, .01, uneven_error_of);
   ASSERT_TRUE(expected.by_error);
   ASSERT_NE(*std::min_element(expected.ends.begin(), expected.ends.end()),
@@ -23,7 +23,7 @@ TEST(Adaptive, TilesEndWhereTheirErrorsSayWhoeverRendersThem) {
   }
 }
 
-TEST(Adaptive, HalvingTheTargetOfAFinishedJobGivesWhatItGivesAtOnce) {
+TEST(Adaptive, HalvingTheTargetOfAFinishedJobMatchesANewJobWithThatTarget) {
   Rig rig;
   rig.rel_error = uneven_error;
   rig.join("w", 4);
@@ -40,7 +40,7 @@ TEST(Adaptive, HalvingTheTargetOfAFinishedJobGivesWhatItGivesAtOnce) {
             stop_at_once(uneven_plan(.01).grid, kMaxSppWithoutLimit, .01, uneven_error_of).ends);
 }
 
-TEST(Adaptive, MoreSamplesForAFinishedJobMakeItOneBySamples) {
+TEST(Adaptive, AddingSamplesTurnsAFinishedJobIntoAJobBySamples) {
   Rig rig;
   rig.rel_error = uneven_error;
   rig.join("w", 4);
@@ -58,7 +58,7 @@ TEST(Adaptive, MoreSamplesForAFinishedJobMakeItOneBySamples) {
   for (TileIndex t = 0; t < 18; ++t) EXPECT_EQ(tile_figures(rig.farm, {"j"}, t)->spp, most + 10);
 }
 
-TEST(Adaptive, CheckpointsAreLevelsAndTheSameWhateverTheOrder) {
+TEST(Adaptive, CheckpointsAreLevelsAndIndependentOfTheOrderOfResults) {
   std::vector<std::vector<RoundIndex>> first;
   for (const int workers : {1, 5}) {
     Rig rig;
@@ -85,7 +85,7 @@ TEST(Adaptive, CheckpointsAreLevelsAndTheSameWhateverTheOrder) {
 // which the stop rule would request them. So only units that are out when the last level is reached, or were
 // leased just before, are rendered in vain. This holds for errors that fall as 1/n; with errors that fall
 // faster, as those of low-discrepancy samples do, the rule predicts too many rounds.
-TEST(Adaptive, FewUnitsAreRenderedInVain) {
+TEST(Adaptive, FewUnitsAreRenderedNeedlessly) {
   for (const auto [workers, threads] : {std::pair(1, 1), {1, 4}, {4, 1}, {3, 4}}) {
     Rig rig;
     rig.rel_error = [](const UnitKey& unit) {
@@ -102,7 +102,7 @@ TEST(Adaptive, FewUnitsAreRenderedInVain) {
 
 // A job whose speculative units have to wait until the worker has little else to do keeps its turn: leases of
 // other jobs in between would keep the worker busy.
-TEST(Adaptive, WhatIsOnlyForeseenKeepsItsJobsTurn) {
+TEST(Adaptive, SpeculativeUnitsKeepTheJobsTurn) {
   Rig rig;
   rig.rel_error = uneven_error;
   rig.cpu_seconds = .1;
@@ -125,7 +125,7 @@ TEST(Adaptive, WhatIsOnlyForeseenKeepsItsJobsTurn) {
 }
 
 // Leases of single units must not use up kMaxLeasesPerWorker while threads still idle.
-TEST(Adaptive, AWorkerOfManyThreadsIsKeptBusyByWhatIsForeseen) {
+TEST(Adaptive, SpeculativeUnitsKeepAWorkerOfManyThreadsBusy) {
   Rig rig;
   rig.rel_error = uneven_error;
   rig.join("w", 200);

@@ -44,7 +44,7 @@ TEST(StopGroups, HaveEnoughPixelsAndEveryTileOnce) {
   }
 }
 
-TEST(StopGroups, AreSingleTilesButForCutOnesAtTheEdge) {
+TEST(StopGroups, AreSingleTilesExceptTruncatedOnesAtTheEdge) {
   const auto groups = stop_groups({{1920, 1080}, 32});  // 60 x 33 whole tiles, and a row 24 pixels high
   EXPECT_EQ(groups.size(), 60u * 33u);
   EXPECT_EQ(groups[0], std::vector<TileIndex>{0});
@@ -53,7 +53,7 @@ TEST(StopGroups, AreSingleTilesButForCutOnesAtTheEdge) {
   EXPECT_EQ(stop_groups({{20, 20}, 32}).size(), 1u);
 }
 
-TEST(Level, IsTheNextOneOnTheGridBelow) {
+TEST(Level, IsRoundedDownToTheGrid) {
   const double step = std::exp2(-.25);
   std::mt19937_64 random(3);
   for (int i = 0; i < 10000; ++i) {
@@ -91,7 +91,7 @@ TEST(AdaptiveStop, SamplesGrowWithTheRootOfTheVariance) {
 
 // The least mean of n, under the condition mean(a/n) = T, is mean(sqrt a)^2 / T. The grids of rounds and
 // levels cost up to one round and one level more.
-TEST(AdaptiveStop, ReachesTheTargetAtHardlyMoreThanTheLeastCost) {
+TEST(AdaptiveStop, ReachesTheTargetNearTheMinimalCost) {
   std::mt19937_64 random(11);
   for (int i = 0; i < 50; ++i) {
     std::vector<double> a(40);
@@ -110,7 +110,7 @@ TEST(AdaptiveStop, ReachesTheTargetAtHardlyMoreThanTheLeastCost) {
 
 // The error after a tile's own last round would bias the decision towards stopping: however low it is, the
 // tile does not end earlier.
-TEST(AdaptiveStop, ATilesLastRoundHasNoSayInItsStop) {
+TEST(AdaptiveStop, LastRoundOfATileDoesNotDecideItsStop) {
   const auto honest = exact({2, 3});
   const auto out = stop_at_once(tiles_in_a_row(2), kMany, 5e-3, honest);
   const ErrorOf other = [&](TileIndex t, RoundIndex k) {
@@ -119,7 +119,7 @@ TEST(AdaptiveStop, ATilesLastRoundHasNoSayInItsStop) {
   EXPECT_EQ(stop_at_once(tiles_in_a_row(2), kMany, 5e-3, other).ends, out.ends);
 }
 
-TEST(AdaptiveStop, AnImageThatTurnsOutWorseThanPredictedGoesOn) {
+TEST(AdaptiveStop, ImageWorseThanPredictedContinues) {
   const auto honest = exact({2, 3});
   const auto out = stop_at_once(tiles_in_a_row(2), kMany, 5e-3, honest);
   const ErrorOf late = [&](TileIndex t, RoundIndex k) {  // one very bright sample comes in the last round
@@ -158,7 +158,7 @@ TEST(AdaptiveStop, TheOrderOfArrivalDoesNotMatter) {
   }
 }
 
-TEST(AdaptiveStop, ASmallerTargetGoesOnToWhereItWouldHaveEndedAtOnce) {
+TEST(AdaptiveStop, LoweredTargetEndsWhereANewJobWithItWouldEnd) {
   const TileGrid grid = tiles_in_a_row(20);
   std::mt19937_64 random(6);
   for (int i = 0; i < 100; ++i) {
@@ -175,14 +175,14 @@ TEST(AdaptiveStop, ASmallerTargetGoesOnToWhereItWouldHaveEndedAtOnce) {
   }
 }
 
-TEST(AdaptiveStop, WithoutAnswersAllSamplesAreTaken) {
+TEST(AdaptiveStop, WithoutErrorFiguresAllSamplesAreRendered) {
   const auto unknown = [](TileIndex t, RoundIndex) { return t == 1 ? std::nan("") : 0.; };
   const auto out = stop_at_once(tiles_in_a_row(3), 1000, 1e-3, unknown);
   EXPECT_FALSE(out.by_error);
   EXPECT_EQ(out.ends, std::vector<RoundIndex>(3, round_count(1000)));
 }
 
-TEST(AdaptiveStop, FewSamplesAreSimplyTaken) {
+TEST(AdaptiveStop, SmallSampleCountsAreRenderedCompletely) {
   for (const std::uint64_t spp : {2, 3, 16, 63, 64}) {
     const auto out = stop_at_once(tiles_in_a_row(2), spp, 1e3, exact({1, 1}));
     EXPECT_FALSE(out.by_error) << spp;
@@ -190,7 +190,7 @@ TEST(AdaptiveStop, FewSamplesAreSimplyTaken) {
   }
 }
 
-TEST(AdaptiveStop, ForeseesWhereItWillEnd) {
+TEST(AdaptiveStop, PredictsWhereItWillEnd) {
   const TileGrid grid = tiles_in_a_row(3);
   const auto error = exact({1, 9, 100});
   AdaptiveStop rule(grid, kMany);

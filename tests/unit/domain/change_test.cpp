@@ -27,7 +27,7 @@ TEST(Failure, OnlyAWorkerThatHoldsTheUnitCanFailIt) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Failure, AForgottenJobStillCountsAgainstTheWorkerThatFailedInIt) {
+TEST(Failure, FailureInARemovedJobStillCountsAgainstTheWorker) {
   Rig rig;
   rig.join("bad", 1);
   rig.join("good", 1);
@@ -43,7 +43,7 @@ TEST(Failure, AForgottenJobStillCountsAgainstTheWorkerThatFailedInIt) {
   EXPECT_EQ(rig.worker("bad").state, WorkerState::connected);
 }
 
-TEST(Time, PausedDoesNotCountAgainstTheBudget) {
+TEST(Time, PausedTimeDoesNotCount) {
   Rig rig;
   rig.join("w", 1);
   JobPlan plan = plan_of("j", 4, 4096);
@@ -66,7 +66,7 @@ TEST(Time, PausedDoesNotCountAgainstTheBudget) {
   EXPECT_EQ(rig.job().stopped, StopReason::time);
 }
 
-TEST(Time, DoesNotRunWhileAJobIsDone) {
+TEST(Time, StopsWhileAJobIsDone) {
   Rig rig;
   rig.join("w", 1);
   JobPlan plan = plan_of("j", 1, 4);
@@ -100,19 +100,19 @@ std::uint64_t spp_with(double target, std::optional<double> then) {
   return tile_figures(rig.farm, {"j"}, 0)->spp;
 }
 
-TEST(Target, ASmallerOneGivesWhatAJobThatHadItFromTheFirstGives) {
+TEST(Target, LoweredTargetMatchesAJobSubmittedWithThatTarget) {
   const std::uint64_t at_once = spp_with(1 / 1000.0, std::nullopt);
   EXPECT_GE(at_once, 1000u);
   EXPECT_EQ(spp_with(1 / 500.0, 1 / 1000.0), at_once);
 }
 
-TEST(Target, ALargerOneStopsTheJobWithTheNextRound) {
+TEST(Target, RaisedTargetStopsTheJobAfterTheNextRound) {
   const std::uint64_t spp = spp_with(1 / 5000.0, 1 / 64.0);
   EXPECT_GE(spp, 64u);
   EXPECT_LE(spp, 512u);
 }
 
-TEST(Target, IsKeptByAJobThatHasNoneOrCannotGoBack) {
+TEST(Target, JobWithoutATargetOrPastItRefusesANewOne) {
   Rig rig;
   rig.rel_error = one_over_n;
   rig.join("w", 1);
@@ -133,7 +133,7 @@ TEST(Target, IsKeptByAJobThatHasNoneOrCannotGoBack) {
   EXPECT_TRUE(rig.farm.retargeted({"j"}, .001).has_value());
 }
 
-TEST(Target, ALargerOneIsSafeAcrossARestart) {
+TEST(Target, RaisedTargetSurvivesARestart) {
   Rig before;
   before.rel_error = one_over_n;
   before.join("w", 1);
@@ -161,7 +161,7 @@ TEST(Target, ALargerOneIsSafeAcrossARestart) {
   EXPECT_EQ(after.job().units_folded, after.job().units_total);
 }
 
-TEST(Restart, ADoneJobWhoseFilmIsLostIsFoldedAgainAndExtended) {
+TEST(Restart, DoneJobWithoutAFilmIsFoldedAgainAndExtended) {
   const JobPlan plan = plan_of("j", 2, 6);
   Rig before;
   before.join("w", 1);
@@ -181,7 +181,7 @@ TEST(Restart, ADoneJobWhoseFilmIsLostIsFoldedAgainAndExtended) {
   EXPECT_EQ(tile_figures(after.farm, {"j"}, 1)->spp, 8u);
 }
 
-TEST(Figures, TellWhatTheQueueWillCost) {
+TEST(Figures, PredictTheCostOfTheQueue) {
   Rig rig;
   rig.cpu_seconds = 1;  // the cost of a unit of 2 samples in 64 pixels
   rig.join("w", 1);
@@ -197,7 +197,7 @@ TEST(Figures, TellWhatTheQueueWillCost) {
 }
 
 // The prediction of a job's remaining time uses these figures.
-TEST(Figures, CountAThreadByTheCoreThatItGets) {
+TEST(Figures, CountThreadsByTheirShareOfACore) {
   Rig rig;
   rig.cpu_seconds = 1;
   rig.join("w", 4);
@@ -215,7 +215,7 @@ TEST(Figures, CountAThreadByTheCoreThatItGets) {
 
 // A unit is not overdue if it is slow only because its worker shares the cores: a copy would be rendered in
 // vain.
-TEST(Figures, AWorkerThatSharesItsCoresIsExpectedLater) {
+TEST(Figures, WorkerThatSharesItsCoresGetsALaterDeadline) {
   for (const double wait : {0., 9.}) {
     Rig rig;
     rig.cpu_seconds = 1;
@@ -233,7 +233,7 @@ TEST(Figures, AWorkerThatSharesItsCoresIsExpectedLater) {
   }
 }
 
-TEST(Figures, TellWhoseThreadsWorkOnAJob) {
+TEST(Figures, CountTheThreadsOnAJob) {
   Rig rig(plan_of("j", 1000, 2), {{"w", 4}});
   EXPECT_EQ(rig.job().cores, 4);
   rig.join("v", 2);

@@ -38,14 +38,14 @@ std::vector<RoundIndex> ends_at(double target, int workers) {
   return ends_in(rig);
 }
 
-TEST(DenoisedJob, EndsAtTheSameLevelWhoeverRendersIt) {
+TEST(DenoisedJob, EndsAtTheSameLevelForAnyWorkers) {
   const auto expected = ends_at(kTarget, 1);
   EXPECT_NE(*std::min_element(expected.begin(), expected.end()),
             *std::max_element(expected.begin(), expected.end()));
   for (const int workers : {3, 8}) EXPECT_EQ(ends_at(kTarget, workers), expected) << workers;
 }
 
-TEST(DenoisedJob, WithoutNoiseEndsAtTheFirstCheck) {
+TEST(DenoisedJob, JobWithoutNoiseEndsAtTheFirstCheck) {
   Rig rig;
   rig.rel_error = [](const UnitKey&) { return 0.; };
   int checks = 0;
@@ -59,7 +59,7 @@ TEST(DenoisedJob, WithoutNoiseEndsAtTheFirstCheck) {
   EXPECT_EQ(checks, 1);
 }
 
-TEST(DenoisedJob, NothingMoreIsFoldedBeforeTheAnswer) {
+TEST(DenoisedJob, FoldsNothingMoreBeforeTheCheckIsAnswered) {
   Rig rig;
   rig.rel_error = uneven_error;
   rig.join("w", 4);
@@ -78,7 +78,7 @@ TEST(DenoisedJob, NothingMoreIsFoldedBeforeTheAnswer) {
   EXPECT_EQ(ends_in(rig), ends_at(kTarget, 1));
 }
 
-TEST(DenoisedJob, ASmallerTargetGivesWhatItGivesAtOnce) {
+TEST(DenoisedJob, LoweredTargetMatchesANewJobWithIt) {
   Rig rig;
   rig.rel_error = uneven_error;
   rig.denoised = upper_end_at;
@@ -94,7 +94,7 @@ TEST(DenoisedJob, ASmallerTargetGivesWhatItGivesAtOnce) {
   EXPECT_EQ(ends_in(rig), ends_at(kTarget, 1));
 }
 
-TEST(DenoisedJob, APausedJobAsksAgainWhenItIsResumed) {
+TEST(DenoisedJob, ResumedJobRepeatsItsPendingCheck) {
   Rig rig;
   rig.rel_error = uneven_error;
   rig.join("w", 4);
@@ -113,7 +113,7 @@ TEST(DenoisedJob, APausedJobAsksAgainWhenItIsResumed) {
 }
 
 // The coordinator may be killed at any moment. It then restores the folded rounds and the stored checks.
-TEST(DenoisedJob, ARestoredJobEndsWhereItWouldHaveEnded) {
+TEST(DenoisedJob, RestoredJobEndsAtTheSamePoint) {
   const auto expected = ends_at(kTarget, 1);
   for (const int units : {10, 80, 100, 120, 140, 160, 200}) {
     Rig first;

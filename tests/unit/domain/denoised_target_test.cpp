@@ -53,7 +53,7 @@ TEST(DenoisedTarget, EndsAtTheSecondCheckInSuccessionThatMeetsTheTarget) {
   EXPECT_EQ(at.size(), 5u) << "the second one was lucky";
 }
 
-TEST(DenoisedTarget, ChecksAreFarApartAndAtTheSameLevelsWhateverTheTarget) {
+TEST(DenoisedTarget, ChecksAreFarApartAndIndependentOfTheTarget) {
   DenoisedTarget rule, other;
   const auto at = checked(rule, levels(), kRuleTarget, [](double spp) { return 1 / spp; });
   const auto there = checked(other, levels(), kRuleTarget / 1e6, [](double) { return 1.; });
@@ -67,7 +67,7 @@ TEST(DenoisedTarget, ChecksAreFarApartAndAtTheSameLevelsWhateverTheTarget) {
   EXPECT_EQ(at.front(), 64);
 }
 
-TEST(DenoisedTarget, ACheckWithoutAnIntervalMeetsNoTarget) {
+TEST(DenoisedTarget, CheckWithoutAnIntervalDoesNotMeetTheTarget) {
   DenoisedTarget rule;
   bool ended = true;
   checked(
@@ -75,7 +75,7 @@ TEST(DenoisedTarget, ACheckWithoutAnIntervalMeetsNoTarget) {
   EXPECT_FALSE(ended);
 }
 
-TEST(DenoisedTarget, ASmallerTargetGoesOnFromTheLevelOfTheLargerOne) {
+TEST(DenoisedTarget, LoweredTargetContinuesFromTheOldTargetsLevel) {
   const auto error = [](double spp) { return 1 / spp; };
   DenoisedTarget at_once, raised;
   bool ended = false;
@@ -93,7 +93,7 @@ TEST(DenoisedTarget, ASmallerTargetGoesOnFromTheLevelOfTheLargerOne) {
   EXPECT_EQ(found, expected);
 }
 
-TEST(DenoisedTarget, StoredChecksDecideAgainWithoutBeingMadeAgain) {
+TEST(DenoisedTarget, StoredChecksDecideAgainAfterARestart) {
   DenoisedTarget first;
   bool ended = false;
   const auto at = checked(

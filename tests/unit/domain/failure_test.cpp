@@ -4,7 +4,7 @@
 namespace ls::coordinator {
 namespace {
 
-TEST(Failure, AUnitThatFailsOnThreeWorkersFailsTheJobWithPlaceAndReplay) {
+TEST(Failure, UnitThatFailsOnThreeWorkersFailsTheJobWithPlaceAndReplayCommand) {
   Rig rig;
   for (const char* name : {"a", "b", "c", "d"}) rig.join(name, 1);
   rig.submit(plan_of("j", 1, 2));
@@ -31,7 +31,7 @@ TEST(Failure, AUnitThatFailsOnThreeWorkersFailsTheJobWithPlaceAndReplay) {
                              testing::HasSubstr("lightshaft render SCENE --pixel 3,4 --sample 5")));
 }
 
-TEST(Failure, ALoneWorkerGetsASecondAttempt) {
+TEST(Failure, LoneWorkerGetsASecondAttempt) {
   Rig rig(plan_of("j", 1, 2), {{"a", 1}});
 
   rig.fail("a");
@@ -41,7 +41,7 @@ TEST(Failure, ALoneWorkerGetsASecondAttempt) {
   EXPECT_EQ(rig.job().state, JobState::failed);
 }
 
-TEST(Failure, OneWorkersWordThatTheSceneIsAtFaultFailsNoJob) {
+TEST(Failure, OneWorkersReportOfAFaultySceneDoesNotFailTheJob) {
   Rig rig(plan_of("j", 5, 2), {{"a", 1}, {"b", 1}});
 
   while (!rig.held[{"a"}].empty()) rig.fail("a", true);
@@ -51,7 +51,7 @@ TEST(Failure, OneWorkersWordThatTheSceneIsAtFaultFailsNoJob) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Failure, AsManyMustFindTheSceneAtFaultAsFailAnyUnit) {
+TEST(Failure, SceneFailsOnlyAfterAsManyReportsAsAnyUnit) {
   for (const int workers : {1, 2, 3, 4}) {
     Rig rig;
     for (int i = 0; i < workers; ++i) rig.join("w" + std::to_string(i), 1);
@@ -74,7 +74,7 @@ TEST(Failure, AsManyMustFindTheSceneAtFaultAsFailAnyUnit) {
   }
 }
 
-TEST(Failure, LosingWorkersCostsAUnitNothing) {
+TEST(Failure, LostWorkersDoNotCountAsFailuresOfAUnit) {
   Rig rig;
   rig.submit(plan_of("j", 1, 2));
 
@@ -99,7 +99,7 @@ std::vector<Effect> bad_worker_against(Rig& rig, const std::string& job) {
   return all;
 }
 
-TEST(Failure, AWorkerThatFailsThreeUnitsGetsNoMoreOfTheJob) {
+TEST(Failure, WorkerThatFailsThreeUnitsGetsNoMoreOfTheJob) {
   Rig rig;
   rig.join("bad", 1);
   rig.join("good", 1);
@@ -112,7 +112,7 @@ TEST(Failure, AWorkerThatFailsThreeUnitsGetsNoMoreOfTheJob) {
   EXPECT_EQ(rig.worker("bad").state, WorkerState::connected) << "one job alone says little";
 }
 
-TEST(Failure, AWorkerThatFailsInTwoJobsIsUnhealthyAndForgivenWithTime) {
+TEST(Failure, WorkerThatFailsInTwoJobsIsUnhealthyForAWhile) {
   Rig rig;
   rig.join("bad", 1);
   rig.join("good", 1);

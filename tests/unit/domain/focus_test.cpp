@@ -20,7 +20,7 @@ std::vector<TileIndex> next_tiles(Rig& rig, std::size_t count) {
   return tiles;
 }
 
-TEST(Focus, ItsTilesAreLeasedBeforeAllOthersUntilTheyHaveAllSamples) {
+TEST(Focus, TilesInTheFocusAreLeasedFirstUntilTheyHaveAllSamples) {
   Rig rig(plan_of("j", 100, 30), {{"w", 1}});  // 5 rounds
   rig.send(JobFocused{{"j"}, over_tiles(70, 71)});
 
@@ -33,7 +33,7 @@ TEST(Focus, ItsTilesAreLeasedBeforeAllOthersUntilTheyHaveAllSamples) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
-TEST(Focus, WithoutItTheOrderIsAsBefore) {
+TEST(Focus, RemovingItRestoresTheOrder) {
   Rig rig(plan_of("j", 100, 30), {{"w", 1}});
   const auto plain = next_tiles(rig, 20);
   Rig other(plan_of("j", 100, 30), {{"w", 1}});
@@ -44,7 +44,7 @@ TEST(Focus, WithoutItTheOrderIsAsBefore) {
 
 // The focus changes only the order of leases: the same units are folded, and every tile ends at the same
 // round.
-TEST(Focus, TheUnitsOfAnAdaptiveJobAreTheSameWithAndWithoutIt) {
+TEST(Focus, AdaptiveJobHasTheSameUnitsWithAndWithoutAFocus) {
   const auto units = [](const std::optional<PixelRect>& focus) {
     JobPlan plan = plan_of("j", 24, 4096);
     plan.grid = {{24 * 32, 32}, 32};
@@ -68,7 +68,7 @@ TEST(Focus, TheUnitsOfAnAdaptiveJobAreTheSameWithAndWithoutIt) {
   EXPECT_EQ(units(PixelRect{700, 0, 701, 1}), plain);
 }
 
-TEST(Focus, UnitsThatComeBackFollowItToo) {
+TEST(Focus, ReturnedUnitsFollowItToo) {
   Rig rig(plan_of("j", 40, 2), {{"lost", 2}});
   rig.lose("lost");
   rig.send(JobFocused{{"j"}, over_tiles(30, 30)});
@@ -77,7 +77,7 @@ TEST(Focus, UnitsThatComeBackFollowItToo) {
   EXPECT_EQ(leases[0].second.lease.units[0].tile, 30u);
 }
 
-TEST(Focus, IsPartOfThePlanThatIsStored) {
+TEST(Focus, IsStoredWithThePlan) {
   Rig rig(plan_of("j", 10, 8), {});
   const PixelRect focus = over_tiles(7, 8);
   rig.send(JobFocused{{"j"}, focus});

@@ -98,7 +98,7 @@ const Story kStories[] = {
      }},
 };
 
-TEST(Freed, UnitsSayWhy) {
+TEST(Freed, FreedUnitsHaveACause) {
   for (const Story& story : kStories) {
     Rig rig;
     const auto freed = of<UnitsFreed>(story.tell(rig));
@@ -109,7 +109,7 @@ TEST(Freed, UnitsSayWhy) {
   }
 }
 
-TEST(Freed, EveryCauseHasItsStory) {
+TEST(Freed, EveryCauseIsCountedInAScenario) {
   for (const auto& [cause, word] : kFreedCauses)
     EXPECT_TRUE(std::any_of(std::begin(kStories), std::end(kStories), [&](const Story& story) {
       return story.cause == cause;

@@ -18,7 +18,7 @@ std::pair<int, int> briefs(const std::vector<Effect>& effects) {
   return found;
 }
 
-TEST(Brief, ComesAgainWithTheNextLeaseAfterAWorkerHasGivenOneBack) {
+TEST(Brief, IsSentAgainWithTheNextLeaseAfterAWorkerReturnsALease) {
   Rig rig(plan_of("j", 3, 2), {{"w", 1}});
   const LeaseId with_brief = rig.held[{"w"}].front().lease;
   while (rig.held[{"w"}].front().lease == with_brief) rig.render("w");
@@ -31,7 +31,7 @@ TEST(Brief, ComesAgainWithTheNextLeaseAfterAWorkerHasGivenOneBack) {
   EXPECT_EQ(briefs(rig.pass(1s)), std::pair(1, 0));
 }
 
-TEST(Brief, AWorkerThatSaysItDoesNotKnowAJobWhoseBriefCameWithTheLeaseIsLeftAloneForLonger) {
+TEST(Brief, WorkerThatDisownsAJobDespiteItsBriefWaitsLonger) {
   Rig rig(plan_of("j", 1, 2), {{"w", 1}});
   std::vector<int> waited;
 
@@ -49,7 +49,7 @@ TEST(Brief, AWorkerThatSaysItDoesNotKnowAJobWhoseBriefCameWithTheLeaseIsLeftAlon
             "the job's brief came with the units");
 }
 
-TEST(Brief, ComesWithEachLeaseOfAWorkerThatRemembersNone) {
+TEST(Brief, IsSentWithEachLeaseToAWorkerWithoutMemory) {
   Rig rig;
   rig.brief_bytes = 0;
   rig.join("old", 1);
@@ -60,7 +60,7 @@ TEST(Brief, ComesWithEachLeaseOfAWorkerThatRemembersNone) {
   EXPECT_EQ(without, 0);
 }
 
-TEST(Brief, ComesAgainOnceTheWorkersMemoryNeededItsRoomForOthers) {
+TEST(Brief, IsSentAgainAfterOtherBriefsDisplacedIt) {
   Rig rig;
   rig.brief_bytes = 2 * memory_of(plan_of("a", 1, 2).brief);
   rig.join("w", 1);
@@ -79,7 +79,7 @@ TEST(Brief, ComesAgainOnceTheWorkersMemoryNeededItsRoomForOthers) {
   EXPECT_EQ(briefs(rig.send(JobResumed{{"first"}})).first, 1);
 }
 
-TEST(Fruitless, AJobWhoseOnlyWorkerGivesEverythingBackSaysSoWithTheReason) {
+TEST(Fruitless, JobSaysWhyItStandsStillIfItsOnlyWorkerReturnsAllUnits) {
   Rig rig(plan_of("j", 3, 2), {{"w", 1}});
   EXPECT_EQ(rig.farm.why_waiting({"j"}), "");
 
@@ -94,7 +94,7 @@ TEST(Fruitless, AJobWhoseOnlyWorkerGivesEverythingBackSaysSoWithTheReason) {
   EXPECT_EQ(rig.job().state, JobState::done) << "its disk has room again";
 }
 
-TEST(Fruitless, EachTimeAWorkerGivesUnitsBackItIsLeftAloneForLonger) {
+TEST(Fruitless, WorkerWaitsLongerEachTimeItReturnsUnits) {
   Rig rig(plan_of("j", 1, 2), {{"w", 1}});
   std::vector<int> waited;
 
@@ -110,7 +110,7 @@ TEST(Fruitless, EachTimeAWorkerGivesUnitsBackItIsLeftAloneForLonger) {
 
 // Results that bring the farm nothing: one that it has already, one of a unit that the job does not have, and
 // one of other samples than it needs.
-TEST(Fruitless, ResultsThatBringNothingDoNotMakeAWorkerLookAbleAgain) {
+TEST(Fruitless, UselessResultsDoNotRehabilitateAFruitlessWorker) {
   Rig rig(plan_of("j", 5, 2), {{"w", 1}});
   const Rig::Held old = rig.take("w");
   rig.result("w", old);
@@ -133,7 +133,7 @@ TEST(Fruitless, ResultsThatBringNothingDoNotMakeAWorkerLookAbleAgain) {
   }
 }
 
-TEST(Fruitless, ADuplicateDoesNotHideThatWorkersAreLostWithTheJob) {
+TEST(Fruitless, DuplicateResultDoesNotHideLostWorkers) {
   Rig rig(plan_of("j", 3, 2), {{"v0", 1}});
   const Rig::Held old = rig.take("v0");
   rig.result("v0", old);
@@ -146,7 +146,7 @@ TEST(Fruitless, ADuplicateDoesNotHideThatWorkersAreLostWithTheJob) {
   EXPECT_THAT(rig.farm.why_waiting({"j"}), HasSubstr("5 times in a row"));
 }
 
-TEST(Fruitless, AResultThatTheCoordinatorCouldNotKeepDoesNotTellAgainstItsWorker) {
+TEST(Fruitless, ResultThatCouldNotBeStoredDoesNotCountAgainstItsWorker) {
   Rig rig(plan_of("j", 1, 2), {{"w", 1}});
 
   for (int i = 0; i < 10; ++i) {
@@ -183,7 +183,7 @@ struct Audited {
   Rig rig;
 };
 
-TEST(Fruitless, AnAuditThatItsOnlyWorkerGivesBackAgainAndAgainIsDropped) {
+TEST(Fruitless, AuditIsDroppedIfItsOnlyWorkerKeepsReturningIt) {
   Audited audited;
   Rig& rig = audited.rig;
   ASSERT_EQ(rig.job().units_done, 2u);
@@ -200,7 +200,7 @@ TEST(Fruitless, AnAuditThatItsOnlyWorkerGivesBackAgainAndAgainIsDropped) {
   EXPECT_EQ(rig.farm.audits().dropped, 2u);
 }
 
-TEST(Fruitless, TheNextJobBeginsNoAuditsThatOnlySuchAWorkerCouldRender) {
+TEST(Fruitless, NextJobBeginsNoAuditsThatOnlyAFruitlessWorkerCouldRender) {
   Audited audited;
   Rig& rig = audited.rig;
   for (int i = 0; i < 20; ++i) rig.give_back("broken", kFull), rig.pass(1s);
@@ -218,7 +218,7 @@ TEST(Fruitless, TheNextJobBeginsNoAuditsThatOnlySuchAWorkerCouldRender) {
   EXPECT_EQ(rig.farm.audits().asked, before);
 }
 
-TEST(Fruitless, AResultMakesAWorkerOneThatIsWaitedForAgain) {
+TEST(Fruitless, WorkerIsNoLongerFruitlessAfterAResult) {
   Audited audited;
   Rig& rig = audited.rig;
   for (int i = 0; i < 20; ++i) rig.give_back("broken", kFull), rig.pass(1s);
@@ -231,7 +231,7 @@ TEST(Fruitless, AResultMakesAWorkerOneThatIsWaitedForAgain) {
 }
 
 // Each process takes the audit and is gone; the next one has another name.
-TEST(Fruitless, AnAuditIsDroppedAfterManyWorkersWereLostWithIt) {
+TEST(Fruitless, AuditIsDroppedAfterItLostManyWorkers) {
   Rig rig(plan_of("j", 1, 2), {{"healthy", 1}},
           {.lease_prefix = "t", .limits = {}, .audit_rate = 1, .audit_seed = 7});
   rig.join("v0", 1);
@@ -249,7 +249,7 @@ TEST(Fruitless, AnAuditIsDroppedAfterManyWorkersWereLostWithIt) {
   EXPECT_EQ(lost, static_cast<int>(kAuditLeases));
 }
 
-TEST(Fruitless, AJobSaysThatOneWorkerAfterTheOtherIsLostWithIt) {
+TEST(Fruitless, JobReportsThatItLosesOneWorkerAfterAnother) {
   Rig rig(plan_of("j", 3, 2), {{"v0", 1}});
 
   for (std::uint32_t i = 0; i < kLossesInARow; ++i) {
@@ -264,7 +264,7 @@ TEST(Fruitless, AJobSaysThatOneWorkerAfterTheOtherIsLostWithIt) {
   EXPECT_EQ(rig.farm.why_waiting({"j"}), "");
 }
 
-TEST(Fruitless, AWorkerThatRendersOtherJobsButNeverThisOneLosesItsUnits) {
+TEST(Fruitless, WorkerThatRendersOnlyOtherJobsLosesTheUnitsOfThisJob) {
   Rig rig(plan_of("j", 1, 2), {{"w", 1}});
   const LeaseId forgotten = rig.held[{"w"}].front().lease;
   rig.take("w");
@@ -282,7 +282,7 @@ TEST(Fruitless, AWorkerThatRendersOtherJobsButNeverThisOneLosesItsUnits) {
   EXPECT_LT(waited, 2 * kNoGrowthLimit);
 }
 
-TEST(Fruitless, AWorkerThatRendersNothingBindsNoNewJobToItsClass) {
+TEST(Fruitless, FruitlessWorkerPinsNoNewJobToItsClass) {
   Rig rig;
   rig.join("broken", 1, 2);
   rig.submit(plan_of("first", 1, 2));

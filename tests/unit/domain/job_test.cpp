@@ -41,7 +41,7 @@ TEST(Job, EarlyArrivalsWaitToBeFoldedInOrder) {
   EXPECT_THAT(rounds_folded(rig.result("w", units[3])), ElementsAre(3));
 }
 
-TEST(Job, ASecondEqualResultIsDropped) {
+TEST(Job, EqualSecondResultIsDropped) {
   Rig rig(plan_of("j", 2, 2), {{"w", 1}});
   const Rig::Held unit = rig.take("w");
   rig.result("w", unit);
@@ -55,7 +55,7 @@ TEST(Job, ASecondEqualResultIsDropped) {
   EXPECT_TRUE(of<Fold>(again).empty());
 }
 
-TEST(Job, ASecondDifferentResultIsEvidenceAndFailsTheJob) {
+TEST(Job, DifferingSecondResultIsStoredAsEvidenceAndFailsTheJob) {
   Rig rig(plan_of("j", 5, 2), {{"a", 1}, {"b", 1}}, {.lease_prefix = "t", .audit_rate = 1});
   const Rig::Held unit = rig.take("a");
   // The unit is audited by b
@@ -72,7 +72,7 @@ TEST(Job, ASecondDifferentResultIsEvidenceAndFailsTheJob) {
   EXPECT_THAT(of<JobFailed>(effects)[0].error, testing::HasSubstr("different bits"));
 }
 
-TEST(Job, ResultsNobodyAskedForAreDropped) {
+TEST(Job, UnrequestedResultsAreDropped) {
   Rig rig(plan_of("j", 2, 4), {{"w", 1}});
   const auto offer = [&](UnitKey key, SampleRange range) {
     return of<DropUnwanted>(rig.send(UnitAccepted{key, range, digest_number(1), {"w"}, 0.1})).size();
@@ -89,7 +89,7 @@ TEST(Job, ResultsNobodyAskedForAreDropped) {
   EXPECT_EQ(rig.job().units_done, 0u);
 }
 
-TEST(Job, PauseStopsLeasesResumeGoesOn) {
+TEST(Job, PauseStopsLeasesAndResumeContinues) {
   Rig rig(plan_of("j", 20, 2), {{"w", 1}});
   rig.send(JobPaused{{"j"}});
   EXPECT_EQ(rig.job().state, JobState::paused);
@@ -104,7 +104,7 @@ TEST(Job, PauseStopsLeasesResumeGoesOn) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Job, PauseTakesBackWhatIsNotBegunAndLeavesWhatIsInHand) {
+TEST(Job, PauseRecallsUnstartedUnitsAndKeepsStartedOnes) {
   Rig rig(plan_of("j", 200, 2), {{"w", 2}});
   for (int i = 0; i < 10; ++i) rig.render("w");
   ASSERT_GT(rig.worker("w").leases, 1u);
@@ -121,7 +121,7 @@ TEST(Job, PauseTakesBackWhatIsNotBegunAndLeavesWhatIsInHand) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Job, CancelTakesLeasesBackAtOnce) {
+TEST(Job, CancelRecallsLeasesAtOnce) {
   Rig rig(plan_of("j", 50, 2), {{"a", 2}, {"b", 2}});
 
   const auto effects = rig.send(JobCancelled{{"j"}});
@@ -134,7 +134,7 @@ TEST(Job, CancelTakesLeasesBackAtOnce) {
   EXPECT_TRUE(jobs_of(rig.farm).empty());
 }
 
-TEST(Job, TheUserMayStopItWithWhatIsLeased) {
+TEST(Job, StopKeepsLeasedUnits) {
   Rig rig(plan_of("j", 4, 1024), {{"w", 1}});
   for (int i = 0; i < 30; ++i) rig.render("w");
 
@@ -147,7 +147,7 @@ TEST(Job, TheUserMayStopItWithWhatIsLeased) {
   EXPECT_EQ(rig.job().units_folded, rig.job().units_total);
 }
 
-TEST(Extend, AFinishedJobGoesOnWithItsCutRoundRenderedAgainInFull) {
+TEST(Extend, FinishedJobContinuesWithItsTruncatedRoundRenderedInFull) {
   Rig rig;
   rig.join("w", 2);
   rig.submit(plan_of("j", 3, 6));  // rounds [0,2) [2,4) [4,6): the last one is truncated from [4,8)
@@ -170,7 +170,7 @@ TEST(Extend, AFinishedJobGoesOnWithItsCutRoundRenderedAgainInFull) {
   EXPECT_EQ(tile_figures(rig.farm, {"j"}, 0)->spp, 16u);
 }
 
-TEST(Extend, ARunningJobsCutRoundIsTakenBackFromWorkers) {
+TEST(Extend, TruncatedRoundOfARunningJobIsRecalled) {
   Rig rig(plan_of("j", 3, 6), {{"w", 2}});
   while (rig.job().rounds_complete < 2) rig.render("w");
   rig.render("w");  // one unit of a truncated round is folded, others are leased
@@ -186,7 +186,7 @@ TEST(Extend, ARunningJobsCutRoundIsTakenBackFromWorkers) {
   EXPECT_EQ(tile_figures(rig.farm, {"j"}, 2)->spp, 8u);
 }
 
-TEST(Extend, ToNoMoreThanThereIsChangesNothing) {
+TEST(Extend, ExtendingToThePresentSamplesChangesNothing) {
   Rig rig(plan_of("j", 3, 6), {{"w", 2}});
   rig.render_all();
 
@@ -205,7 +205,7 @@ JobRestored stored(const Rig& rig, const JobPlan& plan, const std::vector<Effect
   return restored;
 }
 
-TEST(Restart, NothingAcceptedIsLostOrRenderedTwice) {
+TEST(Restart, AcceptedResultsAreNeitherLostNorRenderedTwice) {
   const JobPlan plan = plan_of("j", 5, 40);
   Rig before;
   before.join("w", 2);
@@ -226,7 +226,7 @@ TEST(Restart, NothingAcceptedIsLostOrRenderedTwice) {
   EXPECT_EQ(after.job().state, JobState::done);
 }
 
-TEST(Restart, WithoutAFilmEverythingAcceptedIsFoldedAgain) {
+TEST(Restart, AcceptedResultsAreFoldedAgainWithoutAFilm) {
   const JobPlan plan = plan_of("j", 2, 4);
   Rig before;
   before.join("w", 1);
@@ -243,7 +243,7 @@ TEST(Restart, WithoutAFilmEverythingAcceptedIsFoldedAgain) {
   EXPECT_EQ(after.job().state, JobState::done);
 }
 
-TEST(Restart, ADoneJobStaysDoneAndCanBeExtended) {
+TEST(Restart, DoneJobStaysDoneAndCanBeExtended) {
   const JobPlan plan = plan_of("j", 2, 6);
   Rig before;
   before.join("w", 1);
@@ -261,7 +261,7 @@ TEST(Restart, ADoneJobStaysDoneAndCanBeExtended) {
   EXPECT_EQ(tile_figures(after.farm, {"j"}, 1)->spp, 8u);
 }
 
-TEST(Plan, RefusesWhatIsTooLargeOrMeaningless) {
+TEST(Plan, RefusesTooLargeAndMeaninglessPlans) {
   EXPECT_TRUE(check_plan(plan_of("j", 4, 64)).has_value());
   EXPECT_EQ(check_plan(plan_of("j", 4, std::uint64_t{1} << 60)).error().code, Errc::invalid_argument);
   JobPlan plan = plan_of("j", 4, 64);

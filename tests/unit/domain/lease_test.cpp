@@ -14,7 +14,7 @@ std::vector<LeaseUnit> units_of(const std::vector<Effect>& effects, const std::s
   return units;
 }
 
-TEST(Lease, PreviewsComeFirstEveryTileOnceBeforeAnyTwice) {
+TEST(Lease, EveryTileIsRenderedOnceBeforeAnyTwice) {
   Rig rig(plan_of("j", 10, 8), {{"w", 2}});
 
   std::vector<RoundIndex> rounds;
@@ -27,7 +27,7 @@ TEST(Lease, PreviewsComeFirstEveryTileOnceBeforeAnyTwice) {
   EXPECT_TRUE(std::is_sorted(rounds.begin(), rounds.end()));
 }
 
-TEST(Lease, TheBriefTravelsOnceAStreamAndAgainAfterReconnecting) {
+TEST(Lease, BriefIsSentOncePerStreamAndAgainAfterAReconnect) {
   Rig rig;
   rig.join("w", 1);
   auto leases = sent<AssignLease>(rig.submit(plan_of("j", 50, 8)));
@@ -68,7 +68,7 @@ TEST(Lease, LaterLeasesLastAboutTheTargetTime) {
   EXPECT_LE(largest, 81u) << "a sum of 80 rounded costs may stay a little short of 2 s";
 }
 
-TEST(Lease, NoLeaseExceedsTheLimitHoweverCheapUnitsAre) {
+TEST(Lease, CheapUnitsDoNotExceedTheLeaseLimit) {
   Rig rig;
   rig.cpu_seconds = 0;
   rig.join("w", 64);
@@ -95,7 +95,7 @@ TEST(Lease, ShrinksAtTheTail) {
   EXPECT_EQ(sizes.back(), 1u);
 }
 
-TEST(Lease, TwoLeasesWaitBehindTheOneThatIsRendered) {
+TEST(Lease, TwoLeasesWaitBehindTheRunningOne) {
   Rig rig;
   rig.cpu_seconds = 0.5;
   rig.join("w", 1);
@@ -116,7 +116,7 @@ TEST(Lease, SmallWorkIsSpreadOverIdleWorkers) {
   for (const char* name : {"a", "b", "c", "d"}) EXPECT_EQ(rig.worker(name).units_out, 2u) << name;
 }
 
-TEST(Lease, HigherPriorityGoesFirstThenThoseThatHaveHadLess) {
+TEST(Lease, HigherPriorityGoesFirstThenUsersWithLessTime) {
   Rig rig;
   for (const auto& [id, priority] : {std::pair{"low", 0}, {"high", 5}, {"late", 0}}) {
     JobPlan plan = plan_of(id, 3, 2);
@@ -148,7 +148,7 @@ TEST(Lease, PriorityMayChangeLater) {
   EXPECT_EQ(rig.held[{"w"}].front().job.value, "second");
 }
 
-TEST(Lease, AJobIsPinnedToTheNumericClassOfItsFirstLease) {
+TEST(Lease, JobIsPinnedToTheNumericClassOfItsFirstLease) {
   Rig rig;
   rig.join("a", 1, 1);
   const auto pinned = of<JobPinned>(rig.submit(plan_of("j", 100, 64)));
@@ -164,7 +164,7 @@ TEST(Lease, AJobIsPinnedToTheNumericClassOfItsFirstLease) {
   EXPECT_EQ(rig.farm.why_waiting({"j"}), "b is of another numeric class, 020000000000");
 }
 
-TEST(Lease, TagsOfTheJobMustBeTheWorkers) {
+TEST(Lease, WorkerNeedsAllTagsOfTheJob) {
   Rig rig;
   JobPlan plan = plan_of("j", 4, 2);
   plan.tags = {"vdb", "big"};
@@ -178,7 +178,7 @@ TEST(Lease, TagsOfTheJobMustBeTheWorkers) {
   EXPECT_GT(rig.worker("right").units_out, 0u);
 }
 
-TEST(Lease, ADrainingWorkerGetsNoMoreAndItsRestGoesToOthers) {
+TEST(Lease, DrainingWorkerGetsNoMoreUnitsAndOthersGetItsRest) {
   Rig rig(plan_of("j", 3, 2), {{"a", 1}});
   rig.send(WorkerDrains{{"a"}});
   rig.render("a");
@@ -197,7 +197,7 @@ TEST(Lease, ADrainingWorkerGetsNoMoreAndItsRestGoesToOthers) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Lease, AWorkerThatGivesALeaseBackGetsNoneBeforeTheNextTick) {
+TEST(Lease, WorkerThatReturnsALeaseGetsNoneBeforeTheNextTick) {
   Rig rig(plan_of("j", 1, 2), {{"a", 1}});
   const Rig::Held unit = rig.take("a");
 
@@ -207,7 +207,7 @@ TEST(Lease, AWorkerThatGivesALeaseBackGetsNoneBeforeTheNextTick) {
   EXPECT_EQ(units_of(rig.pass(1s), "a").size(), 1u);
 }
 
-TEST(Lease, ALostWorkersUnitsGoToOthersForFree) {
+TEST(Lease, UnitsOfALostWorkerGoToOthersWithoutAPenalty) {
   Rig rig(plan_of("j", 4, 2), {{"a", 2}});
   rig.join("b", 2);
 
@@ -223,7 +223,7 @@ TEST(Lease, ALostWorkersUnitsGoToOthersForFree) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Lease, AStaleStreamsEndMeansNothing) {
+TEST(Lease, EndOfAStaleStreamHasNoEffect) {
   Rig rig;
   rig.join("a", 1);  // epoch 1
   rig.join("a", 1);  // epoch 2: replaces the first
@@ -235,7 +235,7 @@ TEST(Lease, AStaleStreamsEndMeansNothing) {
   EXPECT_GT(rig.worker("a").units_out, 0u);
 }
 
-TEST(Deadline, ExpiredUnitsAreRenderedByOthersAndTheLateResultStillCounts) {
+TEST(Deadline, OtherWorkersRenderExpiredUnitsAndALateResultStillCounts) {
   Rig rig(plan_of("j", 1, 2), {{"slow", 1}});
   const Rig::Held unit = rig.take("slow");
   rig.pass(kDeadlineSlack + kLoadSlack);
@@ -251,7 +251,7 @@ TEST(Deadline, ExpiredUnitsAreRenderedByOthersAndTheLateResultStillCounts) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Deadline, ProgressRenewsItButNotForever) {
+TEST(Deadline, ProgressExtendsItOnlyUpToALimit) {
   Rig rig(plan_of("j", 1, 2), {{"w", 1}});
   const LeaseId lease = rig.held[{"w"}].front().lease;
 
@@ -265,7 +265,7 @@ TEST(Deadline, ProgressRenewsItButNotForever) {
   EXPECT_LE(waited, kNoGrowthLimit + kDeadlineSlack + kLoadSlack + 1s);
 }
 
-TEST(Deadline, IsRenewedByItsHolderAndByItsFullNameAlone) {
+TEST(Deadline, OnlyItsHolderRenewsItByTheFullName) {
   for (const bool by_another : {true, false}) {
     Rig rig(plan_of("j", 1, 2), {{"w", 1}});
     const LeaseId held = rig.held[{"w"}].front().lease;
@@ -322,7 +322,7 @@ void run_dry(Rig& rig, double cpu_seconds, double fast_seconds) {
   while (rig.worker("fast").units_out > 0 && rig.worker("slow").units_out > 1) rig.render("fast");
 }
 
-TEST(TakingBack, AnIdleWorkerGetsWhatHasNotBeenBegunElsewhere) {
+TEST(TakingBack, IdleWorkerGetsUnstartedUnitsOfOthers) {
   Rig rig;
   run_dry(rig, .5, .001);  // nothing is overdue yet: kSpeculateSlack
   EXPECT_EQ(rig.worker("slow").units_out, 1u) << "what it is rendering stays";
@@ -333,7 +333,7 @@ TEST(TakingBack, AnIdleWorkerGetsWhatHasNotBeenBegunElsewhere) {
   EXPECT_EQ(rig.job().units_done, 8u);
 }
 
-TEST(TakingBack, TheWorkerThatWaitedIsToldAndAResultThatComesAllTheSameCounts) {
+TEST(TakingBack, WaitingWorkerIsNotifiedAndItsLateResultStillCounts) {
   Rig rig;
   rig.cpu_seconds = .5;  // nothing is overdue yet: kSpeculateSlack
   rig.join("slow", 1);
@@ -360,7 +360,7 @@ TEST(TakingBack, TheWorkerThatWaitedIsToldAndAResultThatComesAllTheSameCounts) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(TakingBack, WorkThatWillBeBegunAtOnceStaysWhereItIs) {
+TEST(TakingBack, WorkThatStartsSoonIsNotRecalled) {
   // "slow" holds three units; the last one waits for the two others.
   for (const auto& [share, stays] : {std::pair{.45, 3u}, {.55, 2u}}) {
     Rig rig;
@@ -375,7 +375,7 @@ TEST(TakingBack, WorkThatWillBeBegunAtOnceStaysWhereItIs) {
   }
 }
 
-TEST(TakingBack, AWorkerThatHasNotLoadedTheJobTakesNothing) {
+TEST(TakingBack, WorkerWithoutTheJobsWorldGetsNoRecalledUnits) {
   Rig rig;
   rig.cpu_seconds = .5;  // nothing is overdue yet: kSpeculateSlack
   rig.join("slow", 1);
@@ -389,7 +389,7 @@ TEST(TakingBack, AWorkerThatHasNotLoadedTheJobTakesNothing) {
   EXPECT_EQ(rig.worker("slow").units_out, waiting);
 }
 
-TEST(Speculation, AnIdleWorkerCopiesOverdueUnitsOnce) {
+TEST(Speculation, IdleWorkerCopiesOverdueUnitsOnce) {
   Rig rig(plan_of("j", 1, 2), {{"slow", 1}});
   rig.join("idle", 1);
   rig.join("idle2", 1);

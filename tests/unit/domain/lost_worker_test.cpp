@@ -9,7 +9,7 @@ using namespace std::chrono_literals;
 std::string name(std::size_t i) { return "w-" + std::to_string(i); }
 
 // Otherwise one who joins and leaves again and again fills the table of workers, and no worker can join.
-TEST(LostWorkers, OfThoseThatNeverRenderedFewAreRemembered) {
+TEST(LostWorkers, FewWorkersThatNeverRenderedAreRemembered) {
   Rig rig;
   for (std::size_t i = 0; i < kLostNewcomersKept; ++i) {
     rig.join(name(i), 1);
@@ -25,7 +25,7 @@ TEST(LostWorkers, OfThoseThatNeverRenderedFewAreRemembered) {
   EXPECT_TRUE(rig.farm.worker({name(1)}));
 }
 
-TEST(LostWorkers, OneThatCameBackIsNotForgotten) {
+TEST(LostWorkers, ReturnedWorkerIsNotForgotten) {
   Rig rig;
   rig.join("returns", 1);
   rig.lose("returns");
@@ -39,7 +39,7 @@ TEST(LostWorkers, OneThatCameBackIsNotForgotten) {
   EXPECT_EQ(rig.worker("returns").state, WorkerState::connected);
 }
 
-TEST(LostWorkers, ThoseThatRenderedOrFailedAreRememberedForAnHour) {
+TEST(LostWorkers, WorkersThatRenderedOrFailedAreRememberedForAnHour) {
   Rig rig(plan_of("j", 4, 64), {{"renders", 1}, {"fails", 1}});
   rig.render("renders");
   rig.fail("fails");
@@ -57,7 +57,7 @@ TEST(LostWorkers, ThoseThatRenderedOrFailedAreRememberedForAnHour) {
   EXPECT_FALSE(rig.farm.worker({"renders"}));
 }
 
-TEST(FailureIsNew, OnlyOfAUnitThatTheWorkerHolds) {
+TEST(FailureIsNew, IsTrueOnlyForAUnitThatTheWorkerHolds) {
   Rig rig(plan_of("j", 4, 64), {{"holder", 1}});
   rig.join("other", 1, 2);
   const Rig::Held unit = rig.held[{"holder"}].front();
@@ -70,7 +70,7 @@ TEST(FailureIsNew, OnlyOfAUnitThatTheWorkerHolds) {
   EXPECT_FALSE(rig.farm.failure_is_new({"holder"}, {{"j"}, 0, 4'000'000'000}));
 }
 
-TEST(FailureIsNew, NotOnceTheWorkerIsBlocked) {
+TEST(FailureIsNew, IsFalseOnceTheWorkerIsBlocked) {
   Rig rig(plan_of("j", 16, 64), {{"clumsy", 1}, {"second", 1}, {"third", 1}, {"fourth", 1}});
   std::size_t told = 0;
   while (!rig.held[{"clumsy"}].empty()) {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "common/base/overloaded.h"
+#include "core/base/overloaded.h"
 
 namespace ls::coordinator {
 namespace {

@@ -9,9 +9,9 @@ constexpr int kHours = 12;
 constexpr int kHours = 96;
 #endif
 
-// Thirty days: tests/bench/month.cpp. The sizes are read every hour. Sizes of
+// Thirty days: bench/month.cpp. The sizes are read every hour. Sizes of
 // what is in flight scatter, by less than half of the largest value of many hours.
-TEST(Month, FourDaysKeepEveryInvariantAndNothingGrows) {
+TEST(Month, FourDaysKeepEveryInvariantWithoutGrowingMemory) {
   Month month(1);
   // Largest sizes in the first and in the second half of the time
   std::map<std::string, std::pair<std::size_t, std::size_t>> most;

@@ -8,7 +8,7 @@ Farm::Options audited(double rate) {
   return {.lease_prefix = "t", .limits = {}, .audit_rate = rate, .audit_seed = 7};
 }
 
-TEST(Pin, AWorkerThatIsAloneOfItsClassPinsNoJobThatOthersCanCheck) {
+TEST(Pin, LoneWorkerOfAClassPinsNoJobThatAnotherClassCanAudit) {
   Rig rig(audited(.01));
   rig.join("x", 1, 9);
   for (const char* name : {"a", "b", "c"}) rig.join(name, 1, 1);
@@ -21,7 +21,7 @@ TEST(Pin, AWorkerThatIsAloneOfItsClassPinsNoJobThatOthersCanCheck) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
-TEST(Pin, AWorkerThatIsAloneRendersWhereNoOtherClassHasTwoAndTheEndSaysSo) {
+TEST(Pin, LoneWorkerRendersIfNoClassHasTwoWorkersAndTheReportSaysSo) {
   Rig rig(audited(1));
   rig.join("x", 1, 9);
   rig.join("a", 1, 1);
@@ -35,7 +35,7 @@ TEST(Pin, AWorkerThatIsAloneRendersWhereNoOtherClassHasTwoAndTheEndSaysSo) {
   EXPECT_EQ(rig.farm.audits().missed, 4u);
 }
 
-TEST(Pin, WhereNothingIsAuditedTheFirstWorkerPins) {
+TEST(Pin, FirstWorkerPinsIfNothingIsAudited) {
   Rig rig(audited(0));
   rig.join("x", 1, 9);
   for (const char* name : {"a", "b"}) rig.join(name, 1, 1);
@@ -45,7 +45,7 @@ TEST(Pin, WhereNothingIsAuditedTheFirstWorkerPins) {
   EXPECT_EQ(rig.job().numeric_class, digest_number(9));
 }
 
-TEST(Pin, AWorkerOfAnotherVersionFinishesJobsOfItsClassAndBeginsNone) {
+TEST(Pin, WorkerOfAnotherVersionFinishesJobsOfItsClassButBeginsNone) {
   Rig rig;
   rig.join("old", 1, 1);
   rig.submit(plan_of("begun", 2, 2));
@@ -67,7 +67,7 @@ TEST(Pin, AWorkerOfAnotherVersionFinishesJobsOfItsClassAndBeginsNone) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
-TEST(Pin, WorkersThatMayNotBeginAJobGetItsUnitsAsSoonAsItHasTheirClass) {
+TEST(Pin, WorkersThatMayNotBeginAJobGetUnitsOnceItIsPinnedToTheirClass) {
   for (const bool chosen : {true, false}) {
     Rig rig;
     rig.join_another_version("old", 1, 1);
@@ -84,7 +84,7 @@ TEST(Pin, WorkersThatMayNotBeginAJobGetItsUnitsAsSoonAsItHasTheirClass) {
   }
 }
 
-TEST(Pin, TheClassOfTheFirstResultToBeStoredIsThatOfTheJob) {
+TEST(Pin, FirstStoredResultDecidesTheClass) {
   Rig rig(audited(0));
   rig.submit(plan_of("j", 4, 2));
   EXPECT_FALSE(rig.farm.wanted({{"j"}, 0, 0}, digest_number(1)).pinned);
@@ -100,7 +100,7 @@ TEST(Pin, TheClassOfTheFirstResultToBeStoredIsThatOfTheJob) {
 }
 
 // Two streams of a made-up class take the first leases of a job and never deliver.
-TEST(Pin, AClassWhoseLeasesAreGoneWithoutAResultIsGivenUp) {
+TEST(Pin, ClassWhoseLeasesEndedWithoutAResultIsGivenUp) {
   Rig rig;
   rig.join("x1", 64, 9);
   rig.join("x2", 64, 9);
@@ -118,7 +118,7 @@ TEST(Pin, AClassWhoseLeasesAreGoneWithoutAResultIsGivenUp) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
-TEST(Pin, AClassIsNotPassedOverForOneOfItsWorkersThatBringsNoResult) {
+TEST(Pin, OneFruitlessWorkerDoesNotExcludeItsClass) {
   Rig rig;
   rig.join("broken", 1, 1);
   rig.submit(plan_of("j", 1, 2));
@@ -133,7 +133,7 @@ TEST(Pin, AClassIsNotPassedOverForOneOfItsWorkersThatBringsNoResult) {
 }
 
 // One process takes the job's only unit again and again, each time as a new worker, and leaves with it.
-TEST(Pin, AClassIsPassedOverAfterSeveralOfItsWorkersHaveBroughtNoResult) {
+TEST(Pin, ClassIsSkippedAfterSeveralOfItsWorkersReturnNoResult) {
   Rig rig;
   rig.join("x0", 1, 9);
   rig.submit(plan_of("j", 1, 2));
@@ -154,7 +154,7 @@ TEST(Pin, AClassIsPassedOverAfterSeveralOfItsWorkersHaveBroughtNoResult) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
-TEST(Pin, AClassThatBringsNoResultForLongGivesWayToAnIdleWorkerOfAnother) {
+TEST(Pin, ClassWithoutResultsForLongIsReplacedByAnIdleWorkersClass) {
   for (const bool others : {true, false}) {
     Rig rig;
     rig.join("x1", 64, 9);
@@ -181,7 +181,7 @@ void report(Rig& rig, const char* name) {
   rig.send(progress);
 }
 
-TEST(Pin, AJobThatTakesLongToLoadIsNotTakenFromOneOfTwoClassesAfterTheOtherForEver) {
+TEST(Pin, SlowToLoadJobDoesNotAlternateBetweenTwoClasses) {
   Rig rig;
   rig.join("a", 1, 1);
   rig.join("b", 1, 9);
@@ -197,7 +197,7 @@ TEST(Pin, AJobThatTakesLongToLoadIsNotTakenFromOneOfTwoClassesAfterTheOtherForEv
   EXPECT_EQ(audit(rig.farm), "");
 }
 
-TEST(Pin, TheTimeInWhichAJobIsPausedDoesNotTellAgainstItsClass) {
+TEST(Pin, PausedTimeDoesNotCountAgainstTheJobsClass) {
   Rig rig;
   rig.join("a", 1, 1);
   rig.submit(plan_of("j", 4, 2));
@@ -211,7 +211,7 @@ TEST(Pin, TheTimeInWhichAJobIsPausedDoesNotTellAgainstItsClass) {
   EXPECT_EQ(rig.job().numeric_class, digest_number(1));
 }
 
-TEST(Pin, AClassOfWhichAResultWasAcceptedStays) {
+TEST(Pin, ClassWithAnAcceptedResultStays) {
   Rig rig;
   rig.join("a", 1, 1);
   rig.submit(plan_of("j", 40, 2));
@@ -225,7 +225,7 @@ TEST(Pin, AClassOfWhichAResultWasAcceptedStays) {
   EXPECT_TRUE(rig.held[{"b"}].empty());
 }
 
-TEST(Pin, ANewJobGoesToIdleWorkersOfAClassThatHasDelivered) {
+TEST(Pin, NewJobGoesToIdleWorkersOfAProvenClass) {
   for (const double rate : {0., .01}) {
     Rig rig(audited(rate));
     rig.join("honest", 1, 1);
@@ -247,7 +247,7 @@ TEST(Pin, ANewJobGoesToIdleWorkersOfAClassThatHasDelivered) {
 }
 
 // Its unit fails on the only worker of the class that has delivered; the other class must get its turn.
-TEST(Pin, AFailedUnitGoesToAnotherClassIfNoResultWasAccepted) {
+TEST(Pin, FailedUnitGoesToAnotherClassIfNoResultWasAccepted) {
   Rig rig;
   rig.join("honest", 1, 1);
   rig.submit(plan_of("first", 1, 2));
@@ -262,7 +262,7 @@ TEST(Pin, AFailedUnitGoesToAnotherClassIfNoResultWasAccepted) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
-TEST(Pin, AJobThatAsksForAClassWaitsForItAndSaysWhatThereIs) {
+TEST(Pin, JobThatRequestsAClassWaitsForItAndListsThePresentOnes) {
   for (const std::string asked : {digest_number(9).hex().substr(0, 12), std::string("armv8-a:gcc-14")}) {
     Rig rig(audited(.01));
     for (const char* name : {"a", "b"}) rig.join_of_platform(name, 1, 1, "x86-64-v3:gcc-12.2.0");
@@ -283,7 +283,7 @@ TEST(Pin, AJobThatAsksForAClassWaitsForItAndSaysWhatThereIs) {
   }
 }
 
-TEST(Pin, APinnedJobSaysHowMuchOfTheFarmCanTakeIt) {
+TEST(Pin, PinnedJobReportsItsShareOfTheFarm) {
   Rig rig;
   rig.submit(plan_of("j", 400, 2));
   EXPECT_EQ(rig.job().class_share, std::nullopt);

@@ -5,7 +5,7 @@ namespace ls::coordinator {
 namespace {
 
 // While a result waits, the worker's later messages, with its progress, wait behind it.
-TEST(Deadline, IsNotPassedWhileTheCoordinatorHasNoRoomForTheWorkersResult) {
+TEST(Deadline, DoesNotExpireWhileTheCoordinatorHasNoMemoryForTheResult) {
   Rig rig(plan_of("j", 1, 2), {{"w", 1}});
 
   for (Duration waited{}; waited < 2 * kNoGrowthLimit; waited += 1s) {

@@ -20,7 +20,7 @@ Clockwork farm_with_two_faces(const std::vector<std::string>& honest_workers) {
   return work;
 }
 
-TEST(Principal, TwoWorkersOfOneCannotBarAnHonestWorker) {
+TEST(Principal, TwoWorkersOfOnePrincipalCannotQuarantineAnHonestWorker) {
   Clockwork work = farm_with_two_faces({"a"});
 
   work.run();
@@ -32,7 +32,7 @@ TEST(Principal, TwoWorkersOfOneCannotBarAnHonestWorker) {
   EXPECT_EQ(audit(work.rig.farm), "");
 }
 
-TEST(Principal, TwoHonestOnesFindBothWorkersOfALiar) {
+TEST(Principal, TwoHonestPrincipalsFindBothFaultyWorkers) {
   Clockwork work = farm_with_two_faces({"a", "b"});
 
   work.run();
@@ -47,7 +47,7 @@ TEST(Principal, TwoHonestOnesFindBothWorkersOfALiar) {
 
 // All workers are behind one address: there is nobody else whom they could harm, and a worker with bad memory
 // is still found.
-TEST(Principal, WorkersOfASingleOneDecideAmongThemselves) {
+TEST(Principal, WorkersOfASinglePrincipalDecideAmongThemselves) {
   Clockwork work(all_audited());
   work.pixels = [](const std::string& worker, const UnitKey& unit, const SampleRange& range) {
     return worker == "bad" ? digest_number(1 + unit.tile) : honest(unit, range);
@@ -66,7 +66,7 @@ TEST(Principal, WorkersOfASingleOneDecideAmongThemselves) {
 }
 
 // Machines with two workers each: a neighbour of the worker with bad memory may speak against it.
-TEST(Principal, AWorkerMaySpeakAgainstItsNeighbour) {
+TEST(Principal, WorkerMayVoteAgainstANeighbour) {
   Clockwork work(all_audited());
   work.rig.principals = {{"a", "one"}, {"bad", "one"}, {"b", "two"}, {"c", "two"}};
   work.pixels = [](const std::string& worker, const UnitKey& unit, const SampleRange& range) {
@@ -82,7 +82,7 @@ TEST(Principal, AWorkerMaySpeakAgainstItsNeighbour) {
   EXPECT_EQ(work.seen<WorkerFoundFaulty>()[0].worker.value, "bad");
 }
 
-TEST(Principal, AnAuditIsAskedOfAnotherOneIfThereIsOne) {
+TEST(Principal, AuditGoesToAnotherPrincipalIfThereIsOne) {
   for (const bool other : {true, false}) {
     Rig rig(all_audited());
     rig.principals = {{"x1", "mallory"}, {"x2", "mallory"}};
@@ -105,7 +105,7 @@ TEST(Principal, AnAuditIsAskedOfAnotherOneIfThereIsOne) {
 }
 
 // One process opens stream after stream, each a new worker that fails the same unit.
-TEST(Principal, OneThatFailsAUnitUnderManyNamesFailsNoJob) {
+TEST(Principal, PrincipalThatFailsAUnitUnderManyNamesFailsNoJob) {
   for (const bool one_address : {true, false}) {
     Rig rig;
     rig.principals["honest"] = one_address ? "here" : "there";
@@ -130,7 +130,7 @@ TEST(Principal, OneThatFailsAUnitUnderManyNamesFailsNoJob) {
   }
 }
 
-TEST(Principal, AUnitThatFailsAtThreeOfThemFailsTheJobAlthoughManyWorkersAreThere) {
+TEST(Principal, UnitThatFailsAtThreePrincipalsFailsTheJobEvenWithManyWorkers) {
   Rig rig;
   for (int i = 0; i < 9; ++i) {
     const std::string name = "w" + std::to_string(i);
@@ -158,7 +158,7 @@ JobPlan plan_of_user(const std::string& owner) {
 }
 
 // Two users have a big job each. One worker says that each of its units took a day.
-TEST(Lies, OfCostStarveNoUser) {
+TEST(Lies, FalseCostsDoNotStarveAUser) {
   Clockwork work;
   for (const char* name : {"a", "b", "liar"}) work.join(name, 2);
   work.cost = [](const UnitKey&) { return .1; };
@@ -176,7 +176,7 @@ TEST(Lies, OfCostStarveNoUser) {
 }
 
 // Lies of cost size no leases: what the honest workers get lasts as long as ever.
-TEST(Lies, OfCostSizeNoLeasesOfOthers) {
+TEST(Lies, FalseCostsDoNotChangeLeasesOfOthers) {
   for (const double lie : {0., 86399., 1e300}) {
     Clockwork work;
     for (const char* name : {"a", "liar"}) work.join(name, 1);
@@ -193,7 +193,7 @@ TEST(Lies, OfCostSizeNoLeasesOfOthers) {
 }
 
 // A result that says that it took an hour must not use up the time of its job.
-TEST(Lies, OfCostEndNoJobByTime) {
+TEST(Lies, FalseCostsDoNotEndAJobByTime) {
   Clockwork work;
   work.join("liar", 1);
   work.lies["liar"] = 3600;
@@ -209,7 +209,7 @@ TEST(Lies, OfCostEndNoJobByTime) {
 }
 
 // Its stream breaks every half second. What it says of the units that it held then has the same bound.
-TEST(Lies, OfCostOfUnitsThatWereLeasedBeforeAReconnectEndNoJobByTime) {
+TEST(Lies, FalseCostsOfUnitsLeasedBeforeAReconnectDoNotEndAJobByTime) {
   Clockwork work;
   work.join("liar", 1);
   work.lies["liar"] = 3600;
@@ -258,7 +258,7 @@ struct Interrupted {
   double elapsed = 0;
 };
 
-TEST(Cost, OfUnitsThatWereLeasedBeforeAnInterruptionIsBelievedFromTheirFirstLeaseOn) {
+TEST(Cost, CostOfUnitsLeasedBeforeAnInterruptionCountsFromTheirFirstLease) {
   for (const bool lost : {true, false})
     for (const bool others : {true, false}) {
       SCOPED_TRACE(testing::Message() << (lost ? "lost" : "silent") << (others ? ", others took them" : ""));
@@ -275,7 +275,7 @@ TEST(Cost, OfUnitsThatWereLeasedBeforeAnInterruptionIsBelievedFromTheirFirstLeas
     }
 }
 
-TEST(Cost, OfUnitsOfAForgottenWorkerIsBelievedFromItsReturnOn) {
+TEST(Cost, CostOfAForgottenWorkersUnitsCountsFromItsReturn) {
   Rig rig;
   rig.own_time = true;
   rig.now += 1h;
@@ -294,7 +294,7 @@ TEST(Cost, OfUnitsOfAForgottenWorkerIsBelievedFromItsReturnOn) {
   EXPECT_DOUBLE_EQ(rig.farm.believable_seconds(units[0].key(), {"w"}, 1e6, rig.now), 2);
 }
 
-TEST(Cost, OfNewUnitsIsBelievedAlthoughThoseFromBeforeAnInterruptionTookLong) {
+TEST(Cost, CostOfNewUnitsIsAcceptedAfterUnitsFromBeforeAnInterruptionTookLong) {
   Interrupted now(true, true);
   now.rig.lose("other");  // so that the units of the job are there for the worker
   ASSERT_FALSE(now.rig.held[{"w"}].empty());
@@ -311,7 +311,7 @@ TEST(Cost, OfNewUnitsIsBelievedAlthoughThoseFromBeforeAnInterruptionTookLong) {
   EXPECT_DOUBLE_EQ(now.credible(*fresh, 1e6), 2);
 }
 
-TEST(Lies, NothingIsCreditedBeyondTheTimeOfAWorkersThreads) {
+TEST(Lies, WorkerIsNotCreditedMoreTimeThanItsThreadsHad) {
   Rig rig;
   rig.own_time = true;
   rig.join("w", 2);

@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "common/protocol/briefs.h"
 #include "coordinator/domain/farm/farm.h"
 #include "coordinator/domain/limits.h"
 #include "tests/unit/domain/farm_inspector.h"
+#include "util/protocol/briefs.h"
 
 namespace ls::coordinator {
 

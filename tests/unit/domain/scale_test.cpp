@@ -4,7 +4,7 @@
 namespace ls::coordinator {
 namespace {
 
-TEST(Scale, AMillionUnitsOnAThousandWorkers) {
+TEST(Scale, SchedulesAMillionUnitsOnAThousandWorkers) {
   Rig rig;
   rig.cpu_seconds = 0.5;
   for (int w = 0; w < 1000; ++w) rig.join("w" + std::to_string(w), 16);

@@ -26,7 +26,7 @@ Clockwork four_workers(Farm::Options options = {.lease_prefix = "t"}) {
 
 bool chance_of(std::mt19937_64& random, std::uint64_t percent) { return random() % 100 < percent; }
 
-TEST(Shares, UsersHaveEqualOnesHoweverManyJobsTheyHave) {
+TEST(Shares, UsersHaveEqualSharesForAnyNumberOfJobs) {
   Clockwork work = four_workers();
   for (const char* id : {"ann1", "ann2", "ann3"}) work.rig.submit(plan_for("ann", id));
   work.rig.submit(plan_for("bob", "bob1"));
@@ -53,7 +53,7 @@ TEST(Shares, JobsOfOneUserEndOneAfterTheOtherInTheirOrder) {
     EXPECT_LE(work.finished["shot" + std::to_string(i)], (i + 1) * each + kQueuedLeases * kLeaseSeconds) << i;
 }
 
-TEST(Shares, ALaterJobOfAUserBeginsWhereTheFirstLeavesWorkersFree) {
+TEST(Shares, LaterJobOfAUserUsesWorkersThatTheFirstLeavesFree) {
   Rig rig;
   for (const char* name : {"a", "b", "c", "d"}) rig.join(name, 2);
   JobPlan first = plan_for("ann", "first"), second = plan_for("ann", "second");
@@ -65,7 +65,7 @@ TEST(Shares, ALaterJobOfAUserBeginsWhereTheFirstLeavesWorkersFree) {
   EXPECT_GT(rig.job("second").units_leased, 0u);
 }
 
-TEST(Shares, APausedJobThatGoesOnKeepsItsPlaceBeforeLaterJobsOfItsUser) {
+TEST(Shares, ResumedJobKeepsItsPlaceBeforeLaterJobsOfItsUser) {
   Clockwork work = four_workers();
   work.rig.submit(plan_for("ann", "first", 400));
   work.rig.submit(plan_for("ann", "second", 4000));
@@ -92,7 +92,7 @@ TEST(Shares, AreMeasuredInCoreSecondsNotInUnits) {
   EXPECT_NEAR(work.seconds["dear"], work.seconds["cheap"], kBound);
 }
 
-TEST(Shares, WhoComesLateBeginsEvenAndNobodyPaysForHavingBeenAlone) {
+TEST(Shares, LateUsersStartWithAnEqualShareAndNobodyOwesPastTime) {
   Clockwork work = four_workers();
   work.rig.submit(plan_for("ann", "first", 20000));
   work.run(300);
@@ -106,7 +106,7 @@ TEST(Shares, WhoComesLateBeginsEvenAndNobodyPaysForHavingBeenAlone) {
       << "ann is not made to wait until bob has had as much";
 }
 
-TEST(Shares, WhoWaitsPausedSavesUpNoTurns) {
+TEST(Shares, PausedUsersSaveUpNoTurns) {
   Clockwork work = four_workers();
   work.rig.submit(plan_for("ann", "goes"));
   work.rig.submit(plan_for("bob", "rests"));
@@ -121,7 +121,7 @@ TEST(Shares, WhoWaitsPausedSavesUpNoTurns) {
   EXPECT_NEAR(work.seconds["goes"] - goes, work.seconds["rests"] - rests, kBound);
 }
 
-TEST(Shares, CountWithinAPriorityOnly) {
+TEST(Shares, ApplyWithinAPriority) {
   Clockwork work = four_workers();
   JobPlan urgent = plan_for("ann", "urgent", 400);
   urgent.priority = 1;
@@ -171,7 +171,7 @@ TEST(Shares, DifferByABoundedAmountInRandomHistories) {
   }
 }
 
-TEST(Held, AJobGetsNoWorkerUntilItIsReleased) {
+TEST(Held, HeldJobGetsNoWorkerUntilItIsReleased) {
   Rig rig;
   rig.join("a", 2);
   JobPlan plan = plan_for("ann", "later", 40);
@@ -189,7 +189,7 @@ TEST(Held, AJobGetsNoWorkerUntilItIsReleased) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
-TEST(Held, AJobThatIsHeldWhileItRendersKeepsItsLeasesAndGetsNoMore) {
+TEST(Held, RunningJobThatIsHeldKeepsItsLeasesAndGetsNoMore) {
   Rig rig;
   rig.join("a", 2);
   rig.submit(plan_for("ann", "j", 400));
@@ -204,7 +204,7 @@ TEST(Held, AJobThatIsHeldWhileItRendersKeepsItsLeasesAndGetsNoMore) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
-TEST(Shares, FramesOfASequenceGoInTheirOrderBeforeALaterJobOfTheirUser) {
+TEST(Shares, FramesOfASequenceAreRenderedInOrderBeforeALaterJobOfTheirUser) {
   Clockwork work = four_workers();
   for (int frame = 1; frame <= 5; ++frame) {
     JobPlan plan = plan_for("ann", "s-frame" + std::to_string(frame), 400);
@@ -221,7 +221,7 @@ TEST(Shares, FramesOfASequenceGoInTheirOrderBeforeALaterJobOfTheirUser) {
   EXPECT_EQ(work.seconds["still"], 0);
 }
 
-TEST(Shares, FigureNamesWhoHasHadHowMuch) {
+TEST(Shares, FiguresListTheTimeOfEachUser) {
   Clockwork work = four_workers();
   work.rig.submit(plan_for("ann", "j"));
 
@@ -242,7 +242,7 @@ std::size_t workers_on(const Rig& rig, const std::vector<std::string>& jobs) {
   return n;
 }
 
-TEST(Limits, OfAJobHoldItsWorkersAndUnits) {
+TEST(Limits, JobLimitsBoundItsWorkersAndUnits) {
   Rig rig;
   for (const char* name : {"a", "b", "c", "d"}) rig.join(name, 2);
   JobPlan few = plan_for("ann", "few"), small = plan_for("ann", "small");
@@ -262,7 +262,7 @@ TEST(Limits, OfAJobHoldItsWorkersAndUnits) {
   EXPECT_GT(rig.job("small").units_done, 0u);
 }
 
-TEST(Limits, OfASequenceHoldForAllItsFrames) {
+TEST(Limits, SequenceLimitsHoldForAllFrames) {
   Rig rig;
   for (const char* name : {"a", "b", "c", "d"}) rig.join(name, 2);
   for (const char* id : {"s-frame1", "s-frame2"}) {
@@ -278,7 +278,7 @@ TEST(Limits, OfASequenceHoldForAllItsFrames) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
-TEST(Limits, OfAUserHoldForAllItsJobsAndNotForTheAdministrator) {
+TEST(Limits, UserLimitsHoldForAllJobsOfAUserButNotForTheAdmin) {
   Rig rig({.lease_prefix = "t", .limits = {.workers_per_user = 1, .units_per_user = 3}});
   for (const char* name : {"a", "b", "c", "d"}) rig.join(name, 2);
   rig.submit(plan_for("ann", "one"));
@@ -292,7 +292,7 @@ TEST(Limits, OfAUserHoldForAllItsJobsAndNotForTheAdministrator) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
-TEST(Limits, WhatALeaseGivesBackGoesToAnotherWorker) {
+TEST(Limits, ReturnedUnitsGoToAnotherWorker) {
   Rig rig;
   rig.join("a", 1);
   rig.join("b", 1);
@@ -308,7 +308,7 @@ TEST(Limits, WhatALeaseGivesBackGoesToAnotherWorker) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
-TEST(Memory, AJobIsGivenOnlyToWorkersThatHaveEnough) {
+TEST(Memory, JobGoesOnlyToWorkersWithEnoughMemory) {
   Rig rig;
   rig.join("small", 1, 1, {}, 4ull << 30);
   rig.join("large", 1, 1, {}, 16ull << 30);
@@ -323,7 +323,7 @@ TEST(Memory, AJobIsGivenOnlyToWorkersThatHaveEnough) {
   EXPECT_FALSE(rig.held[{"silent"}].empty()) << "what a worker has is not held against it if it has not said";
 }
 
-TEST(Memory, AJobTooLargeForEveryWorkerSaysSo) {
+TEST(Memory, JobTooLargeForAllWorkersSaysSo) {
   Rig rig;
   rig.join("a", 1, 1, {}, 4ull << 30);
   rig.join("b", 1, 1, {}, 900ull << 20);
@@ -340,7 +340,7 @@ TEST(Memory, AJobTooLargeForEveryWorkerSaysSo) {
   EXPECT_EQ(rig.farm.why_waiting({"j"}), "");
 }
 
-TEST(Locality, AWorkerThatHasTheFilesGoesFirst) {
+TEST(Locality, WorkerThatHasTheFilesGoesFirst) {
   Rig rig;
   JobPlan plan = plan_for("ann", "j", 1);
   rig.join("a", 1);
@@ -354,7 +354,7 @@ TEST(Locality, AWorkerThatHasTheFilesGoesFirst) {
 
 // With two jobs and eight workers, every worker would soon hold both worlds if loaded worlds were not
 // preferred.
-TEST(Locality, WorkersStayWithTheWorldTheyHoldAndNobodyStarves) {
+TEST(Locality, WorkersKeepTheirWorldAndNoJobStarves) {
   Clockwork work;
   for (int i = 0; i < 8; ++i) {
     work.join("w" + std::to_string(i), 1);
@@ -393,7 +393,7 @@ TEST(Tail, CopiesOfTheSlowestUnitsEndAJobSooner) {
   EXPECT_LE(work.seconds["j"], 62 * .5) << "no more than what was out there is rendered twice";
 }
 
-TEST(Limits, AnAuditDoesNotWaitForTheUsersOtherWork) {
+TEST(Limits, AuditDoesNotWaitForTheUsersOtherWork) {
   Clockwork work({.lease_prefix = "t", .limits = {.workers_per_user = 1}, .audit_rate = 1, .audit_seed = 7});
   for (const char* name : {"a", "b"}) work.join(name, 1);
   for (const auto& [id, tiles] : {std::pair("one", 4), {"two", 200}}) {

@@ -17,7 +17,7 @@ JobPlan target_plan(int tiles) {
   return plan;
 }
 
-TEST(StopByError, EndsAtTheSameRoundWhateverTheOrder) {
+TEST(StopByError, EndsAtTheSameRoundForAnyOrderOfResults) {
   for (const int workers : {1, 2, 7}) {
     Rig rig;
     rig.rel_error = error_at;
@@ -51,7 +51,7 @@ TEST(StopByError, LateSpeculativeRoundsAreDropped) {
   EXPECT_EQ(rig.worker("w").units_out, 0u) << "leases beyond the stop are called off";
 }
 
-TEST(StopByError, AnUnreachableTargetEndsAtTheSampleLimit) {
+TEST(StopByError, UnreachableTargetEndsAtTheSampleLimit) {
   Rig rig;
   rig.rel_error = [](const UnitKey&) { return 1e9; };
   rig.join("w", 2);
@@ -79,7 +79,7 @@ TEST(StopByError, ExtendingGoesBeyondTheTarget) {
   EXPECT_EQ(tile_figures(rig.farm, {"j"}, 0)->spp, 640u);
 }
 
-TEST(StopByError, ARestartAnywhereEndsAtTheSameRound) {
+TEST(StopByError, RestartAnywhereEndsAtTheSameRound) {
   for (int cut = 1; cut < 40; cut += 3) {
     Rig before;
     before.rel_error = error_at;
@@ -112,7 +112,7 @@ TEST(StopByError, ARestartAnywhereEndsAtTheSameRound) {
   }
 }
 
-TEST(StopByError, ARestartAfterTheLastFoldAddsNoRound) {
+TEST(StopByError, RestartAfterTheLastFoldAddsNoRound) {
   Rig before;
   before.rel_error = error_at;
   before.join("w", 3);
@@ -148,7 +148,7 @@ void render_all_of_w(Rig& rig, double unit_seconds) {
   }
 }
 
-TEST(StopByTime, ALeaseEndsWithTheUnitThatReachesTheTime) {
+TEST(StopByTime, LeaseEndsWithTheUnitThatReachesTheTimeLimit) {
   constexpr double kUnit = 0.05;
   Rig rig;
   rig.join("w", 1);
@@ -164,7 +164,7 @@ TEST(StopByTime, ALeaseEndsWithTheUnitThatReachesTheTime) {
   EXPECT_LE(seconds(rig.now.time_since_epoch()), 3 + 3 * kUnit);
 }
 
-TEST(StopByTime, NothingLeasedIsThrownAwayAndNothingIsLeasedAfterwards) {
+TEST(StopByTime, LeasedUnitsStillCountAndNoMoreAreLeased) {
   Rig rig;
   rig.own_time = true;
   rig.join("w", 1);
@@ -196,7 +196,7 @@ TEST(StopByTime, NothingLeasedIsThrownAwayAndNothingIsLeasedAfterwards) {
 
 // Each tile gets its first unit although the time is over after the first of them: an image needs a sample in
 // every tile. The worker does not wait for a tick in between.
-TEST(StopByTime, EveryTileHasItsFirstRoundHoweverLateItIs) {
+TEST(StopByTime, EveryTileGetsItsFirstRoundEvenAfterTheLimit) {
   constexpr int kTiles = 20;
   Rig rig;
   rig.own_time = true;
@@ -218,7 +218,7 @@ TEST(StopByTime, EveryTileHasItsFirstRoundHoweverLateItIs) {
 
 // With one thread and units of a second, a unit that would end after the limit is begun only if at least half
 // of it fits.
-TEST(StopByTime, TheLastRoundsAreChosenFromWhatUnitsHaveCost) {
+TEST(StopByTime, LastRoundsAreChosenByMeasuredCosts) {
   for (const double time : {20.3, 20.7}) {
     Rig rig;
     rig.join("w", 1);
@@ -236,7 +236,7 @@ TEST(StopByTime, TheLastRoundsAreChosenFromWhatUnitsHaveCost) {
 
 // The job ends by error or by time, whichever comes first. If the target is far away, the worker has work
 // until the time is up, and no longer than in a job with a time limit alone.
-TEST(StopByTime, ATargetThatIsNotMetDoesNotMoveTheEnd) {
+TEST(StopByTime, UnmetTargetDoesNotChangeTheEnd) {
   constexpr double kUnit = 0.05;
   Rig rig;
   rig.own_time = true;
@@ -259,7 +259,7 @@ TEST(StopByTime, ATargetThatIsNotMetDoesNotMoveTheEnd) {
   EXPECT_EQ(rig.job().units_folded, units) << "nothing was rendered in vain";
 }
 
-TEST(StopByTime, ATargetThatIsMetBeforeEndsTheJobWhereItWouldHaveEnded) {
+TEST(StopByTime, TargetThatIsMetBeforeTheTimeLimitEndsTheJobUnchanged) {
   Rig rig;
   rig.own_time = true;
   rig.rel_error = uneven_error;
@@ -280,7 +280,7 @@ TEST(StopByTime, ATargetThatIsMetBeforeEndsTheJobWhereItWouldHaveEnded) {
 }
 
 // The worker's thread gets a twelfth of a core. Costs are in CPU seconds, the limit in wall-clock seconds.
-TEST(StopByTime, AWorkerThatSharesItsCoresEndsInTimeToo) {
+TEST(StopByTime, WorkerThatSharesItsCoresEndsInTimeToo) {
   constexpr double kCpu = .05, kWall = .6;
   Rig rig;
   rig.join("w", 1);

@@ -25,7 +25,7 @@ auto liars(std::set<std::string> who) {
   };
 }
 
-TEST(Audit, EveryResultCanBeRenderedAgainByAnotherBeforeTheJobEnds) {
+TEST(Audit, AnyResultCanBeAuditedBeforeTheJobEnds) {
   Clockwork work(audited_farm(1));
   for (const char* name : {"a", "b", "c"}) work.join(name, 1);
   const JobPlan plan = plan_of("j", 20, 4);
@@ -42,7 +42,7 @@ TEST(Audit, EveryResultCanBeRenderedAgainByAnotherBeforeTheJobEnds) {
   EXPECT_EQ(work.seconds["j"], 80 * .5);
 }
 
-TEST(Audit, TakesTheShareAskedFor) {
+TEST(Audit, AuditsTheRequestedShareOfResults) {
   Clockwork work(audited_farm(.01));
   for (const char* name : {"a", "b", "c"}) work.join(name, 4);
   work.rig.submit(plan_of("j", 5000, 4));
@@ -61,19 +61,19 @@ std::vector<JobRestored::Audit> opened(Farm::Options options, int results) {
   return rig.farm.open_audits({"j"});
 }
 
-TEST(Audit, HasABoundForEachJob) {
+TEST(Audit, NumberOfAuditsPerJobIsBounded) {
   EXPECT_EQ(opened(audited_farm(1), kMaxAuditsOpen + 20).size(), kMaxAuditsOpen);
 }
 
 // A worker that could predict which units are audited could deliver wrong pixels for all others.
-TEST(Audit, ChoosesUnitsByASeedThatNoWorkerKnows) {
+TEST(Audit, ChoosesUnitsByASecretSeed) {
   Farm::Options one = audited_farm(.5), other = one;
   other.audit_seed = one.audit_seed + 1;
   EXPECT_EQ(opened(one, 40), opened(one, 40));
   EXPECT_NE(opened(one, 40), opened(other, 40));
 }
 
-TEST(Audit, ALoneWorkerIsNotAudited) {
+TEST(Audit, LoneWorkerIsNotAudited) {
   Clockwork work(plan_of("j", 20, 4), {{"a", 2}}, audited_farm(1));
 
   work.run();
@@ -82,7 +82,7 @@ TEST(Audit, ALoneWorkerIsNotAudited) {
   EXPECT_EQ(work.rig.farm.audits().asked, 0u);
 }
 
-TEST(Audit, IsGivenUpWhenNobodyElseIsLeftAndTheJobEnds) {
+TEST(Audit, AuditIsDroppedIfNoOtherWorkerIsLeftAndTheJobEnds) {
   Clockwork work(plan_of("j", 20, 4), {{"a", 1}, {"b", 1}}, audited_farm(1));
   work.run(3);
   work.rig.lose("b");
@@ -106,7 +106,7 @@ JobRestored restored(Digest accepted, JobRestored::Audit audit, int tiles = 6) {
 }
 const Digest kRight = honest({{"j"}, 0, 0}, {0, 2}), kWrong = digest_number(5);
 
-TEST(Audit, UnderWayIsKnownUntilItIsDecided) {
+TEST(Audit, RunningAuditIsListedUntilItIsDecided) {
   Rig rig(plan_of("j", 6, 2), {{"a", 1}, {"b", 1}}, audited_farm(1));
   EXPECT_TRUE(rig.farm.take_changed_audits().empty());
 
@@ -121,7 +121,7 @@ TEST(Audit, UnderWayIsKnownUntilItIsDecided) {
   EXPECT_TRUE(rig.farm.open_audits({"j"}).empty());
 }
 
-TEST(Audit, IsGoneOnWithAfterARestart) {
+TEST(Audit, ContinuesAfterARestart) {
   Rig rig(audited_farm(0));
   rig.send(restored(kRight, {0, 0, std::nullopt}));
   rig.pass(1s);  // no worker has connected again yet
@@ -134,7 +134,7 @@ TEST(Audit, IsGoneOnWithAfterARestart) {
   EXPECT_EQ(rig.farm.audits().equal, 1u);
 }
 
-TEST(Audit, OfAHeldJobIsRenderedAndNothingElseOfIt) {
+TEST(Audit, HeldJobRendersOnlyItsAudits) {
   Rig rig(audited_farm(0));
   rig.send(restored(kRight, {0, 0, std::nullopt}));
   rig.send(JobHeld{{"j"}, true});
@@ -150,7 +150,7 @@ TEST(Audit, OfAHeldJobIsRenderedAndNothingElseOfIt) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Audit, SaysThatItsLeaseEndedWhenItsWorkerIsLost) {
+TEST(Audit, LosingItsWorkerEndsTheAuditsLease) {
   Rig rig(audited_farm(0));
   rig.send(restored(kRight, {0, 0, std::nullopt}));
   rig.join("a", 1);
@@ -168,7 +168,7 @@ TEST(Audit, SaysThatItsLeaseEndedWhenItsWorkerIsLost) {
   }));
 }
 
-TEST(Audit, OfAResultWhoseDigestIsNotKnownAccusesNobody) {
+TEST(Audit, AuditOfAResultWithoutADigestAccusesNobody) {
   Rig rig(audited_farm(0));
   rig.send(restored(Digest{}, {0, 0, std::nullopt}));
   rig.join("a", 1);
@@ -180,7 +180,7 @@ TEST(Audit, OfAResultWhoseDigestIsNotKnownAccusesNobody) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Audit, IsNotEndedByTheWordOfAWorkerThatNobodyAsked) {
+TEST(Audit, UnrequestedResultDoesNotEndAnAudit) {
   Rig rig(plan_of("j", 6, 2), {{"a", 1}}, audited_farm(1));
   rig.join("b", 1);
   rig.join("c", 1);
@@ -196,7 +196,7 @@ TEST(Audit, IsNotEndedByTheWordOfAWorkerThatNobodyAsked) {
   EXPECT_EQ(rig.farm.audits().equal, 0u);
 }
 
-TEST(Audit, DoesNotGoOnByTheWordOfAQuarantinedWorker) {
+TEST(Audit, IgnoresTheResultOfAQuarantinedWorker) {
   Rig rig(audited_farm(0));
   rig.send(restored(kRight, {0, 0, {{{"b"}, kWrong}}}));
   rig.join("a", 1);
@@ -207,7 +207,7 @@ TEST(Audit, DoesNotGoOnByTheWordOfAQuarantinedWorker) {
   EXPECT_TRUE(rig.farm.open_audits({"j"}).empty());
 }
 
-TEST(FaultyWorker, WhatItsPixelsWereACheckpointOfIsOneAgain) {
+TEST(FaultyWorker, CheckpointWithItsPixelsIsMadeAgain) {
   Rig rig(plan_of("j", 2, 6), {{"a", 1}}, audited_farm(0));
   rig.render("a");
   ASSERT_EQ(of<Checkpoint>(rig.render("a")).size(), 1u);
@@ -220,7 +220,7 @@ TEST(FaultyWorker, WhatItsPixelsWereACheckpointOfIsOneAgain) {
   EXPECT_EQ(of<Checkpoint>(effects)[0].spp, 2);
 }
 
-TEST(Audit, AWrongResultFromBeforeTheRestartIsFound) {
+TEST(Audit, WrongResultFromBeforeTheRestartIsFound) {
   Rig rig(audited_farm(0));
   rig.send(restored(kWrong, {0, 0, std::nullopt}));
   for (const char* name : {"a", "b", "c"}) rig.join(name, 1);
@@ -232,7 +232,7 @@ TEST(Audit, AWrongResultFromBeforeTheRestartIsFound) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Audit, WhatASecondWorkerSaidBeforeTheRestartStillCounts) {
+TEST(Audit, SecondResultFromBeforeTheRestartStillCounts) {
   Rig rig(audited_farm(0));
   rig.send(restored(kRight, {0, 0, {{{"b"}, kWrong}}}));
   for (const char* name : {"a", "b"}) rig.join(name, 1);
@@ -247,7 +247,7 @@ TEST(Audit, WhatASecondWorkerSaidBeforeTheRestartStillCounts) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(Audit, OfBeforeTheRestartIsDroppedWhenNobodyComesBackForIt) {
+TEST(Audit, DropsAnOldAuditIfNobodyReturnsForIt) {
   Rig rig(audited_farm(0));
   rig.send(restored(kRight, {0, 0, std::nullopt}, 1));
   rig.pass(kAuditAfterRestart - 1s);
@@ -259,7 +259,7 @@ TEST(Audit, OfBeforeTheRestartIsDroppedWhenNobodyComesBackForIt) {
   EXPECT_EQ(rig.farm.audits().dropped, 1u);
 }
 
-TEST(Audit, OfWhatIsNotAcceptedIsNotTakenUpAfterARestart) {
+TEST(Audit, AuditOfAnUnacceptedResultIsDroppedAfterARestart) {
   Rig rig(audited_farm(0));
   JobRestored event = restored(kRight, {0, 0, std::nullopt});
   event.audits = {{1, 0, std::nullopt}, {7, 0, std::nullopt}, {0, 9, std::nullopt}};
@@ -269,7 +269,7 @@ TEST(Audit, OfWhatIsNotAcceptedIsNotTakenUpAfterARestart) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
-TEST(FaultyWorker, IsFoundByAThirdWorkerQuarantinedAndItsTilesAreRenderedAgain) {
+TEST(FaultyWorker, ThirdWorkerExposesItAndItsTilesAreRenderedAgain) {
   Clockwork work(audited_farm(.01));
   for (int i = 0; i < 8; ++i) work.join("w" + std::to_string(i), 2);
   work.pixels = liars({"w3"});
@@ -306,7 +306,7 @@ std::vector<Effect> says(Rig& rig, const Rig::Held& unit, const std::string& wor
   return rig.send(UnitAccepted{unit.key(), unit.unit.samples, digest, {worker}, .1});
 }
 
-TEST(FaultyWorker, WhoFoundItFirstDoesNotMatter) {
+TEST(FaultyWorker, IsFoundRegardlessOfTheOrderOfResults) {
   for (const bool lies_first : {false, true}) {
     Rig rig(audited_farm(1));
     for (const char* name : {"a", "b", "c"}) rig.join(name, 1);
@@ -330,7 +330,7 @@ TEST(FaultyWorker, WhoFoundItFirstDoesNotMatter) {
   }
 }
 
-TEST(FaultyWorker, TwoThatNobodyAskedBarNoOneAndWhoAccusedIsFound) {
+TEST(FaultyWorker, TwoUnrequestedVotersQuarantineNobodyAndAreFound) {
   Rig rig(audited_farm(0));
   for (const char* name : {"h", "c", "d", "x1", "x2"}) rig.join(name, 1);
   rig.submit(plan_of("j", 6, 2));
@@ -353,7 +353,7 @@ TEST(FaultyWorker, TwoThatNobodyAskedBarNoOneAndWhoAccusedIsFound) {
   EXPECT_EQ(audit(rig.farm), "");
 }
 
-TEST(FaultyWorker, AnUnaskedWordAgainstTheOnlyOtherWorkerFailsNoJob) {
+TEST(FaultyWorker, UnrequestedResultAgainstTheOnlyOtherWorkerFailsNoJob) {
   Rig rig(audited_farm(0));
   for (const char* name : {"h", "x"}) rig.join(name, 1);
   rig.submit(plan_of("j", 6, 2));
@@ -367,7 +367,7 @@ TEST(FaultyWorker, AnUnaskedWordAgainstTheOnlyOtherWorkerFailsNoJob) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(FaultyWorker, ALateResultCountsSinceItsWorkerWasAsked) {
+TEST(FaultyWorker, LateResultOfARequestedVoterCounts) {
   Rig rig(audited_farm(0));
   for (const char* name : {"h", "x", "c"}) rig.join(name, 1);
   rig.submit(plan_of("j", 3, 2));
@@ -387,7 +387,7 @@ TEST(FaultyWorker, ALateResultCountsSinceItsWorkerWasAsked) {
   EXPECT_EQ(rig.farm.audits().differ, 1u);
 }
 
-TEST(FaultyWorker, OneThatIsFoundElsewhereLosesWhatItHoldsAndWhatItHasRendered) {
+TEST(FaultyWorker, WorkerFoundByAnotherCoordinatorLosesItsLeasesAndItsResults) {
   Rig rig(audited_farm(0));
   for (const char* name : {"a", "b"}) rig.join(name, 1);
   rig.submit(plan_of("j", 6, 2));
@@ -406,7 +406,7 @@ TEST(FaultyWorker, OneThatIsFoundElsewhereLosesWhatItHoldsAndWhatItHasRendered) 
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(FaultyWorker, OneThatContradictsItselfNeedsNoThirdWorker) {
+TEST(FaultyWorker, WorkerThatContradictsItselfIsFoundWithoutAThird) {
   Rig rig(plan_of("j", 6, 2), {{"a", 1}, {"b", 1}}, audited_farm(0));
   const Rig::Held unit = rig.take("a");
   rig.result("a", unit);
@@ -434,7 +434,7 @@ TEST(FaultyWorker, ThreeDifferentAnswersFailTheJob) {
 }
 
 // A job comes from another coordinator that had found this worker faulty.
-TEST(FaultyWorker, ThatIsHereAlreadyGetsNothingFromWhenItIsKnown) {
+TEST(FaultyWorker, ConnectedWorkerGetsNoUnitsOnceItIsKnownToBeFaulty) {
   Rig rig(plan_of("j", 6, 2), {{"a", 1}, {"b", 1}}, audited_farm(0));
   ASSERT_GT(rig.worker("a").units_out, 0u);
 
@@ -449,7 +449,7 @@ TEST(FaultyWorker, ThatIsHereAlreadyGetsNothingFromWhenItIsKnown) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-TEST(FaultyWorker, NothingItSendsIsTakenAndItGetsNothingAfterARestart) {
+TEST(FaultyWorker, IsIgnoredAndGetsNoUnitsAfterARestart) {
   Rig rig(audited_farm(0));
   rig.send(WorkerQuarantined{{"a"}, "it rendered wrong pixels of job x"});
   rig.join("a", 1);
@@ -466,7 +466,7 @@ TEST(FaultyWorker, NothingItSendsIsTakenAndItGetsNothingAfterARestart) {
 
 // Where each tile ends depends on the errors of all tiles, including those with wrong pixels: all begin
 // again.
-TEST(FaultyWorker, AJobWithATargetEndsWhereItWouldHaveEndedWithoutIt) {
+TEST(FaultyWorker, JobWithATargetEndsAsIfTheFaultyWorkerHadNotExisted) {
   const auto ends = [](bool with_faulty_worker) {
     Clockwork work(audited_farm(with_faulty_worker ? .05 : 0));
     for (int i = 0; i < 5; ++i) work.join("w" + std::to_string(i), 2);

@@ -54,7 +54,7 @@ struct Uneven {
   std::map<std::string, std::vector<double>> per_sample;
 };
 
-TEST(UnevenCosts, NoLeaseLastsLongerThanItsSecondsAndOneUnit) {
+TEST(UnevenCosts, LeaseLastsAtMostItsSecondsPlusOneUnit) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     Uneven farm(seed);
     farm.workers(1 + farm.pick(3), 4);
@@ -74,7 +74,7 @@ TEST(UnevenCosts, NoLeaseLastsLongerThanItsSecondsAndOneUnit) {
   }
 }
 
-TEST(UnevenCosts, AJobByTimeEndsWithinOneUnitOfItsLimit) {
+TEST(UnevenCosts, JobByTimeEndsWithinOneUnitOfItsLimit) {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     Uneven farm(seed);
     farm.workers(1, 8);
@@ -94,7 +94,7 @@ TEST(UnevenCosts, AJobByTimeEndsWithinOneUnitOfItsLimit) {
 }
 
 // Workers give back what they have not begun while others are rendering later rounds of the same tiles.
-TEST(UnevenCosts, AJobByTimeEndsWithinOneUnitOfItsLimitOnManyWorkers) {
+TEST(UnevenCosts, JobByTimeEndsWithinOneUnitOfItsLimitOnManyWorkers) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     Uneven farm(seed);
     farm.workers(2 + farm.pick(4), 4);
@@ -135,7 +135,7 @@ TEST(UnevenCosts, EqualJobsGetEqualSecondsWithinALease) {
 
 // A user pauses the job, or stops it, while a worker holds hundreds of units that each take far longer than
 // predicted.
-TEST(UnevenCosts, APausedOrStoppedJobIsLeftAfterTheUnitsThatAreBegun) {
+TEST(UnevenCosts, PausedOrStoppedJobEndsAfterItsStartedUnits) {
   for (const bool pause : {true, false}) {
     Clockwork work;
     work.join("w", 2);
@@ -159,7 +159,7 @@ TEST(UnevenCosts, APausedOrStoppedJobIsLeftAfterTheUnitsThatAreBegun) {
 
 // A worker is lost with hundreds of units of a job whose time is up: only those that it may have begun are
 // rendered again.
-TEST(UnevenCosts, WhatALostWorkerHadNotBegunIsNotRenderedAfterTheLimit) {
+TEST(UnevenCosts, UnstartedUnitsOfALostWorkerAreNotRenderedAfterTheTimeLimit) {
   Rig rig;
   rig.own_time = true;
   rig.cpu_seconds = 1e-6;

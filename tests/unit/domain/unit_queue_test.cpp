@@ -23,7 +23,7 @@ std::vector<UnitCode> all_of(UnitQueue& queue, const UnitTable& units) {
   return order;
 }
 
-TEST(UnitQueue, RoundsOfAllTilesOneAfterTheOther) {
+TEST(UnitQueue, ServesRoundByRound) {
   const UnitTable units(3);
   UnitQueue queue(3, 2);
   EXPECT_EQ(queue.surely_waiting(), 6u);
@@ -32,7 +32,7 @@ TEST(UnitQueue, RoundsOfAllTilesOneAfterTheOther) {
   EXPECT_EQ(queue.surely_waiting(), 0u);
 }
 
-TEST(UnitQueue, WhatIsSurelyWantedGoesFirstThenWhatGainsMost) {
+TEST(UnitQueue, CertainUnitsGoFirstThenThoseThatGainMost) {
   const UnitTable units(3);
   UnitQueue queue(3, 10);
   // There are 64 samples after round 5, and each later round adds 64: the gains of tile 0 are 90 / (64 *
@@ -54,7 +54,7 @@ TEST(UnitQueue, WhatIsSurelyWantedGoesFirstThenWhatGainsMost) {
                                    unit_code(8, 1)}));                                 // 0
 }
 
-TEST(UnitQueue, WhatCameBackGoesFirstAmongItsLike) {
+TEST(UnitQueue, ReturnedUnitsGoFirstInTheirRound) {
   const UnitTable units(2);
   UnitQueue queue(2, 8);
   for (const TileIndex t : {0u, 1u}) queue.set_wanted(t, 6, 1);
@@ -70,7 +70,7 @@ TEST(UnitQueue, WhatCameBackGoesFirstAmongItsLike) {
                                                          unit_code(7, 0), unit_code(7, 1)}));
 }
 
-TEST(UnitQueue, TilesOfTheFocusGoFirstWhateverTheirRounds) {
+TEST(UnitQueue, FocusTilesGoFirstInEveryRound) {
   const UnitTable units(3);
   UnitQueue queue(3, 2);
   queue.pop(unit_code(0, 0));
@@ -91,7 +91,7 @@ TEST(UnitQueue, TilesOfTheFocusGoFirstWhateverTheirRounds) {
 }
 
 // A focus does not move speculative units forward: they may turn out not to be needed.
-TEST(UnitQueue, TheFocusDoesNotChangeTheOrderOfWhatIsOnlyProbablyWanted) {
+TEST(UnitQueue, FocusDoesNotReorderSpeculativeUnits) {
   const UnitTable units(2);
   UnitQueue queue(2, 7);
   queue.set_wanted(0, 6, 2);
@@ -103,7 +103,7 @@ TEST(UnitQueue, TheFocusDoesNotChangeTheOrderOfWhatIsOnlyProbablyWanted) {
   EXPECT_EQ(order.at(12), unit_code(6, 0));
 }
 
-TEST(UnitQueue, AnErrorThatIsNotKnownStandsForAGreatOne) {
+TEST(UnitQueue, UnknownErrorCountsAsLarge) {
   const UnitTable units(2);
   UnitQueue queue(2, 7);
   queue.set_wanted(0, 6, 1e30);
@@ -153,7 +153,7 @@ struct Oracle {
   }
 };
 
-TEST(UnitQueue, IsWhatLookingThroughAllUnitsSays) {
+TEST(UnitQueue, MatchesAScanOfAllUnits) {
   for (std::uint32_t seed = 0; seed < 20; ++seed) {
     std::mt19937 rng(seed);
     const auto below = [&](std::uint32_t n) { return static_cast<std::uint32_t>(rng() % n); };
@@ -211,7 +211,7 @@ TEST(UnitQueue, IsWhatLookingThroughAllUnitsSays) {
 }
 
 // However many speculative units came back, the search for a certain one does not look through them.
-TEST(UnitQueue, FindsWhatIsWantedWithoutLookingAtTheRest) {
+TEST(UnitQueue, FindsTheNextUnitWithoutScanningAll) {
   const UnitTable units(2);
   UnitQueue queue(2, 10'000);
   queue.set_wanted(0, 0, 1);
@@ -235,7 +235,7 @@ TEST(UnitQueue, FindsWhatIsWantedWithoutLookingAtTheRest) {
 }
 
 // Entries that a million changes of the predicted order made outdated do not accumulate.
-TEST(UnitQueue, WhatIsOutdatedIsNotKept) {
+TEST(UnitQueue, DropsOutdatedEntries) {
   const UnitTable units(4);
   UnitQueue queue(4, 100);
   for (const RoundIndex before : {RoundIndex{50}, RoundIndex{0}})
@@ -246,7 +246,7 @@ TEST(UnitQueue, WhatIsOutdatedIsNotKept) {
 
 // A long random history, with and without speculative units and a focus. Each heap has at most two entries
 // for each tile and the one that was just added.
-TEST(UnitQueue, EntriesStayBoundedByTheNumberOfTilesWhateverHappens) {
+TEST(UnitQueue, NumberOfEntriesStaysBelowTheNumberOfTiles) {
   constexpr TileIndex kTiles = 5;
   constexpr RoundIndex kRounds = 40;
   for (const bool speculative : {false, true}) {

@@ -1,5 +1,5 @@
 // How a walk records the farm's effects, and compares its records with the farm's.
-#include "common/base/overloaded.h"
+#include "core/base/overloaded.h"
 #include "tests/unit/domain/stop_oracle.h"
 #include "tests/unit/domain/walk.h"
 

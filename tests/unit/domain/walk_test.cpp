@@ -26,14 +26,14 @@ TEST(RandomWalk, ThousandsOfHistoriesKeepEveryInvariant) {
   }
 }
 
-TEST(RandomWalk, AFewLongHistoriesKeepEveryInvariant) {
+TEST(RandomWalk, SomeLongHistoriesKeepEveryInvariant) {
   for (std::uint64_t seed = 10001; seed <= 10000 + kLong; ++seed) {
     const std::string wrong = Walk(seed).run(3000);
     ASSERT_EQ(wrong, "") << "seed " << seed;
   }
 }
 
-TEST(RandomWalk, InFoulWeatherEveryJobEndsOrSaysWhy) {
+TEST(RandomWalk, UnderConstantFailuresEveryJobEndsOrSaysWhy) {
   for (std::uint64_t seed = 20001; seed <= 20000 + kFoul; ++seed) {
     const std::string wrong = Walk(seed).run_into_foul_weather(120);
     ASSERT_EQ(wrong, "") << "seed " << seed;

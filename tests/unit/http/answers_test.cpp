@@ -12,7 +12,7 @@ namespace ls::http::testing {
 namespace {
 
 // Requests that wait for another machine do not delay requests that are answered from memory.
-TEST_F(ServerTest, QuestionsToOtherMachinesKeepNoQuickAnswerWaiting) {
+TEST_F(ServerTest, RequestsToOtherMachinesDoNotDelayQuickResponses) {
   std::promise<void> answered;
   const auto answer = answered.get_future().share();
   std::atomic<int> asking{0};
@@ -80,7 +80,7 @@ TEST_F(ServerTest, SlowReadersOfFinishedImagesTakeNoMemory) {
   server->stop();  // before the folder is removed
 }
 
-TEST_F(ServerTest, AnswersInMemoryAreBoundedAndLaterOnesAreToldToComeAgain) {
+TEST_F(ServerTest, ResponsesInMemoryAreBoundedAndFurtherRequestsGet503) {
   records->log_bytes = 100u << 20;
   Limits limits = quick_limits();
   limits.body_grace_seconds = 600;

@@ -13,7 +13,7 @@ class Jobs : public ApiTest {};
 class Blobs : public ApiTest {};
 class Routes : public ApiTest {};
 
-TEST_F(Jobs, AreSubmittedAsXmlWithTheSpecInTheQuery) {
+TEST_F(Jobs, XmlSubmissionTakesSettingsFromTheQuery) {
   const Response r =
       ask(Method::post,
           "/api/v1/jobs?spp=64&size=320x200&target_error=1e-3&seed=7&define=a=b%3Dc&tags=fast,big"
@@ -113,7 +113,7 @@ TEST_F(Jobs, ShowTheDiagnosticsOfARefusedScene) {
   EXPECT_NE(d["text"].get<std::string>().find("radius"), std::string::npos);
 }
 
-TEST_F(Jobs, ArePausedResumedExtendedAndCancelled) {
+TEST_F(Jobs, PatchPausesResumesExtendsAndCancels) {
   const std::string url = "/api/v1/jobs/" + submit();
 
   EXPECT_EQ(json_of(ask(Method::patch, url, R"({"state":"paused","priority":5,"spp":32})"))["state"],
@@ -132,7 +132,7 @@ TEST_F(Jobs, ArePausedResumedExtendedAndCancelled) {
   EXPECT_EQ(ask(Method::del, url).status, 404);
 }
 
-TEST_F(Jobs, TakeAnotherTargetAndAnyPriorityThatTheCommandLineTakes) {
+TEST_F(Jobs, PatchAcceptsATargetAndEveryPriorityOfTheCommandLine) {
   const std::string url = "/api/v1/jobs/" + submit("?target_error=1");
   const json job = json_of(ask(Method::patch, url, R"({"target_error":0.25,"priority":-1000000})"));
   EXPECT_EQ(job["target_error"], 0.25);
@@ -172,7 +172,7 @@ TEST_F(Jobs, HaveImagesReportAndFigures) {
   EXPECT_EQ(json_of(ask(Method::get, "/api/v1/workers"))["workers"].size(), 2u);
 }
 
-TEST_F(Jobs, ThatDoNotExistAre404EverywhereTheyAreNamed) {
+TEST_F(Jobs, UnknownJobIs404OnEveryRoute) {
   for (const auto& route : routes()) {
     if (route.pattern.find("{id}") == std::string_view::npos) continue;
     for (const std::string& id :
@@ -185,7 +185,7 @@ TEST_F(Jobs, ThatDoNotExistAre404EverywhereTheyAreNamed) {
   }
 }
 
-TEST_F(Blobs, AreUploadedOnceAndFound) {
+TEST_F(Blobs, UploadedBlobIsFound) {
   const std::string url = "/api/v1/blobs/" + sha256("grid").hex();
   const Response before = ask(Method::head, url);
   EXPECT_EQ(before.status, 404);
@@ -202,7 +202,7 @@ TEST_F(Blobs, AreUploadedOnceAndFound) {
   EXPECT_EQ(missing["missing"], json::array({sha256("other").hex()}));
 }
 
-TEST_F(Blobs, WithAnotherDigestOrTooLargeLeaveNothing) {
+TEST_F(Blobs, BlobWithAWrongDigestOrTooLargeLeavesNothing) {
   const std::string url = "/api/v1/blobs/" + sha256("grid").hex();
 
   EXPECT_EQ(ask(Method::put, url, "grit", "application/octet-stream").status, 400);
@@ -219,13 +219,13 @@ TEST_F(Blobs, WithAnotherDigestOrTooLargeLeaveNothing) {
   EXPECT_EQ(ask(Method::put, url, "grit", "application/octet-stream").status, 400);
 }
 
-TEST_F(Blobs, MissingRefusesWhatIsNoListOfDigests) {
+TEST_F(Blobs, MissingRefusesABodyThatIsNotAListOfDigests) {
   for (const char* body :
        {"{}", "[]", R"({"digests":"x"})", R"({"digests":[1]})", R"({"digests":["x"]})", "\xff"})
     EXPECT_EQ(ask(Method::post, "/api/v1/blobs/missing", body).status, 400) << body;
 }
 
-TEST_F(Routes, AskForATokenUnlessTheyAreOpen) {
+TEST_F(Routes, NeedATokenUnlessOpen) {
   const std::set<std::string> open = {"/healthz", "/readyz", "/api/v1/session"};
   for (const auto& route : routes()) {
     Request asked = request(route.method, route.pattern, {{"content-type", "application/json"}});
@@ -239,14 +239,14 @@ TEST_F(Routes, AskForATokenUnlessTheyAreOpen) {
   EXPECT_EQ(ask(Method::get, "/api/v1/nothing").status, 404);
 }
 
-TEST_F(Routes, SayWhoAsks) {
+TEST_F(Routes, ReportTheCaller) {
   const Response answer = ask(Method::get, "/api/v1/session");
   EXPECT_EQ(answer.status, 200);
   EXPECT_EQ(json_of(answer),
             (nlohmann::json{{"role", "admin"}, {"user", ""}, {"version", LIGHTSHAFT_VERSION}}));
 }
 
-TEST_F(Routes, TellWhichMethodsArePossible) {
+TEST_F(Routes, ListAllowedMethods) {
   const Response wrong = ask(Method::put, "/api/v1/jobs/j-1", "x", "text/plain");
   EXPECT_EQ(wrong.status, 405);
   EXPECT_EQ(header(wrong, "Allow"), "GET, HEAD, PATCH, DELETE, OPTIONS");
@@ -288,7 +288,7 @@ TEST_F(Routes, OpenAndCloseASession) {
   EXPECT_EQ(ask(request(Method::get, "/api/v1/jobs", {{"cookie", cookie}})).status, 401);
 }
 
-TEST_F(Routes, SendNoWorkerAwayThatIsNotThereOrToAnotherState) {
+TEST_F(Routes, DrainRefusesUnknownWorkersAndOtherStates) {
   const auto patch = [&](const std::string& worker, const std::string& body) {
     return ask(request(
                    Method::patch, "/api/v1/workers/" + worker,
@@ -318,7 +318,7 @@ TEST_F(Routes, ServeThePagesByExactNameOnly) {
     EXPECT_EQ(ask(request(Method::get, path)).status, 404) << path;
 }
 
-TEST_F(Routes, SayWhetherTheCoordinatorLivesAndIsReady) {
+TEST_F(Routes, ReportHealthAndReadiness) {
   EXPECT_EQ(ask(request(Method::get, "/healthz")).status, 200);
   EXPECT_EQ(ask(request(Method::get, "/readyz")).status, 200);
   const std::string url = "/api/v1/jobs/" + submit();
@@ -330,7 +330,7 @@ TEST_F(Routes, SayWhetherTheCoordinatorLivesAndIsReady) {
   EXPECT_NE(text(r).find("the disk is full"), std::string::npos);
 }
 
-TEST_F(Routes, SayWhetherTheWorkersPortAnswers) {
+TEST_F(Routes, ReportWhetherTheWorkersPortResponds) {
   std::string trouble;
   api.workers_port([&] { return trouble; });
   EXPECT_EQ(ask(request(Method::get, "/readyz")).status, 200);
@@ -355,7 +355,7 @@ TEST_F(Routes, ShowMetrics) {
   EXPECT_NE(metrics.find("# TYPE lightshaft_workers gauge\n"), std::string::npos);
 }
 
-TEST_F(Routes, ParseWhereAnEventStreamGoesOn) {
+TEST_F(Routes, ParseTheLastEventId) {
   const std::string job = submit();
   const auto stream = [&](std::string target, Fields headers = {}) {
     headers.emplace_back("authorization", std::string("Bearer ") + kToken);
@@ -370,7 +370,7 @@ TEST_F(Routes, ParseWhereAnEventStreamGoesOn) {
   EXPECT_EQ(stream("/api/v1/jobs/j-99/events").status, 404);
 }
 
-TEST_F(Routes, AreThoseOfTheOpenApiDocument) {
+TEST_F(Routes, MatchTheOpenApiDocument) {
   const json doc = json::parse(embedded_openapi());
   std::set<std::string> documented, answered;
   for (const auto& path : doc["paths"].items())

@@ -34,7 +34,7 @@ class AuthTest : public ::testing::Test {
   }
 };
 
-TEST_F(AuthTest, LetsInTheTokenOnly) {
+TEST_F(AuthTest, AcceptsOnlyTheToken) {
   EXPECT_EQ(status(Method::get, {{"authorization", std::string("Bearer ") + kToken}}), 200);
   EXPECT_EQ(status(Method::get, {{"authorization", std::string("bearer  ") + kToken}}), 200);
 
@@ -54,7 +54,7 @@ TEST_F(AuthTest, SaysHowToAuthenticate) {
   EXPECT_EQ(refused.headers.front().second.substr(0, 6), "Bearer");
 }
 
-TEST_F(AuthTest, TradesTheTokenForACookieThatScriptsAndOtherSitesCannotUse) {
+TEST_F(AuthTest, ExchangesTheTokenForACookieThatScriptsAndOtherSitesCannotUse) {
   EXPECT_EQ(std::get<Response>(auth.open_session({}, "wrong")).status, 401);
   const std::string set = std::get<std::string>(auth.open_session({}, kToken));
 
@@ -112,7 +112,7 @@ TEST(ClosedSessions, StayClosedAfterARestartAndAtOtherCoordinators) {
   EXPECT_EQ(info.st_mode & 0777, 0600u);
 }
 
-TEST(ClosedSessions, OfManyTheFirstToExpireCloseAllBeforeThem) {
+TEST(ClosedSessions, OverflowClosesAllOlderSessions) {
   const TempFolder folder;
   {
     ClosedSessions sessions(folder.path());
@@ -131,7 +131,7 @@ TEST(ClosedSessions, OfManyTheFirstToExpireCloseAllBeforeThem) {
 
 // Someone with a read token could open and close many sessions so that an earlier closed one is forgotten and
 // becomes valid again.
-TEST_F(AuthTest, AClosedSessionStaysClosedHoweverManyAreClosedAfterIt) {
+TEST_F(AuthTest, ClosedSessionStaysClosedAfterManyOthersAreClosed) {
   const auto close = [&](const std::string& session) {
     auth.close_session(request(Method::del, "/api/v1/session", {{"cookie", session}}));
   };
@@ -160,7 +160,7 @@ TEST_F(AuthTest, SurvivesARestartOfTheCoordinator) {
       restarted.identify(request(Method::get, "/api/v1/jobs", {{"cookie", before}}))));
 }
 
-TEST_F(AuthTest, LetsACookieChangeThingsFromOurOwnPagesOnly) {
+TEST_F(AuthTest, CookieMayChangeThingsOnlyFromTheDashboardsPages) {
   const std::string session = cookie();
 
   EXPECT_EQ(status(Method::post, {{"cookie", session}, {"origin", "http://farm:8080"}}), 200);
@@ -179,7 +179,7 @@ TEST_F(AuthTest, LetsACookieChangeThingsFromOurOwnPagesOnly) {
             403);
 }
 
-TEST_F(AuthTest, ASessionHasTheRoleOfItsTokenAndEndsWithIt) {
+TEST_F(AuthTest, SessionHasTheRoleOfItsTokenAndEndsWithIt) {
   const auto made = tokens.add(Role::submit, "anna");
   ASSERT_TRUE(made);
   const std::string session = cookie(made->token);
@@ -199,7 +199,7 @@ TEST_F(AuthTest, ASessionHasTheRoleOfItsTokenAndEndsWithIt) {
   EXPECT_EQ(status(Method::get, bearer(made->token)), 401);
 }
 
-TEST_F(AuthTest, AJoinTokenOpensNothing) {
+TEST_F(AuthTest, JoinTokenMayUseNoRoute) {
   EXPECT_EQ(status(Method::get, bearer(kJoinToken)), 403);
   EXPECT_EQ(std::get<Response>(auth.open_session({}, kJoinToken)).status, 403);
   EXPECT_TRUE(tokens.may_join(kJoinToken));
@@ -207,13 +207,13 @@ TEST_F(AuthTest, AJoinTokenOpensNothing) {
   EXPECT_FALSE(tokens.may_join(""));
 }
 
-TEST_F(AuthTest, OverTlsTheCookieIsForTlsAlone) {
+TEST_F(AuthTest, CookieIsSecureOverTls) {
   Auth over_tls(tokens, {.secure = true}, [] { return now; });
   EXPECT_NE(std::get<std::string>(over_tls.open_session({}, kToken)).find("; Secure"), std::string::npos);
   EXPECT_EQ(std::get<std::string>(auth.open_session({}, kToken)).find("; Secure"), std::string::npos);
 }
 
-TEST_F(AuthTest, GuessingEndsButNotForThoseWhoWereRightBefore) {
+TEST_F(AuthTest, GuessingIsBlockedButKnownTokensStillWork) {
   Auth strict(tokens, {.failures = {.per_second = .5, .burst = 3}}, [] { return now; });
   const auto ask = [&](const std::string& token, const std::string& from) {
     Request r = request(Method::get, "/api/v1/jobs", bearer(token));
@@ -234,7 +234,7 @@ TEST_F(AuthTest, GuessingEndsButNotForThoseWhoWereRightBefore) {
   EXPECT_EQ(ask(read, "10.0.0.1"), 200);
 }
 
-TEST_F(AuthTest, ATokenHasItsOwnShareOfRequests) {
+TEST_F(AuthTest, EachTokenHasItsShareOfRequests) {
   Auth strict(tokens, {.requests = {.per_second = 2, .burst = 4}}, [] { return now; });
   const Request r = request(Method::get, "/api/v1/jobs");
   const Caller anna{Role::submit, "anna", "a"}, bert{Role::submit, "bert", "b"};
@@ -251,7 +251,7 @@ TEST_F(AuthTest, ATokenHasItsOwnShareOfRequests) {
   EXPECT_TRUE(strict.too_often(r, &anna));
 }
 
-TEST(Throttle, TakesAnIpv6NetworkForOnePerson) {
+TEST(Throttle, CountsAnIpv6NetworkAsOneAddress) {
   EXPECT_EQ(Throttle::group_of("2001:db8:1:2:3:4:5:6"), Throttle::group_of("2001:db8:1:2:9:9:9:9"));
   EXPECT_NE(Throttle::group_of("2001:db8:1:2:3:4:5:6"), Throttle::group_of("2001:db8:1:3:3:4:5:6"));
   EXPECT_EQ(Throttle::group_of("10.0.0.1"), "10.0.0.1");

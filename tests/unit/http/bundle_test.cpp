@@ -7,7 +7,7 @@
 
 #include <cstdio>
 
-#include "common/job/limits.h"
+#include "core/job/limits.h"
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {
@@ -127,7 +127,7 @@ TEST_F(Bundles, PutEveryFileIntoTheStoreByItsDigest) {
   }
 }
 
-TEST_F(Bundles, HaveTheirSceneAtTheTopOrInTheirOnlyFolder) {
+TEST_F(Bundles, SceneIsAtTheTopOrInTheOnlyFolder) {
   EXPECT_EQ(read(kZip, {{"a.XML", "1"}, {"deeper/b.xml", "2"}, {"._a.xml", "3"}})->scene, "a.XML");
   const auto folder =
       read(kTar, {{"bath/b.xml", "2"}, {"bath/t/wood.png", "3"}, {"__MACOSX/bath/._b.xml", "4"}});
@@ -165,7 +165,7 @@ TEST_F(Bundles, MayNameTheirSceneAndSpecInAJobFile) {
   EXPECT_EQ(parse_job_spec(with_litter->spec)->seed, 5u);
 }
 
-TEST_F(Bundles, WithAWrongJobFileAreRefused) {
+TEST_F(Bundles, InvalidJobFileIsRefused) {
   const std::pair<std::string, std::string> kCases[] = {
       {"{", "not JSON"},
       {"[]", "must be an object"},
@@ -183,7 +183,7 @@ TEST_F(Bundles, WithAWrongJobFileAreRefused) {
         << text.substr(0, 100);
 }
 
-TEST_F(Bundles, WithNamesThatLeadOutAreRefused) {
+TEST_F(Bundles, NamesThatLeadOutAreRefused) {
   const std::pair<std::string, std::string> kCases[] = {
       {"../evil.ply", "leads out"},
       {"a/../../evil.ply", "leads out"},
@@ -204,13 +204,13 @@ TEST_F(Bundles, WithNamesThatLeadOutAreRefused) {
 
 // Some programs write backslashes into a zip instead of slashes; libarchive converts them in a zip, not in a
 // tar.
-TEST_F(Bundles, KnowBackslashesInZipOnly) {
+TEST_F(Bundles, BackslashesAreSeparatorsOnlyInZip) {
   EXPECT_THAT(refusal(kTar, around({"a\\b.ply", "x"})), HasSubstr("backslash"));
   EXPECT_THAT(refusal(kZip, around({"a\\..\\b.ply", "x"})), HasSubstr("leads out"));
   EXPECT_EQ(read(kZip, {{"a.xml", "1"}, {"t\\b.ply", "x"}})->assets.count("t/b.ply"), 1u);
 }
 
-TEST_F(Bundles, WithLinksOrDevicesAreRefused) {
+TEST_F(Bundles, LinksAndDevicesAreRefused) {
   EXPECT_THAT(refusal(kTar, around({"l.ply", "", AE_IFLNK, "/etc/passwd"})),
               AllOf(HasSubstr("\"l.ply\""), HasSubstr("link")));
   EXPECT_THAT(refusal(kZip, around({"l.ply", "", AE_IFLNK, "good"})),
@@ -223,13 +223,13 @@ TEST_F(Bundles, WithLinksOrDevicesAreRefused) {
         << type;
 }
 
-TEST_F(Bundles, WithANameTwiceAreRefused) {
+TEST_F(Bundles, DuplicateNameIsRefused) {
   for (const char* again : {"good", "./good", ".//./good"})
     for (const Packing& packing : {kZip, kTar})
       EXPECT_THAT(refusal(packing, around({again, "other"})), HasSubstr("twice")) << again;
 }
 
-TEST_F(Bundles, BeyondTheLimitsAreRefusedByEntry) {
+TEST_F(Bundles, RefusalBeyondALimitNamesTheEntry) {
   const BundleLimits small{.entry_bytes = 10, .total_bytes = 15};
   EXPECT_TRUE(read(kZip, {{"a.xml", "1234567890"}, {"b", "12345"}}, small));
   for (const Packing& packing : {kZip, kTar, kTarGzip}) {
@@ -240,14 +240,14 @@ TEST_F(Bundles, BeyondTheLimitsAreRefusedByEntry) {
   }
 }
 
-TEST_F(Bundles, OfMoreEntriesThanAllowedAreRefused) {
+TEST_F(Bundles, RefuseTooManyEntries) {
   Items items{{"a.xml", "<scene/>"}, {"good", "inside"}};
   for (std::size_t i = 0; i < kMaxBundleEntries; ++i)
     items.push_back({"d" + std::to_string(i), "", AE_IFDIR});
   EXPECT_THAT(refusal(kTarGzip, items), HasSubstr("more than 100000 entries"));
 }
 
-TEST_F(Bundles, ThatAreBombsAreRefusedByEntry) {
+TEST_F(Bundles, DecompressionBombIsRefusedNamingTheEntry) {
   const std::string zeros(100u << 20, '\0');
   for (const Packing& packing : {kZip, kTarGzip})
     EXPECT_THAT(refusal(packing, around({"bomb.vol", zeros})),
@@ -301,7 +301,7 @@ TEST_F(Bundles, EncryptedOrPackedUnusuallyAreRefused) {
               HasSubstr("encrypted"));
 }
 
-TEST_F(Bundles, OfAnotherKindThanAnnouncedAreRefused) {
+TEST_F(Bundles, RefuseAnotherFormatThanAnnounced) {
   const Items items{{"a.xml", "<scene/>"}, {"good", "inside"}};
   EXPECT_THAT(refusal(packed(kTar, items), ArchiveKind::zip), HasSubstr("zip"));
   EXPECT_THAT(refusal(packed(kZip, items), ArchiveKind::tar), HasSubstr("tar"));
@@ -310,7 +310,7 @@ TEST_F(Bundles, OfAnotherKindThanAnnouncedAreRefused) {
     for (const ArchiveKind kind : {ArchiveKind::zip, ArchiveKind::tar}) refusal(garbage, kind);
 }
 
-TEST_F(Bundles, AreGivenUpWhenTheCoordinatorStops) {
+TEST_F(Bundles, StopWhenTheCoordinatorStops) {
   stop.request_stop();
   const auto got = read(kZip, {{"a.xml", "<scene/>"}});
   ASSERT_FALSE(got);
@@ -319,7 +319,7 @@ TEST_F(Bundles, AreGivenUpWhenTheCoordinatorStops) {
 
 class BundleJobs : public ApiTest {};
 
-TEST_F(BundleJobs, AreSubmittedWithTheQueryBeforeTheJobFile) {
+TEST_F(BundleJobs, QueryOverridesTheJobFile) {
   const Items items{{"bath.xml", with_mesh("ball.ply")},
                     {"ball.ply", "ply"},
                     {"job.json", R"({"spp": 8, "seed": 3, "defines": {"a": "1", "b": "2"}})"}};
@@ -340,7 +340,7 @@ TEST_F(BundleJobs, AreSubmittedWithTheQueryBeforeTheJobFile) {
   }
 }
 
-TEST_F(BundleJobs, SayWhatIsWrong) {
+TEST_F(BundleJobs, ErrorsNameTheProblem) {
   const auto answer = [&](const Items& items, const std::string& target = "/api/v1/jobs") {
     const Response r = ask(Method::post, target, packed(kZip, items), "application/zip");
     return std::pair(r.status, json_of(r));

@@ -22,13 +22,13 @@ void expect_described(const json& answer, const json& properties) {
     EXPECT_TRUE(answer.contains(key) || key == "frames") << key << " is described and does not come";
 }
 
-TEST(Documented, AreAllFiguresOfAJob) {
+TEST(Documented, OpenApiDocumentsAllMembersOfAJob) {
   coordinator::JobView view;
   view.id = JobId{"j-1"};
   expect_described(json::parse(coordinator::job_json(view)), properties_of("Job"));
 }
 
-TEST(Documented, AreAllFiguresOfAReport) {
+TEST(Documented, OpenApiDocumentsAllMembersOfAReport) {
   coordinator::ReportFacts facts;
   facts.job.spec.target_error = 1e-3;
   facts.job.spec.reference = sha256("reference");

@@ -33,7 +33,7 @@ TEST(EventQueue, WakesOncePerBatch) {
   EXPECT_EQ(wakes, 2);
 }
 
-TEST(EventQueue, PassesOneJobAndWhatConcernsAll) {
+TEST(EventQueue, PassesEventsOfOneJobAndGeneralOnes) {
   EventQueue queue(kRoomy, "j-1", 0, [] {});
 
   queue.push({1, "job", "mine", "j-1"});
@@ -46,7 +46,7 @@ TEST(EventQueue, PassesOneJobAndWhatConcernsAll) {
   EXPECT_NE(text.find("all"), std::string::npos);
 }
 
-TEST(EventQueue, SaysWhenEventsWereMissed) {
+TEST(EventQueue, ReportsMissedEvents) {
   EventQueue gap(kRoomy, "", 4, [] {});
   gap.push({9, "job", "x", ""});
   EXPECT_EQ(gap.take().substr(0, 62),
@@ -61,7 +61,7 @@ TEST(EventQueue, SaysWhenEventsWereMissed) {
   EXPECT_EQ(none.take().find("reset"), std::string::npos);
 }
 
-TEST(EventQueue, EndsForAReaderThatIsTooSlow) {
+TEST(EventQueue, ClosesForATooSlowReader) {
   EventQueue few({2, 10'000}, "", 0, [] {});
   for (std::uint64_t id = 1; id <= 3; ++id) few.push({id, "job", "x", ""});
   EXPECT_TRUE(few.overflowed());
@@ -88,7 +88,7 @@ TEST(HeadText, CarriesLengthAndTheHeadersThatProtectBrowsers) {
   EXPECT_TRUE(head.ends_with("\r\n\r\n"));
 }
 
-TEST(HeadText, TellsNoLengthWhereThereIsNoBody) {
+TEST(HeadText, HasNoLengthWithoutABody) {
   Response empty;
   empty.status = 204;
   EXPECT_EQ(head_text(empty, {}, 0).find("Content-Length"), std::string::npos);

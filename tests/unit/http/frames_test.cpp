@@ -8,7 +8,7 @@ namespace {
 
 using FramesTest = ApiTest;
 
-TEST_F(FramesTest, TakesTheRangeFromTheQueryAndFromJson) {
+TEST_F(FramesTest, ReadsTheRangeFromQueryAndJson) {
   EXPECT_EQ(ask(Method::post, "/api/v1/jobs?frames=1-10x2", kSceneText, "application/xml").status, 201);
   EXPECT_EQ(records->last_job().spec.frames, (FrameRange{1, 10, 2}));
   const std::string scene = blobs->add(kSceneText).hex();
@@ -39,12 +39,12 @@ TEST_F(FramesTest, NamesOneFrameInTheQuery) {
   EXPECT_EQ(json_of(asked(""))["state"], "queued") << "the job itself was not meant";
 }
 
-TEST_F(FramesTest, TellsWhatAJobIs) {
+TEST_F(FramesTest, DistinguishesImagesSequencesAndFrames) {
   const auto job = json_of(ask(Method::get, "/api/v1/jobs/" + submit()));
   for (const char* key : {"frames", "frame", "sequence"}) EXPECT_TRUE(job.at(key).is_null()) << key;
 }
 
-TEST(FramesInStreams, AStreamOfASequenceHasTheEventsOfItsFrames) {
+TEST(FramesInStreams, SequenceStreamHasTheEventsOfItsFrames) {
   EventQueue queue({100, 1 << 20}, "j-1", 0, [] {});
   std::uint64_t id = 0;
   for (const char* job : {"j-1", "j-1-frame3", "j-12-frame3", "j-12", "j-1-frame3x", "j-2"})

@@ -24,7 +24,7 @@ class List : public ApiTest {
   std::vector<std::string> ids;
 };
 
-TEST_F(List, WithoutParametersHasAllJobsAsTheyCame) {
+TEST_F(List, WithoutParametersListsAllJobsInOrder) {
   EXPECT_EQ(names(""), (Names{"bath.xml", "Cloud.xml", "bathroom.xml"}));
   EXPECT_EQ(list("")["total"], 3);
   EXPECT_EQ(list("")["states"]["cancelled"], 1);
@@ -55,14 +55,14 @@ TEST_F(List, IsOrderedAndCutIntoPages) {
   EXPECT_EQ(names("sort=-progress").size(), 3u);
 }
 
-TEST_F(List, ThatMakesNoSenseIsRefused) {
+TEST_F(List, InvalidParametersAreRefused) {
   for (const char* wrong : {"state=x", "state=done,,x", "sort=size", "limit=1001", "limit=-1", "offset=x",
                             "since=nan", "since=-1", "limit="})
     EXPECT_EQ(ask(Method::get, std::string("/api/v1/jobs?") + wrong).status, 400) << wrong;
   EXPECT_EQ(ask(Method::get, "/api/v1/jobs?search=" + std::string(201, 'x')).status, 400);
 }
 
-TEST_F(List, TheSameSceneOnceMoreTakesOtherSamples) {
+TEST_F(List, ResubmittedSceneAcceptsOtherSamples) {
   const Response r = ask(Method::post, "/api/v1/jobs/" + ids[1] + "/again", R"({"spp": 64, "seed": 5})");
 
   ASSERT_EQ(r.status, 201) << text(r);
@@ -77,7 +77,7 @@ TEST_F(List, TheSameSceneOnceMoreTakesOtherSamples) {
   EXPECT_TRUE(farm.finish(got.id));
 }
 
-TEST_F(List, ASceneOnceMoreKeepsItsSamplesUnlessOthersAreAskedFor) {
+TEST_F(List, ResubmittedSceneKeepsItsSamplesUnlessOthersAreGiven) {
   const std::string url = "/api/v1/jobs/" + submit("?spp=32&target_error=0.5");
 
   ASSERT_EQ(ask(Method::post, url + "/again", "{}").status, 201);
@@ -94,7 +94,16 @@ TEST_F(List, ASceneOnceMoreKeepsItsSamplesUnlessOthersAreAskedFor) {
     EXPECT_EQ(ask(Method::post, url + "/again", wrong).status, 400) << wrong;
 }
 
-TEST_F(List, ASmallPictureIsThereAtAnyTime) {
+TEST_F(List, ResubmittedSceneMayHaveOtherMemory) {
+  const std::string url = "/api/v1/jobs/" + submit("?spp=32&memory=1000");
+
+  ASSERT_EQ(ask(Method::post, url + "/again", "{}").status, 201);
+  EXPECT_EQ(records->last_job().spec.memory, 1000u);
+  ASSERT_EQ(ask(Method::post, url + "/again", R"({"memory": 2000})").status, 201);
+  EXPECT_EQ(records->last_job().spec.memory, 2000u);
+}
+
+TEST_F(List, PreviewIsAvailableAtAnyTime) {
   const std::string url = "/api/v1/jobs/" + ids[0] + "/thumbnail.png";
   const Response before = ask(Method::get, url);
   FakeFarm farm(*coordinator, 1);

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "common/image/exr/pixel_layers.h"
+#include "core/image/exr/pixel_layers.h"
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {
@@ -33,7 +33,7 @@ TEST_F(Pixels, ComeAsHalfFloatsWhileTheJobRendersAndAfterwards) {
   for (const float value : floats(after)) ASSERT_GE(value, 0);
 }
 
-TEST_F(Pixels, OfEveryLayerThatIsListed) {
+TEST_F(Pixels, EveryListedLayerHasPixels) {
   const std::string url = "/api/v1/jobs/" + submit("?aov=depth,shape_id,normal");
 
   const json layers = json_of(ask(Method::get, url + "/layers"));
@@ -50,7 +50,7 @@ TEST_F(Pixels, OfEveryLayerThatIsListed) {
   EXPECT_EQ(layers["layers"][6]["names"].size(), 1u) << "the sphere";
 }
 
-TEST_F(Pixels, ThatAreNotThereAreRefusedWithTheBounds) {
+TEST_F(Pixels, PixelsOutsideTheImageAreRefusedWithItsBounds) {
   const std::string url = "/api/v1/jobs/" + submit() + "/pixels";
   for (const char* wrong :
        {"", "?rect=0,0,1", "?rect=0,0,1,1,1", "?rect=a,0,1,1", "?rect=-1,0,1,1", "?rect=0,0,41,24",
@@ -66,7 +66,7 @@ TEST_F(Pixels, ThatAreNotThereAreRefusedWithTheBounds) {
 
 using PagesTest = ApiTest;
 
-TEST_F(PagesTest, NeedNothingElseAndMayRunNothing) {
+TEST_F(PagesTest, AreSelfContainedAndRunNoScripts) {
   const std::string job = submit();
   ASSERT_TRUE(FakeFarm(*coordinator, 1).finish({job}));
 
@@ -84,7 +84,7 @@ TEST_F(PagesTest, NeedNothingElseAndMayRunNothing) {
   EXPECT_NE(policy.find("frame-ancestors 'none'"), std::string::npos);
 }
 
-TEST_F(PagesTest, OfNoJobAreNotThere) {
+TEST_F(PagesTest, UnknownJobHasNoPage) {
   EXPECT_EQ(ask(Method::get, "/api/v1/jobs/j-99/report.html").status, 404);
   EXPECT_EQ(ask(Method::get, "/api/v1/jobs/" + submit() + "/report.html?frame=x").status, 400);
 }

@@ -25,25 +25,25 @@ class Ownership : public ApiTest {
   const std::string bert = tokens.add(Role::submit, "bert").value().token;
 };
 
-TEST_F(Ownership, IsThatOfTheTokenThatSubmits) {
+TEST_F(Ownership, JobBelongsToTheTokensUser) {
   submit_as(anna);
   EXPECT_EQ(records->last_job().owner, "anna");
   submit();
   EXPECT_EQ(records->last_job().owner, "");
 }
 
-TEST_F(Ownership, TheListHasTheCallersJobsAlone) {
+TEST_F(Ownership, ListHasOnlyTheCallersJobs) {
   submit_as(anna);
   EXPECT_EQ(json_of(ask_as(anna, Method::get, "/api/v1/jobs"))["jobs"].size(), 1u);
   EXPECT_EQ(json_of(ask_as(bert, Method::get, "/api/v1/jobs"))["jobs"].size(), 0u);
 }
 
-TEST_F(Ownership, ATokenThatReadsSubmitsNothing) {
+TEST_F(Ownership, ReadTokenCannotSubmit) {
   const std::string reader = tokens.add(Role::read, "").value().token;
   EXPECT_EQ(ask_as(reader, Method::post, "/api/v1/jobs", kSceneText).status, 403);
 }
 
-TEST_F(Ownership, AJobThatAnotherCoordinatorHasIsAskedForThereWhoeverAsks) {
+TEST_F(Ownership, RequestForAnotherCoordinatorsJobIsRedirectedForEveryCaller) {
   records->others["j-away"] = {.http = "http://other:8080", .alive = true};
   for (const std::string& token : {anna, bert, std::string(kToken)}) {
     const Response moved = ask_as(token, Method::get, "/api/v1/jobs/j-away");
@@ -52,7 +52,7 @@ TEST_F(Ownership, AJobThatAnotherCoordinatorHasIsAskedForThereWhoeverAsks) {
   }
 }
 
-TEST_F(Ownership, AJobThatIsHereLooksLikeNoneToOthersWhateverOthersHave) {
+TEST_F(Ownership, LocalJobOfAnotherUserLooksMissingWhateverOtherCoordinatorsHave) {
   const std::string id = submit_as(anna);
   records->others[id] = {.http = "http://other:8080", .alive = true};
   const Response none = ask_as(bert, Method::get, "/api/v1/jobs/j-none");
@@ -61,7 +61,7 @@ TEST_F(Ownership, AJobThatIsHereLooksLikeNoneToOthersWhateverOthersHave) {
   EXPECT_EQ(json_of(annas), json_of(none));
 }
 
-TEST(Visible, EventsOfOthersAreLeftOutAndWorkersKeepTheirSecrets) {
+TEST(Visible, HidesEventsOfOtherUsersAndSecretsOfWorkers) {
   const Caller anna{Role::submit, "anna", "a"}, reader{Role::read, "", "r"};
   const coordinator::StreamEvent job{1, "job", "{}", "j-1", "bert"}, old{2, "tile", "{}", "j-0", ""};
   EXPECT_FALSE(visible(job, anna));
@@ -77,7 +77,7 @@ TEST(Visible, EventsOfOthersAreLeftOutAndWorkersKeepTheirSecrets) {
   EXPECT_EQ(visible(worker, reader)->data, worker.data);
 }
 
-TEST_F(Ownership, NoUserGoesBeforeOthersByPriority) {
+TEST_F(Ownership, UsersCannotExceedTheUserPriority) {
   const Response refused = ask_as(anna, Method::post, "/api/v1/jobs?priority=1", kSceneText);
   EXPECT_EQ(refused.status, 403);
   EXPECT_NE(text(refused).find("--user-priority"), std::string::npos);
@@ -95,7 +95,7 @@ TEST_F(Ownership, NoUserGoesBeforeOthersByPriority) {
   EXPECT_EQ(patch(kToken, 7), 200);
 }
 
-TEST(Visible, AWorkerWithoutAJobMayNotSayWhatItDidOfOthers) {
+TEST(Visible, WorkerEventWithoutAJobHidesOtherUsersJobs) {
   const coordinator::StreamEvent quarantined{
       3, "worker", R"({"job":null,"activity":"quarantined: it rendered tile 3 of job j-1"})", "", ""};
   const auto hidden = visible(quarantined, {Role::submit, "anna", "a"});
@@ -104,7 +104,7 @@ TEST(Visible, AWorkerWithoutAJobMayNotSayWhatItDidOfOthers) {
   EXPECT_EQ(visible(quarantined, {Role::read, "", "r"})->data, quarantined.data);
 }
 
-TEST(Visible, ToOneOfNoRoleNothingIs) {
+TEST(Visible, CallerWithoutARoleSeesNothing) {
   const Caller nobody;
   EXPECT_FALSE(nobody.sees(""));
   EXPECT_FALSE(nobody.sees("anna"));

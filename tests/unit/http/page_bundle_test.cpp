@@ -60,7 +60,7 @@ TEST(PageBundle, JoinsModulesInTheOrderInWhichTheyNeedEachOther) {
                               "\"></script>\n</head>\n");
 }
 
-TEST(PageBundle, NamesItsFilesByWhatIsInThem) {
+TEST(PageBundle, NamesFilesByTheirContent) {
   const auto one = bundled("import \"./deep/other.js\";\n");
   const auto same = bundled("import \"./deep/other.js\";\n");
   const auto other = bundled("import \"./deep/other.js\";\n", "export const x = 2;\n");
@@ -71,14 +71,14 @@ TEST(PageBundle, NamesItsFilesByWhatIsInThem) {
   EXPECT_EQ(one->style_name, other->style_name);
 }
 
-TEST(PageBundle, LeavesWhatItDoesNotKnowAsItIs) {
+TEST(PageBundle, LeavesUnknownContentUnchanged) {
   for (const std::string_view main :
        {"import * as all from \"./deep/other.js\";\n", "import \"./missing.js\";\n", "export default 1;\n",
         "export { x };\n", "import \"./main.js\";\n"})
     EXPECT_FALSE(bundled(main)) << main;
 }
 
-TEST(PageBundle, HasEveryModuleOfTheDashboardButThoseOfItsWorker) {
+TEST(PageBundle, ContainsAllDashboardModulesExceptTheWorkers) {
   const auto bundle = bundle_page(embedded_files());
   ASSERT_TRUE(bundle) << "a module of web/static/js is written in a way that page_bundle.h does not name";
 
@@ -91,7 +91,7 @@ TEST(PageBundle, HasEveryModuleOfTheDashboardButThoseOfItsWorker) {
   }
 }
 
-TEST(StaticFiles, AreCompressedForWhoAcceptsItAndKeptForEverByTheirDigest) {
+TEST(StaticFiles, AreCompressedForClientsThatAcceptItAndCachedByTheirDigest) {
   const StaticFiles files(embedded_files());
   const auto bundle = bundle_page(embedded_files());
   ASSERT_TRUE(bundle);
@@ -123,7 +123,7 @@ TEST(StaticFiles, AreCompressedForWhoAcceptsItAndKeptForEverByTheirDigest) {
             304);
 }
 
-TEST(ContentCoding, IsGzipOnlyForWhoTakesIt) {
+TEST(ContentCoding, IsGzipOnlyIfAccepted) {
   for (const auto& [field, takes] : {std::pair{"gzip", true},
                                      {"br;q=1, GZIP ; q=0.5", true},
                                      {"gzip;q=0", false},
@@ -133,7 +133,7 @@ TEST(ContentCoding, IsGzipOnlyForWhoTakesIt) {
     EXPECT_EQ(accepts_gzip(request(Method::get, "/", {{"accept-encoding", field}})), takes) << field;
 }
 
-TEST(ContentCoding, LeavesShortAnswersAndPicturesAsTheyAre) {
+TEST(ContentCoding, LeavesShortAnswersAndImagesUncompressed) {
   const Request asks = request(Method::get, "/", {{"accept-encoding", "gzip"}});
   const std::string words(10000, 'a');
   Response shorter = json_response(200, "{}"), picture = text_response(200, "image/png", words),

@@ -13,7 +13,7 @@
 namespace ls::http::testing {
 namespace {
 
-TEST_F(ServerTest, AnswersRequestsOneAfterTheOtherOnAKeptConnection) {
+TEST_F(ServerTest, ServesSuccessiveRequestsOnOneConnection) {
   start();
   RawClient client(server->port());
 
@@ -53,7 +53,7 @@ TEST_F(ServerTest, RefusesAPortThatIsTaken) {
     EXPECT_EQ(Server::listen(wrong).error().code, Errc::invalid_argument) << wrong;
 }
 
-TEST_F(ServerTest, AnswersWhatIsNoRequest) {
+TEST_F(ServerTest, AnswersMalformedRequests) {
   start();
 
   EXPECT_EQ(ask("\x16\x03\x01 hello\r\n\r\n"), 400);
@@ -83,7 +83,7 @@ TEST_F(ServerTest, CutsAHeaderThatDripsIn) {
   EXPECT_EQ(RawClient::status(slow.read_all()), 408);
 }
 
-TEST_F(ServerTest, CutsABodyThatComesTooSlowlyAndKeepsNothingOfIt) {
+TEST_F(ServerTest, CutsATooSlowBodyAndKeepsNothingOfIt) {
   start();
   RawClient slow(server->port());
   ASSERT_TRUE(slow.send(put("never whole", 1'000'000) + "never"));
@@ -94,7 +94,7 @@ TEST_F(ServerTest, CutsABodyThatComesTooSlowlyAndKeepsNothingOfIt) {
   EXPECT_TRUE(eventually([&] { return blobs->open_uploads == 0; }));
 }
 
-TEST_F(ServerTest, KeepsNothingOfAnUploadThatIsCutOff) {
+TEST_F(ServerTest, KeepsNothingOfABrokenUpload) {
   start();
   {
     RawClient client(server->port());
@@ -114,7 +114,7 @@ TEST_F(ServerTest, StreamsABlobOfManyChunksIntoTheStore) {
   EXPECT_EQ(blobs->size(sha256(body)).value_or(0), body.size());
 }
 
-TEST_F(ServerTest, TakesChunkedBodiesWithinTheSameBounds) {
+TEST_F(ServerTest, AcceptsChunkedBodiesWithinTheSameLimits) {
   start();
   const std::string head = "PUT /api/v1/blobs/" + sha256("grid").hex() + " HTTP/1.1\r\nHost: x\r\n" + kAuth +
                            "Transfer-Encoding: chunked\r\n\r\n";
@@ -129,7 +129,7 @@ TEST_F(ServerTest, TakesChunkedBodiesWithinTheSameBounds) {
   EXPECT_EQ(ask(session + "2000\r\n" + std::string(0x2000, ' ') + "\r\n0\r\n\r\n"), 413);
 }
 
-TEST_F(ServerTest, RefusesTooLongABodyBeforeItComes) {
+TEST_F(ServerTest, RefusesATooLongBodyBeforeItArrives) {
   start();
 
   EXPECT_EQ(ask(put("x", 5u << 20)), 413);
@@ -166,7 +166,7 @@ TEST_F(ServerTest, AnswersARefusedUploadThatIsStillBeingSent) {
             401);
 }
 
-TEST_F(ServerTest, AsksForTheBodyOnlyWhenItWantsIt) {
+TEST_F(ServerTest, RequestsTheBodyOnlyWhenItIsNeeded) {
   start();
   RawClient client(server->port());
   std::string head = put("grid", 4);
@@ -219,7 +219,7 @@ TEST_F(ServerTest, BoundsTheNumberOfConnections) {
   EXPECT_EQ(ask(kGet), 200);
 }
 
-TEST_F(ServerTest, LetsIdleConnectionsGiveWay) {
+TEST_F(ServerTest, IdleConnectionsMakeRoom) {
   start();
   std::vector<std::unique_ptr<RawClient>> idle;
   for (int i = 0; i < 16; ++i) idle.push_back(std::make_unique<RawClient>(server->port()));
@@ -264,7 +264,7 @@ TEST_F(ServerTest, ForgetsReadersThatLeave) {
   EXPECT_TRUE(eventually([&] { return api->counters().event_streams == 0; }));
 }
 
-TEST_F(ServerTest, SendsAwayAReaderThatDoesNotKeepUp) {
+TEST_F(ServerTest, DisconnectsATooSlowReader) {
   Limits limits = quick_limits();
   limits.event_queue = 64;
   start(limits);

@@ -46,7 +46,7 @@ class SharesTest : public ServerTest {
   }
 };
 
-TEST_F(SharesTest, UnfinishedBodiesOfOneTokenKeepNobodyOut) {
+TEST_F(SharesTest, UnfinishedBodiesOfOneTokenDoNotBlockOthers) {
   Limits limits = patient_limits();
   limits.body_memory = 4u << 20;
   start(limits);
@@ -79,7 +79,7 @@ TEST_F(SharesTest, UnfinishedBodiesOfOneTokenKeepNobodyOut) {
   EXPECT_EQ(ask(post_scene(bob, scene.size()) + scene), 201);
 }
 
-TEST_F(SharesTest, ABodyThatStallsAfterABurstIsCut) {
+TEST_F(SharesTest, StalledBodyIsCutAfterABurst) {
   Limits limits = quick_limits();
   limits.min_rate = 1;  // by the mean rate alone the burst would allow a stall of eleven days
   start(limits);
@@ -89,7 +89,7 @@ TEST_F(SharesTest, ABodyThatStallsAfterABurstIsCut) {
   EXPECT_EQ(RawClient::status(slow.read_all()), 408);
 }
 
-TEST_F(SharesTest, AReaderThatStallsAfterABurstIsCut) {
+TEST_F(SharesTest, StalledReaderIsCutAfterABurst) {
   Limits limits = quick_limits();
   limits.min_rate = 1;
   records->log_bytes = 30u << 20;
@@ -102,7 +102,7 @@ TEST_F(SharesTest, AReaderThatStallsAfterABurstIsCut) {
   EXPECT_TRUE(eventually([&] { return api->counters().connections == 0; }));
 }
 
-TEST_F(SharesTest, SlowRequestsOfOneTokenKeepNobodyWaiting) {
+TEST_F(SharesTest, SlowRequestsOfOneTokenDoNotDelayOthers) {
   std::promise<void> release;
   auto gate = release.get_future().share();
   std::atomic<int> looking{0};
@@ -128,7 +128,7 @@ TEST_F(SharesTest, SlowRequestsOfOneTokenKeepNobodyWaiting) {
   for (auto& client : waiting) EXPECT_EQ(RawClient::status(client->response()), 201);
 }
 
-TEST_F(SharesTest, WhatOnlyAClientThatHasLeftAskedForIsNotComputed) {
+TEST_F(SharesTest, RequestOfADisconnectedClientIsNotComputed) {
   std::promise<void> release;
   auto gate = release.get_future().share();
   std::atomic<int> looking{0};
@@ -201,7 +201,7 @@ TEST_F(SharesTest, ConnectionsOfOneTokenLeaveRoomForOthers) {
   EXPECT_EQ(ask(with_token("GET /api/v1/jobs", bob)), 200);
 }
 
-TEST_F(SharesTest, ASilentConnectionOfATokenYieldsToANewOne) {
+TEST_F(SharesTest, SilentConnectionOfATokenMakesRoomForANewOne) {
   Limits limits = patient_limits();
   limits.connections_each = 2;
   limits.idle_seconds = 600;
@@ -216,7 +216,7 @@ TEST_F(SharesTest, ASilentConnectionOfATokenYieldsToANewOne) {
   EXPECT_EQ(RawClient::status(kept.back()->response()), 200);
 }
 
-TEST(Shares, OneCallerMayHoldMoreThanItsPartWhileHalfIsFree) {
+TEST(Shares, CallerMayExceedItsShareWhileHalfIsFree) {
   constexpr std::uint64_t kMegabyte = 1u << 20;
   Shares shares(8 * kMegabyte);
   Shares::Held a, b, c, d, other;
@@ -231,7 +231,7 @@ TEST(Shares, OneCallerMayHoldMoreThanItsPartWhileHalfIsFree) {
   EXPECT_TRUE(d.take(shares, "mallory", kMegabyte));
 }
 
-TEST_F(SharesTest, OneTokenMayHaveMoreEventStreamsWhileHalfAreFree) {
+TEST_F(SharesTest, TokenMayHaveMoreEventStreamsWhileHalfAreFree) {
   Limits limits = patient_limits();
   limits.event_streams = 6;
   limits.event_streams_each = 1;

@@ -24,7 +24,7 @@ void write(const std::filesystem::path& file, const std::string& text) {
   ::chmod(file.c_str(), 0600);
 }
 
-TEST(TokenRegistry, KeepsDigestsOfWhatItMadeAndNeverTheTokens) {
+TEST(TokenRegistry, StoresDigestsAndNeverTokens) {
   TempFolder dir;
   std::string annas, id;
   {
@@ -51,7 +51,7 @@ TEST(TokenRegistry, KeepsDigestsOfWhatItMadeAndNeverTheTokens) {
   EXPECT_FALSE((*TokenRegistry::open(dir.path()))->find(annas));
 }
 
-TEST(TokenRegistry, TheFilesOfTheFolderAreAdminAndJoinAndCannotBeRevoked) {
+TEST(TokenRegistry, TokensFromFilesAreAdminAndJoinAndCannotBeRevoked) {
   TempFolder dir;
   auto tokens = TokenRegistry::open(dir.path());
   ASSERT_TRUE(tokens);
@@ -69,7 +69,7 @@ TEST(TokenRegistry, TheFilesOfTheFolderAreAdminAndJoinAndCannotBeRevoked) {
   EXPECT_EQ((*tokens)->revoke("0000000000000000").error().code, Errc::not_found);
 }
 
-TEST(TokenRegistry, RefusesUsersThatCouldBeMistakenOrBreakTheFile) {
+TEST(TokenRegistry, RefusesConfusableUserNamesAndThoseThatBreakTheFile) {
   TokenRegistry tokens("0123456789abcdef");
   for (const char* wrong : {"", " anna", "an na", "anna\nadmin", "#anna", "-", "\xc3\xa4", ".."})
     EXPECT_FALSE(tokens.add(Role::submit, wrong)) << wrong;
@@ -78,7 +78,7 @@ TEST(TokenRegistry, RefusesUsersThatCouldBeMistakenOrBreakTheFile) {
   EXPECT_TRUE(tokens.add(Role::read, ""));
 }
 
-TEST(TokenRegistry, NamesALineThatIsNone) {
+TEST(TokenRegistry, NamesAMalformedLine) {
   const std::string digest = sha256("x").hex();
   for (const std::string& wrong :
        std::vector<std::string>{"boss anna " + digest, "submit - " + digest, "read anna " + digest + "0",
@@ -95,7 +95,7 @@ TEST(TokenRegistry, NamesALineThatIsNone) {
   EXPECT_EQ((*TokenRegistry::open(dir.path()))->find("x")->role, Role::read);
 }
 
-TEST(TokenRegistry, ChangesNothingInAFileThatItCannotRead) {
+TEST(TokenRegistry, DoesNotChangeAnUnreadableFile) {
   TempFolder dir;
   const auto file = dir.path() / "tokens";
   const auto tokens = TokenRegistry::open(dir.path()).value();
@@ -119,7 +119,7 @@ TEST(TokenRegistry, ChangesNothingInAFileThatItCannotRead) {
   EXPECT_FALSE(tokens->find(made.token));
 }
 
-TEST(TokenRegistry, ReadsAFileAgainThatItCouldNotRead) {
+TEST(TokenRegistry, RereadsAFileThatWasUnreadable) {
   TempFolder dir;
   const auto file = dir.path() / "tokens";
   const auto tokens = TokenRegistry::open(dir.path()).value();
@@ -132,7 +132,7 @@ TEST(TokenRegistry, ReadsAFileAgainThatItCouldNotRead) {
   EXPECT_TRUE(tokens->find("x"));
 }
 
-TEST(TokenRegistry, RefusesAFileThatOthersMayWriteAndTokensThatAreOne) {
+TEST(TokenRegistry, RefusesAFileThatOthersMayWriteAndEqualTokens) {
   TempFolder dir;
   write(dir.path() / "tokens", "");
   ::chmod((dir.path() / "tokens").c_str(), 0620);

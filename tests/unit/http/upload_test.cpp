@@ -8,7 +8,7 @@ namespace {
 
 class Uploads : public ApiTest {};
 
-TEST_F(Uploads, InPartsAreKeptUntilTheyAreWhole) {
+TEST_F(Uploads, PartsAreKeptUntilTheUploadIsComplete) {
   const std::string url = "/api/v1/blobs/" + sha256("grid").hex();
   const auto part = [&](const char* range, const char* body) {
     return ask(request(Method::put, url,
@@ -45,7 +45,7 @@ TEST_F(Uploads, InPartsAreKeptUntilTheyAreWhole) {
   EXPECT_EQ(part("bytes 2-3/4", "id").status, 204);
 }
 
-TEST_F(Uploads, OfOneTokenBeyondItsShareDropItsOwnOldestOnly) {
+TEST_F(Uploads, TokenBeyondItsShareLosesOnlyItsOwnOldestUpload) {
   const std::string mallory = tokens.add(Role::submit, "mallory")->token;
   const auto begin = [&](const std::string& token, const Digest& digest) {
     return ask(request(Method::put, "/api/v1/blobs/" + digest.hex(),
@@ -62,7 +62,7 @@ TEST_F(Uploads, OfOneTokenBeyondItsShareDropItsOwnOldestOnly) {
   for (std::size_t i = 0; i < kShare + 3; ++i) EXPECT_EQ(blobs->received(part(i)), i < 3 ? 0u : 1u) << i;
 }
 
-TEST_F(Uploads, WhoSentAllOfABlobMayAskForItsEndWithoutABody) {
+TEST_F(Uploads, CompletePartsCanBeFinishedWithAnEmptyBody) {
   const Digest digest = sha256("grid");
   ASSERT_TRUE(blobs->resume_upload(digest, 0).value()->append(std::as_bytes(std::span("grid", 4))));
 
@@ -73,7 +73,7 @@ TEST_F(Uploads, WhoSentAllOfABlobMayAskForItsEndWithoutABody) {
   EXPECT_EQ(answer.status, 201);
 }
 
-TEST_F(Uploads, APartOfABlobThatWouldBeTooLargeIsRefusedBeforeAnyByteIsKept) {
+TEST_F(Uploads, PartOfATooLargeBlobIsRefusedBeforeAnyByteIsStored) {
   const Digest digest = sha256("large");
   const Response answer = ask(request(
       Method::put, "/api/v1/blobs/" + digest.hex(),
@@ -83,7 +83,7 @@ TEST_F(Uploads, APartOfABlobThatWouldBeTooLargeIsRefusedBeforeAnyByteIsKept) {
   EXPECT_EQ(blobs->received(digest), 0u);
 }
 
-TEST_F(Uploads, AJobThatAnotherCoordinatorHasIsRedirected) {
+TEST_F(Uploads, RequestForAnotherCoordinatorsJobIsRedirected) {
   records->others["j-77"] = {"http://there:8080", true};
   records->others["j-78"] = {"http://there:8080", false};
 

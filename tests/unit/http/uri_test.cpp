@@ -9,7 +9,7 @@ namespace {
 
 using Segments = std::vector<std::string>;
 
-TEST(Uri, TakesATargetApart) {
+TEST(Uri, ParsesATarget) {
   const auto target = parse_target("/api/v1/jobs/a%20b?x=1+2&y&z=%2B=#part");
 
   ASSERT_TRUE(target);
@@ -17,12 +17,12 @@ TEST(Uri, TakesATargetApart) {
   EXPECT_EQ(target->query, (Fields{{"x", "1 2"}, {"y", ""}, {"z", "+="}}));
 }
 
-TEST(Uri, TakesTheAbsoluteFormOfProxies) {
+TEST(Uri, AcceptsTheAbsoluteFormOfProxies) {
   EXPECT_EQ(parse_target("http://farm:8080/api?x=1")->segments, Segments{"api"});
   EXPECT_TRUE(parse_target("http://farm")->segments.empty());
 }
 
-TEST(Uri, RefusesWhatIsBrokenOrHidesASlash) {
+TEST(Uri, RefusesBrokenEscapesAndHiddenSlashes) {
   for (const char* wrong :
        {"", "api", "*", "/a b", "/a\tb", "/%", "/%2", "/%zz", "/a%2fb", "/a%00b", "/a?x=%g0", "/\x7f"})
     EXPECT_FALSE(parse_target(wrong)) << wrong;
@@ -35,7 +35,7 @@ TEST(Uri, BoundsTheNumberOfParameters) {
   EXPECT_FALSE(parse_target(target + "&a"));
 }
 
-TEST(Uri, KeepsDotsAsTheyAre) {
+TEST(Uri, KeepsDots) {
   EXPECT_EQ(parse_target("/a/../b//c/")->segments, (Segments{"a", "..", "b", "", "c"}));
 }
 

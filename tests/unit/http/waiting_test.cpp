@@ -7,7 +7,7 @@ namespace {
 
 using WaitingTest = ApiTest;
 
-TEST_F(WaitingTest, IsAskedForInTheQueryAndInJson) {
+TEST_F(WaitingTest, IsReadFromQueryAndJson) {
   const std::string first = submit(), second = submit("?after=" + first);
   const auto shown = json_of(ask(Method::get, "/api/v1/jobs/" + second));
   EXPECT_EQ(shown["after"], nlohmann::json::parse(R"([{"id": ")" + first + R"(", "state": "queued"}])"));
@@ -23,19 +23,19 @@ TEST_F(WaitingTest, IsAskedForInTheQueryAndInJson) {
   EXPECT_EQ(records->last_job().spec.after, (std::vector{first, second}));
 }
 
-TEST_F(WaitingTest, OfNobodyIsNoted) {
+TEST_F(WaitingTest, EmptyWaitIsStored) {
   const auto shown = json_of(ask(Method::get, "/api/v1/jobs/" + submit()));
   EXPECT_EQ(shown["after"], nlohmann::json::array());
   EXPECT_TRUE(shown["waits_for"].is_null());
 }
 
-TEST_F(WaitingTest, ForAJobThatIsNotThereIsRefused) {
+TEST_F(WaitingTest, WaitForAnUnknownJobIsRefused) {
   const auto refused = ask(Method::post, "/api/v1/jobs?after=j-none", kSceneText, "application/xml");
   EXPECT_EQ(refused.status, 400);
   EXPECT_EQ(json_of(refused)["detail"], "after: there is no job j-none");
 }
 
-TEST_F(WaitingTest, MayBeChangedButNotToACircle) {
+TEST_F(WaitingTest, MayBeChangedButNotToACycle) {
   const std::string first = submit(), second = submit("?after=" + first);
   const auto change = [&](const std::string& job, const std::string& after) {
     return ask(Method::patch, "/api/v1/jobs/" + job, R"({"after": )" + after + "}");

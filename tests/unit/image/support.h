@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include "common/image/film/film.h"
-#include "common/image/film/partial.h"
+#include "core/image/film/film.h"
+#include "core/image/film/partial.h"
 
 namespace ls::test {
 

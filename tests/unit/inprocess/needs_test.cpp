@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/analysis/needs.h"
-#include "common/scene/json/serialize.h"
+#include "core/scene/analysis/needs.h"
+#include "core/scene/json/serialize.h"
 #include "tests/support/render_check.h"
 #include "worker/inprocess.h"
 
@@ -31,14 +31,14 @@ test::SceneBuilder ball() {
   return builder;
 }
 
-TEST(InProcess, RendersASceneWhoseNeedsAreThoseThatTheCoordinatorFound) {
+TEST(InProcess, RendersASceneWhoseNeedsMatchTheCoordinators) {
   const test::ScratchFolder folder;
   LocalJob job = job_of(ball(), folder);
   job.brief.needs = canonical_json(scene::needs_of(ball().scene, true));
   EXPECT_TRUE(make_inprocess_backend(1)->prepare(job, std::atomic<bool>{}));
 }
 
-TEST(InProcess, RefusesASceneWhoseNeedsAreOthersAndNamesTheDifference) {
+TEST(InProcess, RefusesASceneWhoseNeedsDifferAndNamesTheDifference) {
   const test::ScratchFolder folder;
   LocalJob job = job_of(ball(), folder);
   test::SceneBuilder other = ball();
@@ -53,7 +53,7 @@ TEST(InProcess, RefusesASceneWhoseNeedsAreOthersAndNamesTheDifference) {
   EXPECT_THAT(refused.error().reason, HasSubstr("\"point\":1"));
 }
 
-TEST(InProcess, TakesAJobThatSaysNothingOfNeeds) {
+TEST(InProcess, AcceptsAJobWithoutNeeds) {
   const test::ScratchFolder folder;
   EXPECT_TRUE(make_inprocess_backend(1)->prepare(job_of(ball(), folder), std::atomic<bool>{}));
 }

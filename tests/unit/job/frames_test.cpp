@@ -2,9 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/base/frame_range.h"
-#include "common/job/frame_diagnostics.h"
-#include "common/job/settings.h"
+#include "core/base/frame_range.h"
+#include "core/job/frame_diagnostics.h"
+#include "core/job/settings.h"
 
 namespace ls {
 namespace {
@@ -17,7 +17,7 @@ std::string refusal(std::string_view text) {
   return range ? "" : range.error().message;
 }
 
-TEST(FrameRange, IsReadAndWrittenInOneWay) {
+TEST(FrameRange, RoundTripsInOneForm) {
   EXPECT_EQ(parse_frames("1-10").value(), (FrameRange{1, 10, 1}));
   EXPECT_EQ(parse_frames("7").value(), (FrameRange{7, 7, 1}));
   EXPECT_THAT(parse_frames("1-10x4").value().frames(), ElementsAre(1, 5, 9));
@@ -30,7 +30,7 @@ TEST(FrameRange, IsReadAndWrittenInOneWay) {
   EXPECT_FALSE((FrameRange{1, 10, 4}).contains(10));
 }
 
-TEST(FrameRange, RefusesWhatIsNoneOrTooLong) {
+TEST(FrameRange, RefusesMalformedAndTooLongRanges) {
   for (const char* text : {"", "-", "1-", "-3", "a", "1-3-5", "1..3", "1-3x", " 1-3", "1-3 ", "+1", "1-3x-1"})
     EXPECT_THAT(refusal(text), HasSubstr("FIRST-LAST")) << text;
   EXPECT_THAT(refusal("5-3"), HasSubstr("comes before"));
@@ -86,7 +86,7 @@ std::vector<std::string> texts(const FrameDiagnostics& found) {
   return out;
 }
 
-TEST(FrameDiagnostics, NameTheFrameUnlessItIsEveryOne) {
+TEST(FrameDiagnostics, NameTheFrameUnlessAllFramesHaveIt) {
   FrameDiagnostics found;
   found.add(1, {complaint("a typing error")});
   found.add(2, {complaint("a typing error"), complaint("no file fog.2")});
@@ -97,7 +97,7 @@ TEST(FrameDiagnostics, NameTheFrameUnlessItIsEveryOne) {
               ElementsAre("a typing error", "frame 2: no file fog.2", "frame 3 and 1 more: odd"));
 }
 
-TEST(FrameDiagnostics, KeepTwentyAtMost) {
+TEST(FrameDiagnostics, KeepAtMostTwenty) {
   FrameDiagnostics found;
   for (std::uint32_t frame = 1; frame <= 50; ++frame) {
     EXPECT_EQ(found.full(), frame > 20);

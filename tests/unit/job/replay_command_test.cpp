@@ -1,5 +1,5 @@
 // A command that is copied into a shell must give the program exactly the words that were quoted.
-#include "common/job/health_notes.h"
+#include "core/job/health_notes.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <array>
 #include <cstdio>
 
-#include "common/base/safe_text.h"
+#include "core/base/safe_text.h"
 
 namespace ls {
 namespace {
@@ -34,7 +34,7 @@ std::string joined(std::initializer_list<std::string> words) {
   return all;
 }
 
-TEST(ShellWord, IsReadByAShellAsTheTextItStandsFor) {
+TEST(ShellWord, RoundTripsThroughAShell) {
   for (const std::string& text :
        {std::string("plain.xml"), std::string("a b"), std::string("it's"), std::string("$HOME `id` $(id) !x"),
         std::string(""), std::string("x\ny\t\033[31m"), std::string("\\'\n\\"),
@@ -42,25 +42,30 @@ TEST(ShellWord, IsReadByAShellAsTheTextItStandsFor) {
     EXPECT_EQ(words_of(shell_word(text)), joined({text})) << shell_word(text);
 }
 
-TEST(ShellWord, HasNothingThatATerminalWouldObey) {
+TEST(ShellWord, HasNoTerminalControls) {
   const std::string word = shell_word("a\nb\033[31m\x7f");
   EXPECT_EQ(plain_text(word), word);
   EXPECT_EQ(shell_word("scenes/bath.xml"), "scenes/bath.xml");
 }
 
-TEST(ReplayCommand, HasAllOfTheSpecThatDecidesASample) {
+TEST(ReplayCommand, ContainsEverySettingThatDecidesASample) {
   JobSpec spec;
   spec.spp = 64;
   spec.priority = 3;
   spec.seed = 7;
   spec.size = FrameSize{64, 32};
   spec.integrator = "path";
-  spec.defines = {{"colour", "1, 2 3"}, {"n", "$(id)"}};
+  spec.techniques = parse_technique_choice("-path_reuse");
+  spec.defines = {{"-odd", "1"}, {"colour", "1, 2 3"}, {"n", "$(id)"}};
 
   EXPECT_EQ(words_of(replay_command(replay_command("-my scene.xml", spec, 12), 3, 4, 5)),
-            joined({"lightshaft", "render", "./-my scene.xml", "--seed", "7", "--frames", "12", "--size",
-                    "64x32", "--integrator", "path", "-D", "colour=1, 2 3", "-D", "n=$(id)", "--pixel", "3,4",
-                    "--sample", "5"}));
+            joined({"lightshaft",   "render",   "./-my scene.xml",
+                    "--seed",       "7",        "--frames",
+                    "12",           "--size",   "64x32",
+                    "--integrator", "path",     "--techniques=-path_reuse",
+                    "-D-odd=1",     "-D",       "colour=1, 2 3",
+                    "-D",           "n=$(id)",  "--pixel",
+                    "3,4",          "--sample", "5"}));
   EXPECT_EQ(replay_command("fog.xml", {}), "lightshaft render fog.xml");
 }
 
@@ -87,7 +92,7 @@ TEST(HealthNotes, NameTheFirstPlaceOfEachCauseAndItsCommand) {
   EXPECT_THAT(health_json({}, {}), testing::HasSubstr(R"("clean":true)"));
 }
 
-TEST(HealthNotes, OfASequenceCountAllFramesAndPointToTheFirst) {
+TEST(HealthNotes, SequenceCountsAllFramesAndPointsToTheFirst) {
   Health h;
   h.add(HealthCause::infinite, 2, {3, 4, 5});
   std::vector<HealthNote> notes;

@@ -1,4 +1,4 @@
-#include "common/job/sealed_image.h"
+#include "core/job/sealed_image.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <cstring>
 #include <tuple>
 
-#include "common/image/exr/exr_file.h"
+#include "core/image/exr/exr_file.h"
 #include "tests/unit/image/support.h"
 #include "worker/fake/fake_pixels.h"
 
@@ -66,7 +66,7 @@ bool same_bits(const std::variant<ExrHalf, ExrFloat, ExrUint>& a,
                                        a);
 }
 
-TEST(SealedImage, GivesBackWhatTheFinalImageHolds) {
+TEST(SealedImage, ReadsBackTheFinalImage) {
   const Film film = make_film(kGrid, 6);
 
   for (const bool floats : {false, true}) {
@@ -109,7 +109,7 @@ void change(std::variant<ExrHalf, ExrFloat, ExrUint>& layer, std::size_t at) {
   if (auto* counts = std::get_if<ExrUint>(&layer)) ++counts->values[at];
 }
 
-TEST(SealedImage, FindsTheFirstValueOfEachLayerThatIsNotOfItsSamples) {
+TEST(SealedImage, FindsTheFirstChangedValueOfEachLayer) {
   const Film film = film_with_aovs();
   const int x = 11, y = 9;  // in tile 5, whose first pixel is (8, 8)
   for (const bool floats : {false, true}) {
@@ -129,7 +129,7 @@ TEST(SealedImage, FindsTheFirstValueOfEachLayerThatIsNotOfItsSamples) {
   }
 }
 
-TEST(SealedImage, ATileHasOneCountOfSamples) {
+TEST(SealedImage, TileHasOneSampleCount) {
   auto image = read(sealed(make_film(kGrid, 6), true)).value();
   auto& spp = std::get<ExrUint>(image.picture.channels.at("spp")).values;
   spp[0] = 8;
@@ -159,7 +159,7 @@ TEST(SealedImage, NamesTheHeaderThatIsWrong) {
               HasSubstr("25 x 13 pixels, its settings say 26 x 13"));
 }
 
-TEST(SealedImage, OfAPictureOfAnotherProgramSaysWhatIsMissing) {
+TEST(SealedImage, ImageOfAnotherProgramIsRefusedNamingWhatIsMissing) {
   ExrPicture other{{2, 2}, {}, {}};
   for (const char* c : {"R", "G", "B"}) other.channels[c] = ExrFloat{std::vector<float>(4, 1.f)};
   EXPECT_THAT(refusal(write_exr(other).value()), HasSubstr("no layer spp"));
@@ -170,7 +170,7 @@ TEST(SealedImage, OfAPictureOfAnotherProgramSaysWhatIsMissing) {
   EXPECT_THAT(refusal(write_exr(other).value()), HasSubstr("only images that Lightshaft has finished"));
 }
 
-TEST(SealedImage, CutShortAnywhereIsRefusedAndNothingElse) {
+TEST(SealedImage, TruncatedFileIsRefused) {
   const auto good = sealed(make_film(kGrid, 2), false);
   for (std::size_t n = 0; n < good.size(); n += 1 + good.size() / 97)
     EXPECT_FALSE(read(std::span(good).first(n))) << n;
@@ -180,7 +180,7 @@ TEST(SealedImage, CutShortAnywhereIsRefusedAndNothingElse) {
 
 // Simulates a faulty disk: if a flipped bit changes anything that is read from the file, the file is rejected
 // or the seal does not match.
-TEST(SealedImage, NoBitOfTheFileChangesUnseen) {
+TEST(SealedImage, DetectsEveryChangedBit) {
   const auto good = sealed(film_with_aovs(), false);
   const auto before = read_final_exr(good, "image.exr").value();
   ASSERT_TRUE(before.changed && before.changed->empty());

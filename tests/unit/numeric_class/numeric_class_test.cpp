@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "common/assets/image.h"
-#include "common/job/settings.h"
+#include "core/assets/image.h"
+#include "core/job/settings.h"
 #include "tests/unit/numeric_class/libraries.h"
 #include "worker/render/numeric_class/battery_images.h"
 #include "worker/render/render.h"
@@ -53,7 +53,7 @@ TEST(NumericClass, DiffersWhereAnyFunctionThatTheRendererCallsDoes) {
   }
 }
 
-TEST(NumericClass, HasAPlatformThatAJobCanAskFor) {
+TEST(NumericClass, HasAPlatformThatAJobCanRequest) {
   const std::string asked = R"({"numeric_class": ")" + platform() + "\"}";
 
   const auto spec = parse_job_spec(asked);
@@ -63,7 +63,7 @@ TEST(NumericClass, HasAPlatformThatAJobCanAskFor) {
   EXPECT_NE(platform().find(":embree-"), std::string::npos) << platform();
 }
 
-TEST(NumericClass, HoldsPicturesThatCanBeReadAndSayMuch) {
+TEST(NumericClass, TestImagesAreReadableAndVaried) {
   for (const std::string_view picture : {battery::kJpeg, battery::kDwa, battery::kB44, battery::kPxr24}) {
     std::vector<std::byte> bytes;
     for (std::size_t i = 0; i < picture.size(); i += 2)

@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "common/image/film/film.h"
 #include "coordinator/domain/adaptive_stop.h"
+#include "core/image/film/film.h"
 #include "tests/unit/domain/stop_oracle.h"
 #include "tests/unit/numeric_class/libraries.h"
 
@@ -66,7 +66,7 @@ Decisions run_job() {
   return out;
 }
 
-TEST(StopDecisions, AreTheSameUnderAnotherMathematicalLibrary) {
+TEST(StopDecisions, AreTheSameWithAnotherMathLibrary) {
   const Decisions here = run_job();
   ASSERT_EQ(here.verdicts.back(), AdaptiveStop::Verdict::yes);
   ASSERT_GT(here.levels.size(), 3u);

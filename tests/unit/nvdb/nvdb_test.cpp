@@ -78,7 +78,7 @@ TEST(Nvdb, ReadsEveryCompression) {
   }
 }
 
-TEST(Nvdb, PlacesTheGridByItsOwnMap) {
+TEST(Nvdb, PlacesTheGridByItsMap) {
   const NvdbBuilder builder;
   const Read r = read(builder.file());
   // Node (0, 0, 0) is the voxel before the first active one.
@@ -87,7 +87,7 @@ TEST(Nvdb, PlacesTheGridByItsOwnMap) {
   for (int i = 0; i < 16; ++i) EXPECT_EQ(r.grid.index_to_scene[i], expected[i]) << i;
 }
 
-TEST(Nvdb, TilesOfTheRootAndNegativesAreReadToo) {
+TEST(Nvdb, ReadsRootTilesAndNegativeCoordinates) {
   NvdbBuilder builder;
   builder.background = -1;
   std::string b = builder.buffer();
@@ -114,7 +114,7 @@ TEST(Nvdb, ChoosesAGridByItsName) {
   EXPECT_THAT(read(a.file() + b.file()).error, HasSubstr("no single one is called 'density'; name one of"));
 }
 
-TEST(Nvdb, RefusesWhatIsNoDensityByName) {
+TEST(Nvdb, RefusesGridsThatAreNotDensitiesByName) {
   NvdbBuilder builder;
   builder.grid_class = 1;
   EXPECT_THAT(read(builder.file()).error, HasSubstr("grid 'density' is a level set"));
@@ -132,7 +132,7 @@ TEST(Nvdb, RefusesWhatIsNoDensityByName) {
   EXPECT_THAT(read(builder.file()).error, HasSubstr("is empty"));
 }
 
-TEST(Nvdb, RefusesWhatIsTooLargeBeforeItIsAllocated) {
+TEST(Nvdb, RefusesTooLargeGridsBeforeAllocating) {
   NvdbBuilder builder;
   EXPECT_THAT(read(builder.file(), "", 2599).error, HasSubstr("2600 voxels; the limit is 2599"));
   EXPECT_EQ(read(builder.file(), "", 2600).error, "");

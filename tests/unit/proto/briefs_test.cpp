@@ -1,5 +1,5 @@
 // What a worker remembers, as both ends of a stream compute it.
-#include "common/protocol/briefs.h"
+#include "util/protocol/briefs.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 namespace ls {
 namespace {
 
-TEST(BriefMemory, KeepsTheJobsLeasedLastThatFitIn) {
+TEST(BriefMemory, KeepsTheMostRecentlyLeasedJobsThatFit) {
   BriefMemory<int> memory(10);
   memory.leased(1, 4);
   memory.leased(2, 4);
@@ -22,7 +22,7 @@ TEST(BriefMemory, KeepsTheJobsLeasedLastThatFitIn) {
   EXPECT_TRUE(memory.has(3));
 }
 
-TEST(BriefMemory, ABriefThatIsLargerThanAllOfItIsForgottenAtOnce) {
+TEST(BriefMemory, TooLargeBriefIsForgottenAtOnce) {
   BriefMemory<int> memory(10);
   memory.leased(1, 4);
 
@@ -31,7 +31,7 @@ TEST(BriefMemory, ABriefThatIsLargerThanAllOfItIsForgottenAtOnce) {
   EXPECT_EQ(memory.size(), 0u);
 }
 
-TEST(BriefMemory, WhatIsInDoubtKeepsItsPlaceUntilItsBriefComesAgain) {
+TEST(BriefMemory, UncertainEntryKeepsItsPlaceUntilItsBriefIsSentAgain) {
   BriefMemory<int> memory(10);
   memory.leased(1, 6);
   memory.doubt(1);
@@ -46,7 +46,7 @@ TEST(BriefMemory, WhatIsInDoubtKeepsItsPlaceUntilItsBriefComesAgain) {
 }
 
 // A coordinator may count on a smaller memory than the worker has, and may take briefs for larger.
-TEST(BriefMemory, AWorkerHasWhatTheCoordinatorTakesItToHaveWhateverIsLeased) {
+TEST(BriefMemory, WorkerRemembersWhatTheCoordinatorExpectsForAnyLeases) {
   std::mt19937 random(1);
   for (const std::size_t counted_on : {50u, 200u, 400u}) {
     BriefMemory<int> coordinator(counted_on), worker(400);

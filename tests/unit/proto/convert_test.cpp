@@ -95,7 +95,7 @@ Result<Message> over_the_wire(const Message& message, Wire wire) {
 }
 
 // A result without causes but with counts must not be taken for a healthy one.
-TEST(Convert, CountsWithoutCausesAreKeptAsSuch) {
+TEST(Convert, KeepsCountsWithoutCauses) {
   pb::FromWorker wire = to_wire(FromWorker(kFromWorker[2]));
   wire.mutable_result()->set_nonfinite(5);
   const auto more = std::get<UnitResult>(from_wire(wire).value());
@@ -129,7 +129,7 @@ TEST(Convert, ReadsEveryCoordinatorMessageBackAsItWas) {
   }
 }
 
-TEST(Convert, PassesTheSpanOfALeaseOnAndTheTimeSinceWhenAUnitIsHeld) {
+TEST(Convert, KeepsTheSpanOfALeaseAndTheTimeSinceAUnitIsHeld) {
   AssignLease lease = assignment();
   lease.trace = trace::parse_traceparent("00-0af7651916cd43dd8448eb211c80319c-b7ad6b7169203331-01");
   EXPECT_EQ(over_the_wire(ToWorker(lease), pb::ToWorker{}).value(), ToWorker(lease));
@@ -139,7 +139,7 @@ TEST(Convert, PassesTheSpanOfALeaseOnAndTheTimeSinceWhenAUnitIsHeld) {
   EXPECT_EQ(over_the_wire(FromWorker(result), pb::FromWorker{}).value(), FromWorker(result));
 }
 
-TEST(Convert, IgnoresTheSpanOfALeaseThatIsNone) {
+TEST(Convert, IgnoresAnInvalidSpan) {
   pb::ToWorker wire = to_wire(ToWorker(assignment()));
   wire.mutable_assign()->set_traceparent(std::string(1 << 16, '-'));
   EXPECT_EQ(from_wire(wire).value(), ToWorker(assignment()));
@@ -281,7 +281,7 @@ TEST(Convert, SendsOnlyValidUtf8) {
 }
 
 // The coordinator keeps this reason for each worker and job. An older worker may send a longer one.
-TEST(FromWire, CutsTheReasonOfAReturnedLease) {
+TEST(FromWire, TruncatesTheReasonOfAReturnedLease) {
   pb::FromWorker wire = to_wire(FromWorker{LeaseReturned{LeaseId{"l"}, {}, std::string(4000, 'x')}});
   EXPECT_EQ(wire.returned().reason().size(), limits::kReasonBytes);
   wire.mutable_returned()->set_reason(std::string(limits::kReasonBytes - 1, 'x') + "\xc3\xa9 and more");
@@ -291,7 +291,7 @@ TEST(FromWire, CutsTheReasonOfAReturnedLease) {
   EXPECT_EQ(received.reason, std::string(limits::kReasonBytes - 1, 'x')) << "between two characters";
 }
 
-TEST(FromWire, AKindOfMessageThatThisVersionLacksIsKnownAsSuch) {
+TEST(FromWire, UnknownKindOfMessageIsRecognisedAsUnknown) {
   pb::FromWorker from;
   pb::ToWorker to;
   const std::string newer("\x9a\x06\x02hi", 5);  // the unknown field 99, with two bytes
@@ -304,7 +304,7 @@ TEST(FromWire, AKindOfMessageThatThisVersionLacksIsKnownAsSuch) {
   EXPECT_TRUE(known(to_wire(ToWorker{DrainNow{}})));
 }
 
-TEST(Convert, TakesControlCharactersOutOfReceivedTexts) {
+TEST(Convert, RemovesControlCharactersFromReceivedTexts) {
   pb::FromWorker wire = to_wire(FromWorker(kFromWorker[4]));
   wire.mutable_failure()->set_reason("a\x1b[31mb");
   EXPECT_EQ(std::get<UnitFailure>(from_wire(wire).value()).reason, "a [31mb");

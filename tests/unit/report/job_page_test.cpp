@@ -1,4 +1,4 @@
-#include "common/report/job_page.h"
+#include "util/report/job_page.h"
 
 #include <gtest/gtest.h>
 
@@ -50,7 +50,7 @@ std::size_t times(const std::string& text, std::string_view what) {
   return n;
 }
 
-TEST(JobPage, TellsWhatTheReportTells) {
+TEST(JobPage, ShowsAllOfTheReport) {
   const std::string page = page_of(some_report());
 
   for (const char* words :
@@ -79,7 +79,7 @@ TEST(JobPage, TellsWhatTheReportTells) {
 }
 
 // Without a requested target the forecast is for half of the error, and no target line is drawn.
-TEST(JobPage, WithoutATargetSaysWhatHalfOfTheErrorWouldCost) {
+TEST(JobPage, ShowsTheCostOfHalfTheErrorWithoutATarget) {
   json report = some_report();
   report["target_error"] = nullptr;
   report["forecast"]["asked"] = false;
@@ -91,7 +91,7 @@ TEST(JobPage, WithoutATargetSaysWhatHalfOfTheErrorWouldCost) {
   EXPECT_EQ(times(page_of(some_report()), "class=\"target\""), 2u) << "one in each plot";
 }
 
-TEST(JobPage, TrueErrorStandsBesideTheEstimate) {
+TEST(JobPage, ShowsTheTrueErrorBesideTheEstimate) {
   json report = some_report();
   for (json& p : report["convergence"]) p["true_relmse"] = 1.1 * p["relmse"].get<double>();
   report["reference"] = {
@@ -105,7 +105,7 @@ TEST(JobPage, TrueErrorStandsBesideTheEstimate) {
   EXPECT_EQ(times(page_of(some_report()), "polyline class=\"line c1"), 0u);
 }
 
-TEST(JobPage, WhatAReferenceCannotTellIsNotNought) {
+TEST(JobPage, ErrorBelowTheReferencesNoiseIsNotShownAsZero) {
   json report = some_report();
   for (json& p : report["convergence"]) p["true_relmse"] = .1234, p["true_relmse_below_noise"] = false;
   report["convergence"].back()["true_relmse_below_noise"] = true;
@@ -134,7 +134,7 @@ void expect_not(const std::string& page, std::string_view words) {
   EXPECT_EQ(page.find(words), std::string::npos) << '"' << words << "\" is in\n" << page;
 }
 
-TEST(JobPage, ADoubtfulEstimateAndUncleanNumbersAreSaid) {
+TEST(JobPage, ShowsUntrustedEstimatesAndHealthProblems) {
   json report = some_report();
   doubt(report);
   report["few_hits_pixels"] = 12;
@@ -150,7 +150,7 @@ TEST(JobPage, ADoubtfulEstimateAndUncleanNumbersAreSaid) {
   expect(page, "12 pixels got too few hits");
 }
 
-TEST(JobPage, InDoubtSaysWhatToDo) {
+TEST(JobPage, UntrustedJobHasAdvice) {
   json report = some_report();
   expect_not(page_of(report), "What to do");
   doubt(report);
@@ -184,7 +184,7 @@ TEST(JobPage, HasTheMeanOfTheImageAndTheErrorOfSquares) {
 
 // The verdict is shown for every report with `trusted` false, even early ones, and whatever its
 // `verdict_kind` is.
-TEST(JobPage, IsInDoubtWhereTheReportDoesNotTrustItself) {
+TEST(JobPage, ShowsDoubtIfTheReportIsUntrusted) {
   for (const char* kind : {"early", "heavy_tail", "bias_floor", ""}) {
     json report = some_report();
     doubt(report);
@@ -199,7 +199,7 @@ TEST(JobPage, IsInDoubtWhereTheReportDoesNotTrustItself) {
   expect_not(page_of(some_report()), "class=\"verdict\"");
 }
 
-TEST(JobPage, InDoubtPromisesNothing) {
+TEST(JobPage, UntrustedJobHasNoForecast) {
   json report = some_report();
   doubt(report);
   report["rmse_ci95"] = {0.0401, 0.0502};
@@ -213,7 +213,7 @@ TEST(JobPage, InDoubtPromisesNothing) {
 }
 
 // No interval is shown: not as a band, at a point, in the table, or for the slope.
-TEST(JobPage, InDoubtTheCurveHasNoIntervals) {
+TEST(JobPage, UntrustedCurveHasNoIntervals) {
   json report = some_report();
   expect(page_of(report), "class=\"band c0\"");
   expect(page_of(report), "<th scope=\"col\">95 % interval</th>");
@@ -231,7 +231,7 @@ TEST(JobPage, InDoubtTheCurveHasNoIntervals) {
   EXPECT_EQ(cells, report["convergence"].size());
 }
 
-TEST(JobPage, ATargetReachedByAnEstimateInDoubtIsNotSaidToBeReached) {
+TEST(JobPage, UntrustedEstimateBelowTheTargetIsNotShownAsReached) {
   json report = some_report();
   report["stopped"] = "error";
   expect(page_of(report), "done: the target error is reached ·");
@@ -239,7 +239,7 @@ TEST(JobPage, ATargetReachedByAnEstimateInDoubtIsNotSaidToBeReached) {
   expect(page_of(report), "done: the target error is reached by its own estimate: don&#39;t trust yet ·");
 }
 
-TEST(JobPage, SaysTheVerdictAlsoBeforeThereIsASlope) {
+TEST(JobPage, ShowsTheVerdictBeforeThereIsASlope) {
   json report = some_report();
   report["slope"] = report["slope_ci95"] = report["trend"] = nullptr;
   report["verdict_kind"] = "early";
@@ -250,7 +250,7 @@ TEST(JobPage, SaysTheVerdictAlsoBeforeThereIsASlope) {
   expect(page_of(report), "Too early to tell how it converges.");
 }
 
-TEST(JobPage, OfAFailedJobSaysWhy) {
+TEST(JobPage, ShowsWhyAJobFailed) {
   json report = some_report();
   report["state"] = "failed";
   report["stopped"] = nullptr;
@@ -261,14 +261,14 @@ TEST(JobPage, OfAFailedJobSaysWhy) {
   expect_not(page_of(some_report()), "The job failed");
 }
 
-TEST(JobPage, SaysWhatStoppedAJobThatWasNotDone) {
+TEST(JobPage, ShowsWhatStoppedAnUnfinishedJob) {
   json report = some_report();
   report["state"] = "cancelled";
   report["stopped"] = "user";
   expect(page_of(report), "cancelled: someone stopped it");
 }
 
-TEST(JobPage, SaysThatSomeOfTheImageHasNoSampleYet) {
+TEST(JobPage, ReportsPixelsWithoutSamples) {
   json report = some_report();
   report["pixels_without_samples"] = 12800;
   expect(page_of(report),
@@ -278,7 +278,7 @@ TEST(JobPage, SaysThatSomeOfTheImageHasNoSampleYet) {
   expect_not(page_of(some_report()), "No sample has reached");
 }
 
-TEST(JobPage, ATableThatIsCutSaysSo) {
+TEST(JobPage, TruncatedTableIsMarked) {
   json report = some_report();
   const json point = report["convergence"][0];
   report["convergence"] = json::array();
@@ -294,7 +294,7 @@ TEST(JobPage, ATableThatIsCutSaysSo) {
   expect(page_of(some_report()), "<summary>The points as a table</summary>");
 }
 
-TEST(JobPage, SaysWhoseSecondsItCounts) {
+TEST(JobPage, SaysWhichSecondsItCounts) {
   const std::string page = page_of(some_report());
 
   for (const char* words : {"getting the files that the scene names", "reading them and building the world",
@@ -303,7 +303,7 @@ TEST(JobPage, SaysWhoseSecondsItCounts) {
     expect(page, words);
 }
 
-TEST(JobPage, PartsOfTheTimeThatAreTooSmallToCountAreLessThanOnePercent) {
+TEST(JobPage, TinyPartsOfTheTimeAreShownAsLessThanOnePercent) {
   json report = some_report();
   report["time"] = {{"load", .0001},     {"build", 0},  {"render", 100},
                     {"transfer", .0001}, {"merge", .4}, {"idle", 0}};
@@ -314,7 +314,7 @@ TEST(JobPage, PartsOfTheTimeThatAreTooSmallToCountAreLessThanOnePercent) {
   EXPECT_EQ(times(page, "<td>0 %</td>"), 2u);
 }
 
-TEST(JobPage, ProvenanceSaysWhatWasAskedFor) {
+TEST(JobPage, ProvenanceShowsTheRequestedSettings) {
   json report = some_report();
   report.update(json::parse(R"({"max_depth": -1, "rr_depth": 5, "spp_asked": 4096, "time_asked": 90})"));
   for (const char* row :
@@ -329,14 +329,14 @@ TEST(JobPage, ProvenanceSaysWhatWasAskedFor) {
   for (const char* name : {"Samples asked", "Time asked", "Target relMSE"}) expect_not(page_of(report), name);
 }
 
-TEST(JobPage, TheLegendOfSamplesSaysThatThereMayBeMore) {
+TEST(JobPage, SampleLegendMarksItsUpperEndAsOpen) {
   auto page = job_page({some_report().dump(), {}, {std::byte{1}}, {std::byte{2}}});
   ASSERT_TRUE(page);
   expect(*page, "</svg>16,384 or more</span>");
   expect(*page, "</svg>100 % or more</span>");
 }
 
-TEST(JobPage, ThreadsAreThoseOfOneMachineOrTheMeanOfAFarm) {
+TEST(JobPage, ShowsThreadsOfAMachineOrTheFarmsMean) {
   json report = some_report();
   expect(page_of(report), "<dt>Threads</dt><dd><span>3.5</span>");
   report["threads"] = 16;
@@ -350,7 +350,7 @@ void poison(json& j) {
     for (json& child : j) poison(child);
 }
 
-TEST(JobPage, NoTextOfTheReportBecomesMarkup) {
+TEST(JobPage, EscapesAllTextsOfTheReport) {
   json report = some_report();
   report["warnings"] = {"w"};
   report["note"] = "n";
@@ -377,7 +377,7 @@ void expect_sound(const json& report) {
   EXPECT_EQ(times(page, "inf"), 0u) << report.dump(1);
 }
 
-TEST(JobPage, LacksWhatTheReportLacksAndTakesNothingForWhatItIsNot) {
+TEST(JobPage, LeavesOutWhatTheReportLacksAndIgnoresValuesOfWrongTypes) {
   const json whole = some_report();
   const std::vector<json> others{nullptr,
                                  true,
@@ -408,7 +408,7 @@ TEST(JobPage, LacksWhatTheReportLacksAndTakesNothingForWhatItIsNot) {
   expect_sound(json::object());
 }
 
-TEST(JobPage, ConvergencePointsMayBeAnything) {
+TEST(JobPage, HandlesAnyConvergencePoints) {
   json report = some_report();
   report["convergence"] =
       json::parse(R"([null, 1, {}, {"seconds": -1, "relmse": 0}, {"seconds": "x", "relmse": []},
@@ -416,12 +416,12 @@ TEST(JobPage, ConvergencePointsMayBeAnything) {
   expect_sound(report);
 }
 
-TEST(JobPage, WhatIsNoReportIsRefused) {
+TEST(JobPage, RefusesInputThatIsNotAReport) {
   for (const char* text : {"", "[]", "{", "7"})
     EXPECT_EQ(job_page({text, {}, {}, {}}).error().code, Errc::invalid_argument) << text;
 }
 
-TEST(JobPage, IsTheSameForTheSame) { EXPECT_EQ(page_of(some_report()), page_of(some_report())); }
+TEST(JobPage, IsDeterministic) { EXPECT_EQ(page_of(some_report()), page_of(some_report())); }
 
 }  // namespace
 }  // namespace ls::report

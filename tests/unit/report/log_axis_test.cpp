@@ -1,4 +1,4 @@
-#include "common/report/log_axis.h"
+#include "util/report/log_axis.h"
 
 #include <gtest/gtest.h>
 
@@ -36,19 +36,19 @@ TEST(LogAxis, ValuesLieInsideWithAMargin) {
   EXPECT_LT(axis.at(700), 504);
 }
 
-TEST(LogAxis, AxisThatRunsUpwardsIsTurnedRound) {
+TEST(LogAxis, UpwardAxisIsReversed) {
   const LogAxis axis = log_axis(0.001, 1, 300, 14);
   EXPECT_GT(axis.at(0.001), axis.at(1));
 }
 
-TEST(LogAxis, OneValueHasADecadeAroundIt) {
+TEST(LogAxis, SingleValueGetsADecadeAroundIt) {
   const LogAxis axis = log_axis(3, 3, 0, 100);
 
   EXPECT_NEAR(std::log10(axis.hi / axis.lo), 1, 1e-12);
   EXPECT_NEAR(axis.at(3), 50, 1e-9);
 }
 
-TEST(LogAxis, TheEndsOfDoublesAreNotLeft) {
+TEST(LogAxis, StaysWithinTheRangeOfDoubles) {
   const LogAxis axis = log_axis(1e-308, 1e308, 0, 100);
 
   EXPECT_TRUE(std::isfinite(axis.hi) && axis.lo > 0);
@@ -61,7 +61,7 @@ TEST(LogAxis, TheEndsOfDoublesAreNotLeft) {
 }
 
 // The table is shared with the dashboard, whose ticks tests/web/test_modules.py compares with it.
-TEST(Ticks, AreThoseOfTheTable) {
+TEST(Ticks, MatchTheTable) {
   for (const auto& [what, unit] :
        {std::pair("error_ticks", AxisUnit::plain), std::pair("time_ticks", AxisUnit::seconds)})
     for (const auto& row : shown(what))
@@ -77,7 +77,7 @@ TEST(Ticks, LinesBetweenDecadesAreThereButNotMajor) {
       std::is_sorted(all.begin(), all.end(), [](const Tick& a, const Tick& b) { return a.value < b.value; }));
 }
 
-TEST(Ticks, ThereAreNeverMoreLabelsThanHaveRoomAndNeverNone) {
+TEST(Ticks, AxisHasAtLeastOneLabelAndNoMoreThanFit) {
   for (double lo = -6; lo < 6; lo += 0.37)
     for (double wide = 1; wide < 14; wide += 0.41) {
       const LogAxis axis{std::pow(10, lo), std::pow(10, lo + wide), 0, 1};

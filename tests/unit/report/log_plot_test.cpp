@@ -1,4 +1,4 @@
-#include "common/report/log_plot.h"
+#include "util/report/log_plot.h"
 
 #include <gtest/gtest.h>
 
@@ -54,7 +54,7 @@ TEST(LogPlot, ErrorThatFallsAsOneOverTimeIsAStraightLineDownwards) {
   }
 }
 
-TEST(LogPlot, HasItsNameAndSummaryForThoseWhoHearIt) {
+TEST(LogPlot, HasANameAndSummaryForScreenReaders) {
   LogPlot plot = falling();
   plot.summary = "relMSE 0.001 after 8.5 min";
   const auto svg = parsed(svg_of(plot));
@@ -66,7 +66,7 @@ TEST(LogPlot, HasItsNameAndSummaryForThoseWhoHearIt) {
                "0.500 (0.400 to 0.600) at 1 s");
 }
 
-TEST(LogPlot, NamesOfStrangersAreText) {
+TEST(LogPlot, ForeignNamesAreEscaped) {
   LogPlot plot = falling();
   plot.id = "x\" onload=\"y";
   plot.title = plot.summary = plot.x_title = plot.y_title = plot.curves[0].name =
@@ -81,7 +81,7 @@ TEST(LogPlot, NamesOfStrangersAreText) {
   EXPECT_STREQ(svg.select_node("//text[@class='name']").node().text().get(), plot.title.c_str());
 }
 
-TEST(LogPlot, WhatHasNoLogarithmIsLeftOut) {
+TEST(LogPlot, ValuesWithoutALogarithmAreLeftOut) {
   LogPlot plot = falling();
   const double inf = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
   plot.curves[0].points.insert(plot.curves[0].points.begin(),
@@ -94,7 +94,7 @@ TEST(LogPlot, WhatHasNoLogarithmIsLeftOut) {
   EXPECT_EQ(svg.find("inf"), std::string::npos);
 }
 
-TEST(LogPlot, WithoutAPointSaysWhenThereWillBeOne) {
+TEST(LogPlot, SaysWhenTheFirstPointWillComeIfThereIsNone) {
   LogPlot plot = falling();
   plot.curves[0].points.clear();
   plot.target = 0.001;
@@ -122,7 +122,7 @@ TEST(LogPlot, TargetAndForecastMeetWhereTheErrorWillBe) {
   EXPECT_LT(span_x, x);
 }
 
-TEST(LogPlot, AForecastWithoutATargetOrTooFarAwayIsNotDrawn) {
+TEST(LogPlot, ForecastWithoutATargetOrTooFarAwayIsNotDrawn) {
   LogPlot plot = falling();
   plot.ahead = Ahead{5000, 4000, 7000};
   EXPECT_EQ(count_of(parsed(svg_of(plot)), "//path[@class='dot c0']"), 0u);
@@ -132,7 +132,7 @@ TEST(LogPlot, AForecastWithoutATargetOrTooFarAwayIsNotDrawn) {
   EXPECT_EQ(count_of(parsed(svg_of(plot)), "//path[@class='dot c0']"), 0u);
 }
 
-TEST(LogPlot, SeveralCurvesHaveALegendAndTheirOwnMarks) {
+TEST(LogPlot, SeveralCurvesHaveALegendAndDifferentMarks) {
   LogPlot plot = falling();
   for (int i = 1; i < 6; ++i) plot.curves.push_back(plot.curves[0]);
   const auto svg = parsed(svg_of(plot));
@@ -151,7 +151,7 @@ TEST(LogPlot, LongCurvesAreThinnedToTheirEnds) {
   EXPECT_EQ(points.size(), kMostCurvePoints);
 }
 
-TEST(LogPlot, AFileOfItsOwnHasItsStyle) {
+TEST(LogPlot, StandaloneFileContainsItsStyle) {
   const auto svg = parsed(standalone_svg(falling()));
 
   EXPECT_EQ(count_of(svg, "/svg/style"), 1u);

@@ -8,10 +8,10 @@
 #include <iterator>
 #include <limits>
 
-#include "common/report/html.h"
-#include "common/report/number_text.h"
-#include "common/report/phrases.h"
 #include "tests/unit/report/shown.h"
+#include "util/report/html.h"
+#include "util/report/number_text.h"
+#include "util/report/phrases.h"
 
 namespace ls::report {
 namespace {
@@ -23,7 +23,7 @@ TEST(EscapeHtml, LeavesNoMarkup) {
             "&lt;img src=x onerror=&quot;a(&#39;b&#39;)&quot;&gt;&amp;");
 }
 
-TEST(EscapeHtml, LeavesNothingThatForgesOrTurnsLettersRound) {
+TEST(EscapeHtml, RemovesDirectionMarksAndForgedCharacters) {
   EXPECT_EQ(escape_html("a\x1b[31m\x01z"), "a [31m z");
   EXPECT_EQ(escape_html("a\u202Efdp.exe"), "a fdp.exe");
 }
@@ -31,7 +31,7 @@ TEST(EscapeHtml, LeavesNothingThatForgesOrTurnsLettersRound) {
 TEST(EscapeHtml, KeepsLines) { EXPECT_EQ(escape_html("a\n<b\n"), "a\n&lt;b\n"); }
 
 // The examples of RFC 4648, section 10.
-TEST(Base64, IsThatOfTheStandard) {
+TEST(Base64, MatchesTheStandard) {
   EXPECT_EQ(base64(bytes("")), "");
   EXPECT_EQ(base64(bytes("f")), "Zg==");
   EXPECT_EQ(base64(bytes("fo")), "Zm8=");
@@ -42,7 +42,7 @@ TEST(Base64, IsThatOfTheStandard) {
   EXPECT_EQ(base64(bytes("\xff\xfe\xfd")), "//79");
 }
 
-TEST(Document, ForbidsScriptsAndAddressesAndAllowsItsOwnStyleByDigest) {
+TEST(Document, ForbidsScriptsAndAddressesAndAllowsItsStyleByDigest) {
   const std::string page = document("a <b>", "p{color:red}", "<p>x</p>");
 
   // The digest is from: printf 'p{color:red}' | openssl dgst -sha256 -binary | base64
@@ -57,7 +57,7 @@ TEST(Document, ForbidsScriptsAndAddressesAndAllowsItsOwnStyleByDigest) {
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 // The table is shared with the dashboard, whose texts tests/web/test_modules.py compares with it.
-TEST(Words, AreThoseOfTheTable) {
+TEST(Words, MatchTheTable) {
   const std::pair<const char*, std::string (*)(double)> all[] = {
       {"figure", figure},        {"given", given},     {"duration", duration}, {"count", count},
       {"samples", sample_count}, {"bytes", byte_size}, {"percent", percent}};
@@ -74,13 +74,13 @@ TEST(Words, DatesAreInUtc) {
 std::string module_text() {
   std::string text =
       "// Phrases that the dashboard has in common with reports and the terminal: written from "
-      "common/report/phrases.h\n// by LIGHTSHAFT_UPDATE_DOCS=1 report_test --gtest_filter='Phrases.*'.\n"
+      "util/report/phrases.h\n// by LIGHTSHAFT_UPDATE_DOCS=1 report_test --gtest_filter='Phrases.*'.\n"
       "export const phrases = {\n";
   for (const Phrase& p : kPhrases) text += fmt::format("  {}: {},\n", p.key, nlohmann::json(p.text).dump());
   return text + "};\n";
 }
 
-TEST(Phrases, OfTheDashboardAreThoseOfTheReports) {
+TEST(Phrases, DashboardAndReportsShareTheirPhrases) {
   const std::string path = LS_SOURCE_DIR "/web/static/js/phrases.js";
   if (std::getenv("LIGHTSHAFT_UPDATE_DOCS")) std::ofstream(path) << module_text();
   std::ifstream in(path);

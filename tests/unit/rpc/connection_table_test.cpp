@@ -43,14 +43,14 @@ class Connections : public testing::Test {
   TimePoint now_{1h};
 };
 
-TEST_F(Connections, OneAddressHasAShareOfTheUnmetPlaces) {
+TEST_F(Connections, OneAddressHasAShareOfThePlacesBeforeTheHello) {
   for (ConnectionTable::Id id = 1; id <= 4; ++id) EXPECT_TRUE(taken(id, "a"));
 
   EXPECT_EQ(arrive(5, "a").refused, Closed::many_unmet);
   EXPECT_TRUE(taken(6, "b"));
 }
 
-TEST_F(Connections, AnyNumberOfWorkersOfOneAddressIsTakenOnceTheyHaveSaidHello) {
+TEST_F(Connections, AnyNumberOfWorkersOfOneAddressMayStayAfterTheirHello) {
   for (ConnectionTable::Id id = 1; id <= 100; ++id) {
     ASSERT_TRUE(taken(id, "behind one router")) << id;
     say_hello(id);
@@ -59,7 +59,7 @@ TEST_F(Connections, AnyNumberOfWorkersOfOneAddressIsTakenOnceTheyHaveSaidHello) 
   EXPECT_EQ(arrive(101, "behind one router").refused, Closed::full);
 }
 
-TEST_F(Connections, ASilentConnectionIsClosedAfterFiveSeconds) {
+TEST_F(Connections, SilentConnectionIsClosedAfterFiveSeconds) {
   ASSERT_TRUE(taken(1, "a"));
   ASSERT_TRUE(taken(2, "a"));
   say_hello(2);
@@ -73,7 +73,7 @@ TEST_F(Connections, ASilentConnectionIsClosedAfterFiveSeconds) {
   EXPECT_EQ(table_.closed(Closed::silent), 1u);
 }
 
-TEST_F(Connections, AConnectionWhoseWorkerHasLeftIsUnmetAgain) {
+TEST_F(Connections, ConnectionIsUnmetAgainAfterItsWorkerLeaves) {
   ASSERT_TRUE(taken(1, "a"));
   say_hello(1);
   now_ += 1h;
@@ -85,7 +85,7 @@ TEST_F(Connections, AConnectionWhoseWorkerHasLeftIsUnmetAgain) {
   EXPECT_EQ(table_.overdue(now_), std::vector<ConnectionTable::Id>{1});
 }
 
-TEST_F(Connections, AConnectionIsMetWhileOneCallHasShownTheToken) {
+TEST_F(Connections, ConnectionIsKnownOnceOneCallShowedTheToken) {
   ASSERT_TRUE(taken(1, "a"));
   ASSERT_TRUE(table_.call_began(peer(1), now_).guest);
   ASSERT_TRUE(table_.call_began(peer(1), now_).guest);
@@ -99,7 +99,7 @@ TEST_F(Connections, AConnectionIsMetWhileOneCallHasShownTheToken) {
 
 // Places that are held for long go to new connections, so that an address that is used by strangers and
 // workers, or all addresses together, cannot be held by the strangers.
-TEST_F(Connections, OneThatHasWaitedLongMakesRoom) {
+TEST_F(Connections, OldestUnmetConnectionMakesRoom) {
   for (ConnectionTable::Id id = 1; id <= 4; ++id) ASSERT_TRUE(taken(id, "a"));
   now_ += 2s - 1ns;
   EXPECT_EQ(arrive(5, "a").refused, Closed::many_unmet) << "a worker may take so long to say hello";
@@ -112,7 +112,7 @@ TEST_F(Connections, OneThatHasWaitedLongMakesRoom) {
   EXPECT_EQ(table_.closed(Closed::made_room), 1u);
 }
 
-TEST_F(Connections, AnAddressWithManyMakesRoomForOneWithFew) {
+TEST_F(Connections, AddressWithManyConnectionsMakesRoomForOthers) {
   for (ConnectionTable::Id id = 1; id <= 4; ++id) ASSERT_TRUE(taken(id, "a"));
   for (ConnectionTable::Id id = 5; id <= 8; ++id) ASSERT_TRUE(taken(id, "b"));
 
@@ -124,7 +124,7 @@ TEST_F(Connections, AnAddressWithManyMakesRoomForOneWithFew) {
   EXPECT_EQ(arrive(11, "c").refused, Closed::many_unmet) << "a and b have 3, c has 2: places would go round";
 }
 
-TEST_F(Connections, PlacesAreFreeAgainWhenConnectionsAreGone) {
+TEST_F(Connections, ClosedConnectionsFreeTheirPlaces) {
   for (int round = 0; round < 100; ++round) {
     for (ConnectionTable::Id id = 1; id <= 4; ++id) ASSERT_TRUE(taken(id, "a")) << round;
     for (ConnectionTable::Id id = 1; id <= 4; ++id) table_.gone(id);
@@ -132,7 +132,7 @@ TEST_F(Connections, PlacesAreFreeAgainWhenConnectionsAreGone) {
   EXPECT_EQ(table_.size(), 0u);
 }
 
-TEST_F(Connections, ManyCallsBeforeAHelloCloseTheConnectionAndShutItsAddressOut) {
+TEST_F(Connections, TooManyCallsBeforeTheHelloCloseTheConnectionAndBlockItsAddress) {
   ASSERT_TRUE(taken(1, "a"));
   EXPECT_TRUE(table_.call_began(peer(1), now_).guest);
   EXPECT_TRUE(table_.call_began(peer(1), now_).guest);
@@ -148,7 +148,7 @@ TEST_F(Connections, ManyCallsBeforeAHelloCloseTheConnectionAndShutItsAddressOut)
   EXPECT_TRUE(taken(4, "a"));
 }
 
-TEST_F(Connections, AMetConnectionIsNotClosedForManyCalls) {
+TEST_F(Connections, MetConnectionIsNotClosedForManyCalls) {
   ASSERT_TRUE(taken(1, "a"));
   say_hello(1);
   EXPECT_TRUE(table_.call_began(peer(1), now_).guest);
@@ -169,7 +169,7 @@ TEST_F(Connections, BytesBeforeACallAreLimited) {
   EXPECT_EQ(arrive(2, "a").refused, Closed::shut_out) << "it was a header without an end, not a hello";
 }
 
-TEST_F(Connections, ALongHelloThatDoesNotEndShutsItsAddressOut) {
+TEST_F(Connections, EndlessHelloBlocksItsAddress) {
   begin_hello(1, "a");
   EXPECT_FALSE(table_.received(1, 1001, now_));
   now_ += 5s;
@@ -202,7 +202,7 @@ TEST_F(Connections, FewConnectionsAtATimeMaySendALongHello) {
   EXPECT_FALSE(table_.received(4, 1001, now_)) << "the place of the first is free";
 }
 
-TEST_F(Connections, AWorkerMaySendWhatItLikes) {
+TEST_F(Connections, JoinedWorkerHasNoByteLimit) {
   ASSERT_TRUE(taken(1, "a"));
   say_hello(1);
   EXPECT_FALSE(table_.received(1, 1'000'000, now_));
@@ -212,7 +212,7 @@ TEST_F(Connections, AWorkerMaySendWhatItLikes) {
   EXPECT_FALSE(table_.received(1, 1'000'000, now_)) << "these bytes came before";
 }
 
-TEST_F(Connections, APeerThatComesAgainIsANewConnection) {
+TEST_F(Connections, ReturningPeerIsANewConnection) {
   ASSERT_FALSE(table_.arrive(1, {"peer", "a"}, now_).refused);
   ASSERT_TRUE(table_.call_began("peer", now_).guest);
   table_.call_met("peer");

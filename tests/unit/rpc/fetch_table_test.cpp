@@ -27,7 +27,7 @@ class Transfers : public testing::Test {
   TimePoint now_{1h};
 };
 
-TEST_F(Transfers, OneConnectionHasFew) {
+TEST_F(Transfers, TransfersPerConnectionAreLimited) {
   for (FetchTable::Id id = 1; id <= 4; ++id) EXPECT_TRUE(taken(id, "peer", "a"));
   EXPECT_FALSE(taken(5, "peer", "a"));
   EXPECT_TRUE(taken(6, "another", "a"));
@@ -35,7 +35,7 @@ TEST_F(Transfers, OneConnectionHasFew) {
   EXPECT_TRUE(taken(7, "peer", "a"));
 }
 
-TEST_F(Transfers, AChunkThatNobodyTakesEndsTheTransferAfterHalfAMinute) {
+TEST_F(Transfers, UnreadChunkEndsTheTransferAfterHalfAMinute) {
   ASSERT_TRUE(taken(1, "peer", "a"));
   ASSERT_TRUE(taken(2, "peer", "a"));
   ASSERT_TRUE(taken(3, "peer", "a"));
@@ -51,7 +51,7 @@ TEST_F(Transfers, AChunkThatNobodyTakesEndsTheTransferAfterHalfAMinute) {
       << "the third waits for the coordinator, which may have to fetch the blob itself";
 }
 
-TEST_F(Transfers, TheOneThatHasWaitedLongestMakesRoom) {
+TEST_F(Transfers, LongestWaitingTransferMakesRoom) {
   for (FetchTable::Id id = 1; id <= 8; ++id) {
     ASSERT_TRUE(taken(id, fmt::format("peer {}", id), fmt::format("address {}", id)));
     table_.waits(id, now_ + id * 1ms);
@@ -67,7 +67,7 @@ TEST_F(Transfers, TheOneThatHasWaitedLongestMakesRoom) {
   EXPECT_FALSE(taken(11, "peer 11", "address 11")) << "the next one has not waited for a second";
 }
 
-TEST_F(Transfers, NoAddressTakesTheLastPlaces) {
+TEST_F(Transfers, OneAddressCannotTakeTheLastPlaces) {
   for (FetchTable::Id id = 1; id <= 6; ++id) EXPECT_TRUE(taken(id, fmt::format("peer {}", id), "greedy"));
   EXPECT_FALSE(taken(7, "peer 7", "greedy"));
   EXPECT_TRUE(taken(8, "peer 8", "another"));

@@ -141,7 +141,7 @@ TEST_F(GrpcFarm, JobsAreCancelledWhileOthersRender) {
   EXPECT_EQ(coordinator_->job(kept)->state, JobState::done);
 }
 
-TEST_F(GrpcFarm, StreamsThatAreCutAnywhereLoseNothing) {
+TEST_F(GrpcFarm, BrokenStreamsLoseNothing) {
   const JobId job = submit_long();
   auto steady = worker(0);
   for (int i = 1; i <= 6; ++i) {  // each worker disconnects without draining first
@@ -156,7 +156,7 @@ TEST_F(GrpcFarm, StreamsThatAreCutAnywhereLoseNothing) {
   EXPECT_EQ(coordinator_->job(job)->state, JobState::done);
 }
 
-TEST_F(GrpcFarm, WorkersJoinAServerThatComesBackOnItsPort) {
+TEST_F(GrpcFarm, WorkersRejoinARestartedServer) {
   const JobId job = submit_long();
   auto first = worker(1);
   auto second = worker(2);
@@ -174,7 +174,7 @@ TEST_F(GrpcFarm, WorkersJoinAServerThatComesBackOnItsPort) {
   EXPECT_TRUE(second->drain());
 }
 
-TEST_F(GrpcFarm, AWorkerWithAWrongTokenIsToldAndEnds) {
+TEST_F(GrpcFarm, WorkerWithAWrongTokenEndsWithAnError) {
   GrpcWorker stranger(address_, "stranger", folder_.path() / "stranger", "a guess");
 
   const auto ended = stranger.join();
@@ -196,7 +196,7 @@ struct SlowToHear final : worker::LinkObserver {
 
 // close() must wait for lost(). Otherwise the call, which also owns the channel, could outlive the link on a
 // thread of gRPC.
-TEST_F(GrpcFarm, ALinkIsClosedOnlyAfterItsObserverWasTold) {
+TEST_F(GrpcFarm, LinkClosesAfterNotifyingItsObserver) {
   for (int i = 0; i < 5; ++i) {
     auto link = worker::make_grpc_link(address_, kToken);
     const auto observer = std::make_shared<SlowToHear>();
@@ -217,7 +217,7 @@ TEST_F(GrpcFarm, ALinkIsClosedOnlyAfterItsObserverWasTold) {
 // When the last channel of a process is destroyed, gRPC joins its threads. If one of these threads destroyed
 // it, that thread would join itself and use freed memory. This test runs no server, since a server's channels
 // would keep the threads alive.
-TEST(GrpcLink, ToACoordinatorThatIsNotThereEndsCleanly) {
+TEST(GrpcLink, LinkToAMissingCoordinatorEndsCleanly) {
   for (int i = 0; i < 5; ++i) {
     auto link = worker::make_grpc_link("127.0.0.1:1", kToken);  // a port where no coordinator listens
     const auto observer = std::make_shared<SlowToHear>();

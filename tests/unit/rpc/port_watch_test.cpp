@@ -25,7 +25,7 @@ std::optional<bool> answers(const sockaddr_in& address, std::chrono::millisecond
   return port_answers(reinterpret_cast<const sockaddr*>(&address), sizeof address, time_limit);
 }
 
-TEST(PortWatch, AServerAnswers) {
+TEST(PortWatch, RunningServerResponds) {
   const auto coordinator = Coordinator::open({}).value();
   GrpcServer server(*coordinator);
 
@@ -36,7 +36,7 @@ TEST(PortWatch, AServerAnswers) {
 }
 
 // The system itself takes connections for a program that never accepts them.
-TEST(PortWatch, AListenerThatAcceptsNothingDoesNot) {
+TEST(PortWatch, ListenerThatAcceptsNothingCountsAsSilent) {
   const int listener = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address = loopback(0);
   socklen_t length = sizeof address;
@@ -50,7 +50,7 @@ TEST(PortWatch, AListenerThatAcceptsNothingDoesNot) {
   EXPECT_EQ(answers(address, 50ms), false) << "nobody listens";
 }
 
-TEST(PortWatch, TellsOfSilenceAndGivesUpAfterTwoMinutes) {
+TEST(PortWatch, ReportsSilenceAndGivesUpAfterTwoMinutes) {
   PortWatch watch;
   watch.looked(false);
   EXPECT_EQ(watch.trouble(), "") << "one look may fail on a busy machine";

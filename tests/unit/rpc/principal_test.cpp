@@ -6,7 +6,7 @@
 namespace ls::coordinator {
 namespace {
 
-TEST(Principal, IsTheAddressWhicheverThePort) {
+TEST(Principal, IgnoresThePort) {
   EXPECT_EQ(principal_of("ipv4:10.0.0.7:4711", ""), "10.0.0.7");
   EXPECT_EQ(principal_of("ipv4:10.0.0.7:4712", ""), principal_of("ipv4:10.0.0.7:4711", ""));
   EXPECT_NE(principal_of("ipv4:10.0.0.8:4711", ""), principal_of("ipv4:10.0.0.7:4711", ""));
@@ -20,12 +20,12 @@ TEST(Principal, IsTheNetworkOfAnIpv6Address) {
   EXPECT_NE(principal_of("ipv6:[2001:db8:1:3::4]:80", ""), one);
 }
 
-TEST(Principal, IsTheConnectionOnTheCoordinatorsOwnMachine) {
+TEST(Principal, EachLocalConnectionIsAPrincipal) {
   EXPECT_NE(principal_of("ipv4:127.0.0.1:1", ""), principal_of("ipv4:127.0.0.1:2", ""));
   EXPECT_NE(principal_of("ipv6:%5B::1%5D:1", ""), principal_of("ipv6:%5B::1%5D:2", ""));
 }
 
-TEST(Principal, IsAnotherWithAnotherCertificate) {
+TEST(Principal, DiffersByCertificate) {
   const std::string peer = "ipv4:10.0.0.7:4711";
 
   EXPECT_NE(principal_of(peer, "one"), principal_of(peer, "two"));

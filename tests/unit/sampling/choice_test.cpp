@@ -49,7 +49,7 @@ std::vector<double> claimed(const LightBench& b, const V3& x, const V3& n) {
   return p;
 }
 
-TEST(LightChoice, IsMadeAsOftenAsAHitClaims) {
+TEST(LightChoice, ProbabilityMatchesThatOfAHit) {
   test::ChiSquareTally tally("sampling/choice");
   for (const int lights : {5, 300}) {
     const LightBench b(hall(lights));

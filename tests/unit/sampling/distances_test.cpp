@@ -232,7 +232,7 @@ void flights(test::ChiSquareTally& tally) {
         });
 }
 
-TEST(Distances, FallAsTheirDensitySays) {
+TEST(Distances, FollowTheirDensity) {
   test::ChiSquareTally tally("sampling/distances");
   exponentials(tally);
   equiangular(tally);
@@ -240,7 +240,7 @@ TEST(Distances, FallAsTheirDensitySays) {
   tally.close();
 }
 
-TEST(Distances, GrowByOneOverTheDensity) {
+TEST(Distances, DerivativeIsOneOverTheDensity) {
   for (const float depth : {1e-30f, .1f, 3.f, 50.f})
     test::expect_slope(
         fmt::format("truncated to depth {}", depth),

@@ -58,7 +58,7 @@ std::vector<Grid> fields() {
   return all;
 }
 
-TEST(EmissionPoints, FallAsTheirDensitySays) {
+TEST(EmissionPoints, FollowTheirDensity) {
   test::ChiSquareTally tally("sampling/glow_points");
   const double h = 2;
   for (const double depth : kDepths)
@@ -88,7 +88,7 @@ TEST(EmissionPoints, FallAsTheirDensitySays) {
   tally.close();
 }
 
-TEST(EmissionPoints, GrowByOneOverTheDensity) {
+TEST(EmissionPoints, DerivativeIsOneOverTheDensity) {
   const double h = 2;
   for (const double depth : kDepths)
     test::expect_slope(

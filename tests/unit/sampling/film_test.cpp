@@ -57,7 +57,7 @@ V3d lens_point(const Camera& c, const V2& u) {
   return (o - d * (o.z / d.z)) / .25;
 }
 
-TEST(Film, PlacesOnFilmAndLensFallAsTheirDensitySays) {
+TEST(Film, FilmAndLensSamplesFollowTheirDensity) {
   test::ChiSquareTally tally("sampling/film");
   for (const Filter& f : filters()) {
     constexpr int kCells = 80;
@@ -92,7 +92,7 @@ TEST(Film, PlacesOnFilmAndLensFallAsTheirDensitySays) {
   tally.close();
 }
 
-TEST(Film, MapsStretchByOneOverTheDensity) {
+TEST(Film, SamplingJacobianIsOneOverTheDensity) {
   for (const Filter& f : filters()) {
     const PixelFilter sampled(f.filter);
     const double all = integral(f, -f.radius, f.radius);

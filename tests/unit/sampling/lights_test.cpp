@@ -138,7 +138,7 @@ TEST(LightSampling, FollowsTheDensityOfWhatRaysFind) {
   tally.close();
 }
 
-TEST(LightSampling, StretchesTheSquareByOneOverTheDensity) {
+TEST(LightSampling, SamplingJacobianIsOneOverTheDensity) {
   for (const Case& c : cases()) {
     const LightBench b(c.builder);
     const V3 x = b.at(c.from);

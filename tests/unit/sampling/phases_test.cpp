@@ -23,7 +23,7 @@ double distribution(double g, double x) {
 }
 
 // In cells of equal probability, by the closed form of the polar angle's distribution and by azimuth.
-TEST(Phases, SamplesFallAsTheDensitySays) {
+TEST(Phases, SamplesFollowTheirDensity) {
   test::ChiSquareTally tally("sampling/phases");
   constexpr int kRows = 16, kColumns = 12, kSamples = 100000;
   for (const V3& w : kWays)
@@ -48,7 +48,7 @@ TEST(Phases, SamplesFallAsTheDensitySays) {
   tally.close();
 }
 
-TEST(Phases, StretchTheSquareByOneOverTheDensity) {
+TEST(Phases, SamplingJacobianIsOneOverTheDensity) {
   for (const V3& w : kWays)
     for (const float g : {-.9f, -.3f, 0.f, .5f, .95f})
       test::expect_jacobian(fmt::format("g {}", g), [&](const V2& u) -> std::optional<test::Mapped> {

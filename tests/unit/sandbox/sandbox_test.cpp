@@ -1,6 +1,6 @@
 // What a process in the sandbox can still do. Each attempt is made in a new process, as the user of the test
 // and, if that is root, as a user without rights too.
-#include "common/sandbox/sandbox.h"
+#include "util/sandbox/sandbox.h"
 
 #include <fcntl.h>
 #include <grp.h>
@@ -40,7 +40,7 @@
 #include <thread>
 #include <vector>
 
-#include "common/sandbox/call_filter.h"
+#include "util/sandbox/call_filter.h"
 
 namespace ls {
 namespace {
@@ -124,7 +124,7 @@ std::string why_uncaged(bool Sandboxed::*needs) {
     FAIL() << "nothing is caged, and the kernel is no reason";                         \
   }
 
-TEST_P(Cage, ReadsAssetsAndNothingElseOfTheMachine) {
+TEST_P(Cage, CanReadOnlyAssetsAndLibraries) {
   const int asset = try_open(root_ / "cache/sub/asset", O_RDONLY);
   SKIP_UNCAGED(asset, &Sandboxed::files);
   EXPECT_EQ(asset, 0);
@@ -135,7 +135,7 @@ TEST_P(Cage, ReadsAssetsAndNothingElseOfTheMachine) {
   EXPECT_EQ(try_open("/proc/self/status", O_RDONLY), 0);
 }
 
-TEST_P(Cage, WritesNothing) {
+TEST_P(Cage, CannotWriteFiles) {
   const int made = try_open(root_ / "cache/new", O_WRONLY | O_CREAT);
   SKIP_UNCAGED(made, &Sandboxed::files);
   EXPECT_EQ(made, EACCES);
@@ -145,7 +145,7 @@ TEST_P(Cage, WritesNothing) {
   EXPECT_EQ(try_call([&] { return ::unlink((root_ / "cache/sub/asset").c_str()); }), EPERM);
 }
 
-TEST_P(Cage, MovesAndLinksNothing) {
+TEST_P(Cage, CannotMoveOrLinkFiles) {
   const auto asset = root_ / "cache/sub/asset", beside = root_ / "cache/sub/other", out = root_ / "out";
   const int moved = try_call([&] { return ::rename(asset.c_str(), beside.c_str()); });
   SKIP_UNCAGED(moved, &Sandboxed::calls);
@@ -156,7 +156,7 @@ TEST_P(Cage, MovesAndLinksNothing) {
   EXPECT_TRUE(std::filesystem::exists(asset));
 }
 
-TEST_P(Cage, CutsNoFileShort) {
+TEST_P(Cage, CannotTruncateFiles) {
   const auto asset = root_ / "cache/sub/asset";
   const int cut = try_call([&] { return ::truncate(asset.c_str(), 0); });
   SKIP_UNCAGED(cut, &Sandboxed::calls);
@@ -168,7 +168,7 @@ TEST_P(Cage, CutsNoFileShort) {
   EXPECT_EQ(std::filesystem::file_size(asset), 5u);
 }
 
-TEST_P(Cage, ChangesNoModeOwnerTimeOrAttribute) {
+TEST_P(Cage, CannotChangeModeOwnerTimeOrAttributes) {
   const auto asset = root_ / "cache/sub/asset";
   const char* const file = asset.c_str();
   const auto opened = [&] { return ::open(file, O_RDONLY); };
@@ -197,7 +197,7 @@ TEST_P(Cage, ChangesNoModeOwnerTimeOrAttribute) {
   for (std::size_t i = 0; i < calls.size(); ++i) EXPECT_EQ(try_call(calls[i]), EPERM) << "call " << i;
 }
 
-TEST_P(Cage, LocksNoFile) {
+TEST_P(Cage, CannotLockFiles) {
   const auto asset = root_ / "cache/sub/asset";
   const auto opened = [&] { return ::open(asset.c_str(), O_RDONLY); };
   const int locked = try_call([&] { return ::flock(opened(), LOCK_EX | LOCK_NB); });
@@ -209,7 +209,7 @@ TEST_P(Cage, LocksNoFile) {
   EXPECT_EQ(try_call([&] { return ::fcntl(opened(), F_SETLEASE, F_RDLCK); }), EPERM);
 }
 
-TEST_P(Cage, TypesIntoNoTerminal) {
+TEST_P(Cage, CannotTypeIntoATerminal) {
   const int master = ::posix_openpt(O_RDWR | O_NOCTTY);
   ASSERT_GE(master, 0);
   ASSERT_EQ(::grantpt(master), 0);
@@ -235,7 +235,7 @@ TEST_P(Cage, TypesIntoNoTerminal) {
   ::close(terminal), ::close(master);
 }
 
-TEST_P(Cage, HasNoRightsOfRoot) {
+TEST_P(Cage, HasNoRootRights) {
   const auto capabilities = [] {
     std::ifstream status("/proc/self/status");
     for (std::string line; std::getline(status, line);)
@@ -279,14 +279,14 @@ TEST_P(Cage, HasNoRightsOfRoot) {
   for (std::size_t i = 0; i < calls.size(); ++i) EXPECT_EQ(try_call(calls[i]), EPERM) << "call " << i;
 }
 
-TEST_P(Cage, KnowsNoCallThatIsNewerThanItsList) {
+TEST_P(Cage, DeniesUnknownNewSystemCalls) {
   constexpr long kOfTheFuture = 1000;
   const int code = try_call([] { return ::syscall(kOfTheFuture); });
   SKIP_UNCAGED(code, &Sandboxed::calls);
   EXPECT_EQ(code, ENOSYS);
 }
 
-TEST_P(Cage, OpensNoSocketAndTracesNobody) {
+TEST_P(Cage, CannotOpenSocketsOrTraceProcesses) {
   const int tcp =
       try_sandboxed([] { return ::socket(AF_INET, SOCK_STREAM, 0) >= 0 ? 0 : 1; }, &Sandboxed::calls);
   SKIP_UNCAGED(tcp, &Sandboxed::calls);
@@ -299,7 +299,7 @@ TEST_P(Cage, OpensNoSocketAndTracesNobody) {
             EPERM);
 }
 
-TEST_P(Cage, MakesNoNamespaces) {
+TEST_P(Cage, CannotMakeNamespaces) {
   const auto cloned = [](long made) {
     if (made == 0) ::_exit(0);  // the new process
     return made > 0 ? 0 : 1;
@@ -325,7 +325,7 @@ TEST_P(Cage, MakesNoNamespaces) {
   EXPECT_EQ(try_sandboxed([] { return std::thread([] {}).join(), 0; }, &Sandboxed::calls), 0);
 }
 
-TEST_P(Cage, StartsNothingOnceThatIsForbidden) {
+TEST_P(Cage, CannotStartProcessesOnceForbidden) {
   const auto tried = [&](const std::function<long()>& start) {
     return try_sandboxed([&] { return forbid_processes() && start() < 0 ? 1 : 0; }, &Sandboxed::calls);
   };
@@ -348,7 +348,7 @@ TEST_P(Cage, StartsNothingOnceThatIsForbidden) {
   EXPECT_EQ(tried([] { return 0; }), 0);
 }
 
-TEST_P(Cage, SignalsNobodyButItself) {
+TEST_P(Cage, CannotSignalOtherProcesses) {
   const int agent = try_sandboxed([] { return ::kill(::getppid(), 0); }, &Sandboxed::calls);
   SKIP_UNCAGED(agent, &Sandboxed::calls);
   EXPECT_EQ(agent, EPERM);
@@ -373,7 +373,7 @@ TEST_P(Cage, SignalsNobodyButItself) {
   for (const int end : ends) ::close(end);
 }
 
-TEST_P(Cage, DiesOfItsOwnSignals) {
+TEST_P(Cage, CanStillDieOfSignals) {
   for (const bool aborts : {true, false}) {
     const pid_t pid = ::fork();
     if (pid == 0) {
@@ -391,7 +391,7 @@ TEST_P(Cage, DiesOfItsOwnSignals) {
   }
 }
 
-TEST_P(Cage, ChangesLimitsOfNobodyButItself) {
+TEST_P(Cage, CanChangeOnlyItsOwnLimits) {
   const auto set = [](pid_t of) {
     rlimit files{};
     return ::prlimit(of, RLIMIT_NOFILE, nullptr, &files) == 0 &&
@@ -408,7 +408,7 @@ TEST_P(Cage, ChangesLimitsOfNobodyButItself) {
             EPERM);
 }
 
-TEST_P(Cage, LeavesNoMemoryBehind) {
+TEST_P(Cage, CannotLeaveSharedMemoryBehind) {
   const int shared = try_sandboxed([] { return ::shmget(IPC_PRIVATE, 4096, IPC_CREAT | 0600) >= 0 ? 0 : 1; },
                                    &Sandboxed::calls);
   SKIP_UNCAGED(shared, &Sandboxed::calls);
@@ -421,7 +421,7 @@ TEST_P(Cage, LeavesNoMemoryBehind) {
             EPERM);
 }
 
-TEST_P(Cage, HoldsWhatItStartsToTheSame) {
+TEST_P(Cage, AlsoRestrictsChildProcesses) {
   const auto read_secret = [&] {
     const std::string command = "cat '" + (root_ / "secret").string() + "' 2>&1";
     return ::system(command.c_str()) == 0 ? 0 : 1;

@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "common/scene/file_names.h"
-#include "common/scene/folder_assets.h"
+#include "formats/file_names.h"
+#include "formats/folder_assets.h"
 #include "tests/unit/scene/pbrt/pbrt_testing.h"
 #include "tests/unit/scene/scene_testing.h"
 
@@ -24,7 +24,7 @@ std::string told_of(std::string_view file_name) {
   return messages(r);
 }
 
-TEST(FileNames, OfOtherProgramsSayWhatToDo) {
+TEST(FileNames, ForeignSuffixesGetAdvice) {
   EXPECT_NE(told_of("a b/shot.USDZ").find("python3 -m lightshaft.usd 'a b/shot.USDZ' -o shot-scene"),
             std::string::npos)
       << told_of("a b/shot.USDZ");
@@ -42,19 +42,19 @@ TEST(FileNames, OfOtherProgramsSayWhatToDo) {
 }
 
 // The Python package converts a USD stage to XML, and sends the XML under the stage's name.
-TEST(FileNames, OfOtherProgramsMayBeThoseOfScenes) {
+TEST(FileNames, ForeignSuffixMayStillBeAScene) {
   MemoryAssets assets;
   const ReadResult r = read_scene("shot.usda", "<?xml version=\"1.0\"?>\n<scene version=\"3.0.0\"/>", assets);
 
   EXPECT_EQ(messages(r).find("USD"), std::string::npos) << messages(r);
 }
 
-TEST(FileNames, OfScenesSayNothing) {
+TEST(FileNames, SceneSuffixesGetNoAdvice) {
   for (const char* name : {"", "scene", "scene.xml", "usd", "scene.usd.xml", "a.gltf", "a.glb", "a.pbrt"})
     EXPECT_EQ(scene::why_no_scene(name), "") << name;
 }
 
-TEST(FileNames, EndInUpperOrLowerCase) {
+TEST(FileNames, SuffixesIgnoreCase) {
   EXPECT_TRUE(scene::has_ending("A.GlTf", {".glb", ".gltf"}));
   EXPECT_FALSE(scene::has_ending("gltf", {".gltf"}));
   EXPECT_FALSE(scene::has_ending("", {".gltf"}));
@@ -89,13 +89,13 @@ TEST_F(Folder, ReadsAFileOnce) {
   EXPECT_EQ(assets_.find("cloud.vol")->digest, sha256("volume"));
 }
 
-TEST_F(Folder, AMissingFileIsToldWithNamesLikeIt) {
+TEST_F(Folder, MissingFileIsReportedWithSimilarNames) {
   EXPECT_EQ(assets_.find("clod.vol").error(),
             (Error{Errc::not_found, "there is no file \"clod.vol\"; did you mean 'cloud.vol'?"}));
   EXPECT_THAT(assets_.find("nowhere/cloud.vol").error().message, HasSubstr("its folder does not exist"));
 }
 
-TEST_F(Folder, ANameMayHaveBackslashesBetweenFolders) {
+TEST_F(Folder, NamesMayHaveBackslashesBetweenFolders) {
   EXPECT_EQ(assets_.text("sub\\base.xml").value(), "<scene/>");
   EXPECT_EQ(assets_.find(".\\cloud.vol")->digest, sha256("volume"));
   EXPECT_THAT(assets_.find("sub\\bse.xml").error().message,
@@ -105,7 +105,7 @@ TEST_F(Folder, ANameMayHaveBackslashesBetweenFolders) {
 }
 
 // macOS stores letters and their accents apart.
-TEST_F(Folder, ALetterAndItsAccentMayBeWrittenApart) {
+TEST_F(Folder, AccentsMayBeDecomposed) {
   fs::create_directories(path_ / "man\u0303ana");
   write("man\u0303ana/e\u0301te\u0301.vol", "apart");
   write("\u00e9t\u00e9.vol", "composed");
@@ -115,14 +115,14 @@ TEST_F(Folder, ALetterAndItsAccentMayBeWrittenApart) {
   EXPECT_FALSE(assets_.find("e\u0300te\u0301.vol"));  // another accent
 }
 
-TEST_F(Folder, ALinkToNothingIsToldAsThat) {
+TEST_F(Folder, DanglingLinkIsReportedAsSuch) {
   fs::create_symlink("gone.vol", path_ / "link.vol");
 
   EXPECT_EQ(assets_.find("link.vol").error().message,
             "\"link.vol\" is a link to \"gone.vol\", where there is no file");
 }
 
-TEST_F(Folder, APointerOfGitLfsIsToldAsThat) {
+TEST_F(Folder, GitLfsPointerIsReportedAsSuch) {
   write("mesh.ply", "version https://git-lfs.github.com/spec/v1\noid sha256:12\nsize 3\n");
 
   EXPECT_THAT(assets_.find("mesh.ply").error().message, HasSubstr("\"mesh.ply\" is a pointer of Git LFS"));
@@ -144,7 +144,7 @@ TEST_F(Folder, TextPackedByGzipIsUnpackedButKeepsItsDigest) {
               HasSubstr("'cut.xml.gz': is packed by gzip, and damaged"));
 }
 
-TEST_F(Folder, ATextFileWithoutALineEndIsDoubtful) {
+TEST_F(Folder, TextFileWithoutALineEndCausesAWarning) {
   write("whole.obj", "v 0 0 0\nf 1 1 1\n");
   write("cut.obj", "v 0 0 0\nf 1 1 1");
   write("cut.ply", "ply\nformat ascii 1.0\nelement");
@@ -160,7 +160,7 @@ TEST_F(Folder, ATextFileWithoutALineEndIsDoubtful) {
   EXPECT_TRUE(assets_.take_doubts().empty());
 }
 
-TEST_F(Folder, AFolderIsNoFile) {
+TEST_F(Folder, FolderIsNotReadAsAFile) {
   EXPECT_EQ(assets_.find("sub").error().code, Errc::invalid_argument);
   EXPECT_EQ(assets_.text("sub").error().code, Errc::invalid_argument);
   EXPECT_EQ(assets_.find("").error().code, Errc::invalid_argument);
@@ -190,10 +190,10 @@ std::size_t unnoticed(std::string_view name, const std::string& whole, const Kee
   return count;
 }
 
-TEST(DamagedScenes, XmlThatWasCutIsRefused) { EXPECT_EQ(unnoticed("a.xml", kExample, {}), 0u); }
+TEST(DamagedScenes, TruncatedXmlIsRefused) { EXPECT_EQ(unnoticed("a.xml", kExample, {}), 0u); }
 
 // Within a directive a cut is found; between two of them nothing tells that more should follow.
-TEST(DamagedScenes, PbrtThatWasCutIsRefusedUnlessADirectiveEndsThere) {
+TEST(DamagedScenes, TruncatedPbrtIsRefusedUnlessADirectiveEndsThere) {
   std::string world;
   for (int i = 0; i < 20; ++i)
     world += fmt::format("AttributeBegin\n  Shape \"sphere\" \"float radius\" {}\nAttributeEnd\n", i + 1);

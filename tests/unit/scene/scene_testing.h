@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "common/scene/json/serialize.h"
-#include "common/scene/read.h"
+#include "core/scene/json/serialize.h"
+#include "formats/read.h"
 
 namespace ls {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <random>
 
-#include "common/image/exr/final_image.h"
 #include "coordinator/views/views.h"
+#include "core/image/exr/final_image.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -51,7 +51,7 @@ std::vector<std::uint64_t> spp_of_tiles(const Coordinator& coordinator, const Jo
 // When a checkpoint is taken, some tiles are rounds, and levels of adaptive sampling, ahead of others. The
 // cost of the checkpoint must include only its own samples, even after a restart. Every sample costs the same
 // here.
-TEST(Adaptive, ACheckpointCostsWhatItsOwnSamplesTook) {
+TEST(Adaptive, CheckpointCostsOnlyItsOwnSamples) {
   // CPU seconds per sample of a pixel; so little that no unit seems to take longer than it was leased
   constexpr double kCost = 0x1p-40;
   for (const bool killed : {false, true}) {
@@ -87,7 +87,7 @@ TEST(Adaptive, ACheckpointCostsWhatItsOwnSamplesTook) {
   }
 }
 
-TEST(Adaptive, TilesThatNeedMoreGetMoreAndTheImageSaysSo) {
+TEST(Adaptive, NoisierTilesGetMoreSamplesAndTheImageSaysSo) {
   auto coordinator = open_at({});
   const JobId job = submit(*coordinator, spec_with(kTarget));
   ASSERT_TRUE(finish(*coordinator, job, 2));
@@ -119,7 +119,7 @@ TEST(Adaptive, TilesThatNeedMoreGetMoreAndTheImageSaysSo) {
   EXPECT_EQ(curve.back()["relmse"], j["relmse"]) << "the last checkpoint is the image";
 }
 
-TEST(Adaptive, EachTileSaysItsOwnErrorAndTheirMeanIsTheImages) {
+TEST(Adaptive, EachTileHasAnErrorAndTheirMeanIsTheImagesError) {
   auto coordinator = open_at({});
   const JobId job = submit(*coordinator, spec_with(kTarget));
   const auto untouched = nlohmann::json::parse(tiles_json(*coordinator->tiles(job)))["tiles"];
@@ -182,7 +182,7 @@ TEST(Adaptive, ShuffledDuplicatedAndLostResultsGiveTheSamePixels) {
   }
 }
 
-TEST(Adaptive, ACoordinatorKilledAnywhereGivesTheSamePixels) {
+TEST(Adaptive, CoordinatorKilledAtAnyPointGivesTheSamePixels) {
   const Outcome expected = at_once(spec_with(kTarget));
   for (const int k : {1, 40, 95, 101, 107, 113, 119, 125}) {
     TempFolder dir;
@@ -195,7 +195,7 @@ TEST(Adaptive, ACoordinatorKilledAnywhereGivesTheSamePixels) {
   }
 }
 
-TEST(Adaptive, HalvingTheTargetOfAFinishedJobGivesTheBitsOfOneThatHadItFromTheFirst) {
+TEST(Adaptive, HalvingTheTargetOfAFinishedJobGivesTheBitsOfAJobSubmittedWithThatTarget) {
   const Outcome expected = at_once(spec_with(kTarget / 2));
   for (const int way : {0, 1, 2}) {  // in memory, on disk, on disk with a restart between
     TempFolder dir;
@@ -218,7 +218,7 @@ TEST(Adaptive, HalvingTheTargetOfAFinishedJobGivesTheBitsOfOneThatHadItFromTheFi
   }
 }
 
-TEST(Adaptive, ExtendedBySamplesItHasTheBitsOfAJobBySamples) {
+TEST(Adaptive, ExtendingBySamplesGivesTheBitsOfAJobBySamples) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId job = submit(*coordinator, spec_with(kTarget));

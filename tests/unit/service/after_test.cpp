@@ -84,7 +84,7 @@ struct FullStore final : MovingStore {
   std::atomic<bool> full{false};
 };
 
-TEST(After, AJobBeginsWhenTheOneBeforeItIsDone) {
+TEST(After, JobBeginsWhenItsPrerequisiteIsDone) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId first = submit(*coordinator), second = submit(*coordinator, after({first}));
@@ -103,7 +103,7 @@ TEST(After, AJobBeginsWhenTheOneBeforeItIsDone) {
   EXPECT_EQ(waits(*coordinator, second), std::vector<std::string>());
 }
 
-TEST(After, AJobWithSeveralBeforeItWaitsForTheLast) {
+TEST(After, JobWaitsForAllOfItsPrerequisites) {
   auto coordinator = open_at({});
   const JobId one = submit(*coordinator), two = submit(*coordinator);
   const JobId last = submit(*coordinator, after({two, one}));
@@ -115,7 +115,7 @@ TEST(After, AJobWithSeveralBeforeItWaitsForTheLast) {
   EXPECT_EQ(coordinator->job(two)->state, JobState::done);
 }
 
-TEST(After, AFrameWaitsForTheFrameOfItsNumberInASequenceOfTheSameFrames) {
+TEST(After, FrameWaitsForTheFrameWithItsNumberInASequenceOfEqualFrames) {
   auto coordinator = open_at({});
   const JobId first = submit(*coordinator, frames("1-3"));
   const JobId same = submit(*coordinator, after({first}, "1-3"));
@@ -144,7 +144,7 @@ TEST(After, UnknownAndCancelledJobsAreRefused) {
                 " is cancelled and will never be done: submit it again, and name the new job here");
 }
 
-TEST(After, AJobThatIsDoneIsNotWaitedFor) {
+TEST(After, DoneJobIsNotWaitedFor) {
   auto coordinator = open_at({});
   const JobId first = submit(*coordinator);
   FakeFarm farm(*coordinator, 1);
@@ -153,7 +153,7 @@ TEST(After, AJobThatIsDoneIsNotWaitedFor) {
   EXPECT_EQ(waits(*coordinator, submit(*coordinator, after({first}))), std::vector<std::string>());
 }
 
-TEST(After, ACancelledJobLeavesTheOthersHeldAndTheirErrorSaysWhatToDo) {
+TEST(After, CancelledJobKeepsItsWaitersHeldWithAnErrorThatSaysWhatToDo) {
   auto coordinator = open_at({});
   const JobId first = submit(*coordinator), second = submit(*coordinator, after({first}));
   ASSERT_TRUE(coordinator->remove(first));
@@ -174,7 +174,7 @@ TEST(After, ACancelledJobLeavesTheOthersHeldAndTheirErrorSaysWhatToDo) {
   EXPECT_EQ(coordinator->job(second)->state, JobState::done);
 }
 
-TEST(After, AJobThatWouldWaitForItselfIsRefused) {
+TEST(After, WaitingForItselfIsRefused) {
   auto coordinator = open_at({});
   const JobId one = submit(*coordinator), two = submit(*coordinator, after({one}));
   const JobId three = submit(*coordinator, after({two}, "1-2"));
@@ -187,7 +187,7 @@ TEST(After, AJobThatWouldWaitForItselfIsRefused) {
   EXPECT_EQ(waits(*coordinator, one), std::vector<std::string>());
 }
 
-TEST(After, ARestartKeepsTheWaitAndNoticesWhatWasDoneBeforeIt) {
+TEST(After, RestartKeepsWaitingJobsAndFindsPrerequisitesThatAreDone) {
   TempFolder dir;
   JobId first, second, third;
   {
@@ -211,7 +211,7 @@ TEST(After, ARestartKeepsTheWaitAndNoticesWhatWasDoneBeforeIt) {
   }));
 }
 
-TEST(After, FramesThatWaitForAWholeSequenceHearOnceOfEachOfItsEnds) {
+TEST(After, FramesThatWaitForASequenceAreNotifiedOnceOfEachEnd) {
   auto coordinator = open_at({});
   const JobId first = submit(*coordinator, frames("1-6"));
   const JobId second = submit(*coordinator, after({first}, "1-5"));
@@ -226,7 +226,7 @@ TEST(After, FramesThatWaitForAWholeSequenceHearOnceOfEachOfItsEnds) {
   EXPECT_THAT(coordinator->job(second)->waits_for, HasSubstr("is not here any more"));
 }
 
-TEST(After, FramesThatWaitForAWholeSequenceHearNothingOfItsSingleFrames) {
+TEST(After, FramesThatWaitForASequenceIgnoreTheEndsOfItsFrames) {
   auto coordinator = open_at({});
   const JobId first = submit(*coordinator, frames("1-6"));
   const JobId second = submit(*coordinator, after({first}, "1-5"));
@@ -240,7 +240,7 @@ TEST(After, FramesThatWaitForAWholeSequenceHearNothingOfItsSingleFrames) {
   EXPECT_EQ(events.of_frames(second, 5), 0);
 }
 
-TEST(After, ASequenceThatIsExtendedAndDoneAgainEndsTheWaitOfThoseThatCameSince) {
+TEST(After, ExtendedSequenceReleasesLaterWaitersWhenItIsDoneAgain) {
   auto coordinator = open_at({});
   const JobId first = submit(*coordinator, frames("1-2"));
   FakeFarm farm(*coordinator, 1);
@@ -252,14 +252,14 @@ TEST(After, ASequenceThatIsExtendedAndDoneAgainEndsTheWaitOfThoseThatCameSince) 
   ASSERT_TRUE(farm.run([&] { return coordinator->job(second)->state == JobState::done; }));
 }
 
-TEST(After, AJobThatIsNamedTwiceIsWaitedForOnce) {
+TEST(After, JobNamedTwiceIsWaitedForOnce) {
   auto coordinator = open_at({});
   const JobId first = submit(*coordinator);
 
   EXPECT_EQ(waits(*coordinator, submit(*coordinator, after({first, first}))), std::vector{first.value});
 }
 
-TEST(After, AJobThatHasBegunIsNotHeldAnyMore) {
+TEST(After, StartedJobIsNoLongerHeld) {
   auto coordinator = open_at({});
   const JobId begun = submit(*coordinator), shot = submit(*coordinator, frames("1-2"));
   const JobId other = submit(*coordinator);
@@ -287,7 +287,7 @@ TEST(After, AJobThatHasBegunIsNotHeldAnyMore) {
   EXPECT_EQ(waits(*coordinator, frame_job(shot, 2)), std::vector{other.value});
 }
 
-TEST(After, ARefusedWaitLeavesTheOtherPartsOfTheChangeUndone) {
+TEST(After, RefusedWaitUndoesTheWholeChange) {
   auto coordinator = open_at({});
   for (const JobId& job : {submit(*coordinator), submit(*coordinator, frames("1-2"))}) {
     JobChange change{.priority = 5, .spp = 64};
@@ -301,7 +301,7 @@ TEST(After, ARefusedWaitLeavesTheOtherPartsOfTheChangeUndone) {
   }
 }
 
-TEST(After, AWaitThatCannotBeStoredIsRefusedAndHasNoEffect) {
+TEST(After, WaitThatCannotBeStoredIsRefusedWithoutEffect) {
   const auto store = std::make_shared<FullStore>();
   const auto coordinator = std::move(*Coordinator::open({.jobs = store}));
   const JobId first = submit(*coordinator), second = submit(*coordinator, after({first}));
@@ -315,7 +315,7 @@ TEST(After, AWaitThatCannotBeStoredIsRefusedAndHasNoEffect) {
   EXPECT_EQ(waits(*coordinator, second), std::vector<std::string>());
 }
 
-TEST(After, AJobThatIsSubmittedAgainWaitsForNobody) {
+TEST(After, ResubmittedJobWaitsForNobody) {
   auto coordinator = open_at({});
   const JobId first = submit(*coordinator), second = submit(*coordinator, after({first}));
 

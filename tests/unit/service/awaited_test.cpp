@@ -62,7 +62,7 @@ struct Awaited : ::testing::Test {
   }
 };
 
-TEST_F(Awaited, ADamagedFileHasTheJobWaitWithAnErrorThatSaysWhatToDo) {
+TEST_F(Awaited, JobWaitsForADamagedFileWithAnErrorThatSaysWhatToDo) {
   damage();
 
   fetch();
@@ -73,7 +73,7 @@ TEST_F(Awaited, ADamagedFileHasTheJobWaitWithAnErrorThatSaysWhatToDo) {
                     HasSubstr("upload the file again"), HasSubstr("lightshaft submit")));
 }
 
-TEST_F(Awaited, TheJobGoesOnByItselfWhenTheFileIsHereAgain) {
+TEST_F(Awaited, JobContinuesWhenItsFileReturns) {
   damage();
   fetch();
 
@@ -84,7 +84,7 @@ TEST_F(Awaited, TheJobGoesOnByItselfWhenTheFileIsHereAgain) {
   EXPECT_TRUE(finish(*coordinator, job));
 }
 
-TEST_F(Awaited, AFileThatIsGoneIsWaitedForOverARestart) {
+TEST_F(Awaited, JobWaitsForAMissingFileAfterARestart) {
   ASSERT_TRUE(blobs->remove(wood));
   fetch();
   ASSERT_EQ(state(), JobState::paused);
@@ -98,7 +98,7 @@ TEST_F(Awaited, AFileThatIsGoneIsWaitedForOverARestart) {
   EXPECT_TRUE(goes_on());
 }
 
-TEST_F(Awaited, AFileThatIsFoundMissingAtTheStartIsWaitedFor) {
+TEST_F(Awaited, JobWaitsForAFileThatIsMissingAtTheStart) {
   coordinator.reset();
   ASSERT_TRUE(blobs->remove(wood));
 
@@ -109,7 +109,7 @@ TEST_F(Awaited, AFileThatIsFoundMissingAtTheStartIsWaitedFor) {
   EXPECT_TRUE(goes_on());
 }
 
-TEST_F(Awaited, AFileThatCameBackWhileTheCoordinatorWasDownIsNoticed) {
+TEST_F(Awaited, FileThatReturnedWhileTheCoordinatorWasDownIsFound) {
   damage();
   fetch();
   coordinator.reset();
@@ -120,7 +120,7 @@ TEST_F(Awaited, AFileThatCameBackWhileTheCoordinatorWasDownIsNoticed) {
   EXPECT_TRUE(goes_on());
 }
 
-TEST_F(Awaited, AJobThatItsUserPausedMeanwhileStaysPaused) {
+TEST_F(Awaited, JobPausedByItsUserStaysPausedWhenItsFileReturns) {
   const JobId paused = job;
   damage();
   fetch();
@@ -134,7 +134,7 @@ TEST_F(Awaited, AJobThatItsUserPausedMeanwhileStaysPaused) {
   EXPECT_EQ(coordinator->job(paused)->state, JobState::paused);
 }
 
-TEST_F(Awaited, AJobThatDoesNotNeedTheFileGoesOn) {
+TEST_F(Awaited, JobThatDoesNotNeedTheFileContinues) {
   const JobId without = submit(*coordinator);
   damage();
 
@@ -143,7 +143,7 @@ TEST_F(Awaited, AJobThatDoesNotNeedTheFileGoesOn) {
   EXPECT_EQ(coordinator->job(without)->state, JobState::queued);
 }
 
-TEST_F(Awaited, ADamagedSceneFileIsRefusedAtTheSubmission) {
+TEST_F(Awaited, DamagedSceneFileIsRefusedAtSubmission) {
   const std::string part = R"(<scene version="3.0.0"><emitter type="constant"/></scene>)";
   const std::string whole = R"(<scene version="3.0.0"><include filename="part.xml"/><shape type="sphere"/>
     <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film></sensor></scene>)";

@@ -34,7 +34,7 @@ JobId finished(Coordinator& coordinator, JobSpec spec = {}) {
   return job;
 }
 
-TEST(Restore, ADamagedRecordFailsItsJobAloneUntilItIsRemoved) {
+TEST(Restore, DamagedRecordFailsOnlyItsJobUntilItIsRemoved) {
   TempFolder dir;
   JobId good, bad;
   {
@@ -58,7 +58,7 @@ TEST(Restore, ADamagedRecordFailsItsJobAloneUntilItIsRemoved) {
   EXPECT_EQ(coordinator->job(bad).error().code, Errc::not_found);
 }
 
-TEST(Restore, AnUnreadableFolderFailsItsJobAloneUntilItIsRepaired) {
+TEST(Restore, UnreadableFolderFailsOnlyItsJobUntilItIsRepaired) {
   TempFolder dir;
   JobId good, bad;
   {
@@ -85,7 +85,7 @@ TEST(Restore, AnUnreadableFolderFailsItsJobAloneUntilItIsRepaired) {
   EXPECT_EQ(pixels(*coordinator, bad), reference_pixels());
 }
 
-TEST(Pin, AClassThatCannotBeStoredHoldsTheJobUntilItIs) {
+TEST(Pin, JobIsHeldUntilItsClassIsStored) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId job = submit(*coordinator);
@@ -136,7 +136,7 @@ std::vector<UserCommand> user_commands() {
 }
 
 // The command is acknowledged only if its effect would survive kill -9; a command that is refused has none.
-TEST(Change, ThatCannotBeStoredIsRefusedAndHasNoEffect) {
+TEST(Change, IsRefusedWithoutEffectIfItCannotBeStored) {
   for (const bool sequence : {false, true})
     for (const UserCommand& command : user_commands()) {
       SCOPED_TRACE(fmt::format("{}{}", command.name, sequence ? ", of a sequence" : ""));
@@ -176,7 +176,7 @@ TEST(Change, ThatCannotBeStoredIsRefusedAndHasNoEffect) {
     }
 }
 
-TEST(Change, ThatTheFarmMakesIsStoredAsSoonAsTheDiskCanAgain) {
+TEST(Change, FarmsOwnChangesAreStoredOnceTheDiskWorksAgain) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId job = submit(*coordinator);
@@ -192,7 +192,7 @@ TEST(Change, ThatTheFarmMakesIsStoredAsSoonAsTheDiskCanAgain) {
   EXPECT_EQ(coordinator->job(job)->state, JobState::paused);
 }
 
-TEST(Done, AJobLeavesTheFarmsBooksAndCanStillBeExtended) {
+TEST(Done, DoneJobLeavesTheFarmAndCanStillBeExtended) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   JobSpec spec;
@@ -210,7 +210,7 @@ TEST(Done, AJobLeavesTheFarmsBooksAndCanStillBeExtended) {
   EXPECT_EQ(report(*coordinator, job)["core_seconds"], (8 + farm.results_sent) * kUnitSeconds);
 }
 
-TEST(Done, AJobWhoseSnapshotIsLostIsFoldedAgainWhenItIsExtended) {
+TEST(Done, ExtendingAJobWithoutItsSnapshotFoldsItsResultsAgain) {
   for (const bool results_too : {false, true}) {
     TempFolder dir;
     JobId job;
@@ -227,7 +227,7 @@ TEST(Done, AJobWhoseSnapshotIsLostIsFoldedAgainWhenItIsExtended) {
   }
 }
 
-TEST(Done, WaitsForASnapshotThatCannotBeWritten) {
+TEST(Done, JobWaitsUntilItsSnapshotIsWritten) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId job = submit(*coordinator);
@@ -247,7 +247,7 @@ TEST(Done, WaitsForASnapshotThatCannotBeWritten) {
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels());
 }
 
-TEST(Remove, CancelsAJobThatRunsAndRemovesOneThatHasEnded) {
+TEST(Remove, CancelsARunningJobAndRemovesAnEndedOne) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId done = finished(*coordinator), running = submit(*coordinator);
@@ -275,7 +275,7 @@ TEST(Remove, CancelsAJobThatRunsAndRemovesOneThatHasEnded) {
   EXPECT_FALSE(fs::exists(dir.path() / "jobs" / "j-1.removed")) << "what a crash left of a removal";
 }
 
-TEST(Change, IsDoneAsAWholeOrNotAtAll) {
+TEST(Change, IsAtomic) {
   auto coordinator = open_at({});
   const JobId job = submit(*coordinator);
   // Samples and target error cannot be changed together
@@ -295,7 +295,7 @@ TEST(Change, IsDoneAsAWholeOrNotAtAll) {
   EXPECT_EQ(after.state, JobState::paused);
 }
 
-TEST(Change, ATargetSurvivesARestart) {
+TEST(Change, TargetSurvivesARestart) {
   TempFolder dir;
   JobId job;
   JobSpec spec;
@@ -311,7 +311,7 @@ TEST(Change, ATargetSurvivesARestart) {
   EXPECT_LE(report(*coordinator, job)["relmse"].get<double>(), .003);
 }
 
-TEST(Lease, OfAnotherStartIsNotTakenForOneOfThis) {
+TEST(Lease, LeaseOfAnEarlierStartIsNotConfusedWithACurrentOne) {
   auto coordinator = open_at({});
   submit(*coordinator);
   auto mail = std::make_shared<Mailbox>();
@@ -331,7 +331,7 @@ TEST(Lease, OfAnotherStartIsNotTakenForOneOfThis) {
   EXPECT_EQ(cancelled->lease.value, "l77-1000");
 }
 
-TEST(Budget, HoldsNoThreadBackAndGrantsInOrder) {
+TEST(Budget, GrantsInOrderWithoutBlockingThreads) {
   ByteBudget budget(10);
   std::string granted;
   const auto ask = [&](std::size_t bytes, char name) { budget.ask(bytes, [&, name] { granted += name; }); };
@@ -350,7 +350,7 @@ TEST(Budget, HoldsNoThreadBackAndGrantsInOrder) {
   EXPECT_EQ(granted, "abcd");
 }
 
-TEST(Queue, HoldsBackWhoeverFillsItUntilThereIsRoom) {
+TEST(Queue, BlocksProducersUntilThereIsRoom) {
   WorkQueue<int> queue;
   for (int i = 0; i < 3; ++i) queue.push(i);
   std::atomic<bool> through = false;

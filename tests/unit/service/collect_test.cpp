@@ -31,7 +31,7 @@ struct Collect : ::testing::Test {
   }
 };
 
-TEST_F(Collect, TheFilesOfAJobStayAsLongAsItAndGoAfterIt) {
+TEST_F(Collect, FilesOfAJobAreRemovedAfterIt) {
   auto coordinator = open();
   const JobId job = coordinator->submit({"scene.xml", kSceneText, {}, {}}).value();
   const Digest stray = put(*coordinator, "a file of a bundle that was refused");
@@ -52,7 +52,7 @@ TEST_F(Collect, TheFilesOfAJobStayAsLongAsItAndGoAfterIt) {
   EXPECT_TRUE(coordinator->blobs().list(false).value().empty());
 }
 
-TEST_F(Collect, WhoIsToldThatABlobIsThereHasTimeToSubmit) {
+TEST_F(Collect, BlobReportedAsPresentStaysUntilTheSubmission) {
   auto coordinator = open();
   const Digest file = put(*coordinator, "grid");
   coordinator->collect();
@@ -65,7 +65,7 @@ TEST_F(Collect, WhoIsToldThatABlobIsThereHasTimeToSubmit) {
   EXPECT_TRUE(coordinator->blobs().has(file));
 }
 
-TEST_F(Collect, AnUploadThatNobodyGoesOnWithIsRemovedAlsoWhereBlobsStayForGood) {
+TEST_F(Collect, AbandonedUploadIsRemovedEvenWhereBlobsAreKeptForEver) {
   Coordinator::Options options;
   options.data = dir.path();
   options.clock = clock;
@@ -81,7 +81,7 @@ TEST_F(Collect, AnUploadThatNobodyGoesOnWithIsRemovedAlsoWhereBlobsStayForGood) 
   EXPECT_EQ(coordinator->blobs().received(file), 0u);
 }
 
-TEST_F(Collect, AnUploadThatNobodyGoesOnWithIsRemoved) {
+TEST_F(Collect, AbandonedUploadIsRemoved) {
   auto coordinator = open();
   const Digest file = sha256("grid");
   ASSERT_TRUE(coordinator->blobs().resume_upload(file, 0).value()->append(std::as_bytes(std::span("gr", 2))));

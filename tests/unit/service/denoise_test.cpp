@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <thread>
 
-#include "common/base/spawn.h"
-#include "common/image/exr/exr_file.h"
-#include "common/image/exr/final_image.h"
+#include "core/base/spawn.h"
+#include "core/image/exr/exr_file.h"
+#include "core/image/exr/final_image.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -71,7 +71,7 @@ TEST(ServiceDenoise, AddsLayersToTheImageAndTheirErrorToTheReport) {
 
 // Two jobs have the same pixels and different references. The denoised image may come from the cache, but
 // each job gets the error against its own reference.
-TEST(ServiceDenoise, TheTrueErrorIsOfTheJobsOwnReference) {
+TEST(ServiceDenoise, TrueErrorUsesTheJobsReference) {
   TempFolder dir;
   for (const std::filesystem::path& data : {dir.path(), std::filesystem::path()}) {
     auto coordinator = open_with(data, fake("blurs"));
@@ -104,7 +104,7 @@ TEST(ServiceDenoise, TheTrueErrorIsOfTheJobsOwnReference) {
 
 // Denoising leaves the pixels and their digest as they are: those of a job that has only the denoiser's guide
 // layers.
-TEST(ServiceDenoise, LeavesTheImageItselfAlone) {
+TEST(ServiceDenoise, DoesNotChangeTheImage) {
   auto coordinator = open_with({}, fake("blurs"));
   JobSpec plain = denoised_job();
   plain.denoise = false;
@@ -116,7 +116,7 @@ TEST(ServiceDenoise, LeavesTheImageItselfAlone) {
   EXPECT_FALSE(report(*coordinator, without).contains("denoised"));
 }
 
-TEST(ServiceDenoise, AJobIsRejectedWhereThereIsNoDenoiser) {
+TEST(ServiceDenoise, JobIsRejectedWithoutADenoiser) {
   auto coordinator = open_with({}, "/no/such/libOpenImageDenoise.so.2");
 
   const auto submitted = coordinator->submit({"test.xml", kSceneText, {}, denoised_job()});
@@ -127,7 +127,7 @@ TEST(ServiceDenoise, AJobIsRejectedWhereThereIsNoDenoiser) {
   EXPECT_TRUE(coordinator->jobs().empty());
 }
 
-TEST(ServiceDenoise, ADenoiserThatIsLostMeanwhileCostsTheLayersAlone) {
+TEST(ServiceDenoise, LosingTheDenoiserCostsOnlyTheDenoisedLayers) {
   TempFolder dir;
   const auto library = dir.path() / "oidn.so";
   std::filesystem::copy_file(fake("blurs"), library);
@@ -144,7 +144,7 @@ TEST(ServiceDenoise, ADenoiserThatIsLostMeanwhileCostsTheLayersAlone) {
               AllOf(HasSubstr("oidn.so"), HasSubstr("LIGHTSHAFT_OIDN")));
 }
 
-TEST(ServiceDenoise, ALargerJobIsDenoisedAgain) {
+TEST(ServiceDenoise, ExtendedJobIsDenoisedAgain) {
   TempFolder dir;
   auto coordinator = open_with(dir.path(), fake("blurs"));
   const JobId job = submit(*coordinator, denoised_job(4)), whole = submit(*coordinator, denoised_job(16));
@@ -159,7 +159,7 @@ TEST(ServiceDenoise, ALargerJobIsDenoisedAgain) {
   EXPECT_EQ(half(extended, "denoised.G").values, half(image_of(*coordinator, whole), "denoised.G").values);
 }
 
-TEST(ServiceDenoise, ThePictureIsShownWhileTheJobRenders) {
+TEST(ServiceDenoise, DenoisedImageIsShownWhileTheJobRenders) {
   auto coordinator = open_with({}, fake("blurs"));
   const JobId job = submit(*coordinator, denoised_job());
   EXPECT_TRUE(coordinator->image_png(job, 0, true)) << "without a sample";
@@ -175,7 +175,7 @@ TEST(ServiceDenoise, ThePictureIsShownWhileTheJobRenders) {
   EXPECT_EQ(report(*coordinator, job)["denoised"], nullptr) << "not before it has ended";
 }
 
-TEST(ServiceDenoise, AJobThatDoesNotAskForItHasNoDenoisedPicture) {
+TEST(ServiceDenoise, JobWithoutDenoiseHasNoDenoisedImage) {
   auto coordinator = open_with({}, fake("blurs"));
   JobSpec plain = denoised_job();
   plain.denoise = false;

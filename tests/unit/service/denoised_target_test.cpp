@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <random>
 
-#include "common/base/spawn.h"
-#include "common/image/exr/final_image.h"
 #include "coordinator/views/views.h"
+#include "core/base/spawn.h"
+#include "core/image/exr/final_image.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -76,7 +76,7 @@ const Targets& targets() {
   return all;
 }
 
-TEST(DenoisedJob, EndsWhenTwoChecksMeetTheTargetAndSaysWhatItMeans) {
+TEST(DenoisedJob, EndsWhenTwoChecksMeetTheTargetAndExplainsIt) {
   auto coordinator = open_denoised({});
   const JobId job = submit(*coordinator, spec_with(targets().tight));
   FakeFarm farm(*coordinator, 2);
@@ -126,7 +126,7 @@ TEST(DenoisedJob, ShuffledResultsAndAKilledCoordinatorGiveTheSamePixelsAndChecks
   }
 }
 
-TEST(DenoisedJob, ASmallerTargetGivesTheBitsOfAJobThatHadItFromTheFirst) {
+TEST(DenoisedJob, LoweredTargetGivesTheBitsOfAJobSubmittedWithIt) {
   const TargetOutcome expected = target_at_once(spec_with(targets().tight));
   for (const bool restarted : {false, true}) {
     TempFolder dir;
@@ -148,7 +148,7 @@ TEST(DenoisedJob, ASmallerTargetGivesTheBitsOfAJobThatHadItFromTheFirst) {
   }
 }
 
-TEST(DenoisedJob, ExtendedBySamplesItHasNoTargetAnyMore) {
+TEST(DenoisedJob, ExtendingBySamplesRemovesTheTarget) {
   auto coordinator = open_denoised({});
   const JobId job = submit(*coordinator, spec_with(targets().loose));
   FakeFarm farm(*coordinator, 2);
@@ -165,7 +165,7 @@ TEST(DenoisedJob, ExtendedBySamplesItHasNoTargetAnyMore) {
   EXPECT_EQ(target_outcome(*coordinator, job).pixels, target_at_once(plain).pixels);
 }
 
-TEST(DenoisedJob, WaitsWhileItsDenoiserIsGoneAndGoesOnWithTheSamePixels) {
+TEST(DenoisedJob, WaitsForAMissingDenoiserAndContinuesWithTheSamePixels) {
   TempFolder dir;
   const auto library = dir.path() / "oidn.so";
   std::filesystem::copy_file(copying(), library);
@@ -185,7 +185,7 @@ TEST(DenoisedJob, WaitsWhileItsDenoiserIsGoneAndGoesOnWithTheSamePixels) {
   EXPECT_EQ(target_outcome(*coordinator, job), target_at_once(spec_with(targets().tight)));
 }
 
-TEST(DenoisedJob, ALiarThatIsFoundOutCostsItsChecksToo) {
+TEST(DenoisedJob, ExposedFaultyWorkerInvalidatesChecksToo) {
   const TargetOutcome expected = target_at_once(spec_with(targets().tight));
   Coordinator::Options options;
   options.denoiser = copying().string();
@@ -210,7 +210,7 @@ TEST(DenoisedJob, IsRefusedWithoutADenoiserOrWithoutATarget) {
   no_target.target_error.reset();
   const auto meant = coordinator->submit({"test.xml", kSceneText, {}, no_target});
   ASSERT_FALSE(meant);
-  EXPECT_THAT(meant.error().error.message, HasSubstr("there is no target_error"));
+  EXPECT_THAT(meant.error().error.message, HasSubstr("'target_layer'"));
 }
 
 }  // namespace

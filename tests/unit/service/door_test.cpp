@@ -4,17 +4,18 @@
 #include <cmath>
 #include <thread>
 
-#include "common/image/frame/render_limits.h"
-#include "common/protocol/limits.h"
-#include "common/scene/schema/integrators.h"
 #include "coordinator/admission/admission.h"
+#include "core/image/frame/render_limits.h"
+#include "core/scene/schema/integrators.h"
+#include "formats/read.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
+#include "util/protocol/limits.h"
 
 namespace ls::coordinator {
 namespace {
 
-TEST(Service, OnlyWorkersWithTheJoinTokenAreTaken) {
+TEST(Service, OnlyWorkersWithTheJoinTokenMayJoin) {
   Coordinator::Options options;
   options.join_token = "open sesame";
   auto coordinator = Coordinator::open(options).value();
@@ -28,7 +29,7 @@ TEST(Service, OnlyWorkersWithTheJoinTokenAreTaken) {
   ASSERT_TRUE(std::holds_alternative<Welcome>(mail->take()->second));
 }
 
-TEST(Service, AFakeWorkerIsTakenOnlyWhereItIsAllowed) {
+TEST(Service, FakeWorkerMayJoinOnlyIfAllowed) {
   WorkerHello hello;
   hello.name = "w";
   hello.fake = true;
@@ -52,7 +53,7 @@ TEST(Service, AFakeWorkerIsTakenOnlyWhereItIsAllowed) {
 
 // A job is marked as fake when a fake worker has rendered one of its units, whatever numeric class the worker
 // claims.
-TEST(Service, AJobSaysSoOnceAFakeWorkerHasRenderedAUnitOfIt) {
+TEST(Service, JobIsMarkedFakeOnceAFakeWorkerHasRenderedAUnit) {
   Coordinator::Options options;
   options.allow_fake = true;
   options.audit_rate = 0;
@@ -69,7 +70,7 @@ TEST(Service, AJobSaysSoOnceAFakeWorkerHasRenderedAUnitOfIt) {
   }
 }
 
-TEST(Service, AWorkerKeepsItsIdAndItsOlderStreamIsSilent) {
+TEST(Service, ReconnectedWorkerKeepsItsIdAndItsOldStreamIsIgnored) {
   auto coordinator = open_at({});
   auto mail = std::make_shared<Mailbox>();
   WorkerHello hello;
@@ -98,7 +99,7 @@ Welcome join(Coordinator& coordinator, const WorkerHello& hello) {
 }
 
 // Users see the ids of workers.
-TEST(Service, AnIdWithoutItsSecretIsNotGivenAgain) {
+TEST(Service, WorkerIdIsNotReusedWithoutItsSecret) {
   const auto coordinator = open_at({});
   WorkerHello hello;
   hello.name = "w";
@@ -121,7 +122,7 @@ TEST(Service, AnIdWithoutItsSecretIsNotGivenAgain) {
   EXPECT_EQ(join(*coordinator, hello).worker, first.worker);
 }
 
-TEST(Service, AWorkerThatKeepsNoSecretIsKnownByItsIdAlone) {
+TEST(Service, WorkerWithoutASecretIsIdentifiedByItsIdAlone) {
   const auto coordinator = open_at({});
   WorkerHello old;
   old.name = "w";
@@ -133,7 +134,7 @@ TEST(Service, AWorkerThatKeepsNoSecretIsKnownByItsIdAlone) {
   EXPECT_EQ(join(*coordinator, old).worker, first.worker);
 }
 
-TEST(Service, AWorkerKeepsItsIdWhenTheCoordinatorStartsAnew) {
+TEST(Service, WorkerKeepsItsIdAfterTheCoordinatorRestarts) {
   Coordinator::Options options;
   options.worker_key = "a secret of the farm";
   auto coordinator = Coordinator::open(options).value();
@@ -152,7 +153,7 @@ TEST(Service, AWorkerKeepsItsIdWhenTheCoordinatorStartsAnew) {
 }
 
 // Anybody with the join token could otherwise write into the log of any job.
-TEST(Service, AFailureOfAUnitThatTheWorkerDoesNotHoldIsNotLogged) {
+TEST(Service, FailureOfAUnitThatTheWorkerDoesNotHoldIsNotLogged) {
   const auto coordinator = open_at({});
   const JobId job = submit(*coordinator);
   WorkerHello hello;
@@ -190,7 +191,7 @@ TEST(Service, AFailureOfAUnitThatTheWorkerDoesNotHoldIsNotLogged) {
       << coordinator->job_log(job).value();
 }
 
-TEST(Service, ASceneMayOnlyNameWhatWasSentAlong) {
+TEST(Service, SceneMayOnlyNameItsOwnFiles) {
   auto coordinator = open_at({});
   std::string text = kSceneText;
   text.replace(text.find("<shape type=\"sphere\"/>"), 22,
@@ -235,7 +236,7 @@ TEST(Service, AcknowledgesFailuresToo) {
   EXPECT_FALSE(ack->refused);
 }
 
-TEST(Service, RefusesASceneOfMoreFilesThanAWorkerCanBeToldOf) {
+TEST(Service, RefusesASceneWithMoreFilesThanAMessageToAWorkerHolds) {
   auto coordinator = open_at({});
   std::string shapes;
   std::map<std::string, Digest> assets;
@@ -254,12 +255,12 @@ TEST(Service, RefusesASceneOfMoreFilesThanAWorkerCanBeToldOf) {
   EXPECT_NE(refused.error().error.message.find("4096"), std::string::npos) << refused.error().error.message;
 }
 
-TEST(Service, TakesEveryIntegratorThatASceneMaySay) {
+TEST(Service, AcceptsEveryIntegratorOfTheSceneFormat) {
   auto coordinator = open_at({});
   for (const auto& row : scene::integrators()) {
     JobSpec spec;
     spec.integrator = std::string(row.name);
-    const auto taken = admit({"t.xml", kSceneText, {}, spec}, coordinator->blobs());
+    const auto taken = admit({"t.xml", kSceneText, {}, spec}, coordinator->blobs(), scenes_in_this_process());
     ASSERT_TRUE(taken) << row.name << ": " << taken.error().error.message;
     EXPECT_EQ(taken->job.settings.integrator, row.ours);
     EXPECT_EQ(taken->job.settings.max_depth, row.max_depth.value_or(-1)) << row.name;
@@ -267,12 +268,12 @@ TEST(Service, TakesEveryIntegratorThatASceneMaySay) {
 }
 
 // Scenes and jobs have the same limits. A value above its limit is reported with its place in the scene.
-TEST(Service, TakesTheLargestFramesAndSampleCountsThatASceneMayHave) {
+TEST(Service, AcceptsTheLargestAllowedFramesAndSampleCounts) {
   auto coordinator = open_at({});
   const auto with = [&](std::string from, const std::string& to) {
     std::string text = kSceneText;
     text.replace(text.find(from), from.size(), to);
-    return admit({"t.xml", text, {}, {}}, coordinator->blobs());
+    return admit({"t.xml", text, {}, {}}, coordinator->blobs(), scenes_in_this_process());
   };
   const auto side = [](int n) { return std::to_string(n) + "\""; };
   EXPECT_TRUE(with("40\"", side(kMaxFrameSide)));
@@ -299,7 +300,7 @@ TEST(Service, RefusesSpecsBeyondItsLimits) {
   EXPECT_NE(refusal(spec), "");
   spec = {};
   spec.size = FrameSize{0, 10};
-  EXPECT_NE(refusal(spec).find("0 x 10"), std::string::npos);
+  EXPECT_NE(refusal(spec).find("'size'"), std::string::npos);
   spec.size = FrameSize{1 << 20, 1 << 20};
   EXPECT_NE(refusal(spec), "");
   spec = {};

@@ -29,7 +29,7 @@ EtaInputs facts() {
   return f;
 }
 
-TEST(Eta, OfATargetIsItsForecastWithAnIntervalWhateverTheJobForesees) {
+TEST(Eta, EtaOfATargetIsItsForecastWithAnInterval) {
   const auto forecast = forecast_of(points(256), 1e-3);
   ASSERT_TRUE(forecast);
   const Eta out = eta_of(facts(), points(256));
@@ -43,7 +43,7 @@ TEST(Eta, OfATargetIsItsForecastWithAnIntervalWhateverTheJobForesees) {
   EXPECT_DOUBLE_EQ(out.progress, 256 / forecast->spp);
 }
 
-TEST(Eta, TakesOffWhatWasSpentSinceTheLastPoint) {
+TEST(Eta, SubtractsTimeSpentSinceTheLastCheckpoint) {
   EtaInputs later = facts();
   later.core_seconds += 2;
   const Eta before = eta_of(facts(), points(256)), after = eta_of(later, points(256));
@@ -53,7 +53,7 @@ TEST(Eta, TakesOffWhatWasSpentSinceTheLastPoint) {
   EXPECT_EQ(eta_of(later, points(256)).seconds, 0);
 }
 
-TEST(Eta, EndsWithTheSamplesWhereTheTargetIsFarther) {
+TEST(Eta, SampleLimitEndsItBeforeAFarTarget) {
   EtaInputs f = facts();
   f.core_left = f.core_to_limit = 3;
   const Eta out = eta_of(f, points(256));
@@ -64,21 +64,21 @@ TEST(Eta, EndsWithTheSamplesWhereTheTargetIsFarther) {
   EXPECT_DOUBLE_EQ(eta_of(f, points(256)).ci95->second, f.core_to_limit / 2);
 }
 
-TEST(Eta, IsTheJobsOwnForesightUntilThereArePoints) {
+TEST(Eta, UsesPredictedCostsUntilThereAreCheckpoints) {
   const Eta out = eta_of(facts(), {});
   EXPECT_EQ(out.seconds, .5);
   EXPECT_FALSE(out.ci95);
   EXPECT_DOUBLE_EQ(out.progress, facts().done);
 }
 
-TEST(Eta, IsNothingWhereNothingIsMeasuredOrNobodyWorks) {
+TEST(Eta, IsUnknownWithoutMeasurementsOrWorkers) {
   EtaInputs f = facts();
   f.cores = 0;
   EXPECT_FALSE(eta_of(f, points(256)).seconds);
   EXPECT_FALSE(eta_of({}, {}).seconds);
 }
 
-TEST(Eta, OfTheClockNeedsNoForecast) {
+TEST(Eta, TimeLimitNeedsNoForecast) {
   EtaInputs f = facts();
   f.time = 2.5;
   f.cores_with_more = 10;
@@ -102,7 +102,7 @@ TEST(Eta, WithMoreWorkersIsShorterInProportion) {
 
 // With 1.5 core seconds left in four units, a fifth thread has nothing to do, and the time is never less than
 // that of one unit.
-TEST(Eta, NoMoreThreadsHelpThanThereAreUnitsLeft) {
+TEST(Eta, ThreadsBeyondTheRemainingUnitsDoNotHelp) {
   EtaInputs f;
   f.core_left = 1.5;
   f.unit_seconds = 1.5 / 4;
@@ -119,7 +119,7 @@ TEST(Eta, NoMoreThreadsHelpThanThereAreUnitsLeft) {
 // The number of units that a target needs is not known. At the end, threads wait for the last needed unit;
 // this unit itself may have waited for a thread that rendered a unit that was not needed. Together the wait
 // is at most twice a unit's time. With one thread there is no wait.
-TEST(Eta, OfATargetThreadsWaitForTheLastUnit) {
+TEST(Eta, TargetIncludesTheWaitForTheLastUnit) {
   EtaInputs f = facts();
   f.cores = 4;
   const Eta even = eta_of(f, points(256));
@@ -133,7 +133,7 @@ TEST(Eta, OfATargetThreadsWaitForTheLastUnit) {
 }
 
 // With any wait the time is at most that of one thread alone.
-TEST(Eta, WithoutWorkLeftNobodyWaits) {
+TEST(Eta, IsZeroWithoutRemainingWork) {
   EtaInputs f = facts();
   f.cores = 4;
   f.unit_seconds = .8;
@@ -142,7 +142,7 @@ TEST(Eta, WithoutWorkLeftNobodyWaits) {
   EXPECT_EQ(eta_of(f, points(256)).ci95->second, 0);
 }
 
-TEST(Eta, NoMoreThreadsHelpThanUnitsMayBeUnderWayAtOnce) {
+TEST(Eta, ThreadsBeyondTheUnitLimitDoNotHelp) {
   EtaInputs f;
   f.core_left = 64;
   f.unit_seconds = 1;
@@ -156,7 +156,7 @@ TEST(Eta, NoMoreThreadsHelpThanUnitsMayBeUnderWayAtOnce) {
   EXPECT_FALSE(eta_of(f, {}).with_more);
 }
 
-TEST(Eta, OfThePartOfAUnitThatIsLeftIsThatPart) {
+TEST(Eta, PartlyRenderedUnitCountsByItsRest) {
   EtaInputs f;
   f.core_left = .25;
   f.unit_seconds = 1;
@@ -167,7 +167,7 @@ TEST(Eta, OfThePartOfAUnitThatIsLeftIsThatPart) {
 }
 
 // Each end of the interval assumes as many cores as help it.
-TEST(Eta, AnIntervalHoldsItsMiddleWhereUnitsAreFew) {
+TEST(Eta, IntervalContainsItsEstimateEvenWithFewUnits) {
   EtaInputs f = facts();
   f.unit_seconds = 3;
   f.cores = 16;

@@ -47,7 +47,7 @@ EventHub::Reserve from_zero() {
   return [](std::uint64_t) -> Result<std::uint64_t> { return 0; };
 }
 
-TEST(EventHub, ReplaysWhatAReaderMissedThenGoesOnLive) {
+TEST(EventHub, ReplaysMissedEventsAndContinuesLive) {
   EventHub hub(from_zero());
   for (int i = 0; i < 5; ++i) hub.publish("job", std::to_string(i), "j");
   Listener late;
@@ -88,7 +88,7 @@ void publish(EventHub& hub, std::uint64_t count) {
   for (std::uint64_t i = 0; i < count; ++i) hub.publish("job", "{}", "j");
 }
 
-TEST(EventHub, ReservesEveryIdAgainOnceTheStoreCan) {
+TEST(EventHub, ReservesIdsOnceTheStoreWorks) {
   Ids ids;
   EventHub hub(ids.reserve());
   publish(hub, limits::kEventIdBlock);
@@ -102,7 +102,7 @@ TEST(EventHub, ReservesEveryIdAgainOnceTheStoreCan) {
   EXPECT_GE(ids.reserved, hub.last_id());
 }
 
-TEST(EventHub, LeavesTheIdsOfAnEarlierStartOnceTheStoreCan) {
+TEST(EventHub, UsesNewIdsOnceTheStoreWorks) {
   Ids ids{.reserved = 5 * limits::kEventIdBlock, .fails = true};
   EventHub hub(ids.reserve());
   publish(hub, limits::kEventIdBlock);
@@ -113,7 +113,7 @@ TEST(EventHub, LeavesTheIdsOfAnEarlierStartOnceTheStoreCan) {
   EXPECT_EQ(hub.last_id(), 5 * limits::kEventIdBlock + 1);
 }
 
-TEST(EventHub, NothingComesOnceTheHandleIsGone) {
+TEST(EventHub, SendsNothingAfterTheHandleIsDestroyed) {
   EventHub hub(from_zero());
   Listener gone, stays;
   auto handle = hub.subscribe(0, gone.callback());
@@ -127,7 +127,7 @@ TEST(EventHub, NothingComesOnceTheHandleIsGone) {
   EXPECT_EQ(gone.first(1).size(), 1u);
 }
 
-TEST(Events, TellAJobFromSubmissionToItsEndWithGrowingIds) {
+TEST(Events, CoverAJobFromSubmissionToEndWithGrowingIds) {
   TempFolder dir;
   std::uint64_t last = 0;
   {
@@ -156,7 +156,7 @@ TEST(Events, TellAJobFromSubmissionToItsEndWithGrowingIds) {
   EXPECT_GE(open_at(dir.path())->last_event_id(), last);
 }
 
-TEST(Events, TellThatAJobWasRemoved) {
+TEST(Events, IncludeTheRemovalOfAJob) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   Listener listener;
@@ -172,7 +172,7 @@ TEST(Events, TellThatAJobWasRemoved) {
   EXPECT_EQ(nlohmann::json::parse(last.data), (nlohmann::json{{"id", job.value}, {"state", "removed"}}));
 }
 
-TEST(Views, ShowAbsentFiguresAsNullAndKeepBadTextReadable) {
+TEST(Views, ShowMissingFiguresAsNullAndCleanBadText) {
   JobView v;
   v.id.value = "j-1";
   v.name = "bad \xff name";
@@ -185,7 +185,7 @@ TEST(Views, ShowAbsentFiguresAsNullAndKeepBadTextReadable) {
   EXPECT_EQ(nlohmann::json::parse(jobs_json(JobsPage{{v, v}}))["jobs"].size(), 2u);
 }
 
-TEST(Views, TellWhetherTheFiguresAreToBeTrusted) {
+TEST(Views, ReportWhetherFiguresAreTrusted) {
   JobView v;
   v.spp = 65536, v.spp_asked = false;
   v.error_now = ErrorFigures{.5, .25, .125, .375, .4, .6};

@@ -71,7 +71,7 @@ struct Slow {
   }
 };
 
-TEST_P(FoundOutLate, NothingIsSaidOfItsPixelsAfterwards) {
+TEST_P(FoundOutLate, ReportsNothingAboutItsDiscardedPixels) {
   const JobId job = submit(*coordinator, spec);
   Slow(*coordinator, [](const UnitKey& unit) { return unit.tile == 0 && unit.round < 3; }).farm.run([&] {
     return coordinator->job(job)->units_done == 3;

@@ -6,7 +6,7 @@
 #include <mutex>
 #include <thread>
 
-#include "common/base/clock.h"
+#include "core/base/clock.h"
 
 namespace ls::coordinator {
 

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "common/image/exr/exr_file.h"
+#include "core/image/exr/exr_file.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -45,7 +45,7 @@ JobId submit_spp(Coordinator& coordinator, std::uint64_t spp) {
   return submit(coordinator, spec);
 }
 
-TEST(ServiceHealth, IsTheSameShuffledDuplicatedAndInMemory) {
+TEST(ServiceHealth, IsTheSameForShuffledAndDuplicatedResults) {
   TempFolder dir;
   for (unsigned seed = 0; seed < 3; ++seed) {
     auto coordinator = open_at(seed == 2 ? std::filesystem::path() : dir.path() / std::to_string(seed));
@@ -91,7 +91,7 @@ TEST(ServiceHealth, SurvivesARestartAtAnyPointAndAfterTheEnd) {
 }
 
 // 6 samples end with a truncated round; when the job is extended, that round is rendered again in full.
-TEST(ServiceHealth, OfAnExtendedJobIsThatOfOneRenderedAtOnce) {
+TEST(ServiceHealth, ExtendedJobHasTheHealthOfASingleRender) {
   TempFolder dir;
   for (const bool restart : {false, true}) {
     const auto folder = dir.path() / std::to_string(restart);
@@ -115,7 +115,7 @@ TEST(ServiceHealth, OfAnExtendedJobIsThatOfOneRenderedAtOnce) {
 }
 
 // The health includes only units that are in the image: those of tile 0 wait for its first round.
-TEST(ServiceHealth, IsOfWhatIsFoldedOnly) {
+TEST(ServiceHealth, CountsOnlyFoldedResults) {
   auto coordinator = open_at({});
   const JobId job = submit_spp(*coordinator, 16);
   FakeFarm farm(*coordinator, 1);
@@ -127,7 +127,7 @@ TEST(ServiceHealth, IsOfWhatIsFoldedOnly) {
   EXPECT_EQ(coordinator->job(job)->health, expected(16, 1));
 }
 
-TEST(ServiceHealth, IsToldWithPlaceAndCommandInReportViewAndImage) {
+TEST(ServiceHealth, AppearsWithPlaceAndCommandInReportViewAndImage) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   JobSpec spec;
@@ -152,7 +152,7 @@ TEST(ServiceHealth, IsToldWithPlaceAndCommandInReportViewAndImage) {
   EXPECT_THAT(bytes, HasSubstr(canonical_json(coordinator->job(job)->health)));
 }
 
-TEST(ServiceHealth, OfAHealthyJobIsClean) {
+TEST(ServiceHealth, HealthyJobIsClean) {
   auto coordinator = open_at({});
   const JobId job = submit_spp(*coordinator, 4);
   ASSERT_TRUE(finish(*coordinator, job));
@@ -163,7 +163,7 @@ TEST(ServiceHealth, OfAHealthyJobIsClean) {
 }
 
 // A result is rejected if its health names a pixel outside the unit.
-TEST(ServiceHealth, OfOtherPixelsIsRefused) {
+TEST(ServiceHealth, HealthOfOtherPixelsIsRefused) {
   auto coordinator = open_at({});
   const JobId job = submit_spp(*coordinator, 2);
   FakeFarm farm(*coordinator, 1);

@@ -4,9 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/analysis/needs.h"
-#include "common/scene/json/serialize.h"
 #include "coordinator/admission/admission.h"
+#include "core/scene/analysis/needs.h"
+#include "core/scene/json/serialize.h"
+#include "formats/read.h"
 #include "tests/unit/service/fake_farm.h"
 
 namespace ls::coordinator {
@@ -36,10 +37,10 @@ SubmitRequest request(const char* weight) {
   return {"a.xml", blend(weight), {{"wood.png", kWoodDigest}}, {}};
 }
 
-TEST(Needs, AFileThatNothingNeededNamesNeedNotBeUploaded) {
+TEST(Needs, UnneededFileNeedNotBeUploaded) {
   auto coordinator = open_at({});
 
-  const auto taken = admit(request("0"), coordinator->blobs());
+  const auto taken = admit(request("0"), coordinator->blobs(), scenes_in_this_process());
 
   ASSERT_TRUE(taken) << taken.error().error.message;
   EXPECT_TRUE(taken->job.assets.empty());
@@ -47,10 +48,10 @@ TEST(Needs, AFileThatNothingNeededNamesNeedNotBeUploaded) {
   EXPECT_THAT(taken->scene_json, Not(HasSubstr("wood.png")));
 }
 
-TEST(Needs, AFileThatIsNeededMustBeThereAndItsPlaceIsTold) {
+TEST(Needs, MissingNeededFileIsReportedWithItsPlace) {
   auto coordinator = open_at({});
 
-  const auto refused = admit(request("0.5"), coordinator->blobs());
+  const auto refused = admit(request("0.5"), coordinator->blobs(), scenes_in_this_process());
 
   ASSERT_FALSE(refused);
   ASSERT_FALSE(refused.error().diagnostics.empty());
@@ -58,7 +59,7 @@ TEST(Needs, AFileThatIsNeededMustBeThereAndItsPlaceIsTold) {
   EXPECT_THAT(refused.error().diagnostics[0].text, HasSubstr("wood.png"));
 
   ASSERT_TRUE(coordinator->blobs().put(kWoodDigest, std::as_bytes(std::span(std::string_view("wood")))));
-  const auto taken = admit(request("0.5"), coordinator->blobs());
+  const auto taken = admit(request("0.5"), coordinator->blobs(), scenes_in_this_process());
   ASSERT_TRUE(taken);
   EXPECT_EQ(taken->job.assets.size(), 1u);
   EXPECT_EQ(taken->job.assets[0].bytes, 4u);
@@ -66,7 +67,7 @@ TEST(Needs, AFileThatIsNeededMustBeThereAndItsPlaceIsTold) {
 
 TEST(Needs, AreKeptWithTheJobAndSentWithIt) {
   auto coordinator = open_at({});
-  const auto taken = admit(request("0"), coordinator->blobs());
+  const auto taken = admit(request("0"), coordinator->blobs(), scenes_in_this_process());
   ASSERT_TRUE(taken);
 
   const auto scene = deserialize_scene(taken->scene_json);

@@ -1,9 +1,10 @@
 // Scenes in Nori's format are accepted like any others.
 #include <gtest/gtest.h>
 
-#include "common/scene/schema/integrators.h"
-#include "common/scene/schema/nori_words.h"
 #include "coordinator/admission/admission.h"
+#include "core/scene/schema/integrators.h"
+#include "core/scene/schema/nori_integrators.h"
+#include "formats/read.h"
 #include "tests/unit/service/fake_farm.h"
 
 namespace ls::coordinator {
@@ -30,10 +31,10 @@ const std::string kMitsuba = R"(<scene version="3.0.0">
   <emitter type="constant"/>
 </scene>)";
 
-TEST(Service, TakesASceneOfNoriAsTheSameSceneOfMitsuba) {
+TEST(Service, NoriSceneEqualsTheSameMitsubaScene) {
   auto coordinator = open_at({});
-  const auto nori = admit({"a.xml", kNori, {}, {}}, coordinator->blobs());
-  const auto mitsuba = admit({"b.xml", kMitsuba, {}, {}}, coordinator->blobs());
+  const auto nori = admit({"a.xml", kNori, {}, {}}, coordinator->blobs(), scenes_in_this_process());
+  const auto mitsuba = admit({"b.xml", kMitsuba, {}, {}}, coordinator->blobs(), scenes_in_this_process());
 
   ASSERT_TRUE(nori) << format_diagnostics(nori.error().diagnostics);
   ASSERT_TRUE(mitsuba);
@@ -42,13 +43,13 @@ TEST(Service, TakesASceneOfNoriAsTheSameSceneOfMitsuba) {
   EXPECT_TRUE(nori->job.warnings.empty());
 }
 
-TEST(Service, TakesTheNamesOfNorisIntegrators) {
+TEST(Service, AcceptsNorisIntegratorNames) {
   auto coordinator = open_at({});
   for (const auto& row : scene::nori::integrators()) {
     if (scene::integrator_row(row.name)) continue;  // a name of both formats has Mitsuba's meaning
     JobSpec spec;
     spec.integrator = std::string(row.name);
-    const auto taken = admit({"t.xml", kMitsuba, {}, spec}, coordinator->blobs());
+    const auto taken = admit({"t.xml", kMitsuba, {}, spec}, coordinator->blobs(), scenes_in_this_process());
     ASSERT_TRUE(taken) << row.name << ": " << taken.error().error.message;
     EXPECT_EQ(taken->job.settings.integrator, row.ours) << row.name;
     EXPECT_EQ(taken->job.settings.max_depth, row.max_depth.value_or(-1)) << row.name;

@@ -39,7 +39,7 @@ TEST(Owner, IsShownAndSurvivesARestart) {
   EXPECT_EQ(owner_of(*coordinator, nobodys), "");
 }
 
-TEST(Owner, OfASequenceIsThatOfItsFrames) {
+TEST(Owner, SequenceAndFramesHaveOneOwner) {
   TempFolder dir;
   JobSpec spec;
   spec.frames = FrameRange{1, 2, 1};
@@ -55,7 +55,7 @@ TEST(Owner, OfASequenceIsThatOfItsFrames) {
   EXPECT_EQ(coordinator->jobs().front().owner, "anna");
 }
 
-TEST(Owner, IsWithEveryEventOfTheJobToItsRemoval) {
+TEST(Owner, EveryEventOfAJobHasItsOwner) {
   auto coordinator = open_at({});
   std::mutex mutex;
   std::condition_variable heard;
@@ -81,7 +81,7 @@ TEST(Owner, IsWithEveryEventOfTheJobToItsRemoval) {
 
 // The owner in a worker's event is that of the job in the event. A worker may hold units of several users at
 // once.
-TEST(Owner, OfAWorkersEventIsThatOfTheJobThatItNames) {
+TEST(Owner, WorkersEventBelongsToTheOwnerOfItsJob) {
   Coordinator::Options options;
   const auto clock = std::make_shared<FakeClock>();
   options.clock = clock;

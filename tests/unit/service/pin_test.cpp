@@ -34,7 +34,7 @@ AssignLease lease_of_round_0(const Coordinator& coordinator, const JobId& job) {
   return assign;
 }
 
-TEST(Pin, OfResultsOfTwoClassesInOneBatchOnlyThoseOfTheFirstAreStored) {
+TEST(Pin, BatchWithResultsOfTwoClassesStoresOnlyTheFirstClass) {
   const std::string expected = reference_pixels();
   TempFolder dir;
   const auto clock = std::make_shared<GateClock>();

@@ -13,7 +13,7 @@
 namespace ls::coordinator {
 namespace {
 
-TEST(Pressure, ResultsThatFindNoRoomWaitAndTheirLeasesDoNotPass) {
+TEST(Pressure, ResultsThatWaitForMemoryKeepTheirLeasesAlive) {
   TempFolder dir;
   auto clock = std::make_shared<GateClock>();
   Coordinator::Options options;

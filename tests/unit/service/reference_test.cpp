@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <thread>
 
-#include "common/image/exr/exr_file.h"
 #include "coordinator/admission/admission.h"
 #include "coordinator/store/blobs/memory_blobs.h"
+#include "core/image/exr/exr_file.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -73,7 +73,7 @@ TEST(ServiceReference, IsReadWholeFromAStoreThatReturnsPieces) {
   EXPECT_TRUE(reference) << reference.error().message;
 }
 
-TEST(ServiceReference, GivesTheTrueErrorAtEveryCheckpointWhateverTheOrder) {
+TEST(ServiceReference, GivesTheTrueErrorAtEveryCheckpointForAnyOrderOfResults) {
   TempFolder dir;
   const auto first = rendered(dir.path() / "a", 1);
   ASSERT_EQ(first.size(), 4u);  // 2, 4, 8, 16 samples
@@ -89,7 +89,7 @@ TEST(ServiceReference, GivesTheTrueErrorAtEveryCheckpointWhateverTheOrder) {
 
 // The job is cancelled in the middle of a round. The list of jobs, the curve and the report then describe the
 // same image, which is the one that the user gets, and the true error is that of this image.
-TEST(ServiceReference, TheCurveEndsWithTheImageThatIsHandedOut) {
+TEST(ServiceReference, CurveEndsWithTheErrorOfTheFinalImage) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId job = submit(*coordinator, against(*coordinator));
@@ -169,7 +169,7 @@ JobSpec against_own_scene(Coordinator& coordinator, const std::string& seed) {
   return spec;
 }
 
-TEST(ServiceReference, OfTheJobsOwnSeedIsToldAndGivesNoVerdict) {
+TEST(ServiceReference, ReferenceWithTheJobsSeedIsReportedWithoutAVerdict) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId same = submit(*coordinator, against_own_scene(*coordinator, "0")),

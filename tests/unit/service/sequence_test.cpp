@@ -7,6 +7,7 @@
 
 #include "coordinator/admission/admission.h"
 #include "coordinator/views/views.h"
+#include "formats/read.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -43,7 +44,7 @@ SubmitRequest meshes(Coordinator& coordinator, const std::set<int>& present, Job
   return request;
 }
 
-TEST(FrameId, IsMadeAndReadInOneWay) {
+TEST(FrameId, RoundTripsInOneForm) {
   const JobId whole{"j-f1234567"};
   const auto id = frame_of(frame_job(whole, 12));
   ASSERT_TRUE(id);
@@ -54,7 +55,23 @@ TEST(FrameId, IsMadeAndReadInOneWay) {
     EXPECT_FALSE(frame_of(JobId{text})) << text;
 }
 
-TEST(Sequence, IsOneJobWhoseFramesHaveThePixelsOfJobsOfTheirOwn) {
+TEST(Sequence, EndsAtTheFirstFrameWhoseReaderFails) {
+  const auto coordinator = Coordinator::open({}).value();
+  int read = 0;
+  const SceneReader failing = [&](std::string_view, std::string_view, AssetSource&,
+                                  const ReadOptions&) -> Result<ReadResult> {
+    ++read;
+    return fail(Errc::invalid_argument, "the scene s.xml cannot be read: its reader crashed");
+  };
+  JobSpec spec;
+  spec.frames = FrameRange{1, 20, 1};
+  const auto taken = admit_sequence({"s.xml", kSceneText, {}, spec}, coordinator->blobs(), failing);
+  ASSERT_FALSE(taken);
+  EXPECT_THAT(taken.error().error.message, HasSubstr("its reader crashed"));
+  EXPECT_EQ(read, 1);
+}
+
+TEST(Sequence, FramesHaveThePixelsOfSeparateJobs) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId id = submit(*coordinator, frames(3, 5));
@@ -182,7 +199,7 @@ TEST(Sequence, IsPausedResumedCancelledAndRemovedAsAWhole) {
   EXPECT_TRUE(open_at(dir.path())->jobs().empty());
 }
 
-TEST(Sequence, ExtendedGivesThePixelsOfOneRenderedSoAtOnce) {
+TEST(Sequence, ExtendedSequenceHasThePixelsOfASingleRender) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId id = submit(*coordinator, frames(1, 2, 4));
@@ -220,7 +237,7 @@ TEST(Sequence, IsNotExtendedInPartsIfAFrameHasMoreSamplesAlready) {
     EXPECT_EQ(pixels(*coordinator, frame_job(id, frame)), pixels_with_seed(frame, 64));
 }
 
-TEST(Sequence, WhatBelongsToOneImageAsksForTheFrame) {
+TEST(Sequence, RequestsForOneImageNeedTheFrame) {
   auto coordinator = open_at({});
   const JobId id = submit(*coordinator, frames(2, 3));
   const auto error = coordinator->image_png(id, 0).error();
@@ -234,7 +251,8 @@ TEST(Sequence, WhatBelongsToOneImageAsksForTheFrame) {
 
 TEST(Sequence, EveryFrameReadsItsOwnFilesAndTheSharedOnesOnce) {
   auto coordinator = open_at({});
-  const auto taken = admit_sequence(meshes(*coordinator, {1, 2, 3}, frames(1, 3)), coordinator->blobs());
+  const auto taken = admit_sequence(meshes(*coordinator, {1, 2, 3}, frames(1, 3)), coordinator->blobs(),
+                                    scenes_in_this_process());
   ASSERT_TRUE(taken);
   ASSERT_EQ(taken->size(), 3u);
   EXPECT_EQ((*taken)[1].job.assets.at(0).name, "mesh.002.ply");
@@ -242,30 +260,30 @@ TEST(Sequence, EveryFrameReadsItsOwnFilesAndTheSharedOnesOnce) {
   EXPECT_NE((*taken)[0].job.scene, (*taken)[1].job.scene);
   const auto alone =
       admit({"mesh.xml", with_mesh("mesh.002.ply"), {{"mesh.002.ply", (*taken)[1].job.assets[0].digest}}, {}},
-            coordinator->blobs());
+            coordinator->blobs(), scenes_in_this_process());
   ASSERT_TRUE(alone);
   EXPECT_EQ(alone->job.scene, (*taken)[1].job.scene) << "a frame is the scene that names its file";
 }
 
-TEST(Sequence, FramesMayMoveWithTheirNumber) {
+TEST(Sequence, FrameNumberMayMoveObjects) {
   auto coordinator = open_at({});
   std::string text = kSceneText;
   text.replace(text.find("<shape type=\"sphere\"/>"), 22,
                "<shape type=\"sphere\"><float name=\"radius\" value=\"$frame\"/></shape>");
   SubmitRequest request{"s.xml", text, {}, frames(1, 2)};
-  const auto taken = admit_sequence(request, coordinator->blobs());
+  const auto taken = admit_sequence(request, coordinator->blobs(), scenes_in_this_process());
   ASSERT_TRUE(taken) << taken.error().error.message;
   EXPECT_NE((*taken)[0].job.scene, (*taken)[1].job.scene);
   EXPECT_TRUE((*taken)[0].job.warnings.empty());
 
   request.scene_text = kSceneText;
-  const auto still = admit_sequence(request, coordinator->blobs());
+  const auto still = admit_sequence(request, coordinator->blobs(), scenes_in_this_process());
   ASSERT_TRUE(still);
   ASSERT_EQ((*still)[0].job.warnings.size(), 1u);
   EXPECT_NE((*still)[0].job.warnings[0].find("the same scene"), std::string::npos);
 }
 
-TEST(Sequence, AMissingFileIsRefusedWithItsFrame) {
+TEST(Sequence, MissingFileIsRefusedWithItsFrame) {
   auto coordinator = open_at({});
   const auto refused = coordinator->submit(meshes(*coordinator, {1, 3, 5}, frames(1, 5)));
   ASSERT_FALSE(refused);
@@ -287,7 +305,7 @@ TEST(Sequence, AMissingFileIsRefusedWithItsFrame) {
     EXPECT_EQ(d.text.find("frame"), std::string::npos) << "every frame has it: " << d.text;
 }
 
-TEST(Sequence, RefusesWhatIsTooMuchForAllFramesTogether) {
+TEST(Sequence, TotalOfAllFramesIsLimited) {
   auto coordinator = open_at({});
   JobSpec spec = frames(1, 10'000);
   spec.size = FrameSize{8192, 8192};  // 65536 tiles each
@@ -300,7 +318,7 @@ TEST(Sequence, RefusesWhatIsTooMuchForAllFramesTogether) {
   EXPECT_NE(text.error().error.message.find("scene text"), std::string::npos) << text.error().error.message;
 }
 
-TEST(Sequence, ItsEventsAreItsOwnAndItsFrames) {
+TEST(Sequence, EventsCoverTheSequenceAndItsFrames) {
   auto coordinator = open_at({});
   const JobId id = submit(*coordinator, frames(1, 2));
   std::mutex mutex;

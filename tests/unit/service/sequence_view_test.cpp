@@ -28,7 +28,7 @@ JobView whole(const std::vector<JobView>& frames, double cores = 0) {
                        frames);
 }
 
-TEST(SequenceView, HasTheStateOfItsFramesTogether) {
+TEST(SequenceView, CombinesTheStatesOfItsFrames) {
   using S = JobState;
   struct Row {
     std::initializer_list<S> frames;
@@ -46,7 +46,7 @@ TEST(SequenceView, HasTheStateOfItsFramesTogether) {
   for (const Row& row : rows) EXPECT_EQ(sequence_state(with(row.frames)), row.expected) << &row - rows;
 }
 
-TEST(SequenceView, PointsAtTheFrameToLookAt) {
+TEST(SequenceView, PointsToTheMostInterestingFrame) {
   using S = JobState;
   EXPECT_EQ(whole(with({S::queued, S::queued})).frames->current, 1u);
   EXPECT_EQ(whole(with({S::done, S::running, S::running})).frames->current, 2u);
@@ -55,7 +55,7 @@ TEST(SequenceView, PointsAtTheFrameToLookAt) {
   EXPECT_EQ(whole(ended).frames->current, 2u);
 }
 
-TEST(SequenceView, AddsUpAndWeighsByPixels) {
+TEST(SequenceView, CombinesFramesByTheirPixels) {
   auto frames = with({JobState::done, JobState::running});
   frames[0].size = {10, 30};
   frames[0].spp_done = 16, frames[0].progress = 1, frames[0].units_done = 10, frames[0].core_seconds = 3;
@@ -76,7 +76,7 @@ TEST(SequenceView, AddsUpAndWeighsByPixels) {
 // Two frames of one size have relMSE 2 with the interval [1, 5], and 4 with [4, 8]. Their mean is 3. The
 // errors are independent, so each end of the mean's interval is half the root of the sum of squares away:
 // sqrt(3^2 + 4^2) / 2 = 5/2 above, sqrt(1^2 + 0^2) / 2 = 1/2 below.
-TEST(SequenceView, ItsErrorIsTheMeanAndItsIntervalThatOfIndependentEstimates) {
+TEST(SequenceView, ErrorIsTheMeanOfItsFramesWithTheIntervalOfIndependentEstimates) {
   auto frames = with({JobState::done, JobState::done, JobState::queued});
   frames[0].error_now = ErrorFigures{3, 2, 1, 5};
   frames[1].error_now = ErrorFigures{4, 4, 4, 8};
@@ -91,7 +91,7 @@ TEST(SequenceView, ItsErrorIsTheMeanAndItsIntervalThatOfIndependentEstimates) {
   EXPECT_FALSE(whole(with({JobState::queued})).error_now);
 }
 
-TEST(SequenceView, IsTrustedNoMoreThanItsWorstFrame) {
+TEST(SequenceView, IsUntrustedIfAFrameIs) {
   auto frames = with({JobState::done, JobState::done, JobState::queued});
   frames[0].convergence_status = ConvergenceStatus{ConvergenceStatus::Kind::converging, "as expected", true};
   EXPECT_TRUE(whole(frames).convergence_status->trusted);
@@ -107,7 +107,7 @@ TEST(SequenceView, IsTrustedNoMoreThanItsWorstFrame) {
   EXPECT_EQ(v.few_hits, 5u);
 }
 
-TEST(SequenceView, ExpectsFramesThatWaitToCostWhatTheOthersDo) {
+TEST(SequenceView, PredictsThatWaitingFramesCostLikeOthers) {
   auto frames = with({JobState::done, JobState::running, JobState::queued, JobState::cancelled});
   frames[0].progress = 1, frames[0].units_done = 10, frames[0].core_seconds = 40;
   frames[1].progress = .5, frames[1].units_done = 5, frames[1].core_seconds = 20;
@@ -121,7 +121,7 @@ TEST(SequenceView, ExpectsFramesThatWaitToCostWhatTheOthersDo) {
   EXPECT_FALSE(whole(frames, 0).eta_seconds);
 }
 
-TEST(SequenceView, ItsTimeLeftIsThatOnCoresThatItsLimitsAndUnitsKeepBusy) {
+TEST(SequenceView, EtaUsesOnlyCoresThatItsLimitsAndUnitsKeepBusy) {
   auto frames = with({JobState::done, JobState::queued});
   frames[0].progress = 1, frames[0].units_done = 10, frames[0].core_seconds = 40;
   const auto eta = [&](double cores, int workers) {
@@ -138,7 +138,7 @@ TEST(SequenceView, ItsTimeLeftIsThatOnCoresThatItsLimitsAndUnitsKeepBusy) {
 }
 
 // Frames that render in no time, but that each worker must load for a while.
-TEST(SequenceView, ItsTimeLeftHasTheLoadingOfFramesThatWait) {
+TEST(SequenceView, EtaIncludesLoadingOfWaitingFrames) {
   auto frames =
       with({JobState::done, JobState::running, JobState::queued, JobState::queued, JobState::queued});
   frames[0].progress = 1, frames[0].units_done = 10, frames[0].core_seconds = .01;
@@ -160,7 +160,7 @@ TEST(SequenceView, ItsTimeLeftHasTheLoadingOfFramesThatWait) {
   EXPECT_DOUBLE_EQ(view(8, 2).eta_seconds.value(), .035 / 4 + 1.2);
 }
 
-TEST(SequenceView, NamesTheFrameThatFailedBeforeOneThatWaits) {
+TEST(SequenceView, NamesAFailedFrameBeforeAWaitingOne) {
   auto frames = with({JobState::queued, JobState::queued, JobState::failed});
   frames[0].error = "no worker is connected";
   EXPECT_EQ(whole(frames).error, "frame 1: no worker is connected");
@@ -168,7 +168,7 @@ TEST(SequenceView, NamesTheFrameThatFailedBeforeOneThatWaits) {
   EXPECT_EQ(whole(frames).error, "frame 3: unit 3 crashed");
 }
 
-TEST(SequenceView, NamesTheFirstFrameThatHasAnErrorEvenIfAnotherOneBeforeItIsOpen) {
+TEST(SequenceView, NamesTheFirstFailedFrameEvenIfAnEarlierFrameIsUnfinished) {
   auto frames = with({JobState::running, JobState::queued, JobState::queued});
   frames[1].error = "job j-0, for which it waits, failed";
   EXPECT_EQ(whole(frames).error, "frame 2: job j-0, for which it waits, failed");

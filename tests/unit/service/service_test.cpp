@@ -10,7 +10,7 @@
 #include <limits>
 #include <thread>
 
-#include "common/base/log.h"
+#include "core/base/log.h"
 #include "tests/support/fake_clock.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
@@ -40,7 +40,7 @@ TEST(Service, RendersAJobOnDiskToThePixelsOfOneInMemory) {
 }
 
 // The rounds have 2, 2, 4 and 8 samples, so the first half of a tile's units is a quarter of its samples.
-TEST(Service, ProgressIsThatOfSamplesNotOfUnits) {
+TEST(Service, ProgressCountsSamplesNotUnits) {
   auto coordinator = open_at({});
   const JobId job = submit(*coordinator);
   FakeFarm farm(*coordinator, 1);
@@ -74,7 +74,7 @@ TEST(Service, ShuffledAndDuplicatedResultsGiveTheSamePixels) {
   }
 }
 
-TEST(Service, ARestartAtAnyPointLosesNothingThatCounts) {
+TEST(Service, RestartAtAnyPointLosesNoAcknowledgedResult) {
   const std::string expected = reference_pixels();
   for (int k = 0; k <= 8; ++k) {
     TempFolder dir;
@@ -89,7 +89,7 @@ TEST(Service, ARestartAtAnyPointLosesNothingThatCounts) {
   }
 }
 
-TEST(Service, ASegmentCutAtAnyByteIsRenderedAgainToTheSamePixels) {
+TEST(Service, SegmentCutAtAnyByteIsRenderedAgainWithTheSamePixels) {
   const std::string expected = reference_pixels();
   for (const double share : {0.0, .13, .5, .77, .999}) {
     TempFolder dir;
@@ -125,7 +125,7 @@ TEST(Service, AcknowledgedResultsAreNotRenderedAgainAfterARestart) {
   EXPECT_EQ(farm.results_sent, 3);  // the rest of 8 units
 }
 
-TEST(Service, WrongPartialsAreRefusedWithAReasonWhileTheJobGoesOn) {
+TEST(Service, WrongPartialsAreRefusedWithAReasonAndTheJobContinues) {
   const std::string expected = reference_pixels();
   for (int kind = 0; kind < 4; ++kind) {
     auto coordinator = open_at({});
@@ -159,7 +159,7 @@ TEST(Service, WrongPartialsAreRefusedWithAReasonWhileTheJobGoesOn) {
   }
 }
 
-TEST(Service, AnExtendedJobHasTheBitsOfOneRenderedAtOnce) {
+TEST(Service, ExtendedJobHasTheBitsOfASingleRender) {
   TempFolder dir;
   for (const bool restart : {false, true}) {
     const auto data = dir.path() / (restart ? "restart" : "live");
@@ -184,7 +184,7 @@ TEST(Service, AnExtendedJobHasTheBitsOfOneRenderedAtOnce) {
   }
 }
 
-TEST(Service, ACancelledJobIgnoresResults) {
+TEST(Service, CancelledJobIgnoresResults) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId job = submit(*coordinator);
@@ -201,7 +201,7 @@ TEST(Service, ACancelledJobIgnoresResults) {
   EXPECT_EQ(extend(*coordinator, job, 64).error().code, Errc::failed_precondition);
 }
 
-TEST(Service, ARestartFromASnapshotAndWhatCameAfterItGivesTheSamePixels) {
+TEST(Service, RestartFromASnapshotAndLaterResultsGivesTheSamePixels) {
   const std::string expected = reference_pixels();
   for (int k = 2; k <= 8; k += 2) {
     TempFolder dir;
@@ -234,7 +234,7 @@ TEST(Service, ARestartFromASnapshotAndWhatCameAfterItGivesTheSamePixels) {
   }
 }
 
-TEST(Service, AFullDiskPausesTheJobUntilAPersonResumesIt) {
+TEST(Service, FullDiskPausesTheJobUntilSomebodyResumesIt) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId job = submit(*coordinator);
@@ -269,7 +269,7 @@ TEST(Service, AFullDiskPausesTheJobUntilAPersonResumesIt) {
   EXPECT_TRUE(coordinator->ready(&why));
 }
 
-TEST(Service, AnUnknownJobIsSaidToBeSo) {
+TEST(Service, UnknownJobIsReportedAsUnknown) {
   auto coordinator = open_at({});
   const JobId nobody{"j-none"};
   EXPECT_EQ(coordinator->job(nobody).error().code, Errc::not_found);
@@ -277,7 +277,7 @@ TEST(Service, AnUnknownJobIsSaidToBeSo) {
   EXPECT_EQ(coordinator->wait(nobody).error().code, Errc::not_found);
 }
 
-TEST(Service, ATargetErrorStopsTheJobAndSurvivesARestart) {
+TEST(Service, TargetErrorStopsTheJobEvenAfterARestart) {
   JobSpec spec;
   spec.target_error = .003;
   auto whole = open_at({});

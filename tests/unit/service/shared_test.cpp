@@ -64,7 +64,7 @@ struct Shared : ::testing::Test {
   }
 };
 
-TEST_F(Shared, ATakeoverWaitsForBlobsThatDoNotAnswerAndIsThenMade) {
+TEST_F(Shared, TakeoverWaitsUntilTheBlobStoreResponds) {
   const StoredJob job = foreign();
   blobs->away = true;
   inherit(job);
@@ -85,7 +85,7 @@ TEST_F(Shared, ATakeoverWaitsForBlobsThatDoNotAnswerAndIsThenMade) {
   EXPECT_EQ(pixels(*coordinator, job.id), reference_pixels(16));
 }
 
-TEST_F(Shared, AFileThatIsNotThereIsToldAtOnceAndWaitedFor) {
+TEST_F(Shared, MissingFileIsReportedAtOnceAndTheJobWaits) {
   StoredJob job = foreign();
   job.assets.push_back({sha256("fog"), 3, "fog.vol"});
   inherit(job);
@@ -103,7 +103,7 @@ TEST_F(Shared, AFileThatIsNotThereIsToldAtOnceAndWaitedFor) {
 }
 
 // The image of a job that is taken over is lost, so the figures of that image are dropped.
-TEST_F(Shared, AnInheritedJobIsNotToldToBeAsGoodAsItsLostImage) {
+TEST_F(Shared, InheritedJobDoesNotReportTheErrorOfItsLostImage) {
   StoredJob job = foreign(32);
   job.spec.target_error = 1e-3;
   job.totals.few_hits = 7;
@@ -122,7 +122,7 @@ TEST_F(Shared, AnInheritedJobIsNotToldToBeAsGoodAsItsLostImage) {
 
 // Files of the job here are from an earlier ownership and must be ignored; they may even be of another
 // numeric class.
-TEST_F(Shared, AnInheritedJobBeginsWithNothingThatLayHere) {
+TEST_F(Shared, InheritedJobIgnoresOldLocalFiles) {
   const StoredJob job = foreign(32);
   {
     inherit(job);
@@ -150,7 +150,7 @@ TEST_F(Shared, AnInheritedJobBeginsWithNothingThatLayHere) {
   EXPECT_EQ(pixels(*coordinator, job.id), reference_pixels(32));
 }
 
-TEST_F(Shared, AJobThatGoesToAnotherIsToldAsMovedNotAsCancelled) {
+TEST_F(Shared, JobThatChangesCoordinatorIsReportedAsMovedNotCancelled) {
   auto request = SubmitRequest{"test.xml", kSceneText, {}, {}};
   request.owner = "anna";
   const JobId job = coordinator->submit(std::move(request)).value();

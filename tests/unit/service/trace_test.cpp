@@ -77,7 +77,7 @@ std::map<std::string, int> counts(const std::vector<CollectedSpan>& spans) {
   return all;
 }
 
-TEST_F(TraceTest, AJobsSpansFormATree) {
+TEST_F(TraceTest, SpansOfAJobFormATree) {
   int results = 0;
   std::set<UnitKey> units;
   {
@@ -110,7 +110,7 @@ TEST_F(TraceTest, AJobsSpansFormATree) {
   EXPECT_THAT(events, ::testing::ElementsAre("running", "done"));
 }
 
-TEST_F(TraceTest, AJobIsPartOfTheTraceOfWhoeverSubmitsIt) {
+TEST_F(TraceTest, JobIsPartOfItsSubmittersTrace) {
   {
     const auto coordinator = open();
     const JobId job = submit_below(*coordinator, kParent);
@@ -121,7 +121,7 @@ TEST_F(TraceTest, AJobIsPartOfTheTraceOfWhoeverSubmitsIt) {
   EXPECT_EQ(root.parent, "b7ad6b7169203331");
 }
 
-TEST_F(TraceTest, ANewCoordinatorContinuesTheTrace) {
+TEST_F(TraceTest, NewCoordinatorContinuesTheTrace) {
   JobId job;
   std::string trace;
   for (const std::string parent : {"", kParent}) {
@@ -157,7 +157,7 @@ TEST_F(TraceTest, ANewCoordinatorContinuesTheTrace) {
 
 // The worker sends a result of a lease from before the coordinator's restart, and reports since when it has
 // had the unit.
-TEST_F(TraceTest, ALeaseFromBeforeTheRestartIsRecordedByWhatItsWorkerSays) {
+TEST_F(TraceTest, LeaseFromBeforeTheRestartIsRecordedFromItsWorkersReport) {
   std::vector<UnitResult> kept;
   JobId job;
   {
@@ -188,7 +188,7 @@ TEST_F(TraceTest, ALeaseFromBeforeTheRestartIsRecordedByWhatItsWorkerSays) {
   expect_a_tree(spans);
 }
 
-TEST_F(TraceTest, AWorkerCannotMoveALeaseOutOfItsJob) {
+TEST_F(TraceTest, WorkerCannotMoveALeaseToAnotherJob) {
   {
     const auto coordinator = open();
     const JobId job = submit(*coordinator);
@@ -202,7 +202,7 @@ TEST_F(TraceTest, AWorkerCannotMoveALeaseOutOfItsJob) {
   expect_a_tree(collector_.spans());
 }
 
-TEST_F(TraceTest, AnExtendedJobGetsAnotherSpanOfTheSameTrace) {
+TEST_F(TraceTest, ExtendedJobGetsAnotherSpanOfTheSameTrace) {
   {
     const auto coordinator = open();
     const JobId job = submit(*coordinator);
@@ -224,7 +224,7 @@ TEST_F(TraceTest, AnExtendedJobGetsAnotherSpanOfTheSameTrace) {
   }
 }
 
-TEST_F(TraceTest, ACancelledJobsSpanEnds) {
+TEST_F(TraceTest, SpanOfACancelledJobEnds) {
   {
     const auto coordinator = open();
     const JobId job = submit(*coordinator);
@@ -237,7 +237,7 @@ TEST_F(TraceTest, ACancelledJobsSpanEnds) {
 }
 
 // Workers get a traceparent only from a coordinator whose tracer samples the job.
-TEST_F(TraceTest, WorkersAreToldOfALeasesSpanOnlyIfTheJobIsTraced) {
+TEST_F(TraceTest, WorkersGetALeasesSpanOnlyIfTheJobIsTraced) {
   const auto told = [&](Coordinator& coordinator) {
     const auto mail = std::make_shared<Mailbox>();
     WorkerHello hello;
@@ -302,7 +302,7 @@ struct TracedJob {
   std::vector<trace::SpanContext> contexts;
 };
 
-TEST(JobTrace, ARefusedResultEndsNoLeaseOfAnotherWorker) {
+TEST(JobTrace, RefusedResultEndsNoLeaseOfAnotherWorker) {
   TracedJob job;
   const Lease a = job.lend("t-1", "a"), b = job.lend("t-2", "b");
   job.result(a, "a", true);
@@ -315,7 +315,7 @@ TEST(JobTrace, ARefusedResultEndsNoLeaseOfAnotherWorker) {
   EXPECT_EQ(lost.at("t-2"), "");
 }
 
-TEST(JobTrace, AWorkerCannotChangeTheLeaseOfAnother) {
+TEST(JobTrace, WorkerCannotChangeTheLeaseOfAnother) {
   TracedJob job;
   const Lease a = job.lend("t-1", "a", 0);
   job.result(a, "liar", true);
@@ -325,7 +325,7 @@ TEST(JobTrace, AWorkerCannotChangeTheLeaseOfAnother) {
 }
 
 // Both farms count their jobs and leases from 1.
-TEST(JobTrace, TwoFarmsInOneTraceHaveSpansOfTheirOwn) {
+TEST(JobTrace, TwoFarmsInOneTraceHaveSeparateSpans) {
   StoredJob one;
   one.traceparent = kParent;
   one.submitted_unix = 1'700'000'000.25;
@@ -344,7 +344,7 @@ TEST(JobTrace, TwoFarmsInOneTraceHaveSpansOfTheirOwn) {
   EXPECT_EQ(leases.size(), 3u);
 }
 
-TEST_F(TraceTest, AJobSubmittedAgainIsPartOfTheTraceOfThatRequest) {
+TEST_F(TraceTest, ResubmittedJobBelongsToTheTraceOfThatRequest) {
   {
     const auto coordinator = open();
     const JobId first = submit_below(*coordinator, "");
@@ -374,7 +374,7 @@ class TraceOfAnUnwrittenImage : public TraceTest {
   std::filesystem::path image(const JobId& job) const { return folder_ / "jobs" / job.value / "image.exr"; }
 };
 
-TEST_F(TraceOfAnUnwrittenImage, AJobThatIsRemovedEndsItsSpan) {
+TEST_F(TraceOfAnUnwrittenImage, RemovedJobEndsItsSpan) {
   {
     const auto coordinator = open();
     const JobId job = render(*coordinator);
@@ -383,7 +383,7 @@ TEST_F(TraceOfAnUnwrittenImage, AJobThatIsRemovedEndsItsSpan) {
   expect_a_tree(collector_.spans());
 }
 
-TEST_F(TraceOfAnUnwrittenImage, AJobThatEndsAfterARestartHasTheSpanThatItBeganWith) {
+TEST_F(TraceOfAnUnwrittenImage, JobThatEndsAfterARestartKeepsItsSpan) {
   JobId job;
   {
     const auto coordinator = open();

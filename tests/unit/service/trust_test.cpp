@@ -48,7 +48,7 @@ Result<std::unique_ptr<WorkerSession>> come_back(Coordinator& coordinator, const
   return coordinator.connect(hello, std::make_shared<MailSink>(std::make_shared<Mailbox>(), 0));
 }
 
-TEST(Trust, TheImageOfAFarmWithALiarIsThatOfHonestWorkers) {
+TEST(Trust, FarmWithAFaultyWorkerMakesTheImageOfHonestWorkers) {
   auto coordinator = open_audited({}, 1);
   const JobId job = submit(*coordinator, samples(64));
   FakeFarm farm(*coordinator, 4);
@@ -70,7 +70,7 @@ TEST(Trust, TheImageOfAFarmWithALiarIsThatOfHonestWorkers) {
   }
 }
 
-TEST(Trust, WhatALiarLeftInTheLogIsNotTakenUpAfterARestart) {
+TEST(Trust, FaultyWorkersResultsInTheLogAreIgnoredAfterARestart) {
   const TempFolder folder;
   JobId job;
   {
@@ -107,7 +107,7 @@ bool come_to_be_audited(const std::filesystem::path& job, const UnitKey& unit) {
   return true;
 }
 
-TEST(Trust, AnAuditUnderWayIsGoneOnWithAfterARestart) {
+TEST(Trust, AuditContinuesAfterARestart) {
   const TempFolder folder;
   JobId job;
   {
@@ -138,7 +138,7 @@ TEST(Trust, AnAuditUnderWayIsGoneOnWithAfterARestart) {
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels(512));
 }
 
-TEST(Trust, AQuarantinedWorkerStaysQuarantinedOverARestart) {
+TEST(Trust, WorkerStaysQuarantinedAfterARestart) {
   const TempFolder folder;
   WorkerId faulty;
   {
@@ -157,7 +157,7 @@ TEST(Trust, AQuarantinedWorkerStaysQuarantinedOverARestart) {
   EXPECT_THAT(coordinator->workers()[0].activity, testing::StartsWith("quarantined: it rendered tile"));
 }
 
-TEST(Trust, AQuarantinedWorkerStaysQuarantinedWhenTheJobThatItWasFoundByIsGone) {
+TEST(Trust, WorkerStaysQuarantinedAfterTheJobThatExposedItIsRemoved) {
   const TempFolder folder;
   WorkerId faulty;
   {
@@ -202,7 +202,7 @@ struct FoundElsewhere : ::testing::Test {
   }
 };
 
-TEST_F(FoundElsewhere, AWorkerHereIsQuarantinedAtOnceAndItsTilesAreRenderedAgain) {
+TEST_F(FoundElsewhere, WorkerIsQuarantinedHereTooAndItsTilesAreRenderedAgain) {
   auto coordinator = open();
   const JobId job = submit(*coordinator, samples(64));
   FakeFarm farm(*coordinator, 2);
@@ -220,7 +220,7 @@ TEST_F(FoundElsewhere, AWorkerHereIsQuarantinedAtOnceAndItsTilesAreRenderedAgain
 }
 
 // The finished image keeps the wrong pixels, but an extension of it uses none of them.
-TEST_F(FoundElsewhere, AJobThatWasDoneBeforeIsExtendedWithoutTheLiarsPixels) {
+TEST_F(FoundElsewhere, FinishedJobIsExtendedWithoutTheFaultyWorkersPixels) {
   for (const bool on_disk : {true, false}) {
     auto coordinator = open(on_disk);
     const JobId job = submit(*coordinator, samples(16));
@@ -248,7 +248,7 @@ TEST_F(FoundElsewhere, AJobThatWasDoneBeforeIsExtendedWithoutTheLiarsPixels) {
   }
 }
 
-TEST_F(FoundElsewhere, UntilItIsStoredThatAWorkerIsQuarantinedTheJobsWait) {
+TEST_F(FoundElsewhere, JobsWaitUntilTheQuarantineIsStored) {
   auto coordinator = open_audited_here();
   const JobId job = submit(*coordinator, samples(64));
   FakeFarm farm(*coordinator, 4);
@@ -271,7 +271,7 @@ TEST_F(FoundElsewhere, UntilItIsStoredThatAWorkerIsQuarantinedTheJobsWait) {
 // The user resumes the job while a result is being stored. Storing it has failed already, but the error is
 // handled only after the resume. The test is repeated, since the scheduler decides whether the resume falls
 // between the two.
-TEST_F(FoundElsewhere, AnErrorFromBeforeAJobWasResumedDoesNotPauseItAgain) {
+TEST_F(FoundElsewhere, OldErrorDoesNotPauseAResumedJobAgain) {
   for (int trial = 0; trial < 40; ++trial) {
     auto coordinator = open_audited_here();
     const JobId job = submit(*coordinator, samples(64));
@@ -297,7 +297,7 @@ TEST_F(FoundElsewhere, AnErrorFromBeforeAJobWasResumedDoesNotPauseItAgain) {
   }
 }
 
-TEST(Trust, AbsurdTimesOfAWorkerCountForNothingAndTheRecordStaysReadable) {
+TEST(Trust, AbsurdTimesFromAWorkerAreIgnoredAndTheRecordStaysReadable) {
   const TempFolder folder;
   JobId job;
   {
@@ -319,7 +319,7 @@ TEST(Trust, AbsurdTimesOfAWorkerCountForNothingAndTheRecordStaysReadable) {
   EXPECT_TRUE(coordinator->image_exr(job));
 }
 
-TEST(Trust, AJobTooLargeForEveryWorkerSaysSoInItsView) {
+TEST(Trust, JobTooLargeForAllWorkersSaysSo) {
   auto coordinator = open_audited({}, 0);
   JobSpec spec = samples(4);
   spec.memory = 8ull << 30;

@@ -7,7 +7,7 @@
 namespace ls::coordinator {
 namespace {
 
-TEST(JobViewJson, TimeLeftWithMoreWorkersNamesTheirNumberAndKeepsItsOlderKeys) {
+TEST(JobViewJson, EtaWithMoreWorkersHasTheirNumberAndKeepsTheDeprecatedKeys) {
   JobView view;
   view.eta_with_more = 66;
   view.eta_with_more_ci95 = std::pair(50., 90.);
@@ -20,7 +20,7 @@ TEST(JobViewJson, TimeLeftWithMoreWorkersNamesTheirNumberAndKeepsItsOlderKeys) {
   EXPECT_EQ(json["eta_with_8_more_ci95"], json["eta_with_more"]["ci95"]);
 }
 
-TEST(JobViewJson, WithoutAnEffectOfMoreWorkersTheirKeysAreNull) {
+TEST(JobViewJson, KeysOfMoreWorkersAreNullIfMoreDoNotHelp) {
   const auto json = nlohmann::json::parse(job_json(JobView{}));
 
   for (const char* key : {"eta_with_more", "eta_with_8_more", "eta_with_8_more_ci95"})

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "common/image/exr/exr_file.h"
+#include "core/image/exr/exr_file.h"
 #include "tests/unit/store/temp_folder.h"
 
 namespace ls::coordinator {
@@ -29,7 +29,7 @@ std::filesystem::path decoder(const TempFolder& folder, const std::string& comma
   return path;
 }
 
-TEST(DecodedReference, IsThatOfTheLibrary) {
+TEST(DecodedReference, MatchesTheLibrarysDecoding) {
   const FrameSize size{40, 24};
   const auto exr = grey_exr(size, .5F);
 
@@ -44,7 +44,7 @@ TEST(DecodedReference, IsThatOfTheLibrary) {
   EXPECT_THAT(missing.error().message, HasSubstr("/no/such/lightshaft-exr"));
 }
 
-TEST(DecodedReference, OfAFileThatCrashesItsDecoderOrTakesItOverIsRefused) {
+TEST(DecodedReference, FileThatCrashesOrTakesOverItsDecoderIsRefused) {
   const TempFolder folder;
   const FrameSize size{40, 24};
   const auto exr = grey_exr(size, .5F);

@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/image/aov/aov.h"
 #include "coordinator/store/blobs/memory_blobs.h"
+#include "core/image/aov/aov.h"
 #include "tests/support/eventually.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/service/moving_store.h"
@@ -39,7 +39,7 @@ class Films : public ::testing::Test {
   std::unique_ptr<Coordinator> coordinator = std::move(*Coordinator::open(options(folder.path())));
 };
 
-TEST_F(Films, OfOneUserTakeHalfOfTheRoomAtMost) {
+TEST_F(Films, OneUserMayUseHalfOfTheFilmMemory) {
   const auto first = hand_in("mallory");
   ASSERT_TRUE(first);
   ASSERT_TRUE(hand_in("mallory"));
@@ -52,7 +52,7 @@ TEST_F(Films, OfOneUserTakeHalfOfTheRoomAtMost) {
   EXPECT_TRUE(hand_in("bob"));
 }
 
-TEST_F(Films, OfAllUsersFitIntoTheRoom) {
+TEST_F(Films, AllUsersShareTheFilmMemory) {
   for (const char* owner : {"a", "a", "b", "b"}) ASSERT_TRUE(hand_in(owner));
 
   const auto more = hand_in("c");
@@ -60,14 +60,14 @@ TEST_F(Films, OfAllUsersFitIntoTheRoom) {
   EXPECT_THAT(more.error().error.message, HasSubstr("all jobs"));
 }
 
-TEST_F(Films, OfASequenceCountForTheFewFramesThatAreRenderedAtOnce) {
+TEST_F(Films, FilmsOfASequenceCountOnlyForFramesThatRenderTogether) {
   EXPECT_FALSE(hand_in("mallory", "1-100"));
   EXPECT_TRUE(hand_in("", "1-100"));  // the administrator's, which may use all of the room
 
   EXPECT_FALSE(hand_in("bob"));
 }
 
-TEST_F(Films, OfCancelledJobsMakeRoom) {
+TEST_F(Films, CancelledJobsFreeFilmMemory) {
   const auto first = hand_in("mallory");
   ASSERT_TRUE(hand_in("mallory"));
   ASSERT_FALSE(hand_in("mallory"));
@@ -90,7 +90,7 @@ struct FullStore final : MovingStore {
   std::atomic<bool> full{false};
 };
 
-TEST(StoreTrouble, OfASubmissionIsToldUntilTheStoreTakesRecordsAgain) {
+TEST(StoreTrouble, FailedSubmissionIsReportedUntilTheStoreAcceptsRecordsAgain) {
   const auto store = std::make_shared<FullStore>();
   const auto coordinator = std::move(*Coordinator::open({.jobs = store}));
   store->full = true;
@@ -106,7 +106,7 @@ TEST(StoreTrouble, OfASubmissionIsToldUntilTheStoreTakesRecordsAgain) {
   EXPECT_TRUE(coordinator->ready(&why)) << why;
 }
 
-TEST(StoreTrouble, AtTheStartLeavesACoordinatorThroughWhichJobsCanBeRemoved) {
+TEST(StoreTrouble, CoordinatorWithABrokenStoreStartsSoThatJobsCanBeRemoved) {
   const auto store = std::make_shared<FullStore>();
   JobId job;
   {
@@ -122,7 +122,7 @@ TEST(StoreTrouble, AtTheStartLeavesACoordinatorThroughWhichJobsCanBeRemoved) {
   EXPECT_TRUE((*opened)->remove(job));
 }
 
-TEST(Sequences, ThatAreTooLargeAreRefusedAfterAFewFrames) {
+TEST(Sequences, TooLargeSequenceIsRefusedAfterAFewFrames) {
   struct Counting final : MemoryBlobs {
     Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
                                         std::uint64_t length) const override {

@@ -28,7 +28,7 @@ struct Queue {
   std::vector<std::string> served;
 };
 
-TEST(Turns, OneCallersQueueDoesNotHoldUpAnother) {
+TEST(Turns, QueueOfOneCallerDoesNotDelayAnother) {
   Queue queue({.places = 4, .places_each = 2});
   for (int i = 0; i < 100; ++i) queue.ask("mallory");
 
@@ -38,7 +38,7 @@ TEST(Turns, OneCallersQueueDoesNotHoldUpAnother) {
   EXPECT_EQ(queue.turns.waiting(), 98u);
 }
 
-TEST(Turns, ServeTheCallerThatIsServedLeast) {
+TEST(Turns, ServeTheLeastServedCaller) {
   Queue queue({.places = 2, .places_each = 2});
   const auto first = queue.ask("mallory");
   queue.ask("mallory");
@@ -52,7 +52,7 @@ TEST(Turns, ServeTheCallerThatIsServedLeast) {
   EXPECT_EQ(queue.served, std::vector<std::string>{"anna"});
 }
 
-TEST(Turns, GoRoundAmongCallersThatKeepAsking) {
+TEST(Turns, RotateAmongBusyCallers) {
   Turns turns({.places = 1, .places_each = 1});
   std::vector<std::string> served;
   std::vector<Turns::Ticket> tickets(8);
@@ -70,7 +70,7 @@ TEST(Turns, GoRoundAmongCallersThatKeepAsking) {
   EXPECT_EQ(served, (std::vector<std::string>{"mallory", "bob", "mallory", "bob", "mallory"}));
 }
 
-TEST(Turns, ARequestThatLeavesTheQueueIsNotServed) {
+TEST(Turns, CancelledRequestIsNotServed) {
   Queue queue({.places = 1, .places_each = 1});
   const auto first = queue.ask("anna");
   const auto second = queue.ask("bob");
@@ -96,7 +96,7 @@ TEST(Turns, MemoryIsSharedAndSmallRequestsNeverWaitForIt) {
   EXPECT_EQ(queue.served, (std::vector<std::string>{"mallory", "anna", "carl", "bob"}));
 }
 
-TEST(Turns, ARequestLargerThanEverythingIsServedAlone) {
+TEST(Turns, OversizedRequestIsServedAlone) {
   Queue queue({.places = 9, .places_each = 9, .bytes = 1000, .bytes_each = 500});
   const auto small = queue.ask("anna", 100);
   queue.ask("bob", 5000);
@@ -107,7 +107,7 @@ TEST(Turns, ARequestLargerThanEverythingIsServedAlone) {
   EXPECT_EQ(queue.served, (std::vector<std::string>{"anna", "bob"}));
 }
 
-TEST(Turns, AThreadWaitsForItsTurn) {
+TEST(Turns, ThreadWaitsForItsTurn) {
   Gate gate({.places = 1, .places_each = 1});
   bool first_has_left = false, second_came = false;
   std::optional<Gate::Place> first(std::in_place, gate, "anna", 0);
@@ -123,7 +123,7 @@ TEST(Turns, AThreadWaitsForItsTurn) {
   EXPECT_TRUE(second_came);
 }
 
-TEST(Shares, OneCallerHasAQuarterAndSmallPiecesAreFree) {
+TEST(Shares, CallerGetsAQuarterAndSmallRequestsAreFree) {
   Shares shares(1 << 20);
   Shares::Held a, b, c, d, small;
 
@@ -136,7 +136,7 @@ TEST(Shares, OneCallerHasAQuarterAndSmallPiecesAreFree) {
   EXPECT_TRUE(b.take(shares, "mallory", 200'000));
 }
 
-TEST(Shares, APieceLargerThanAQuarterLeavesTheOthersTheirs) {
+TEST(Shares, LargePieceLeavesOtherCallersTheirShares) {
   Shares shares(1 << 20);
   Shares::Held huge[4], more;
 
@@ -145,7 +145,7 @@ TEST(Shares, APieceLargerThanAQuarterLeavesTheOthersTheirs) {
   EXPECT_TRUE(more.take(shares, "d", 100'000));
 }
 
-TEST(Pace, FastBytesBuyNoStall) {
+TEST(Pace, FastBytesEarnNoPause) {
   const SteadyClock::time_point began{};
   TransferPace pace(began, 15, 8192);
 
@@ -154,7 +154,7 @@ TEST(Pace, FastBytesBuyNoStall) {
   EXPECT_EQ(pace.deadline(), began + steady_seconds(17));
 }
 
-TEST(Pace, DripsDoNotPutItOff) {
+TEST(Pace, DripsDoNotExtendTheDeadline) {
   const SteadyClock::time_point began{};
   TransferPace pace(began, 15, 8192);
 
@@ -163,7 +163,7 @@ TEST(Pace, DripsDoNotPutItOff) {
   EXPECT_LT(pace.deadline(), began + steady_seconds(15.1));  // 14 bytes are 1.7 ms at 8192 a second
 }
 
-TEST(Pace, WhoKeepsUpIsNeverCut) {
+TEST(Pace, SteadySenderIsNeverCut) {
   const SteadyClock::time_point began{};
   TransferPace pace(began, 15, 8192);
 

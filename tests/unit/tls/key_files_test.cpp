@@ -7,7 +7,7 @@ namespace {
 
 constexpr unsigned kRoot = 0, kUs = 10001, kOther = 1000;
 
-TEST(KeyFiles, NobodyElseMayReadAKey) {
+TEST(KeyFiles, RefusesKeysThatOthersMayRead) {
   EXPECT_TRUE(kept_secret(kUs, 0100600, kUs));
   EXPECT_TRUE(kept_secret(kUs, 0100400, kUs));
   for (const unsigned mode : {0100640u, 0100604u, 0100660u, 0100644u})
@@ -16,7 +16,7 @@ TEST(KeyFiles, NobodyElseMayReadAKey) {
 }
 
 // A cluster mounts a secret as root's file that is readable by a group of the process.
-TEST(KeyFiles, WhatRootOwnsMayBeShownThroughItsGroup) {
+TEST(KeyFiles, RootOwnedFileMayBeReadableByItsGroup) {
   EXPECT_TRUE(kept_secret(kRoot, 0100440, kUs));
   EXPECT_TRUE(kept_secret(kRoot, 0100640, kUs));
   EXPECT_FALSE(kept_secret(kRoot, 0100660, kUs)) << "the group may write";

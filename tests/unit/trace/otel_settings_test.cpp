@@ -1,4 +1,4 @@
-#include "common/trace/otel_settings.h"
+#include "util/trace/otel_settings.h"
 
 #include <gtest/gtest.h>
 
@@ -30,7 +30,7 @@ TEST(TraceSettings, NothingIsTracedWithoutAnEndpointOrIfThatIsSwitchedOff) {
   EXPECT_EQ(read({{kEndpoint, "http://c:4318"}, {"OTEL_TRACES_EXPORTER", "none"}}).value(), std::nullopt);
 }
 
-TEST(TraceSettings, TheAddressForAllSignalsGetsThePathOfTracesAndTheirOwnIsTakenAsItIs) {
+TEST(TraceSettings, EndpointForAllSignalsGetsTheTracesPathAndTheTracesEndpointIsUsedUnchanged) {
   EXPECT_EQ(read({{kEndpoint, "http://c:4318"}}).value()->url, "http://c:4318/v1/traces");
   EXPECT_EQ(read({{kEndpoint, "http://c:4318/otlp/"}}).value()->url, "http://c:4318/otlp/v1/traces");
   EXPECT_EQ(
@@ -58,7 +58,7 @@ TEST(TraceSettings, HeadersAndAttributesAreDecoded) {
   EXPECT_EQ(read({{kEndpoint, "http://c"}}).value()->service, "lightshaft-worker");
 }
 
-TEST(TraceSettings, TheServiceIsNamedOnceAndByItsOwnVariableFirst) {
+TEST(TraceSettings, ServiceHasOneNameAndItsOwnVariableTakesPrecedence) {
   Variables variables{{kEndpoint, "http://c"}, {"OTEL_RESOURCE_ATTRIBUTES", "a=b,service.name=farm"}};
   const auto by_attribute = read(variables).value().value();
   variables["OTEL_SERVICE_NAME"] = "own";
@@ -72,13 +72,13 @@ TEST(TraceSettings, TheServiceIsNamedOnceAndByItsOwnVariableFirst) {
   }
 }
 
-TEST(TraceSettings, ProtocolsThatGoToTheSamePortAreTaken) {
+TEST(TraceSettings, AcceptsProtocolsOfTheSamePort) {
   for (const char* protocol : {"", "http/json", "http/protobuf"})
     EXPECT_TRUE(read({{kEndpoint, "http://c"}, {"OTEL_EXPORTER_OTLP_PROTOCOL", protocol}}).value())
         << protocol;
 }
 
-TEST(TraceSettings, AWrongVariableIsNamed) {
+TEST(TraceSettings, InvalidVariableIsNamed) {
   for (const auto& [name, value] : Variables{{"OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", "c:4318"},
                                              {"OTEL_EXPORTER_OTLP_HEADERS", "no pair"},
                                              {"OTEL_EXPORTER_OTLP_TRACES_HEADERS", "a=%zz"},
@@ -98,7 +98,7 @@ TEST(TraceSettings, AWrongVariableIsNamed) {
   EXPECT_NE(ratio.error().message.find("OTEL_TRACES_SAMPLER_ARG"), std::string::npos);
 }
 
-TEST(TraceSettings, AMessageDoesNotRepeatAHeader) {
+TEST(TraceSettings, MessagesDoNotRepeatHeaderValues) {
   const auto settings = read({{kEndpoint, "http://c"}, {"OTEL_EXPORTER_OTLP_HEADERS", "key=s3cret%"}});
   EXPECT_EQ(settings.error().message.find("s3cret"), std::string::npos);
 }
@@ -109,7 +109,7 @@ Sampler sampler(const std::string& name, const std::string& argument = "") {
       ->sampler;
 }
 
-TEST(Sampler, FollowsTheProgramThatBeganTheTraceUnlessToldOtherwise) {
+TEST(Sampler, FollowsTheParentsDecisionUnlessConfiguredOtherwise) {
   const TraceId id = trace_id_of("x");
   EXPECT_TRUE(sampler("").takes(id, std::nullopt));
   EXPECT_FALSE(sampler("").takes(id, false));
@@ -122,7 +122,7 @@ TEST(Sampler, FollowsTheProgramThatBeganTheTraceUnlessToldOtherwise) {
 // The decision depends on the trace id, which is a digest. So the number of sampled traces of 10,000 is
 // binomial with p = 1/4 and has the standard deviation 43.3. It exceeds 5 deviations with a probability of
 // one in a million. The ids are fixed, and so is the count.
-TEST(Sampler, TakesItsFractionOfTheTraces) {
+TEST(Sampler, SamplesItsFractionOfTraces) {
   const Sampler quarter = sampler("traceidratio", "0.25");
   int taken = 0;
   for (int i = 0; i < 10'000; ++i) taken += quarter.takes(trace_id_of(std::to_string(i)), std::nullopt);

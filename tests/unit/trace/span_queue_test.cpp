@@ -1,4 +1,4 @@
-#include "common/trace/span_queue.h"
+#include "util/trace/span_queue.h"
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ TEST(SpanQueue, CollectsSpansForAMoment) {
   EXPECT_EQ(queue.figures().sent, 2u);
 }
 
-TEST(SpanQueue, AFullBatchDoesNotWait) {
+TEST(SpanQueue, FullBatchIsSentAtOnce) {
   SpanQueue queue = with(kMaxBatch + 3);
 
   EXPECT_EQ(queue.due(at(0)).size(), kMaxBatch);
@@ -33,13 +33,13 @@ TEST(SpanQueue, AFullBatchDoesNotWait) {
   EXPECT_TRUE(queue.due(at(0)).empty()) << "the rest collects";
 }
 
-TEST(SpanQueue, IsBoundedAndCountsWhatItLeavesOut) {
+TEST(SpanQueue, IsBoundedAndCountsDroppedSpans) {
   SpanQueue queue = with(kMaxWaiting + 5);
 
   EXPECT_EQ(queue.figures().left_out, 5u);
 }
 
-TEST(SpanQueue, TriesAgainAfterGrowingPausesAndThenGivesTheBatchUp) {
+TEST(SpanQueue, RetriesWithGrowingPausesAndThenDropsTheBatch) {
   SpanQueue queue = with(2);
   double now = kCollectSeconds, pause = kFirstPauseSeconds;
   for (int i = 1; i < kMaxSendings; ++i, pause *= 2) {
@@ -60,7 +60,7 @@ TEST(SpanQueue, TriesAgainAfterGrowingPausesAndThenGivesTheBatchUp) {
   EXPECT_FALSE(queue.in_trouble());
 }
 
-TEST(SpanQueue, DoesNotRepeatWhatTheCollectorRefused) {
+TEST(SpanQueue, DoesNotResendRefusedSpans) {
   SpanQueue queue = with(3);
   ASSERT_EQ(queue.due(at(2)).size(), 3u);
   queue.refused();
@@ -85,7 +85,7 @@ TEST(SpanQueue, RefusedBatchesDoNotCountAsAttemptsToSendTheNextOne) {
   EXPECT_EQ(queue.due(at(4 + kFirstPauseSeconds)).size(), 1u) << "it is sent again";
 }
 
-TEST(SpanQueue, BelievesNoCollectorThatRejectsMoreThanItGot) {
+TEST(SpanQueue, IgnoresImpossibleRejectionCounts) {
   SpanQueue queue = with(3);
   ASSERT_EQ(queue.due(at(2)).size(), 3u);
   queue.taken(1'000'000);
@@ -94,7 +94,7 @@ TEST(SpanQueue, BelievesNoCollectorThatRejectsMoreThanItGot) {
   EXPECT_EQ(queue.figures().sent, 0u);
 }
 
-TEST(SpanQueue, AtTheEndEverythingIsDue) {
+TEST(SpanQueue, EverythingIsSentAtTheEnd) {
   SpanQueue queue = with(2);
   queue.hurry();
 

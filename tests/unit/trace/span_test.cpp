@@ -1,16 +1,16 @@
-#include "common/trace/span.h"
+#include "util/trace/span.h"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "common/trace/otlp.h"
+#include "util/trace/otlp.h"
 
 namespace ls::trace {
 namespace {
 
 constexpr const char* kText = "00-0af7651916cd43dd8448eb211c80319c-b7ad6b7169203331-01";
 
-TEST(Traceparent, ReadsBackAsItWasWritten) {
+TEST(Traceparent, RoundTrips) {
   const auto context = parse_traceparent(kText);
 
   ASSERT_TRUE(context);
@@ -28,12 +28,12 @@ TEST(Traceparent, SaysWhetherTheTraceIsRecorded) {
   EXPECT_TRUE(to_traceparent(*parse_traceparent(text)).ends_with("-00"));
 }
 
-TEST(Traceparent, OfALaterVersionIsReadAsFarAsItIsKnown) {
+TEST(Traceparent, LaterVersionIsReadAsFarAsPossible) {
   EXPECT_TRUE(parse_traceparent("cc" + std::string(kText).substr(2) + "-what-comes"));
   EXPECT_FALSE(parse_traceparent("cc" + std::string(kText).substr(2) + ".what-comes"));
 }
 
-TEST(Traceparent, IsIgnoredIfItIsNone) {
+TEST(Traceparent, IsIgnoredIfMalformed) {
   const std::string good = kText;
   const auto changed = [&](std::size_t at, const std::string& part) {
     std::string text = good;
@@ -56,7 +56,7 @@ TEST(Ids, AreTheSameForTheSameTextOnly) {
 
 using nlohmann::json;
 
-TEST(Otlp, WritesASpanAsTheSpecificationSays) {
+TEST(Otlp, WritesSpansByTheSpecification) {
   const TraceId trace = parse_traceparent("00-0af7651916cd43dd8448eb211c80319c-b7ad6b7169203331-01")->trace;
   const Span span{.context = {trace, SpanId{{1, 2, 3, 4, 5, 6, 7, 8}}},
                   .parent = SpanId{{255}},
@@ -96,7 +96,7 @@ TEST(Otlp, ReadsHowManySpansWereRejected) {
   EXPECT_EQ(otlp_partial_success(R"({"partialSuccess": {"rejectedSpans": 4}})").rejected, 4u);
 }
 
-TEST(Otlp, TakesAnAnswerThatItDoesNotUnderstandAsSuccess) {
+TEST(Otlp, UnknownAnswerCountsAsSuccess) {
   for (const std::string& answer :
        {std::string(), std::string("{}"), std::string("<html>"), std::string("[1]"),
         std::string("\xff\x00\x01", 3), std::string(R"({"partialSuccess": 7})"),

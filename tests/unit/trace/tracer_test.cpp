@@ -1,4 +1,4 @@
-#include "common/trace/tracer.h"
+#include "util/trace/tracer.h"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@ namespace {
 
 Span a_span(Tracer& tracer) { return {.context = {trace_id_of("t"), tracer.new_span_id()}, .name = "x"}; }
 
-TEST(Tracer, SendsWhatWaitsWhenTheProgramEnds) {
+TEST(Tracer, SendsPendingSpansAtTheEnd) {
   test::SpanCollector collector;
   {
     const auto tracer = collector.tracer(std::make_shared<FakeClock>());
@@ -60,7 +60,7 @@ TEST(Tracer, NamesEveryAttributeOfTheProgramOnce) {
   EXPECT_EQ(attributes["team"], "light");
 }
 
-TEST(Tracer, GivesEverySpanAnotherId) {
+TEST(Tracer, SpanIdsAreUnique) {
   test::SpanCollector collector;
   const auto tracer = collector.tracer();
   std::set<SpanId> ids;
@@ -69,7 +69,7 @@ TEST(Tracer, GivesEverySpanAnotherId) {
   EXPECT_FALSE(ids.contains(SpanId{}));
 }
 
-TEST(Tracer, TellsTimesByTheWallClock) {
+TEST(Tracer, UsesWallClockTimes) {
   test::SpanCollector collector;
   const auto clock = std::make_shared<FakeClock>();
   const auto tracer = collector.tracer(clock);
@@ -98,7 +98,7 @@ TEST(Tracer, DoesNotWaitForACollectorThatHangs) {
   SUCCEED();
 }
 
-TEST(Tracer, CountsWhatTheCollectorRefuses) {
+TEST(Tracer, CountsRefusedSpans) {
   for (const Result<HttpAnswer>& answer :
        {Result<HttpAnswer>(HttpAnswer{400, "no"}), Result<HttpAnswer>(HttpAnswer{302, ""}),
         Result<HttpAnswer>(HttpAnswer{200, R"({"partialSuccess":{"rejectedSpans":"512"}})"})}) {

@@ -117,7 +117,7 @@ class Vdb : public testing::Test {
   Scratch file_;
 };
 
-TEST_F(Vdb, ReadsOneNumberAVoxelAndThree) {
+TEST_F(Vdb, ReadsOneAndThreeNumbersPerVoxel) {
   write(file_.path(), filled<openvdb::FloatGrid>([](int i) { return static_cast<float>(i); }));
   expect_them(read(file_.path()), 1);
   write(file_.path(), filled<openvdb::DoubleGrid>([](int i) { return static_cast<double>(i); }));
@@ -128,7 +128,7 @@ TEST_F(Vdb, ReadsOneNumberAVoxelAndThree) {
   expect_them(read(file_.path()), 3);
 }
 
-TEST_F(Vdb, HalvesAreNumbersToo) {
+TEST_F(Vdb, ReadsHalfFloats) {
   const auto grid = filled<openvdb::FloatGrid>([](int i) { return static_cast<float>(i); });
   grid->setSaveFloatAsHalf(true);
   write(file_.path(), grid);
@@ -147,7 +147,7 @@ TEST_F(Vdb, NegativesOfEveryChannelAreCounted) {
   EXPECT_EQ(r.at(1, 1, 1, 1), 0);
 }
 
-TEST_F(Vdb, ALimitCountsEveryValue) {
+TEST_F(Vdb, LimitCountsEveryValue) {
   write(file_.path(), filled<openvdb::Vec3SGrid>(three<float>));
 
   EXPECT_THAT(read(file_.path(), 3 * 420 - 1).error, HasSubstr("420 voxels of 3 values; the limit is 419"));
@@ -247,14 +247,14 @@ void for_each_form(const std::filesystem::path& path, Check check) {
   check(out.str());
 }
 
-TEST_F(Vdb, EveryFormIsReadWhole) {
+TEST_F(Vdb, ReadsEveryFormCompletely) {
   for_each_form(file_.path(), [&](const std::string& whole) {
     store(file_.path(), whole);
     expect_them(read(file_.path()), 1);
   });
 }
 
-TEST_F(Vdb, AFileThatEndsTooEarlyIsRefusedInEveryForm) {
+TEST_F(Vdb, TruncatedFileIsRefusedInEveryForm) {
   for_each_form(file_.path(), [&](const std::string& whole) {
     const std::size_t step = std::max<std::size_t>(1, whole.size() / 200);
     for (std::size_t cut = 0; cut < whole.size(); cut += step) {
@@ -266,7 +266,7 @@ TEST_F(Vdb, AFileThatEndsTooEarlyIsRefusedInEveryForm) {
   });
 }
 
-TEST_F(Vdb, GzipIsUnpackedAndTellsItsDamage) {
+TEST_F(Vdb, GzipIsUnpackedAndDamageReported) {
   write(file_.path(), filled<openvdb::FloatGrid>([](int i) { return static_cast<float>(i); }));
   const std::string packed = gzipped(bytes_of(file_.path()));
 
@@ -285,13 +285,13 @@ TEST_F(Vdb, GzipIsUnpackedAndTellsItsDamage) {
   }
 }
 
-TEST_F(Vdb, APointerOfGitLfsIsToldAsThat) {
+TEST_F(Vdb, GitLfsPointerIsReportedAsSuch) {
   store(file_.path(), "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 12\n");
 
   EXPECT_THAT(read(file_.path()).error, HasSubstr("git lfs pull"));
 }
 
-TEST_F(Vdb, OfGridsThatShareATreeEachIsRead) {
+TEST_F(Vdb, GridsThatShareATreeAreRead) {
   const auto one = filled<openvdb::FloatGrid>([](int i) { return static_cast<float>(i); });
   one->setName("density");
   const auto other = openvdb::gridPtrCast<openvdb::FloatGrid>(one->copyGrid());

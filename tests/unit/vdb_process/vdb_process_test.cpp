@@ -17,9 +17,9 @@
 #include <limits>
 #include <thread>
 
-#include "common/base/spawn.h"
-#include "common/sandbox/call_filter.h"
+#include "core/base/spawn.h"
 #include "tests/unit/nvdb/nvdb_builder.h"
+#include "util/sandbox/call_filter.h"
 #include "worker/render/media/vdb_process.h"
 #include "worker/render/media/vdb_reply.h"
 #include "worker/render/vdb/nvdb.h"
@@ -75,7 +75,7 @@ VdbReply reply_of(int x, int y, int z) {
   return reply;
 }
 
-TEST_F(VdbProcess, AGridOfAnotherProcessIsTheGridOfThisOne) {
+TEST_F(VdbProcess, GridFromTheProcessEqualsOneReadDirectly) {
   const std::string bytes = test::NvdbBuilder().file();
   LsVdbGrid here{};
   decode_nvdb(std::as_bytes(std::span(bytes)), "", 1 << 20, here);
@@ -90,7 +90,7 @@ TEST_F(VdbProcess, AGridOfAnotherProcessIsTheGridOfThisOne) {
   delete[] here.values;
 }
 
-TEST_F(VdbProcess, WhatIsRefusedIsToldWhy) {
+TEST_F(VdbProcess, RefusalHasAReason) {
   const auto garbage = VdbFile::read(file("a.vdb", "no grid at all"), "", 1 << 20);
   const auto large = VdbFile::read(file("a.nvdb", test::NvdbBuilder().file()), "", 100);
 
@@ -102,7 +102,7 @@ TEST_F(VdbProcess, WhatIsRefusedIsToldWhy) {
   EXPECT_THAT(large.error().message, HasSubstr("the limit is 100"));
 }
 
-TEST_F(VdbProcess, AFileThatCrashesItsReaderIsAnError) {
+TEST_F(VdbProcess, FileThatCrashesItsReaderIsAnError) {
   const auto crashed = read_by("kill -SEGV $$");
   ASSERT_FALSE(crashed);
   EXPECT_EQ(crashed.error().code, Errc::invalid_argument);
@@ -117,7 +117,7 @@ TEST_F(VdbProcess, AFileThatCrashesItsReaderIsAnError) {
   EXPECT_FALSE(read_by("exit 3"));
 }
 
-TEST_F(VdbProcess, AReplyIsBelievedOnlyWhereItHolds) {
+TEST_F(VdbProcess, ReplyIsValidated) {
   VdbReply sound = reply_of(2, 1, 1), endless = sound, three = reply_of(1, 1, 1), two = three,
            refused = reply_of(0, 0, 0);
   endless.grid.index_to_scene[3] = std::numeric_limits<double>::infinity();
@@ -147,7 +147,7 @@ TEST_F(VdbProcess, AReplyIsBelievedOnlyWhereItHolds) {
   EXPECT_EQ(told.error().message.size(), sizeof refused.error - 1);
 }
 
-TEST_F(VdbProcess, WhatTheProgramLeavesBehindCannotChangeItsReply) {
+TEST_F(VdbProcess, LeftoverProcessesCannotChangeTheReply) {
   const auto go = fifo("go"), done = fifo("done");
   const auto cut = answered(reply_of(2, 1, 1), {1, 2},
                             "{ read word <'" + go.string() + "'; (: >/proc/self/fd/3); echo cut >'" +
@@ -183,7 +183,7 @@ int with_limit(std::uint64_t more, const std::function<int()>& run) {
 }
 
 // 258^3 values, 66 MiB: read they fit into any of these limits, but the reply takes as much again.
-TEST_F(VdbProcess, AGridAndItsReplyFitIntoWhatTheRendererHasLeft) {
+TEST_F(VdbProcess, GridAndReplyMustFitIntoTheRenderersRemainingMemory) {
   test::NvdbBuilder builder;
   builder.hi = {255, 255, 255};
   const auto path = file("large.nvdb", builder.file());
@@ -200,7 +200,7 @@ TEST_F(VdbProcess, AGridAndItsReplyFitIntoWhatTheRendererHasLeft) {
   EXPECT_EQ(read_with(60 * kMiB), 1);  // not even read: no fault of the file
 }
 
-TEST_F(VdbProcess, AReplyThatIsMappedCountsTowardsTheLimit) {
+TEST_F(VdbProcess, MappedReplyCountsTowardsTheLimit) {
   const auto path = file("a.nvdb", test::NvdbBuilder().file());
   const int failed = with_limit(512 * kMiB, [&] {
     const std::uint64_t before = limit();
@@ -215,7 +215,7 @@ TEST_F(VdbProcess, AReplyThatIsMappedCountsTowardsTheLimit) {
 }
 #endif
 
-TEST_F(VdbProcess, AProgramThatIsMissingIsNoFaultOfTheFile) {
+TEST_F(VdbProcess, MissingProgramIsNotReportedAsABadFile) {
   const auto missing = VdbFile::read("a.vdb", "", 1 << 20, "/nowhere/lightshaft-vdb");
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().code, Errc::internal);

@@ -8,7 +8,7 @@ namespace {
 Delivery delivery(std::uint64_t number) { return {number, "id", "job.done", "{}"}; }
 TimePoint at(double s) { return TimePoint{} + from_seconds(s); }
 
-TEST(WebhookLine, GivesDeliveriesInTheOrderTheyCame) {
+TEST(WebhookLine, DeliversInOrder) {
   Line line;
   line.add(delivery(1));
   line.add(delivery(2));
@@ -22,7 +22,7 @@ TEST(WebhookLine, GivesDeliveriesInTheOrderTheyCame) {
   EXPECT_FALSE(line.next_due());
 }
 
-TEST(WebhookLine, WaitsLongerAfterEveryFailureAndHoldsTheLaterOnesBack) {
+TEST(WebhookLine, WaitsLongerAfterEachFailureAndDelaysLaterEvents) {
   Line line;
   line.add(delivery(1));
   line.add(delivery(2));
@@ -65,7 +65,7 @@ TEST(WebhookLine, GivesUpAfterTwentyAttempts) {
   EXPECT_EQ(line.due(at(now))->number, 2u);
 }
 
-TEST(WebhookLine, GivesTheOldestUpWhenTooManyWait) {
+TEST(WebhookLine, DropsTheOldestIfTooManyWait) {
   Line line;
   for (std::uint64_t n = 1; n <= kMaxWaiting; ++n) ASSERT_FALSE(line.add(delivery(n)));
 

@@ -11,9 +11,9 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
-#include "common/base/digest.h"
-#include "common/base/secret.h"
 #include "coordinator/base/limits.h"
+#include "core/base/digest.h"
+#include "core/base/secret.h"
 #include "tests/support/eventually.h"
 #include "tests/support/span_collector.h"
 
@@ -99,7 +99,7 @@ class WebhooksTest : public ::testing::Test {
 
 using Names = std::vector<std::string>;
 
-TEST_F(WebhooksTest, TellsEveryStateOnceInOrderAndWhatTheJobIs) {
+TEST_F(WebhooksTest, SendsEachStateOnceInOrderWithTheJob) {
   Receiver receiver;
   const auto webhooks = start(receiver);
 
@@ -127,7 +127,7 @@ TEST_F(WebhooksTest, SignsTimeAndBodyWithTheSecret) {
             "t=1700000000,v1=" + hmac_sha256("the secret", "1700000000." + post.body));
 }
 
-TEST_F(WebhooksTest, OfATracedJobCarriesTheSpanOfItsDelivery) {
+TEST_F(WebhooksTest, EventOfATracedJobCarriesItsSpan) {
   test::SpanCollector collector;
   const auto tracer = collector.tracer();
   coordinator_.reset();
@@ -164,12 +164,12 @@ TEST_F(WebhooksTest, OfATracedJobCarriesTheSpanOfItsDelivery) {
 }
 
 // RFC 4231, test case 2.
-TEST(WebhookSignature, IsTheStandardsHmac) {
+TEST(WebhookSignature, IsStandardHmac) {
   EXPECT_EQ(hmac_sha256("Jefe", "what do ya want for nothing?"),
             "5bdcc146bf60754e6a042426089575c75a003f089d2739839dec58b964ec3843");
 }
 
-TEST_F(WebhooksTest, SendsAgainWhatIsNotTakenWithTheSameId) {
+TEST_F(WebhooksTest, ResendsUnacceptedEventsWithTheSameId) {
   Receiver receiver;
   receiver.answer = 500;
   const auto webhooks = start(receiver);
@@ -183,7 +183,7 @@ TEST_F(WebhooksTest, SendsAgainWhatIsNotTakenWithTheSameId) {
   EXPECT_EQ(header(posts[0], "Lightshaft-Delivery"), header(posts[1], "Lightshaft-Delivery"));
 }
 
-TEST_F(WebhooksTest, TellsAfterARestartWhatNobodyTookBefore) {
+TEST_F(WebhooksTest, SendsUndeliveredEventsAfterARestart) {
   Receiver away, back;
   away.answer = 503;
   {
@@ -197,7 +197,7 @@ TEST_F(WebhooksTest, TellsAfterARestartWhatNobodyTookBefore) {
   EXPECT_EQ(events(back.wait_for(1)), Names{"job.queued"});
 }
 
-TEST_F(WebhooksTest, TellsAfterARestartWhatHappenedWhileNobodyListened) {
+TEST_F(WebhooksTest, SendsMissedEventsAfterARestart) {
   Receiver before, after;
   JobId job;
   {
@@ -214,7 +214,7 @@ TEST_F(WebhooksTest, TellsAfterARestartWhatHappenedWhileNobodyListened) {
   EXPECT_EQ(events(after.wait_for(1)), Names{"job.cancelled"});
 }
 
-TEST_F(WebhooksTest, DoesNotTellOfJobsFromBeforeItWasAskedTo) {
+TEST_F(WebhooksTest, DoesNotReportJobsFromBeforeItsStart) {
   const JobId old = submit();
   ASSERT_TRUE(coordinator_->cancel(old));
   Receiver receiver;
@@ -226,14 +226,14 @@ TEST_F(WebhooksTest, DoesNotTellOfJobsFromBeforeItWasAskedTo) {
   EXPECT_EQ(nlohmann::json::parse(posts[0].body)["job"]["id"], fresh.value);
 }
 
-TEST_F(WebhooksTest, RefusesWhatIsNoWebAddress) {
+TEST_F(WebhooksTest, RefusesInvalidUrls) {
   for (const char* url :
        {"file:///etc/passwd", "gopher://a", "receiver/hook", "http://a b/", "http://a\r\nX: y"})
     EXPECT_FALSE(check_http_url(url, "--webhook")) << url;
   EXPECT_TRUE(check_http_url("https://receiver.example/hook?x=1", "--webhook"));
 }
 
-TEST_F(WebhooksTest, WhatWentByUnseenIsToldAfterAll) {
+TEST_F(WebhooksTest, SendsEventsMissedWhileDown) {
   const auto farm = Coordinator::open({}).value();
   const JobId ends = farm->submit({"a.xml", kScene, {}, {}}).value(),
               stays = farm->submit({"b.xml", kScene, {}, {}}).value();
@@ -264,7 +264,7 @@ TEST_F(WebhooksTest, WhatWentByUnseenIsToldAfterAll) {
   EXPECT_EQ(nlohmann::json::parse(posts[0].body)["job"]["id"], ends.value);
 }
 
-TEST_F(WebhooksTest, ASecondStartWritesNothingOfJobsThatAreKnownToBeOpen) {
+TEST_F(WebhooksTest, SecondStartWritesNothingForOpenJobsThatItKnows) {
   const JobId job = submit();
   Receiver receiver;
   start(receiver).reset();
@@ -279,7 +279,7 @@ TEST_F(WebhooksTest, ASecondStartWritesNothingOfJobsThatAreKnownToBeOpen) {
   EXPECT_EQ(before.st_ino, after.st_ino) << "written anew";
 }
 
-TEST_F(WebhooksTest, AnEndThatWaitsToBeToldIsNotToldTwiceAfterACrash) {
+TEST_F(WebhooksTest, PendingEndIsNotSentTwiceAfterACrash) {
   const JobId job = submit();
   const auto open = folder_ / "outbox" / "open" / job.value;
   Receiver receiver;

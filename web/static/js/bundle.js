@@ -135,7 +135,7 @@ export function framesOf(numbers) {
   return `${sorted[0]}-${last}x${by}`;
 }
 
-/** What a scene names, found as the coordinator's reader finds it (common/scene/reader/load_document.cpp, reader.cpp). */
+/** What a scene names, found as the coordinator's reader finds it (formats/reader/load_document.cpp, reader.cpp). */
 class Survey {
   found = new Map(); // files found: name -> {path, file}
   missing = new Set();

@@ -1,4 +1,4 @@
-// Figures as people read them. Reports (common/report/number_text.cpp) show them alike: tests/support/shown.json.
+// Figures as people read them. Reports (util/report/number_text.cpp) show them alike: tests/support/shown.json.
 
 export const kAbsent = "–";
 const kSuperscript = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };

@@ -1,4 +1,4 @@
-// Phrases that the dashboard has in common with reports and the terminal: written from common/report/phrases.h
+// Phrases that the dashboard has in common with reports and the terminal: written from util/report/phrases.h
 // by LIGHTSHAFT_UPDATE_DOCS=1 report_test --gtest_filter='Phrases.*'.
 export const phrases = {
   doubt: "don't trust yet",

@@ -1,4 +1,4 @@
-// Logarithmic axes for the error plot: ranges, ticks, labels. No drawing. common/report/log_axis.cpp, which draws the
+// Logarithmic axes for the error plot: ranges, ticks, labels. No drawing. util/report/log_axis.cpp, which draws the
 // same plot into reports, follows the same rules.
 import { superscript } from "./format.js";
 import { denoisedTarget } from "./verdict.js";

@@ -38,7 +38,7 @@ export const inPlainWords = (text) => text.replace(/was not sent along: name it 
 
 function range(text) {
   if (/^\d+(-\d+(x\d+)?)?$/.test(text)) return text;
-  throw new Error(`Frames must be first-last, 1-10 say, or 1-10x2 for every second one, not “${text}”.`);
+  throw new Error(`Frames must be first-last, for example 1-10, or 1-10x2 for every second one, not “${text}”.`);
 }
 
 function positive(text, what, whole) {

@@ -91,7 +91,7 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
   async function compare(id) {
     sources.b?.close();
     sources.b = null;
-    change({ b: null, file: null, view: { ...get().viewer.view, other: id || null } });
+    change({ b: null, file: null, refused: null, view: { ...get().viewer.view, other: id || null } });
     if (id) await openJob("b", id);
     else probeAgain();
   }
@@ -114,12 +114,12 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
     try {
       source = await openFile(file);
     } catch (error) {
-      set(withViewer(get(), { problem: `${file.name}: ${error.message}` }));
+      set(withViewer(get(), { refused: `${file.name}: ${error.message}` }));  // not `problem`, which goes when pixels of the job come
       return;
     }
     sources.b?.close();
     sources.b = source;
-    change({ b: source, file: file.name, problem: null, view: { ...get().viewer.view, other: null } });
+    change({ b: source, file: file.name, refused: null, view: { ...get().viewer.view, other: null } });
     refreshFigures();
   }
 
@@ -225,7 +225,7 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
       }
       for (const which of ["a", "b"]) sources[which]?.close();
       sources.a = sources.b = null;
-      set({ ...get(), viewer: { id, view, a: null, b: null, plain: "rgb", report: null, survey: null, histogram: false, file: null, others: null, tool: "pan", probe: null, figures: null, flip: null, problem: null, changed: 0 } });
+      set({ ...get(), viewer: { id, view, a: null, b: null, plain: "rgb", report: null, survey: null, histogram: false, file: null, others: null, tool: "pan", probe: null, figures: null, flip: null, problem: null, refused: null, changed: 0 } });
       openJob("a", id);
       // if this fails, the viewer says so for the layers
       snapshot(`job ${id}`, () => api.job(id), (now, job) => (now.viewer?.id === id ? withJob(now, job) : now)).catch(() => {});

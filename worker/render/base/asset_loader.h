@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <string>
 
-#include "common/base/error.h"
-#include "common/scene/scene.h"
+#include "core/base/error.h"
+#include "core/scene/scene.h"
 #include "worker/render/render.h"
 
 namespace ls::render {

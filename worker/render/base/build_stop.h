@@ -3,7 +3,7 @@
 
 #include <atomic>
 
-#include "common/base/error.h"
+#include "core/base/error.h"
 
 namespace ls::render {
 

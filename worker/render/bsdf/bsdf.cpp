@@ -1,6 +1,6 @@
 #include "worker/render/bsdf/bsdf.h"
 
-#include "common/scene/limits.h"
+#include "core/scene/limits.h"
 #include "worker/render/base/work_counters.h"
 #include "worker/render/bsdf/conductor.h"
 #include "worker/render/bsdf/dielectric.h"

@@ -18,8 +18,8 @@
 #include <optional>
 #include <vector>
 
-#include "common/base/error.h"
-#include "common/scene/scene.h"
+#include "core/base/error.h"
+#include "core/scene/scene.h"
 #include "worker/render/math/math.h"
 #include "worker/render/texture/surface_attributes.h"
 #include "worker/render/texture/texture.h"

@@ -12,7 +12,7 @@
 #include <tuple>
 #include <vector>
 
-#include "common/scene/schema/traits.h"
+#include "core/scene/schema/traits.h"
 #include "worker/render/bsdf/lobes.h"
 #include "worker/render/bsdf/microfacet_tables.h"
 

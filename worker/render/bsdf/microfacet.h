@@ -7,7 +7,7 @@
 // Mitsuba. The *density* of sampling uses the exact G1, since the density must be exact.
 #pragma once
 
-#include "common/scene/scene.h"
+#include "core/scene/scene.h"
 #include "worker/render/math/math.h"
 
 namespace ls::render {

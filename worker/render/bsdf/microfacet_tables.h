@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/scene/scene.h"
+#include "core/scene/scene.h"
 #include "worker/render/math/math.h"
 
 namespace ls::render {

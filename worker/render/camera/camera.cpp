@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "common/base/overloaded.h"
+#include "core/base/overloaded.h"
 #include "worker/render/base/work_counters.h"
 
 namespace ls::render {

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/image/frame/frame.h"
-#include "common/scene/scene.h"
+#include "core/image/frame/frame.h"
+#include "core/scene/scene.h"
 #include "worker/render/math/math.h"
 #include "worker/render/texture/texture.h"
 

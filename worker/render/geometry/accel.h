@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "common/base/error.h"
+#include "core/base/error.h"
 #include "worker/render/geometry/geometry.h"
 
 namespace ls::render {

@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
-#include "common/base/error.h"
-#include "common/scene/scene.h"
+#include "core/base/error.h"
+#include "core/scene/scene.h"
 #include "worker/render/base/asset_loader.h"
 #include "worker/render/math/math.h"
 #include "worker/render/math/transform.h"

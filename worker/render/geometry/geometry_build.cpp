@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "common/scene/schema/traits.h"
+#include "core/scene/schema/traits.h"
 #include "worker/render/geometry/geometry.h"
 #include "worker/render/geometry/shape_import.h"
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <string_view>
 
-#include "common/assets/mesh.h"
-#include "common/base/overloaded.h"
+#include "core/assets/mesh.h"
+#include "core/base/overloaded.h"
 
 namespace ls::render {
 namespace {

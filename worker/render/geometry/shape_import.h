@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "common/assets/data.h"
-#include "common/scene/schema/mesh_attributes.h"
+#include "core/assets/data.h"
+#include "core/scene/schema/mesh_attributes.h"
 #include "worker/render/geometry/surface_boxes.h"
 #include "worker/render/texture/surface_attributes.h"
 

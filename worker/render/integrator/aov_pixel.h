@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/image/aov/identifiers.h"
+#include "core/image/aov/identifiers.h"
 #include "worker/render/integrator/path_tracer.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/world/world.h"

@@ -7,7 +7,7 @@
 
 #include <cstdint>
 
-#include "common/scene/scene.h"
+#include "core/scene/scene.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {

@@ -4,7 +4,7 @@
 // (tests/unit/render/integrator/mis_test.cpp).
 #pragma once
 
-#include "common/scene/scene_shapes.h"
+#include "core/scene/scene_shapes.h"
 
 namespace ls::render {
 

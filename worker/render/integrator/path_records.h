@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "common/image/film/health.h"
+#include "core/image/film/health.h"
 #include "worker/render/bsdf/bsdf.h"
 #include "worker/render/geometry/geometry.h"
 #include "worker/render/math/math.h"

@@ -49,9 +49,9 @@ const Variant& choose(const World& w) {
 }
 
 // The largest usable radiance: 2^31 samples of it can be summed in float32. A larger sample is an error of
-// the scene: adding it could make the sums of a whole unit (a tile and a range of samples) infinite, and
-// rendering the unit again would not help. NaN fails the test too. The limit applies to single samples, so
-// that rejection does not depend on how samples are grouped.
+// the scene: adding it could make the sums of a whole unit infinite, and rendering the unit again would not
+// help. NaN fails the test too. The limit applies to single samples, so that rejection does not depend on how
+// samples are grouped.
 constexpr float kLargestRadiance = 0x1p96f;
 bool usable(const SampleOutcome& s) {
   const C3& c = s.radiance;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "common/image/error/relative_weights.h"
+#include "core/image/error/relative_weights.h"
 #include "worker/render/base/in_order.h"
 #include "worker/render/integrator/light_paths.h"
 #include "worker/render/integrator/variant.h"

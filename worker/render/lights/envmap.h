@@ -32,9 +32,9 @@
 #include <string_view>
 #include <vector>
 
-#include "common/assets/data.h"
-#include "common/base/error.h"
-#include "common/scene/scene.h"
+#include "core/assets/data.h"
+#include "core/base/error.h"
+#include "core/scene/scene.h"
 #include "worker/render/math/math.h"
 #include "worker/render/texture/texels.h"
 

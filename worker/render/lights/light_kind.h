@@ -18,7 +18,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "common/scene/scene.h"
+#include "core/scene/scene.h"
 #include "worker/render/base/kinds.h"
 #include "worker/render/geometry/geometry.h"
 #include "worker/render/lights/light_tree.h"

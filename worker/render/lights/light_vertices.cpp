@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/check.h"
+#include "core/base/check.h"
 #include "worker/render/math/random.h"
 
 namespace ls::render {

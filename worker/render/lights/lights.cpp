@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/overloaded.h"
+#include "core/base/overloaded.h"
 
 namespace ls::render {
 namespace {

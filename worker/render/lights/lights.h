@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/error.h"
+#include "core/base/error.h"
 #include "worker/render/lights/area.h"
 #include "worker/render/lights/distant.h"
 #include "worker/render/lights/local_lights.h"

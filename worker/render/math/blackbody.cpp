@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "common/scene/xml/spectrum.h"
+#include "core/scene/spectrum.h"
 
 namespace ls::render {
 namespace {

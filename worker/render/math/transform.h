@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "common/scene/scene.h"
+#include "core/scene/scene.h"
 #include "worker/render/math/math.h"
 
 namespace ls::render {

@@ -10,7 +10,7 @@
 #include <limits>
 #include <vector>
 
-#include "common/scene/scene.h"
+#include "core/scene/scene.h"
 #include "worker/render/base/work_counters.h"
 #include "worker/render/math/math.h"
 #include "worker/render/math/transform.h"

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <span>
 
-#include "common/assets/grid_files.h"
-#include "common/base/file_form.h"
-#include "common/base/overloaded.h"
+#include "core/assets/grid_files.h"
+#include "core/base/file_form.h"
+#include "core/base/overloaded.h"
 #include "worker/render/base/build_stop.h"
 #include "worker/render/media/vdb_process.h"
 

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "common/base/error.h"
-#include "common/scene/scene.h"
+#include "core/base/error.h"
+#include "core/scene/scene.h"
 #include "worker/render/base/asset_loader.h"
 #include "worker/render/media/grid.h"
 

@@ -15,7 +15,7 @@
 #include <fstream>
 #include <mutex>
 
-#include "common/base/spawn.h"
+#include "core/base/spawn.h"
 #include "worker/render/base/build_stop.h"
 
 namespace ls::render {

@@ -14,8 +14,8 @@
 #include <memory>
 #include <string>
 
-#include "common/base/error.h"
-#include "common/base/spawn.h"
+#include "core/base/error.h"
+#include "core/base/spawn.h"
 #include "worker/render/media/vdb_reply.h"
 
 namespace ls::render {

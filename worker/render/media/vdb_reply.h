@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <span>
 
-#include "common/base/error.h"
+#include "core/base/error.h"
 
 extern "C" {
 

@@ -13,8 +13,8 @@
 #include <string_view>
 #include <vector>
 
-#include "common/assets/image.h"
-#include "common/base/digest.h"
+#include "core/assets/image.h"
+#include "core/base/digest.h"
 #include "worker/render/base/build_id.h"
 #include "worker/render/bsdf/bsdf.h"
 #include "worker/render/geometry/accel.h"

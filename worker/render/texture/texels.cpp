@@ -111,10 +111,9 @@ bool has_alpha(const ImageData& image) {
 // Replaces the colours of t, which has three channels of floats, by those of linear sRGB.
 Result<void> convert(std::string_view name, Texels& t, const std::array<float, 9>& m) {
   if (!std::ranges::all_of(m, [](float x) { return std::isfinite(x); }))
-    return fail(Errc::invalid_argument,
-                fmt::format("texture '{}': the `chromaticities` in its header are those of no colour space; "
-                            "write them anew",
-                            name));
+    return fail(Errc::invalid_argument, fmt::format("texture '{}': the `chromaticities` in its header are "
+                                                    "those of no colour space; write the file again",
+                                                    name));
   for (std::size_t i = 0; i + 2 < t.f32.size(); i += 3) {
     const float r = t.f32[i], g = t.f32[i + 1], b = t.f32[i + 2];
     for (std::size_t k = 0; k < 3; ++k) t.f32[i + k] = m[3 * k] * r + m[3 * k + 1] * g + m[3 * k + 2] * b;

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "common/assets/data.h"
-#include "common/scene/scene.h"
+#include "core/assets/data.h"
+#include "core/scene/scene.h"
 #include "worker/render/math/math.h"
 
 namespace ls::render {

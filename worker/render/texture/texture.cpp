@@ -11,9 +11,9 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/overloaded.h"
-#include "common/scene/limits.h"
-#include "common/scene/schema/texture_uses.h"
+#include "core/base/overloaded.h"
+#include "core/scene/limits.h"
+#include "core/scene/schema/texture_uses.h"
 #include "worker/render/texture/texels.h"
 
 namespace ls::render {

@@ -8,9 +8,9 @@
 #include <memory>
 #include <span>
 
-#include "common/assets/data.h"
-#include "common/base/error.h"
-#include "common/scene/scene.h"
+#include "core/assets/data.h"
+#include "core/base/error.h"
+#include "core/scene/scene.h"
 #include "worker/render/math/math.h"
 #include "worker/render/texture/surface_attributes.h"
 

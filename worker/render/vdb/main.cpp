@@ -12,8 +12,8 @@
 #include <cstdlib>
 #include <limits>
 
-#include "common/base/spawn.h"
-#include "common/sandbox/call_filter.h"
+#include "core/base/spawn.h"
+#include "util/sandbox/call_filter.h"
 #include "worker/render/media/vdb_reply.h"
 
 namespace {

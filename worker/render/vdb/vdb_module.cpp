@@ -22,7 +22,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/file_form.h"
+#include "core/base/file_form.h"
 #include "worker/render/vdb/nvdb.h"
 
 namespace {

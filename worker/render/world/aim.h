@@ -2,7 +2,7 @@
 // directions: towards lamps, that is, lights without extent (lamp_directions.h), and towards the sky.
 #pragma once
 
-#include "common/scene/scene.h"
+#include "core/scene/scene.h"
 
 namespace ls::render {
 

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "common/base/overloaded.h"
-#include "common/scene/schema/traits.h"
+#include "core/base/overloaded.h"
+#include "core/scene/schema/traits.h"
 #include "worker/render/math/blackbody.h"
 #include "worker/render/math/transform.h"
 #include "worker/render/media/grid_load.h"

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "common/image/error/relative_weights.h"
+#include "core/image/error/relative_weights.h"
 #include "worker/render/base/in_order.h"
 #include "worker/render/math/processor.h"
 #include "worker/render/math/random.h"

@@ -22,7 +22,7 @@
 
 #include <algorithm>
 
-#include "common/scene/scene.h"
+#include "core/scene/scene.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {

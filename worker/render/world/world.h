@@ -6,8 +6,8 @@
 #include <deque>
 #include <vector>
 
-#include "common/image/aov/aov.h"
-#include "common/scene/analysis/needs.h"
+#include "core/image/aov/aov.h"
+#include "core/scene/analysis/needs.h"
 #include "worker/render/base/features.h"
 #include "worker/render/bsdf/bsdf.h"
 #include "worker/render/camera/camera.h"

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/assets/image.h"
-#include "common/image/aov/identifiers.h"
-#include "common/scene/schema/integrators.h"
+#include "core/assets/image.h"
+#include "core/image/aov/identifiers.h"
+#include "core/scene/schema/integrators.h"
 #include "worker/render/base/build_stop.h"
 #include "worker/render/geometry/coincident.h"
 #include "worker/render/geometry/surface_boxes.h"

@@ -4,8 +4,8 @@
 
 #include <memory>
 
-#include "common/base/error.h"
-#include "common/scene/scene.h"
+#include "core/base/error.h"
+#include "core/scene/scene.h"
 #include "worker/render/base/asset_loader.h"
 #include "worker/render/world/world.h"
 

@@ -1,5 +1,4 @@
-"""python -m lightshaft.usd: writes a stage as a scene that `lightshaft render` and `lightshaft submit`
-take."""
+"""python -m lightshaft.usd: writes a stage as a scene for `lightshaft render` and `lightshaft submit`."""
 
 import argparse
 import sys
@@ -11,17 +10,17 @@ from . import read
 def main() -> int:
     parser = argparse.ArgumentParser(
         prog="python -m lightshaft.usd",
-        description="Writes scene.xml, and the meshes and images that it names, of a stage of USD.",
+        description="Writes a USD stage as scene.xml, with the meshes and images that it names.",
     )
     parser.add_argument("stage", help="a .usd, .usda, .usdc or .usdz")
     parser.add_argument("-o", "--output", required=True, metavar="FOLDER")
     parser.add_argument("--camera", metavar="PATH", help="the path of the camera's prim")
     parser.add_argument("--frames", metavar="A-B", help="time codes, as in 1-10 or 1-10x2")
     parser.add_argument(
-        "--size", nargs=2, type=int, metavar=("WIDTH", "HEIGHT"), help="of the image, in pixels"
+        "--size", nargs=2, type=int, metavar=("WIDTH", "HEIGHT"), help="size of the image in pixels"
     )
     parser.add_argument(
-        "--allow", action="append", default=[], metavar="FOLDER", help="read files from here, too"
+        "--allow", action="append", default=[], metavar="FOLDER", help="also read files from this folder"
     )
     options = parser.parse_args()
     try:

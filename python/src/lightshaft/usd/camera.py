@@ -1,4 +1,4 @@
-"""The camera of a stage, and the frame that it fills."""
+"""Reads the camera of a stage and the size of its frame."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ TENTH = 0.1  # apertures and focal lengths are in tenths of a scene unit
 
 
 def chosen(stage: Usd.Stage, wanted: str | None) -> UsdGeom.Camera | None:
-    """The camera by its path; else that of the render settings, or the only one. None: there is none."""
+    """Returns the camera with the given path; else that of the render settings, or the only one. None: the stage
+    has none."""
     if wanted is None:
         settings = render_settings(stage)
         relationship = settings.GetRelationship("camera") if settings else None
@@ -121,7 +122,7 @@ def add_camera(
 
 
 def _clipping(problems: Problems, prim: Usd.Prim, time: Usd.TimeCode) -> tuple[float, float]:
-    """The least and the largest depth that is seen: all, unless the camera itself says otherwise."""
+    """Returns the smallest and the largest visible depth. Everything is visible unless the camera limits it."""
     attribute = prim.GetAttribute("clippingRange")
     if not attribute.HasAuthoredValue():
         return NEAR, FAR
@@ -135,7 +136,7 @@ def _clipping(problems: Problems, prim: Usd.Prim, time: Usd.TimeCode) -> tuple[f
 def add_framing_camera(
     document: Document, problems: Problems, stage: Usd.Stage, time: Usd.TimeCode, size: tuple[int, int] | None
 ) -> None:
-    """All of the stage, seen from its front: +z, or -y where z is up."""
+    """Adds a camera that shows the whole stage from its front: from +z, or from -y if z points up."""
     problems.warn("the stage", "it has no camera: all of it is seen, from its front")
     cache = UsdGeom.BBoxCache(time, [UsdGeom.Tokens.default_, UsdGeom.Tokens.render])
     box = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()

@@ -1,5 +1,4 @@
-"""The scene as it is made: a dictionary in the style of Mitsuba's load_dict, whose keys are paths of
-prims."""
+"""The scene: a dictionary in the style of Mitsuba's load_dict, whose keys are paths of prims."""
 
 from __future__ import annotations
 
@@ -23,7 +22,7 @@ class Document:
         self._counts: dict[str, int] = {}
 
     def define(self, wanted: str, value: dict[str, Any]) -> str:
-        """Adds an object under an id like `wanted` that is not taken yet, and returns the id."""
+        """Adds an object under an unused id like `wanted` and returns the id."""
         identifier, count = wanted, self._counts.get(wanted, 1)
         while identifier in self.scene:
             count += 1

@@ -1,7 +1,7 @@
-"""The files that a scene of a stage names: those made of its meshes, and its images and grids.
+"""The files of a stage's scene: those made from its meshes, and its images and grids.
 
-A stage may come from anywhere. Nothing is sent that lies outside the folder of the stage (links followed) and
-the folders that the caller allows: no image, no grid, and nothing of a layer that is composed from elsewhere.
+Since a stage may come from anywhere, only files in the folder of the stage (after following links) and in the folders
+that the caller allows are sent: this applies to images, to grids, and to layers from elsewhere.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .problems import Problems
 
 
 class Asset:
-    """A file of the stage's: on disk, or within a .usdz."""
+    """A file of the stage, on disk or in a .usdz."""
 
     def __init__(self, path: pathlib.Path, member: str, prim: str) -> None:
         self.path, self.member, self.prim = path, member, prim
@@ -70,7 +70,7 @@ class Files:
         return bool(resolved) and os.path.isfile(Ar.SplitPackageRelativePathOuter(resolved)[0])
 
     def find(self, prim: Any, value: Any) -> Asset | None:
-        """The file of an asset path. None, with an error told, if there is none."""
+        """Returns the file of an asset path. Returns None and reports an error if it does not exist."""
         resolved = str(value.resolvedPath) or self._meant(value.path)
         outer, inner = Ar.SplitPackageRelativePathOuter(resolved)
         if not resolved or not os.path.isfile(outer):
@@ -82,7 +82,7 @@ class Files:
         return Asset(real, inner, str(prim.GetPath()))
 
     def _meant(self, path: str) -> str:
-        """The file that a path means which USD does not find, because it was written on Windows or macOS."""
+        """Finds the file for a path that USD does not resolve because it was written on Windows or macOS."""
         found = written_otherwise(self._roots[0], path) if path else None
         return "" if found is None else str(found)
 
@@ -91,18 +91,18 @@ class Files:
         if not any(real.is_relative_to(root) for root in self._roots):
             raise FileRefused(
                 f"{owner} names {named}, which is {real} and lies outside {self._roots[0]}; "
-                f"if it is to be sent, allow its folder: allow=[{str(real.parent)!r}]"
+                f"to send it, allow its folder: allow=[{str(real.parent)!r}]"
             )
         return real
 
     def take(self, asset: Asset) -> str:
-        """The name by which the scene knows a file that is sent as it is."""
+        """Adds a file that is sent unchanged. Returns its name in the scene."""
         if asset.key not in self._named:
             self._named[asset.key] = self._keep(asset.source(), asset.suffix)
         return self._named[asset.key]
 
     def write(self, content: bytes, suffix: str) -> str:
-        """A file named by its content, so that equal ones are sent once."""
+        """Adds a file that is named by its content, so that equal files are sent once."""
         name = hashlib.sha256(content).hexdigest()[:32] + suffix
         if name not in self.sources:
             self.sources[name] = Source.of_bytes(content)

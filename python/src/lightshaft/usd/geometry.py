@@ -1,4 +1,4 @@
-"""Meshes and basic shapes of a stage as shapes of the scene, without their place."""
+"""Converts meshes and basic shapes of a stage to shapes of the scene, without their position."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Dict = dict[str, Any]
 
 @dataclasses.dataclass
 class Leaf:
-    """A shape, and where it stands in what holds it."""
+    """A shape and its position in its parent."""
 
     name: str
     shape: Dict
@@ -41,17 +41,17 @@ class Geometry:
         self._problems, self._time = problems, time
 
     def leaves(self, prim: Usd.Prim, matrix: Matrix) -> list[Leaf]:
-        """The shapes of a prim; none, with a warning told, if it is of a type that is not read."""
+        """Returns the shapes of a prim. Returns none and reports a warning if its type is not supported."""
         kind = str(prim.GetTypeName())
         if kind == "Mesh":
             return self._mesh(prim, matrix)
         build = SHAPES.get(kind)
         if build is None:
-            self._problems.warn(prim, f"a {kind} is not read: make it a Mesh")
+            self._problems.warn(prim, f"a {kind} is not supported: make it a Mesh")
             return []
         surface = self._surface(prim)
         if surface.coordinates is not None or surface.colours is not None:
-            self._problems.warn(prim, f"a {kind} has no primvars for its material: displayColor is taken")
+            self._problems.warn(prim, f"a {kind} has no primvars for its material: displayColor is used")
             surface = self._materials.of_colour(prim, *self._display(prim))
         shapes = [
             Leaf(str(prim.GetPath()), self._shaded(shape, surface), matrix @ own)
@@ -60,7 +60,7 @@ class Geometry:
         return shapes
 
     def placed(self, leaf: Leaf, matrix: Matrix) -> Dict:
-        """The shape of a leaf at `matrix`, as triangles if that stretches a sphere."""
+        """Places the shape of a leaf at `matrix`. A sphere that would be stretched becomes triangles."""
         shape = leaf.shape
         if shape["type"] == "sphere" and not is_similarity(matrix):
             kept = {key: value for key, value in shape.items() if key not in ("type", "radius")}
@@ -77,7 +77,7 @@ class Geometry:
     # Surfaces
 
     def _surface(self, prim: Usd.Prim, mesh: Usd.Prim | None = None) -> Surface:
-        """Of a prim, or of the subset of a mesh."""
+        """Returns the surface of a prim, or of a subset of a mesh."""
         api = UsdShade.MaterialBindingAPI(prim)
         material = api.ComputeBoundMaterial(UsdShade.Tokens.full)[0]
         surface = self._materials.of_material(material) if material else None
@@ -88,7 +88,7 @@ class Geometry:
         opacity = primvars.FindPrimvarWithInheritance("displayOpacity")
         values = np.asarray(opacity.ComputeFlattened(self._time) or [1.0]) if opacity else np.ones(1)
         if values.size and np.ptp(values) > 0:
-            self._problems.warn(prim, "displayOpacity that varies is left out")
+            self._problems.warn(prim, "displayOpacity that varies is ignored")
             values = np.ones(1)
         colours = primvars.FindPrimvarWithInheritance("displayColor")
         found = colours.ComputeFlattened(self._time) if colours else None
@@ -150,7 +150,7 @@ class Geometry:
         return found
 
     def _normals(self, prim: Usd.Prim, polygons: Polygons, corners: Ints) -> Corners | None:
-        """None: each face is flat."""
+        """Returns the normals. None: each face is flat."""
         subdivided = str(self._get(prim, "subdivisionScheme", "catmullClark")) != "none"
         if subdivided:
             self._problems.warn(prim, "a subdivision surface: its base mesh is rendered")
@@ -210,7 +210,7 @@ class Geometry:
     def _spread(
         self, prim: Usd.Prim, name: str, values: Floats, kind: str, polygons: Polygons
     ) -> Corners | None:
-        """Which value each corner has, by the interpolation."""
+        """Returns the index of each vertex's value, by the interpolation."""
         size = len(polygons.indices)
         if kind in ("vertex", "varying"):
             index = polygons.indices
@@ -230,7 +230,7 @@ class Geometry:
         return Corners(values, index)
 
     def _parts(self, prim: Usd.Prim, count: int) -> list[tuple[Usd.Prim, Ints | None]]:
-        """(the prim that a material is bound to, its faces; None: all)."""
+        """Returns pairs (the prim that has the material, its faces). None: all faces."""
         subsets = UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets()
         if not subsets:
             return [(prim, None)]

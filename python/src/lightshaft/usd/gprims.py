@@ -1,4 +1,4 @@
-"""Basic shapes as triangles, where the scene format has no such shape or cannot stretch it."""
+"""Makes triangles of basic shapes that the scene format does not have or cannot stretch."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TURNS = {  # the axis z of a shape turned to x, y or z, in order of the others
 
 
 def revolved(heights: Floats, radii: Floats, normals: Floats, axis: str) -> Part:
-    """What a line of (radius, height), with normals (outward, upward), draws around an axis."""
+    """Makes the surface that a line of (radius, height) with normals (outward, upward) draws around an axis."""
     angle = np.linspace(0, 2 * np.pi, AROUND + 1)[:-1]
     cos, sin = np.cos(angle)[None, :], np.sin(angle)[None, :]
     flat = np.ones_like(cos)
@@ -42,7 +42,7 @@ def sphere_part(radius: float) -> Part:
 
 
 def cylinder_part(bottom: float, top: float, height: float, axis: str, caps: bool = True) -> Part:
-    """Also a cone (`top` 0) and what lies between the two."""
+    """Makes a cylinder, a cone (`top` 0) or a truncated cone."""
     slope = np.array([height, bottom - top]) / np.hypot(height, bottom - top)
     low, high = -height / 2, height / 2
     heights, radii, normals = [low, high], [bottom, top], [slope, slope]

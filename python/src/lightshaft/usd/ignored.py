@@ -1,4 +1,4 @@
-"""What a stage says that changes its picture elsewhere and has no effect here, told by its prims."""
+"""Reports the parts of a stage that have no effect here but would change its image in other renderers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SILENT = {
     *("SkelRoot", "Skeleton", "SkelAnimation", "BlendShape", "OpenVDBAsset"),
     *("RenderSettings", "RenderProduct", "RenderVar", "RenderPass", "Backdrop", "Collection"),
 }
-MOTION = "motion blur is not read"
+MOTION = "motion blur is not supported"
 NO_EFFECT = {
     "velocities": MOTION,
     "accelerations": MOTION,
@@ -21,7 +21,7 @@ NO_EFFECT = {
     "exposure:iso": "images are linear, and --exposure shows them brighter",
     "exposure:fStop": "images are linear, and --exposure shows them brighter",
     "exposure:responsivity": "images are linear, and --exposure shows them brighter",
-    "treatAsLine": "a cylinder light has the radius that it says",
+    "treatAsLine": "a cylinder light always has its own radius",
     "fieldIndex": "the first grid of the name is read",
 }
 LIGHT_INPUTS = {
@@ -46,7 +46,7 @@ SHADER_INPUTS = {
 
 
 def tell_prim(prim: Usd.Prim, problems: Problems) -> None:
-    """The type of a prim, and its attributes."""
+    """Reports the type and the attributes of a prim that have no effect."""
     kind = str(prim.GetTypeName())
     if kind and kind not in SILENT and not prim.IsA(UsdGeom.Imageable):
         problems.warn(prim, f"a {kind} has no effect")
@@ -63,7 +63,7 @@ def tell_prim(prim: Usd.Prim, problems: Problems) -> None:
 
 
 def tell_light(prim: Usd.Prim, problems: Problems) -> None:
-    """The inputs of a light."""
+    """Reports inputs of a light that have no effect."""
     for attribute in prim.GetAuthoredAttributes():
         name = attribute.GetName()
         if name.startswith("inputs:") and name[7:] not in LIGHT_INPUTS and _says_something(attribute):
@@ -71,7 +71,7 @@ def tell_light(prim: Usd.Prim, problems: Problems) -> None:
 
 
 def tell_material(material: UsdShade.Material, problems: Problems) -> None:
-    """Outputs of a material besides its surface."""
+    """Reports outputs of a material other than its surface."""
     for name, output in (
         ("displacement", material.GetDisplacementOutput()),
         ("volume", material.GetVolumeOutput()),
@@ -81,7 +81,7 @@ def tell_material(material: UsdShade.Material, problems: Problems) -> None:
 
 
 def tell_shader(shader: UsdShade.Shader, problems: Problems) -> None:
-    """Inputs that a shader of this kind does not have: most are misspelt."""
+    """Reports inputs that this kind of shader does not have; most are misspelt."""
     kind = shader.GetIdAttr().Get()
     known = SHADER_INPUTS.get(kind)
     if known is None:
@@ -92,7 +92,7 @@ def tell_shader(shader: UsdShade.Shader, problems: Problems) -> None:
 
 
 def _says_something(attribute: Usd.Attribute) -> bool:
-    """Whether it has a value, and one that its schema does not say anyway."""
+    """Returns True if the attribute has a value that differs from its schema's default."""
     if attribute.HasAuthoredConnections():
         return True
     value = attribute.Get(Usd.TimeCode.EarliestTime())

@@ -1,4 +1,4 @@
-"""Images of textures: sent as they are where they can be, else computed and written anew."""
+"""Images of textures: sent unchanged if possible, else converted and written to new files."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Pixels = npt.NDArray[np.float32]
 
 @dataclasses.dataclass(frozen=True)
 class Look:
-    """What a shader makes of a file's texels: values = texel * scale + bias of some channels."""
+    """How a shader uses a file's texels: values = texel * scale + bias, for some channels."""
 
     channels: str = "rgb"
     scale: tuple[float, ...] = (1, 1, 1, 1)
@@ -44,14 +44,14 @@ class Images:
         self._written: dict[tuple[tuple[str, str], Look], tuple[str, bool]] = {}
 
     def name(self, asset: Asset, look: Look) -> tuple[str, bool]:
-        """(the name of the file, whether its values are linear as they are)."""
+        """Returns (name of the file, True if its values are linear)."""
         key = asset.key, look
         if key not in self._written:
             self._written[key] = self._name(asset, look)
         return self._written[key]
 
     def fault(self, node: Any, value: Any) -> str:
-        """Why the image of an asset path cannot be read; empty: it can."""
+        """Returns why the image of an asset path cannot be read. Empty: it can be read."""
         if not self._files.exists(value):
             return "is not found"
         asset = self._files.find(node, value)
@@ -89,7 +89,8 @@ class Images:
 
 
 def _open(asset: Asset) -> Image.Image:
-    """Without its `format`, if it was converted: the scene format reads no such file (palettes, CMYK)."""
+    """Opens the image. If it was converted, it has no `format`, because the scene format does not support the file
+    (palettes, CMYK)."""
     try:
         picture: Image.Image = Image.open(io.BytesIO(asset.read()))
         picture.load()
@@ -101,14 +102,14 @@ def _open(asset: Asset) -> Image.Image:
 
 
 def _is_raw(picture: Image.Image | None, space: str) -> bool:
-    """By USD's rule for `auto`: 8-bit images of three or four channels are sRGB."""
+    """Applies USD's rule for `auto`: 8-bit images of three or four channels are sRGB."""
     if space != "auto":
         return space == "raw"
     return picture is None or picture.mode not in ("RGB", "RGBA")
 
 
 def _texels(picture: Image.Image, raw: bool) -> Pixels:
-    """(height, width, 3 or 4), linear."""
+    """Returns linear texels as an array (height, width, 3 or 4)."""
     if picture.mode in ("I;16", "I", "F"):
         top = 1.0 if picture.mode == "F" else 65535.0
         values = np.asarray(picture, np.float32)[:, :, None] / np.float32(top)
@@ -147,14 +148,14 @@ def _exr_texels(asset: Asset) -> Pixels:
 
 
 def scaled(asset: Asset, colour: list[float]) -> bytes:
-    """An image of light times a colour, as EXR."""
+    """Writes an image of light, multiplied by a colour, as EXR."""
     picture = None if asset.suffix in (".exr", ".hdr") else _open(asset)
     texels = _exr_texels(asset) if picture is None else _texels(picture, raw=False)
     return exr(np.maximum(texels[:, :, :3], 0) * np.array(colour, np.float32))
 
 
 def exr(values: npt.NDArray[Any]) -> bytes:
-    """(height, width, 3) as a half-float EXR file: what a half cannot hold is cut off."""
+    """Encodes (height, width, 3) as an EXR file of half floats. Larger values are clamped."""
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder) / "image.exr"
         pixels = np.ascontiguousarray(np.clip(values, -65504, 65504).astype(np.float16))

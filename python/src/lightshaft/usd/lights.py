@@ -49,7 +49,7 @@ class Lights:
         build(self, prim, matrix)
 
     def finish(self) -> None:
-        """Domes of one colour are one sky: the scene format has no second."""
+        """Combines domes of one colour into one sky, because the scene format has only one."""
         if self._maps > 1 or (self._maps and self._sky):
             self._problems.error(
                 self._sky[0][0] if self._sky else "the stage",
@@ -60,12 +60,12 @@ class Lights:
             self._document.define(self._sky[0][0], {"type": "constant", "radiance": colour(list(total))})
 
     def value(self, prim: Usd.Prim, name: str, default: Any) -> Any:
-        """An input; of files of before 2021 by its name of then."""
+        """Returns an input. In files from before 2021 it has its old name."""
         now, then = prim.GetAttribute(f"inputs:{name}"), prim.GetAttribute(name)
         old = then and then.HasAuthoredValue() and not (now and now.HasAuthoredValue())
         attribute = then if old else now
         if attribute and attribute.HasAuthoredConnections():
-            self._problems.warn(prim, f"inputs:{name} is computed by a shader: its own value is taken")
+            self._problems.warn(prim, f"inputs:{name} is computed by a shader: the input's own value is used")
         found = attribute.Get(self._time) if attribute else None
         return default if found is None else found
 
@@ -77,7 +77,7 @@ class Lights:
         return found
 
     def luminance(self, prim: Usd.Prim, intensity: float = 1.0) -> list[float]:
-        """intensity 2^exposure color, times the colour of a temperature."""
+        """Returns intensity * 2^exposure * color, times the colour of the temperature."""
         power = self.number(prim, "intensity", intensity)
         power *= 2.0 ** min(self.number(prim, "exposure", 0.0), 100.0)
         shown = plain(self.value(prim, "color", (1.0, 1.0, 1.0)))
@@ -86,13 +86,13 @@ class Lights:
             warm = plain(UsdLux.BlackbodyTemperatureAsRgb(kelvin))
             shown = [a * b for a, b in zip(shown, warm)]
         if power < 0 or min(shown) < 0:
-            self._problems.warn(prim, "light of less than nothing is left out")
+            self._problems.warn(prim, "a light of negative intensity is left out")
         return [max(power * x, 0.0) for x in shown]
 
     def _check(self, prim: Usd.Prim) -> None:
         for name in ("diffuse", "specular"):
             if self.number(prim, name, 1.0) != 1:
-                self._problems.warn(prim, f"inputs:{name} has no effect: light acts on surfaces as it does")
+                self._problems.warn(prim, f"inputs:{name} has no effect: light is reflected as the surface's material says")
         if self.value(prim, "shadow:enable", True) is False:
             self._problems.warn(prim, "inputs:shadow:enable has no effect: all lights cast shadows")
         filters = prim.GetRelationship("light:filters")
@@ -111,7 +111,7 @@ class Lights:
         luminance = self.luminance(prim, 50000.0)
         half = min(max(self.number(prim, "angle", 0.53) / 2, 0.0), 180.0)
         if half > 90:
-            self._problems.error(prim, "an angle above 180 degrees is not read. Take a DomeLight")
+            self._problems.error(prim, "an angle above 180 degrees is not supported. Use a DomeLight")
             return
         size = math.pi * math.sin(math.radians(half)) ** 2
         # Parallel light has no luminance: its intensity is what a plane that faces it receives.
@@ -137,7 +137,7 @@ class Lights:
             return
         kind = str(self.value(prim, "texture:format", "automatic"))
         if kind not in ("automatic", "latlong"):
-            self._problems.error(prim, f"a map of format {kind} is not read. Make it latlong")
+            self._problems.error(prim, f"a map of format {kind} is not supported. Make it latlong")
             return
         asset = self._document.files.find(prim, file)
         if asset is None:
@@ -195,7 +195,7 @@ class Lights:
     def cylinder(self, prim: Usd.Prim, matrix: Matrix) -> None:
         length, radius = self.number(prim, "length", 1.0), self.number(prim, "radius", 0.5)
         if prim.HasAPI(UsdLux.ShapingAPI) and self.number(prim, "shaping:cone:angle", 90.0) < 180:
-            self._problems.warn(prim, "the cone of a cylinder light is left out: it shines to all sides")
+            self._problems.warn(prim, "the cone of a cylinder light is left out: it emits in all directions")
         x, y, z = (matrix[:3, k] for k in range(3))
         across = float(np.linalg.norm(y))
         straight = max(abs(x @ y), abs(x @ z), abs(y @ z)) <= 1e-6 * across**2
@@ -216,8 +216,8 @@ class Lights:
         self._lamp(prim, {"type": "ply", "filename": name}, np.eye(4), part.area())
 
     def _lamp(self, prim: Usd.Prim, shape: Dict, to_world: Matrix, area: float, flat: bool = False) -> None:
-        """A shape that gives off light and lets light of others pass. `flat`: its normal is the light's
-        axis."""
+        """Adds a shape that emits light and lets the light of others pass. `flat`: its normal is the axis of the
+        light."""
         if not area > 0:
             self._problems.warn(prim, "a light without a size is left out")
             return
@@ -239,7 +239,7 @@ class Lights:
         self._document.define(str(prim.GetPath()), placed)
 
     def _beam(self, prim: Usd.Prim, flat: bool) -> Dict:
-        """Cone and focus as the angles of an area light, which are those from its normal."""
+        """Returns cone and focus as the angles of an area light, measured from its normal."""
         if not prim.HasAPI(UsdLux.ShapingAPI):
             return {}
         cone = min(self.number(prim, "shaping:cone:angle", 90.0), 90.0) if flat else 90.0
@@ -252,7 +252,7 @@ class Lights:
         if focus > 0:
             self._problems.warn(prim, "inputs:shaping:focus beside a cone is left out")
         if cone <= 0:
-            self._problems.warn(prim, "a cone of no angle is taken for one of 0.01 degrees")
+            self._problems.warn(prim, "a cone of 0 degrees is rendered with 0.01 degrees")
             cone = 0.01
         begin = cone * (1 - soft)
         if soft == 0:
@@ -266,14 +266,14 @@ class Lights:
         }
 
     def _point(self, prim: Usd.Prim, matrix: Matrix, radius: float, cone: float) -> None:
-        """A sphere far smaller than its distance: what its cross-section sends into each direction."""
+        """Replaces a tiny sphere by a point that emits the light of its cross-section in each direction."""
         luminance = self.luminance(prim)
         if self.value(prim, "normalize", False):
             intensity = [x / 4 for x in luminance]  # pi r^2 of 4 pi r^2
         else:
             intensity = [x * math.pi * radius**2 for x in luminance]
         if not any(intensity):
-            self._problems.warn(prim, "a sphere of radius 0 gives off no light unless inputs:normalize is on")
+            self._problems.warn(prim, "a sphere of radius 0 emits no light unless inputs:normalize is on")
             return
         if cone >= 180:
             place = {"type": "point", "position": matrix[:3, 3], "intensity": colour(intensity)}
@@ -302,7 +302,7 @@ class Lights:
 
 
 def soft_profile(cone: float, soft: float) -> Any:
-    """USD's falloff over the square around the cone, whose middle is the axis."""
+    """Makes an image of USD's falloff over the square around the cone. The axis is in its centre."""
     across = (np.arange(PROFILE) + 0.5) / PROFILE * 2 - 1
     angle = np.arctan(np.hypot(across[None, :], across[:, None]) * math.tan(cone))
     begin = cone * (1 - soft)
@@ -311,7 +311,7 @@ def soft_profile(cone: float, soft: float) -> Any:
 
 
 def _turned(matrix: Matrix) -> Matrix:
-    """Without its place and its size; mirrored if it was."""
+    """Removes position and size from a matrix. A mirroring stays."""
     left, _, right = np.linalg.svd(matrix[:3, :3])
     result = np.eye(4)
     result[:3, :3] = left @ right

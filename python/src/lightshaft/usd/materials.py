@@ -1,4 +1,4 @@
-"""Materials: UsdPreviewSurface as a bsdf and emission, in the same way as the add-on for Blender does it."""
+"""Converts UsdPreviewSurface to a bsdf and emission, in the same way as the Blender add-on."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class Surface:
     bsdf: str
     emission: Any = None
     coordinates: str | None = None
-    """The primvar of the texture coordinates that it looks up images with."""
+    """The primvar of the texture coordinates for images."""
     colours: Primvar | None = None
-    """The primvar that a mesh must bring as its attribute `color`."""
+    """The primvar that a mesh must have as its attribute `color`."""
 
 
 class Materials:
@@ -37,7 +37,7 @@ class Materials:
         self._colours: dict[Any, Surface] = {}
 
     def of_material(self, material: UsdShade.Material) -> Surface | None:
-        """None, with a warning told, if it has no surface that is read."""
+        """Converts a material. Returns None and reports a warning if it has no supported surface."""
         path = str(material.GetPath())
         if path not in self._known:
             self._known[path] = None
@@ -46,7 +46,7 @@ class Materials:
         return self._known[path]
 
     def of_colour(self, prim: Any, value: list[float] | Primvar, opacity: float) -> Surface:
-        """What has no material: diffuse, with its displayColor."""
+        """Makes a diffuse material of displayColor for prims without a material."""
         key = (value.name if isinstance(value, Primvar) else tuple(value), opacity)
         if key not in self._colours:
             used = _Used(self._shaders, self._problems)
@@ -60,7 +60,7 @@ class Materials:
         kind = shader.GetIdAttr().Get() if shader else None
         if kind != "UsdPreviewSurface":
             told = f"its surface is {kind}, not UsdPreviewSurface" if kind else "it has no UsdPreviewSurface"
-            self._problems.warn(material, f"{told}: displayColor is taken")
+            self._problems.warn(material, f"{told}: displayColor is used")
             return None
         used = _Used(self._shaders, self._problems)
         tell_material(material, self._problems)
@@ -72,7 +72,7 @@ class Materials:
 
 
 class _Used:
-    """Turns inputs into values of the scene, and keeps what a mesh must bring for them."""
+    """Turns inputs into values of the scene, and collects the attributes that a mesh must have for them."""
 
     def __init__(self, shaders: Shaders, problems: Problems) -> None:
         self._shaders, self._problems = shaders, problems
@@ -84,13 +84,13 @@ class _Used:
             if self.coordinates not in (None, given.coordinates):
                 self._problems.warn(
                     given.asset.prim,
-                    f"a material with two sets of texture coordinates: {self.coordinates} is taken for all",
+                    f"a material with two sets of texture coordinates: {self.coordinates} is used for all",
                 )
             self.coordinates = self.coordinates or given.coordinates
             return self._shaders.bitmap(given, bounded=bounded, **look)
         if isinstance(given, Primvar):
             if self.colours is not None and self.colours.name != given.name:
-                self._problems.warn(given.name, "a material with two colours of primvars: the first is taken")
+                self._problems.warn(given.name, "a material with two colours from primvars: the first is used")
             self.colours = self.colours or given
             return {"type": "mesh_attribute", "name": "vertex_color"}
         if isinstance(given, list):
@@ -108,10 +108,10 @@ class Preview:
         return self._shaders.input(self._shader, name, default)
 
     def bsdf(self) -> Dict:
-        """Without its opacity."""
+        """Returns the bsdf without its opacity."""
         tell_shader(self._shader, self._problems)
         if self._input("displacement", 0.0) != 0.0:
-            self._problems.warn(self._shader, "displacement is left out")
+            self._problems.warn(self._shader, "displacement is ignored")
         base = self._used.value(self._input("diffuseColor", list(GREY)))
         roughness = self._used.value(self._input("roughness", 0.5))
         ior = max(float(self._shaders.constant(self._shader, "ior", 1.5)), 1e-3)
@@ -126,10 +126,10 @@ class Preview:
         return two_sided(self._with_normals(bsdf))
 
     def _by_specular_colour(self, base: Any, roughness: Any) -> Dict:
-        """The reflection straight on is given as a colour."""
+        """Makes a surface whose reflection at normal incidence is a colour."""
         given = self._input("specularColor", [0.0, 0.0, 0.0])
         if not isinstance(given, list):
-            self._problems.warn(self._shader, "a texture as specularColor: 0.04 is taken")
+            self._problems.warn(self._shader, "a texture as specularColor: 0.04 is used")
             given = [0.04] * 3
         top = min(max(given), 0.99)
         if top <= 0:
@@ -143,19 +143,19 @@ class Preview:
         return bsdf
 
     def _gloss(self, coat: Any) -> Any:
-        """Burley's gloss, from 0 (alpha 0.1) to 1 (alpha 0.001), whose alpha is the square of a roughness."""
+        """Returns Burley's gloss, from 0 (alpha 0.1) to 1 (alpha 0.001), for a roughness whose square is alpha."""
         rough = self._input("clearcoatRoughness", 0.01)
         if coat == 0.0:
             return 0.0
         if not isinstance(rough, float):
-            self._problems.warn(self._shader, "a texture as clearcoatRoughness: 0.01 is taken")
+            self._problems.warn(self._shader, "a texture as clearcoatRoughness: 0.01 is used")
             rough = 0.01
         return min(max((0.1 - rough**2) / 0.099, 0.0), 1.0)
 
     def _with_normals(self, bsdf: Dict) -> Dict:
         given = self._input("normal", [0.0, 0.0, 1.0])
         if isinstance(given, Primvar):
-            self._problems.warn(self._shader, "normals of a primvar are left out")
+            self._problems.warn(self._shader, "normals from a primvar are ignored")
         if not isinstance(given, Texture):
             return bsdf
         look = given.look
@@ -179,7 +179,7 @@ class Preview:
         return self._used.value(given)
 
     def emission(self, opacity: Any) -> Any:
-        """What is cut out or lets light pass by `opacity` gives as much less light."""
+        """Returns the emission. Parts that `opacity` cuts out or makes transparent emit less."""
         given = self._input("emissiveColor", [0.0, 0.0, 0.0])
         if opacity == 0.0 or (isinstance(given, list) and not any(x > 0 for x in given)):
             return None
@@ -199,7 +199,7 @@ def masked(bsdf: Dict, opacity: Any) -> Dict:
 
 
 def opaque(base: Any, metallic: Any, roughness: Any, ior: float, coat: Any, gloss: Any) -> Dict:
-    """A dielectric coat over a diffuse base wherever it can be; else Burley's model."""
+    """Makes an opaque surface: a dielectric coat over a diffuse base where possible, else Burley's model."""
     if not isinstance(roughness, float) or coat != 0.0:
         return burley(base, metallic, roughness, ior, coat, gloss)
     coated = {

@@ -1,5 +1,5 @@
-"""Meshes as PLY files: triangles of polygons, with normals, texture coordinates and colours of their
-corners."""
+"""Writes meshes as PLY files: triangulated polygons with normals, texture coordinates and colours of their
+vertices."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ Ints = npt.NDArray[np.int64]
 
 @dataclasses.dataclass
 class Polygons:
-    """Faces as USD has them: how many corners each has, and which point each corner is at."""
+    """Faces as in USD: the number of vertices of each face, and the point of each vertex."""
 
     points: Floats
     counts: Ints
     indices: Ints
 
     def fault(self) -> str:
-        """What is wrong with them; empty: nothing."""
+        """Returns what is wrong with the polygons. Empty: nothing."""
         if self.points.ndim != 2 or self.points.shape[1] != 3 or not np.isfinite(self.points).all():
             return "its points are not three finite numbers each"
         if (self.counts < 0).any() or self.counts.sum() != len(self.indices):
@@ -33,7 +33,7 @@ class Polygons:
         return ""
 
     def triangles(self) -> tuple[Ints, Ints]:
-        """(corners, three a triangle; the face that each triangle is of)."""
+        """Returns (vertices, three for each triangle; the face of each triangle)."""
         counts = np.maximum(self.counts - 2, 0)
         starts = np.cumsum(self.counts) - self.counts
         face = np.repeat(np.arange(len(counts)), counts)
@@ -45,7 +45,7 @@ class Polygons:
         return corners, face
 
     def _concave(self, starts: Ints) -> Ints:
-        """The faces of more than three corners that a fan of triangles does not cover."""
+        """Returns the faces of more than three vertices that a fan of triangles does not cover."""
         if not len(self.indices) or self.counts.max() < 4:
             return np.empty(0, np.int64)
         follower = np.arange(len(self.indices)) + 1
@@ -62,7 +62,7 @@ class Polygons:
         return found
 
     def _cut(self, corners: Ints, count: int) -> Ints:
-        """Triangles of a polygon with inward corners, seen along the axis that it faces most."""
+        """Triangulates a concave polygon, seen along the axis that it faces most."""
         place = self.points[self.indices[corners]].astype(np.float64)
         normal = np.cross(place - place[0], np.roll(place, -1, axis=0) - place[0]).sum(axis=0)
         axis = int(np.abs(normal).argmax())
@@ -79,15 +79,15 @@ class Polygons:
 
 @dataclasses.dataclass
 class Corners:
-    """Values of a primvar, and which of them each corner has."""
+    """The values of a primvar, and the index of each vertex's value."""
 
     values: Floats
     index: Ints
 
 
 def smooth_normals(points: Floats, triangles: Ints) -> Floats:
-    """At each point the sum of the normals of its triangles, weighted by their angles there: however
-    polygons are cut, it is the same."""
+    """Returns for each point the sum of the normals of its triangles, weighted by their angles. It does not depend
+    on how polygons are triangulated."""
     corner = [points[triangles[:, k]].astype(np.float64) for k in range(3)]
     normals = np.zeros((len(points), 3))
     for k in range(3):
@@ -100,7 +100,7 @@ def smooth_normals(points: Floats, triangles: Ints) -> Floats:
 
 
 def is_closed(triangles: Ints) -> bool:
-    """Whether each edge is between two triangles that run along it in opposite directions."""
+    """Returns True if each edge belongs to two triangles that run along it in opposite directions."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(
         np.int64
     )
@@ -111,8 +111,8 @@ def is_closed(triangles: Ints) -> bool:
 
 @dataclasses.dataclass
 class Part:
-    """Triangles of one surface: rows of (x, y, z, maybe a normal, maybe u and v, maybe r, g and b), and three
-    rows a triangle."""
+    """The triangles of one surface. A row is (x, y, z, and optionally a normal, u and v, and r, g and b); a
+    triangle has three rows."""
 
     names: tuple[str, ...]
     table: Floats
@@ -143,7 +143,7 @@ class Part:
         return cls(tuple(names), table, corners, is_closed(vertex))
 
     def ply(self) -> bytes:
-        """The rows in use, each distinct one once."""
+        """Encodes the rows in use, each distinct one once."""
         rows = np.ascontiguousarray(self.table[self.triangles.ravel()])
         packed = rows.view(np.dtype((np.void, rows.dtype.itemsize * rows.shape[1]))).ravel()
         _, first, index = np.unique(packed, return_index=True, return_inverse=True)
@@ -155,7 +155,7 @@ class Part:
         return "\n".join(header).encode() + rows[first].tobytes() + faces.tobytes()
 
     def back(self, share: float) -> Part:
-        """The same sheet turned round, behind its front by a share of its size."""
+        """Returns the same sheet with its front reversed, a fraction of its size behind it."""
         table = self.table.copy()
         if "nx" in self.names:
             normals = table[:, 3:6].astype(np.float64)
@@ -172,7 +172,7 @@ class Part:
         return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
     def moved(self, matrix: npt.NDArray[np.float64]) -> Part:
-        """Without normals and the like: its shape alone."""
+        """Moves the mesh and drops normals and other attributes."""
         points = self.table[:, :3] @ matrix[:3, :3].T + matrix[:3, 3]
         triangles = self.triangles[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else self.triangles
         return Part(("x", "y", "z"), points.astype("<f4"), triangles, self.closed)

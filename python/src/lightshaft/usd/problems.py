@@ -1,4 +1,4 @@
-"""What a stage has that cannot be rendered, by the paths of its prims."""
+"""Collects what cannot be rendered from a stage, by the paths of its prims."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ MOST_TOLD = 20  # errors at once, as the farm does
 
 
 class Problems:
-    """Collects errors and warnings. What many prims have in common is told once, with the first of them."""
+    """Collects errors and warnings. A problem that many prims share is reported once, with the first of them."""
 
     def __init__(self) -> None:
         self._warned: dict[str, dict[str, None]] = {}
@@ -25,12 +25,11 @@ class Problems:
 
     @contextlib.contextmanager
     def reading(self, prim: object) -> Iterator[None]:
-        """An error of the prim, if what is done with its values cannot be: files may hold values of any
-        type."""
+        """Reports an error of the prim if its values cannot be used: files may contain values of any type."""
         try:
             yield
         except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError, RuntimeError) as error:
-            self.error(prim, f"a value of it is not of the type that its schema says: {error}")
+            self.error(prim, f"one of its values has another type than its schema requires: {error}")
 
     @property
     def warnings(self) -> list[str]:
@@ -42,7 +41,7 @@ class Problems:
         return told
 
     def raise_errors(self) -> None:
-        """StageRejected, if anything is wrong: with as much of it as a person reads."""
+        """Raises StageRejected if there are errors. The message has only as many of them as a person reads."""
         if self._errors:
             found = [Diagnostic(text=text, path=path) for path, text in self._errors]
             if len(found) > MOST_TOLD:

@@ -1,4 +1,4 @@
-"""A stage as a scene: the XML of its frame, or of each of its frames, and the files that these name."""
+"""Converts a stage to a scene: the XML of its frame, or of each of its frames, and the files that they name."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ FRAME_NAME = "frame.####.xml"
 class StageScene:
     main: SceneText
     included: Mapping[str, SceneText]
-    """Of a sequence: the scene of each frame, by its name."""
+    """For a sequence: the scene of each frame, by name."""
     files: Mapping[str, Source]
-    """What the scene names, the scenes of frames included."""
+    """The files that the scene and the scenes of all frames name."""
     warnings: tuple[str, ...]
 
     def text_of(self, file: str) -> SceneText:
-        """The scene in which the farm found something."""
+        """Returns the scene in which the farm found a problem."""
         return self.included.get(file, self.main)
 
     def write(self, folder: PathLike) -> pathlib.Path:
@@ -65,7 +65,7 @@ def read(
 
     `camera`: the path of the camera's prim, which is needed if the stage has several. `frames` ("1-10"): a
     sequence, one image for each of these time codes; without it, the stage is read at its start. `size`:
-    of the image, in pixels. Nothing is read that lies outside of `folder` (default: that of the stage) and
+    size of the image in pixels. Nothing is read that lies outside of `folder` (default: that of the stage) and
     the folders `allow`. StageRejected has everything that is wrong, by the paths of prims.
     """
     place = pathlib.Path(path)
@@ -98,12 +98,12 @@ def _times(stage: Usd.Stage, frames: str | None) -> list[Usd.TimeCode]:
         return [Usd.TimeCode(stage.GetStartTimeCode()) if known else Usd.TimeCode.EarliestTime()]
     numbers = [number for number in frame_numbers(frames) if number is not None]
     if not numbers:
-        raise StageRejected(f"frames {frames!r} is neither one time code nor a range such as 1-10")
+        raise StageRejected(f"frames {frames!r} must be a time code or a range such as 1-10")
     return [Usd.TimeCode(number) for number in numbers]
 
 
 def _bake_skinning(stage: Usd.Stage, times: list[Usd.TimeCode]) -> None:
-    """Writes the points of skinned meshes into the session, which no file keeps."""
+    """Writes the points of skinned meshes into the session layer, which is never saved."""
     roots = [prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Root)]
     if times[0].IsEarliestTime():
         interval = Gf.Interval.GetFullInterval()
@@ -130,12 +130,12 @@ def _open(path: pathlib.Path) -> Usd.Stage:
 
 
 def _check_composition(stage: Usd.Stage, problems: Problems) -> None:
-    """Layers that are referenced and not found, or cannot be read."""
+    """Reports referenced layers that are missing or unreadable."""
     for error in stage.GetCompositionErrors():
         prim, told = error.rootSite.path, " ".join(str(error).split())
         material = re.search(r"@([^@]+\.mtlx)@", told)
         if material and os.path.isfile(material[1]):
-            problems.warn(prim, f"MaterialX is not read: {os.path.basename(material[1])} is left out")
+            problems.warn(prim, f"MaterialX is not supported: {os.path.basename(material[1])} is ignored")
         else:
             problems.error(prim, told)
     problems.raise_errors()
@@ -167,7 +167,7 @@ class _Reader:
         lights.finish()
         shines = any("emitter" in value or "temperature" in value for value in document.scene.values())
         if not lights.count and not shines:
-            problems.warn("the stage", "it has no light: a white sky is put around it")
+            problems.warn("the stage", "it has no light: a white sky is added")
             document.define("sky", {"type": "constant", "radiance": colour([1, 1, 1])})
         if self._camera is None:
             cameras.add_framing_camera(document, problems, self._stage, time, self._size)

@@ -1,4 +1,4 @@
-"""Inputs of shaders: a number, a colour, a texture, or a primvar of the mesh."""
+"""Reads inputs of shaders: a number, a colour, a texture, or a primvar of the mesh."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Input = float | list[float] | Texture | Primvar
 
 
 def plain(value: Any) -> Any:
-    """Numbers and lists of Python's, of those that USD has."""
+    """Converts USD's numbers and vectors to Python's numbers and lists."""
     if isinstance(value, (bool, str)) or value is None:
         return value
     try:
@@ -48,13 +48,13 @@ def plain(value: Any) -> Any:
 
 
 class Shaders:
-    """Follows the connections of shaders at one time."""
+    """Follows the connections of shaders at one time code."""
 
     def __init__(self, files: Files, images: Images, problems: Problems, time: Usd.TimeCode) -> None:
         self._files, self._images, self._problems, self._time = files, images, problems, time
 
     def follow(self, shader: UsdShade.Shader, name: str) -> tuple[Any, UsdShade.Shader | None, str]:
-        """(value, None, "") or (None, the shader that makes it, the name of its output)."""
+        """Returns (value, None, ""), or (None, the shader that computes it, the name of its output)."""
         given = shader.GetInput(name)
         if not given:
             return None, None, ""
@@ -66,10 +66,10 @@ class Shaders:
         return None, None, ""
 
     def constant(self, shader: UsdShade.Shader, name: str, default: Any) -> Any:
-        """The value of an input that nothing but a value can be the source of."""
+        """Returns the value of an input that cannot be connected."""
         value, source, _ = self.follow(shader, name)
         if source is not None:
-            self._problems.warn(shader, f"inputs:{name} is computed by a shader: left out")
+            self._problems.warn(shader, f"inputs:{name} is computed by a shader: ignored")
         return default if value is None else value
 
     def input(self, shader: UsdShade.Shader, name: str, default: float | list[float]) -> Input:
@@ -85,7 +85,7 @@ class Shaders:
             values = default if fallback is None else fallback
             if isinstance(values, list) and isinstance(default, list):
                 return Primvar(str(self.constant(source, "varname", "")), tuple(values[:3]))
-            self._problems.warn(source, "a primvar that is one number is not read: its fallback is taken")
+            self._problems.warn(source, "a primvar of a single number is not supported: its fallback is used")
             return values if isinstance(values, float) else default
         self._problems.warn(
             source, f"the shader {kind or 'without an id'} is not read: inputs:{name} has its default"
@@ -110,13 +110,13 @@ class Shaders:
         if value is None or not value.path:
             return without
         if "<UDIM>" in value.path:
-            self._problems.error(node, f"@{value.path}@: images in tiles (UDIM) are not read")
+            self._problems.error(node, f"@{value.path}@: images in tiles (UDIM) are not supported")
             return 0.0
         given = node.GetInput("fallback")
         if given and given.GetAttr().HasAuthoredValue():
             why = self._images.fault(node, value)
             if why:
-                self._problems.warn(node, f"@{value.path}@ {why}: the fallback of the shader is taken")
+                self._problems.warn(node, f"@{value.path}@ {why}: the shader's fallback is used")
                 return without
         asset = self._files.find(node, value)
         if asset is None:
@@ -128,9 +128,9 @@ class Shaders:
     def _wrap(self, node: UsdShade.Shader) -> str:
         across, along = (str(self.constant(node, name, "useMetadata")) for name in ("wrapS", "wrapT"))
         if across != along:
-            self._problems.warn(node, "wrapS and wrapT differ: wrapS is taken for both")
+            self._problems.warn(node, "wrapS and wrapT differ: wrapS is used for both")
         if across not in WRAP:
-            self._problems.warn(node, f"wrapS '{across}' is not read: the image's border goes on")
+            self._problems.warn(node, f"wrapS '{across}' is not supported: the image's edge is extended")
         return WRAP.get(across, "clamp")
 
     def _coordinates(self, node: UsdShade.Shader) -> tuple[str, Matrix]:
@@ -145,7 +145,7 @@ class Shaders:
         if source is None:
             return "st", matrix
         if not kind or not kind.startswith("UsdPrimvarReader_float2"):
-            self._problems.warn(source, f"texture coordinates of the shader {kind}: st is taken")
+            self._problems.warn(source, f"texture coordinates of the shader {kind}: st is used")
             return "st", matrix
         return str(self.constant(source, "varname", "st")) or "st", matrix
 
@@ -160,7 +160,7 @@ class Shaders:
         return matrix
 
     def bitmap(self, texture: Texture, **changes: Any) -> dict[str, Any]:
-        """As a texture of the scene. `changes`: of its Look."""
+        """Makes a texture of the scene. `changes`: changes of its Look."""
         name, raw = self._images.name(texture.asset, dataclasses.replace(texture.look, **changes))
         found: dict[str, Any] = {"type": "bitmap", "filename": name, "raw": raw, "wrap_mode": texture.wrap}
         if not np.allclose(texture.to_st, np.eye(4)):

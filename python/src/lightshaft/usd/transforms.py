@@ -1,4 +1,4 @@
-"""Transforms as 4 x 4 matrices that stand before a column: USD's stand after a row."""
+"""Transforms as 4 x 4 matrices for column vectors. USD's matrices are for row vectors."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def scale(x: float, y: float, z: float) -> Matrix:
 
 
 def is_similarity(matrix: Matrix) -> bool:
-    """Whether it turns, moves, mirrors, and scales alike in all directions."""
+    """Returns True if the matrix only rotates, moves, mirrors, and scales uniformly."""
     product = matrix[:3, :3].T @ matrix[:3, :3]
     return bool(np.allclose(product, np.eye(3) * product[0, 0], atol=EXACT * product[0, 0], rtol=0))
 
@@ -41,8 +41,8 @@ def mirrors(matrix: Matrix) -> bool:
 
 
 def unscaled(matrix: Matrix) -> Matrix:
-    """For what looks or shines along its axis z, with y upright: without size and shear. z and the plane of z and
-    y stay, and it mirrors if `matrix` does."""
+    """Removes scale and shear, for cameras and lights that point along their axis z with y upwards. z, the plane
+    of z and y, and a mirroring stay."""
     z, y = matrix[:3, 2], matrix[:3, 1]
     z = z / np.linalg.norm(z)
     x = np.cross(y, z)

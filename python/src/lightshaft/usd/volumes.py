@@ -1,4 +1,4 @@
-"""Volumes of UsdVol: grids of OpenVDB files as media."""
+"""Converts volumes of UsdVol, grids of OpenVDB files, to media."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Volumes:
         self._settings = {name: plain(value) for name, value in SETTINGS.items()}
 
     def around(self, point: Matrix) -> str | None:
-        """The medium that a point is in."""
+        """Returns the medium that contains a point."""
         for medium, box in self._boxes:
             local = np.linalg.inv(box) @ np.append(point, 1.0)
             if np.abs(local[:3]).max() < 1:
@@ -46,9 +46,9 @@ class Volumes:
             elif name == "temperature":
                 temperature = self._grid(prim, str(target), matrix)
             else:
-                self._problems.warn(prim, f"the field {name} is left out: density and temperature are read")
+                self._problems.warn(prim, f"the field {name} is ignored: only density and temperature are supported")
         if density is None:
-            self._problems.warn(prim, "a volume without a field density is left out")
+            self._problems.warn(prim, "a volume without a field `density` is left out")
             return
         box = self._box(prim, matrix)
         if box is None:
@@ -92,7 +92,7 @@ class Volumes:
     def _grid(self, prim: Usd.Prim, path: str, matrix: Matrix) -> dict[str, Any] | None:
         field = prim.GetStage().GetPrimAtPath(path)
         if not field or not field.IsA(UsdVol.OpenVDBAsset):
-            self._problems.warn(prim, f"the field {path} is no OpenVDBAsset: left out")
+            self._problems.warn(prim, f"the field {path} is not an OpenVDBAsset: ignored")
             return None
         file = field.GetAttribute("filePath").Get(self._time)
         if file is None or not file.path:
@@ -102,20 +102,20 @@ class Volumes:
         if asset is None:
             return None
         if asset.suffix != ".vdb":
-            self._problems.error(field, f"@{file.path}@ is no .vdb")
+            self._problems.error(field, f"@{file.path}@ is not a .vdb file")
             return None
         own = UsdGeom.Xformable(field) if field.IsA(UsdGeom.Xformable) else None
         if own is not None and not np.allclose(np.array(own.GetLocalTransformation(self._time)), np.eye(4)):
-            self._problems.warn(field, "the transform of a field is left out: move its volume")
+            self._problems.warn(field, "the transform of a field is ignored: move its volume instead")
         name = field.GetAttribute("fieldName").Get(self._time)
         grid = {"type": "gridvolume", "filename": self._document.files.take(asset), "to_world": matrix}
         return {**grid, "grid_name": str(name)} if name else grid
 
     def _box(self, prim: Usd.Prim, matrix: Matrix) -> Matrix | None:
-        """Where the cube [-1, 1]^3 of the medium stands: USD says how far a volume reaches as its extent."""
+        """Returns the position of the medium's cube [-1, 1]^3. USD gives the size of a volume as its extent."""
         extent = prim.GetAttribute("extent").Get(self._time)
         if extent is None or len(extent) != 2:
-            self._problems.error(prim, "it has no extent. Author one: the box of its grids")
+            self._problems.error(prim, "it has no extent. Set it to the box of its grids")
             return None
         low, high = np.array(extent[0], float), np.array(extent[1], float)
         half = (high - low) / 2 * MARGIN

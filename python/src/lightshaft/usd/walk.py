@@ -1,9 +1,8 @@
-"""Goes through a stage: what stands where, with everything that is instanced kept once.
+"""Traverses a stage and collects its objects and their positions. Everything that is instanced is stored once.
 
-A content is what a stage, or a prototype, holds: leaves (shapes), things that are placed by themselves
-(lights and volumes), and instances of other contents. The scene format has groups of shapes, and no groups
-in groups: so each content with shapes becomes one group, and instances within instances become instances
-of the innermost.
+A content is what a stage or a prototype contains: leaves (shapes), single objects (lights and volumes), and instances
+of other contents. The scene format has groups of shapes, but no groups within groups: so each content with shapes
+becomes one group, and nested instances become instances of the innermost group.
 """
 
 from __future__ import annotations
@@ -40,10 +39,10 @@ class Content:
     group: str | None = None
     uses: int = 0
     placed: int = 0
-    """How much is placed for one of it, up to one more than may be."""
+    """Number of objects that one instance places, up to one more than the limit."""
 
     def measure(self) -> None:
-        """Once the contents that it has instances of are measured."""
+        """Measures the content after the contents that it has instances of."""
         shining = sum(leaf.shines for leaf in self.leaves)
         own = shining + (len(self.leaves) > shining) + len(self.others)
         self.placed = min(own + sum(inner.placed for inner, _ in self.instances), MAX_PLACED + 1)
@@ -82,7 +81,7 @@ class Walk:
         self._place(root, np.eye(4), whole=True)
 
     def _visit(self, first: Usd.Prim, around: Matrix, content: Content) -> None:
-        """A prim and what is below it, without recursion: hierarchies may be deep."""
+        """Visits a prim and everything below it, without recursion, because hierarchies may be deep."""
         waiting = [(first, around)]
         while waiting:
             prim, parent = waiting.pop()
@@ -119,7 +118,7 @@ class Walk:
         kind = str(prim.GetTypeName())
         tell_prim(prim, self._problems)
         if kind == "SkelRoot" and prim.IsInstanceProxy():
-            self._problems.warn(prim, "skinning of an instance is left out: its meshes stand as bound")
+            self._problems.warn(prim, "skinning of an instance is ignored: its meshes stay in their bind pose")
         if not kind or kind in SILENT or not prim.IsA(UsdGeom.Imageable):
             return
         if str(UsdGeom.Imageable(prim).ComputePurpose()) not in SHOWN:
@@ -130,13 +129,14 @@ class Walk:
             content.others.append((prim, matrix, self._volumes.add))
         elif prim.IsA(UsdGeom.Gprim):
             if prim.HasAPI(UsdLux.LightAPI):
-                self._problems.warn(prim, "the light of a mesh is left out: give it an emissiveColor")
+                self._problems.warn(prim, "the light of a mesh is ignored: give it an emissiveColor")
             content.leaves += self._geometry.leaves(prim, matrix)
         elif kind not in SILENT:
             self._problems.warn(prim, f"a {kind} is not read")
 
     def _instance(self, prim: Usd.Prim, matrix: Matrix, content: Content) -> None:
-        """What looks different by what it inherits (material, colour, purpose) is a content of its own."""
+        """Makes an instance. A prototype that looks different because of inherited properties (material, colour,
+        purpose) becomes a separate content."""
         material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial(UsdShade.Tokens.full)[0]
         primvars = UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance()
         inherited = tuple((str(p.GetPrimvarName()), str(p.Get(self._time))) for p in primvars)
@@ -168,7 +168,7 @@ class Walk:
             UsdGeom.PointInstancer.IgnoreMask,
         )
         if len(places) != indices.size:
-            self._problems.error(prim, "positions, orientations or scales are not as many as protoIndices")
+            self._problems.error(prim, "positions, orientations or scales do not have as many values as protoIndices")
             return
         mask = instancer.ComputeMaskAtTime(self._time)
         prototypes: dict[int, Content] = {}
@@ -199,7 +199,7 @@ class Walk:
         if key not in self._prototypes:
             if key in self._building or len(self._building) >= MAX_NESTING:
                 raise StageRejected(
-                    f"{prim.GetPath()}: instances stand within each other more than {MAX_NESTING} deep, or "
+                    f"{prim.GetPath()}: instances are nested more than {MAX_NESTING} deep, or "
                     "within themselves"
                 )
             self._building.append(key)

@@ -1,13 +1,13 @@
 // Names and planes of AOVs; partials, films and merges with AOVs; the errors for damaged partials.
-#include "common/image/aov/aov.h"
+#include "core/image/aov/aov.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstring>
 
-#include "common/image/exr/final_image.h"
-#include "common/image/film/merge.h"
+#include "core/image/exr/final_image.h"
+#include "core/image/film/merge.h"
 #include "tests/unit/image/support.h"
 #include "worker/fake/fake_pixels.h"
 
@@ -45,7 +45,7 @@ std::string not_written(const Partial& p) {
   return got ? "accepted" : got.error().message;
 }
 
-TEST(Aovs, AreCalledByTheirNamesAndByOthers) {
+TEST(Aovs, HaveNamesAndAliases) {
   const auto set = [](std::vector<std::string> names) { return parse_aovs(names).value(); };
 
   EXPECT_EQ(names_of(set({"uv", "depth", "depth"})), (std::vector<std::string>{"depth", "uv"}));
@@ -54,7 +54,7 @@ TEST(Aovs, AreCalledByTheirNamesAndByOthers) {
   for (const AovRow& row : aov_rows()) EXPECT_EQ(names_of(set({std::string(row.name)}))[0], row.name);
 }
 
-TEST(Aovs, AnUnknownNameIsToldWhatThereIs) {
+TEST(Aovs, UnknownNameIsRefusedWithTheKnownNames) {
   const std::vector<std::string> names = {"depth", "radiosity\n"};
 
   const std::string text = parse_aovs(names).error().message;
@@ -63,13 +63,13 @@ TEST(Aovs, AnUnknownNameIsToldWhatThereIs) {
   for (const AovRow& row : aov_rows()) EXPECT_THAT(text, HasSubstr(std::string(row.name)));
 }
 
-TEST(Aovs, NoneOfThemAddsNothing) {
+TEST(Aovs, EmptyListAddsNoLayers) {
   EXPECT_EQ(planes_of({}).count(), 0u);
   EXPECT_EQ(partial_bytes_per_pixel({}), 24u);
   EXPECT_EQ(film_bytes_per_pixel({}), 48u);
 }
 
-TEST(Aovs, PlanesAreSortedAsAFileSortsThem) {
+TEST(Aovs, PlanesAreInTheOrderOfTheFile) {
   EXPECT_THAT(planes_of(AovSet{}.with(Aov::depth).with(Aov::direct)).names,
               ElementsAre("aov.depth.Z", "aov.direct.B", "aov.direct.G", "aov.direct.R", "aov.hits"));
   const auto all = planes_of(AovSet(~0u)).names;
@@ -94,7 +94,7 @@ TEST(Partial, WithAovsSurvivesEncodingBitForBit) {
   }
 }
 
-TEST(Partial, WithoutAovsIsTheSixChannels) {
+TEST(Partial, WithoutAovsHasSixChannels) {
   const Partial partial = make_partial(kGrid, 0, {0, 2});
 
   const auto exr = encoded(partial);
@@ -104,7 +104,7 @@ TEST(Partial, WithoutAovsIsTheSixChannels) {
   EXPECT_EQ(decode_partial(exr, partial.header, kFrame).value(), partial);
 }
 
-TEST(PartialGate, TakesExactlyTheAovsThatAreAskedFor) {
+TEST(PartialGate, RequiresExactlyTheRequestedAovs) {
   const Partial partial = with_aovs(0, {0, 2}), plain = with_aovs(0, {0, 2}, {});
 
   EXPECT_THAT(refusal(decode_partial(encoded(partial), partial.header, kFrame)),
@@ -130,7 +130,7 @@ TEST(PartialGate, RefusesChannelsThatNoAovHas) {
   EXPECT_THAT(renamed("id.shape_id.7.n", "id.shape_id.8.n"), HasSubstr("belongs"));
 }
 
-TEST(PartialGate, NoFlippedBitOfAnAovGoesUnnoticed) {
+TEST(PartialGate, DetectsEveryFlippedBitOfAnAov) {
   const Partial partial = with_aovs(5, {0, 2});
   const auto good = encoded(partial);
   const Digest digest = unit_digest(partial);
@@ -148,7 +148,7 @@ TEST(PartialGate, NoFlippedBitOfAnAovGoesUnnoticed) {
   EXPECT_LE(harmless, (planes_of(kSome).count() + 6) * 4 + 16);
 }
 
-TEST(PartialGate, RefusesCountsAndIdentifiersThatNoRendererMakes) {
+TEST(PartialGate, RefusesImpossibleCountsAndIdentifiers) {
   const auto told = [](auto change) {
     // Four samples, all with the same object in every pixel.
     Partial partial = with_aovs(0, {4, 8});
@@ -222,7 +222,7 @@ TEST(Film, BeautyHasTheSameBitsWithAndWithoutAovs) {
   EXPECT_EQ(rich.error(), plain.error());
 }
 
-TEST(Film, WithAovsIsContinuedToTheBitsOfOneShot) {
+TEST(Film, ContinuedFilmWithAovsHasTheBitsOfOneRender) {
   Film film = film_of(24);
   for (TileIndex t = 0; t < kGrid.count(); ++t)
     for (RoundIndex k = film.full_rounds(t); k < round_count(48); ++k)
@@ -253,7 +253,7 @@ PartialSource source(std::string name, const Partial& partial) {
   return {std::move(name), [bytes = encoded(partial)] { return Result<std::vector<std::byte>>(bytes); }};
 }
 
-TEST(Merge, OfPartialsWithAovsIsTheFilm) {
+TEST(Merge, PartialsWithAovsGiveTheFilm) {
   std::vector<PartialSource> sources;
   for (TileIndex t = kGrid.count(); t-- > 0;)
     for (RoundIndex k = round_count(12); k-- > 0;)

@@ -1,5 +1,5 @@
 // Synthetic images with known noise. Seeds are fixed. The derivation of each threshold is beside it.
-#include "common/image/error/area_error.h"
+#include "core/image/error/area_error.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "common/image/error/error_estimate.h"
+#include "core/image/error/error_estimate.h"
 
 namespace ls {
 namespace {
@@ -71,7 +71,7 @@ AreaCoverage held_areas(int images, double pixel, double square, double image, b
 
 // A share of 400 images that is expected to be 0.95 has the standard deviation 0.011: 0.9 and 0.995 are more
 // than four away.
-TEST(AreaError, IntervalsHoldForIndependentPixelsAndForSquaresThatErrAlike) {
+TEST(AreaError, IntervalsHoldForIndependentPixelsAndForSquaresWithSharedErrors) {
   for (const double square : {0., .02}) {
     const AreaCoverage held = held_areas(400, .1, square, 0, false);
     EXPECT_GT(held.mean, .9) << square;
@@ -80,7 +80,7 @@ TEST(AreaError, IntervalsHoldForIndependentPixelsAndForSquaresThatErrAlike) {
   }
 }
 
-TEST(AreaError, TheIntervalOfTheMeanHoldsForErrorsThatAllPixelsHaveInCommonIfItIsToldOfThem) {
+TEST(AreaError, IntervalOfTheMeanHoldsForKnownSharedErrors) {
   const AreaCoverage held = held_areas(400, .1, 0, .01, true);
   EXPECT_GT(held.mean, .9);
   EXPECT_LT(held.mean, .995);
@@ -89,7 +89,7 @@ TEST(AreaError, TheIntervalOfTheMeanHoldsForErrorsThatAllPixelsHaveInCommonIfItI
 }
 
 // With 1,024 samples the last round has 64: its part is far smaller than that of the samples before it.
-TEST(AreaError, TheIntervalOfTheMeanHoldsForErrorsInCommonAlsoIfTheLastRoundIsSmall) {
+TEST(AreaError, IntervalOfTheMeanHoldsForSharedErrorsEvenIfTheLastRoundIsSmall) {
   std::mt19937_64 random(23);
   std::normal_distribution<double> normal;
   constexpr std::uint64_t kSamples = 1024, kLast = 64, kBefore = kSamples - kLast;

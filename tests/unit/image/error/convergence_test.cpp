@@ -1,4 +1,4 @@
-#include "common/image/error/convergence.h"
+#include "core/image/error/convergence.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "common/image/frame/rounds.h"
+#include "core/image/frame/rounds.h"
 #include "tests/support/significance.h"
 
 namespace ls {
@@ -60,7 +60,7 @@ std::vector<ErrorPoint> checkpoints(Job& job, RoundIndex rounds) {
   return points;
 }
 
-TEST(Trend, OfThePowerLawIsItsExponent) {
+TEST(Trend, PowerLawHasItsExponent) {
   for (const double slope : {.5, 1., 1.5}) {
     std::vector<ErrorPoint> points;
     for (double spp = 8; spp <= 1024; spp *= 2) {
@@ -85,14 +85,14 @@ TEST(Trend, NeedsThreeDoublings) {
   EXPECT_FALSE(trend_of({}));
 }
 
-TEST(Trend, UsesDoublingsOfALongJobOnly) {
+TEST(Trend, LongJobUsesOnlyDoublings) {
   Job job(50, 3);
   const auto trend = trend_of(checkpoints(job, 5 + 32));  // up to 2048 samples
   ASSERT_TRUE(trend);
   EXPECT_EQ(trend->points, 9);  // at 2048, 1024, ..., 8 samples
 }
 
-TEST(Trend, IgnoresPointsThatAreNoFigures) {
+TEST(Trend, IgnoresInvalidPoints) {
   Job job(100, 1);
   auto points = checkpoints(job, 7);
   const auto before = trend_of(points)->slope;
@@ -107,7 +107,7 @@ TEST(Trend, IgnoresPointsThatAreNoFigures) {
 // Returns the tolerance for the fraction of successes in n independent trials of probability .95.
 double spread(int n) { return test::kStandardErrors * std::sqrt(.95 * .05 / n); }
 
-TEST(Trend, ItsIntervalCoversTheTrueSlopeInNineteenOfTwentyJobs) {
+TEST(Trend, IntervalCoversTheTrueSlopeInNineteenOfTwentyJobs) {
   constexpr int kJobs = 1000;
   int covered = 0;
   for (int i = 0; i < kJobs; ++i) {
@@ -119,7 +119,7 @@ TEST(Trend, ItsIntervalCoversTheTrueSlopeInNineteenOfTwentyJobs) {
   EXPECT_NEAR(covered / double{kJobs}, .95, spread(kJobs) + .01);
 }
 
-TEST(Trend, SaysInWordsHowItGoes) {
+TEST(Trend, DescribesTheTrendInWords) {
   Job slow(4000, 1, .6), fair(4000, 2, 1), fast(4000, 3, 1.5);
   EXPECT_THAT(trend_of(checkpoints(slow, 9))->verdict, HasSubstr("slower than 1/N"));
   EXPECT_EQ(trend_of(checkpoints(fair, 9))->verdict, "converging as expected");
@@ -136,7 +136,7 @@ std::vector<ErrorPoint> against_a_reference(double bias) {
   return points;
 }
 
-TEST(ConvergenceStatus, TellsABiasFloorOnlyWhereTheTrueErrorStays) {
+TEST(ConvergenceStatus, ReportsABiasFloorOnlyIfTheTrueErrorStays) {
   using Kind = ConvergenceStatus::Kind;
   EXPECT_EQ(judge(against_a_reference(0), "").kind, Kind::converging);
   // The squared bias 2.5e-5 is within the interval of the error 9.8e-4.
@@ -154,7 +154,7 @@ TEST(ConvergenceStatus, TellsABiasFloorOnlyWhereTheTrueErrorStays) {
 
 // The jobs and the reference have no bias. The true error is another sample from the distribution of the
 // estimated one.
-TEST(ConvergenceStatus, SeesNoFloorWhereThereIsNone) {
+TEST(ConvergenceStatus, ReportsNoFloorWithoutOne) {
   int floors = 0;
   for (std::uint64_t i = 0; i < 200; ++i) {
     Job job(400, 9000 + i), realised(400, 20000 + i);
@@ -167,7 +167,7 @@ TEST(ConvergenceStatus, SeesNoFloorWhereThereIsNone) {
   EXPECT_LE(floors, 1);
 }
 
-TEST(ConvergenceStatus, PutsDoubtFirst) {
+TEST(ConvergenceStatus, ShowsDoubtFirst) {
   EXPECT_EQ(judge(against_a_reference(.05), "don't trust yet: ...").kind,
             ConvergenceStatus::Kind::heavy_tail);
   EXPECT_EQ(judge({}, "").kind, ConvergenceStatus::Kind::early);
@@ -178,7 +178,7 @@ TEST(ConvergenceStatus, PutsDoubtFirst) {
   EXPECT_EQ(judge(checkpoints(fast, 9), "").kind, ConvergenceStatus::Kind::fast);
 }
 
-TEST(Forecast, OfAJobThatIsThereIsZero) {
+TEST(Forecast, ReachedTargetHasZeroForecast) {
   Job job(100, 1);
   const auto points = checkpoints(job, 6);
   const auto forecast = forecast_of(points, 2 * points.back().relmse);
@@ -187,7 +187,7 @@ TEST(Forecast, OfAJobThatIsThereIsZero) {
   EXPECT_EQ(forecast->core_seconds_hi, 0);
 }
 
-TEST(Forecast, IsTheEndOfTheRoundThatReachesTheTarget) {
+TEST(Forecast, EndsAtTheRoundThatReachesTheTarget) {
   const std::vector<ErrorPoint> now{{64, 10, .02, .0199, .0201}};
   // This takes twice the samples, 128, where a round ends.
   const auto forecast = forecast_of(now, .01);
@@ -263,7 +263,7 @@ TEST(Forecast, HoldsInNineOfTenCasesWhereTheSlopeFlattens) {
 
 // The interval must not be needlessly wide: if the slope is always 1, the ends for a quarter of the error
 // differ by less than a factor of 2.
-TEST(Forecast, IsOfUseWhereTheSlopeStays) {
+TEST(Forecast, IsAccurateIfTheSlopeStays) {
   Job job(4000, 1);
   const auto points = checkpoints(job, 8);
   const auto forecast = forecast_of(points, points.back().relmse / 4);

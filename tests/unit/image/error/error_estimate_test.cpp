@@ -1,5 +1,5 @@
 // Synthetic images with known noise. Seeds are fixed. The derivation of each threshold is beside it.
-#include "common/image/error/error_estimate.h"
+#include "core/image/error/error_estimate.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -243,7 +243,7 @@ TEST(ErrorEstimate, SumsOfTilesAreThoseOfTheImage) {
   EXPECT_DOUBLE_EQ(e.relmse, both.relative.squares / (6 * kErrorPixels));
 }
 
-TEST(ErrorEstimate, HeavyTailsGetAVerdictInsteadOfTrust) {
+TEST(ErrorEstimate, HeavyTailsAreUntrusted) {
   std::mt19937_64 random(6);
   // A Pareto distribution with tail index 1.1 has no variance.
   const auto pareto = [](std::mt19937_64& r) {
@@ -264,7 +264,7 @@ TEST(ErrorEstimate, HeavyTailsGetAVerdictInsteadOfTrust) {
 
 // Twelve of 1,024 pixels carry the error. At the edge of a lamp each half has found light; an outlier is in
 // one half.
-TEST(ErrorEstimate, FewPixelsThatCarryTheErrorAreDoubtedOnlyIfTheirLightIsInOneHalf) {
+TEST(ErrorEstimate, FewPixelsThatCarryTheErrorAreUntrustedOnlyIfTheirLightIsInOneHalf) {
   std::vector<double> a(3 * kErrorPixels, 1.0), edge(3 * kErrorPixels, 1.0), outliers(3 * kErrorPixels, 1.0);
   for (std::size_t i = 0; i < 3 * kErrorPixels; ++i) {
     if (i % kErrorPixels % 85 != 3) continue;
@@ -299,7 +299,7 @@ TEST(ErrorEstimate, RmseHasNoIntervalWhereFewBrightPixelsCarryIt) {
   EXPECT_GT(none.rmse_hi, none.rmse);
 }
 
-TEST(ErrorEstimate, LowerEndStaysAboveZeroWhateverThePixels) {
+TEST(ErrorEstimate, LowerEndStaysAboveZeroForAllPixels) {
   std::vector<double> a(3 * kErrorPixels, 1.0), b(3 * kErrorPixels, 1.0);
   a[17] = 1e6;
 
@@ -312,7 +312,7 @@ TEST(ErrorEstimate, LowerEndStaysAboveZeroWhateverThePixels) {
   EXPECT_FALSE(e.trusted);
 }
 
-TEST(ErrorEstimate, EqualHalvesHaveNoErrorAndAreBelievedOnlyAfterSomeSamples) {
+TEST(ErrorEstimate, EqualHalvesHaveNoErrorAndAreTrustedOnlyAfterSomeSamples) {
   const std::vector<double> flat(3 * kErrorPixels, 0.25);
 
   const ImageError early = image_error(estimate_error({kErrorSide, kErrorSide, flat, flat}, 2));
@@ -325,7 +325,7 @@ TEST(ErrorEstimate, EqualHalvesHaveNoErrorAndAreBelievedOnlyAfterSomeSamples) {
   EXPECT_EQ(image_error(TileError{}).relmse, 0);
 }
 
-TEST(ErrorEstimate, IsNotBelievedWhereNoSampleHasFoundLight) {
+TEST(ErrorEstimate, IsUntrustedIfNoSampleFoundLight) {
   std::vector<double> black(3 * kErrorPixels), spark(3 * kErrorPixels);
   spark[17] = 1;
 
@@ -351,7 +351,7 @@ TEST(ErrorEstimate, WorksOnTilesOfAnyShape) {
   }
 }
 
-TEST(FewHits, ArePixelsWhoseLightStandsInOneHalf) {
+TEST(FewHits, ArePixelsWithLightInOneHalfOnly) {
   std::vector<double> a(3 * kErrorPixels, 1.0), b(3 * kErrorPixels, 1.0);
   const auto set = [&](std::size_t p, double in_a, double in_b) {
     for (std::size_t c = 0; c < 3; ++c) a[c * kErrorPixels + p] = in_a, b[c * kErrorPixels + p] = in_b;
@@ -369,7 +369,7 @@ TEST(FewHits, ArePixelsWhoseLightStandsInOneHalf) {
   EXPECT_FALSE(has_few_hits(halves, 300 % kErrorSide, 300 / kErrorSide));
 }
 
-TEST(FewHits, AreNotThePixelsBesideASilhouette) {
+TEST(FewHits, ExcludePixelsAlongASilhouette) {
   std::vector<double> half(3 * kErrorPixels);
   for (std::size_t i = 0; i < half.size(); ++i)
     // The left part is lit, the rest is black.
@@ -397,7 +397,7 @@ TEST(Checkpoints, CompleteWhenAllTilesHaveTheRound) {
   EXPECT_EQ(points.at(1).plain.squares, 60);
 }
 
-TEST(Checkpoints, StoppedTilesStandWithTheirLastFigures) {
+TEST(Checkpoints, StoppedTilesKeepTheirLastFigures) {
   Checkpoints points(2);
   points.folded(0, 0, figures(1));
   points.stopped(0);
@@ -417,7 +417,7 @@ TEST(Checkpoints, StoppedTilesStandWithTheirLastFigures) {
   EXPECT_EQ(points.at(2).plain.squares, 13);
 }
 
-TEST(Checkpoints, AReplacedRoundTakesTheNewerFigures) {
+TEST(Checkpoints, ReplacedRoundUsesTheNewerFigures) {
   Checkpoints points(2);
   points.folded(0, 0, figures(1));
   points.folded(0, 1, figures(5));

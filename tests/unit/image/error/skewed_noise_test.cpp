@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
-#include "common/image/error/error_estimate.h"
-#include "common/image/film/film.h"
+#include "core/image/error/error_estimate.h"
+#include "core/image/film/film.h"
 
 namespace ls {
 namespace {
@@ -69,7 +69,7 @@ Sums trial(std::mt19937_64& random) {
 // of which g leaves nearly all. The mean ratio of 400 trials of 1,024 pixels has the standard error 2 /
 // sqrt(400 * 1024) = .3 %. The additional .5 % is for terms of second order in the noise, a few times the
 // square of 4 %.
-TEST(SkewedNoise, TheLastRoundTellsWhatItTakesOffTheRelativeError) {
+TEST(SkewedNoise, LastRoundCorrectsTheRelativeErrorForSkew) {
   std::mt19937_64 random(11);
   Sums sum;
   for (int i = 0; i < 400; ++i) {
@@ -81,7 +81,7 @@ TEST(SkewedNoise, TheLastRoundTellsWhatItTakesOffTheRelativeError) {
   EXPECT_NEAR(sum.corrected / sum.realised, 1, .005 + 4 * .003);
 }
 
-TEST(SkewedNoise, ThereIsNothingToCorrectWhereItIsDark) {
+TEST(SkewedNoise, DarkPixelsNeedNoCorrection) {
   std::vector<double> a(3 * kNoisyPixels), b = a, a0 = a, b0 = a;
   std::mt19937_64 random(12);
   std::normal_distribution<double> normal(0, 1e-3);
@@ -93,7 +93,7 @@ TEST(SkewedNoise, ThereIsNothingToCorrectWhereItIsDark) {
 }
 
 // With few samples, more is unknown of the weights than the first order of the noise tells.
-TEST(SkewedNoise, AnIntervalOfFewSamplesContainsBothWaysToWeighAndReachesBeyond) {
+TEST(SkewedNoise, IntervalOfFewSamplesIsWiderThanTheIntervalsOfBothWeightings) {
   std::mt19937_64 random(13);
   Halves before = skewed(2, random), now = skewed(2, random);
   for (std::size_t h = 0; h < 2; ++h)
@@ -163,7 +163,7 @@ Partial partial_of(const TileGrid& grid, const SampleRange& range, std::uint64_t
   return p;
 }
 
-TEST(SkewedNoise, AFilmRemembersTheCorrectionOverARestart) {
+TEST(SkewedNoise, FilmKeepsTheCorrectionOverARestart) {
   const TileGrid grid{{kSkewedSide, kSkewedSide}, kSkewedSide};
   Film film(grid);
   for (const RoundIndex k : {0, 1, 2, 3}) ASSERT_TRUE(film.fold(0, k, partial_of(grid, round_range(k), k)));
@@ -176,7 +176,7 @@ TEST(SkewedNoise, AFilmRemembersTheCorrectionOverARestart) {
 }
 
 // The error after round k must not depend on whether a truncated round k was folded before.
-TEST(SkewedNoise, ATailThatIsReplacedLeavesNoTrace) {
+TEST(SkewedNoise, ReplacedTailLeavesNoTrace) {
   const TileGrid grid{{kSkewedSide, kSkewedSide}, kSkewedSide};
   Film once(grid), twice(grid);
   for (const RoundIndex k : {0, 1, 2})

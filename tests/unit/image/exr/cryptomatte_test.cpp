@@ -5,8 +5,8 @@
 #include <bit>
 #include <random>
 
-#include "common/image/aov/identifiers.h"
-#include "common/image/exr/final_image.h"
+#include "core/image/aov/identifiers.h"
+#include "core/image/exr/final_image.h"
 #include "tests/unit/image/support.h"
 #include "worker/fake/fake_pixels.h"
 
@@ -50,7 +50,7 @@ TEST(IdSlots, AddExactlyInAnyOrderWhileTheySuffice) {
   EXPECT_EQ(first.more, 0);
 }
 
-TEST(IdSlots, BeyondThemTheLargestStayAndTheRestIsCounted) {
+TEST(IdSlots, OverflowKeepsTheLargestAndCountsTheRest) {
   std::vector<IdSlot> many;
   for (int id = 1; id <= kIdSlots + 3; ++id) many.push_back({static_cast<float>(id), static_cast<float>(id)});
 
@@ -64,7 +64,7 @@ TEST(IdSlots, BeyondThemTheLargestStayAndTheRestIsCounted) {
   EXPECT_NE(wrong_with(slots, 165), "");
 }
 
-TEST(IdSlots, PlanesGiveThemBack) {
+TEST(IdSlots, RoundTripThroughPlanes) {
   const IdSlots slots = seen({{3, 1}, {5, 7}});
   std::vector<float> planes(kIdPlanes * 4, -1);
 
@@ -106,7 +106,7 @@ TEST(Cryptomatte, EveryIdentifierIsAnOrdinaryFloat) {
   EXPECT_GT(turned, 0);
 }
 
-TEST(FinalImage, HasTheLayersThatAreAskedFor) {
+TEST(FinalImage, HasTheRequestedLayers) {
   const AovSet aovs = AovSet{}.with(Aov::depth).with(Aov::normal).with(Aov::shape_id).with(Aov::coverage);
   const TileGrid grid{{20, 12}, 8};
   Film film(grid, aovs);
@@ -136,7 +136,7 @@ TEST(FinalImage, HasTheLayersThatAreAskedFor) {
   EXPECT_THAT(picture.strings["cryptomatte/f834d0a/manifest"], HasSubstr("3f800000"));
 }
 
-TEST(FinalImage, WithoutAovsHasNoByteMore) {
+TEST(FinalImage, WithoutAovsHasNoExtraBytes) {
   const Film film = make_film({{20, 12}, 8}, 4);
   Provenance plain, named;
   named.manifests = {"{}", "{}"};

@@ -1,4 +1,4 @@
-#include "common/image/exr/exr_file.h"
+#include "core/image/exr/exr_file.h"
 
 #include <ImfChannelList.h>
 #include <ImfChromaticities.h>
@@ -23,7 +23,7 @@
 #include <fstream>
 #include <optional>
 
-#include "common/image/exr/memory.h"
+#include "core/image/exr/memory.h"
 
 namespace ls {
 namespace {
@@ -149,7 +149,7 @@ TEST(ExrImage, ChromaticitiesAreConvertedAsInMitsuba) {
   EXPECT_NEAR(xyz[2], .176218, 2e-4);
 }
 
-TEST(ExrImage, Rec709IsLeftAloneAndPrimariesOfNoSpaceGiveNoFiniteMatrix) {
+TEST(ExrImage, Rec709IsUnchangedAndInvalidPrimariesGiveNoMatrix) {
   EXPECT_FALSE(read_exr_image(write({}), "plain")->to_srgb);
   EXPECT_FALSE(read_exr_image(write({.primaries = Imf::Chromaticities()}), "rec709")->to_srgb);
   EXPECT_FALSE(read_exr_image(write({.channels = {"Y"}}), "grey")->to_srgb);
@@ -210,7 +210,7 @@ void each_block(int side, Check check, Done done) {
       }
 }
 
-TEST(ExrRead, TakesPxr24WithFloatsOf24Bits) {
+TEST(ExrRead, ReadsPxr24WithFloatsOf24Bits) {
   for (const bool tiled : {false, true}) {
     EXPECT_EQ(packed(Imf::PXR24_COMPRESSION, Imf::HALF, tiled).is,
               packed(Imf::PXR24_COMPRESSION, Imf::HALF, tiled).was);
@@ -231,7 +231,7 @@ int step_of(float v) { return half(v).bits(); }
 // difference exceeds spread / 2^s + 1, with `spread` the largest distance in the block. So s is 0 if spread
 // is at most 30, and otherwise spread / 2^(s-1) > 30. Values are rounded to the nearest step, so the error is
 // at most 2^(s-1) < spread / 30. Floats are not compressed.
-TEST(ExrRead, TakesB44AsFarAsItsStepsReach) {
+TEST(ExrRead, ReadsB44WithinItsQuantisation) {
   for (const auto compression : {Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION})
     for (const bool tiled : {false, true}) {
       EXPECT_EQ(packed(compression, Imf::FLOAT, tiled).is, packed(compression, Imf::FLOAT, tiled).was);
@@ -264,7 +264,7 @@ double on_dwa_scale(double v) { return v <= 1 ? std::pow(v, 1 / 2.2) : std::log(
 // (a sum over 64 values, divided by 8), and a rounding is 2^-11 of the number: over a block, 2^-11 times 2.2
 // per pixel. There are four such roundings (to the scale, to Y'CbCr, and back from both), which blue enlarges
 // by up to 2.9.
-TEST(ExrRead, TakesDwaWithinItsQuantisation) {
+TEST(ExrRead, ReadsDwaWithinItsQuantisation) {
   constexpr double kBase = 45. / 100'000, kY = 6.71 * kBase, kC = 5.31 * kBase;
   const double bound = kY + 1.8556 * kC + 2.9 * 4 * 0x1p-11 * 2.2;
   for (const auto compression : {Imf::DWAA_COMPRESSION, Imf::DWAB_COMPRESSION})
@@ -288,17 +288,17 @@ TEST(ExrRead, TakesDwaWithinItsQuantisation) {
       }
 }
 
-TEST(ExrRead, TakesTheDataWindowWhereverItLies) {
+TEST(ExrRead, ReadsAnyDataWindow) {
   expect_rgb(read_exr_rgb(write({.x0 = -5, .y0 = 1000}), "shifted"));
   expect_rgb(read_exr_rgb(write({.x0 = 2'000'000, .y0 = -2'000'000, .tiled = true}), "far away"));
 }
 
-TEST(ExrRead, TakesGreyAndIgnoresOtherChannels) {
+TEST(ExrRead, ReadsGreyAndIgnoresOtherChannels) {
   expect_rgb(read_exr_rgb(write({.channels = {"Y"}}), "grey"), true);
   expect_rgb(read_exr_rgb(write({.channels = {"R", "G", "B", "A", "Z"}}), "more"));
 }
 
-TEST(ExrRead, TakesTheFirstPartWithColour) {
+TEST(ExrRead, ReadsTheFirstPartWithColour) {
   exr::MemoryWriter out;
   {
     std::vector<Imf::Header> headers(2, Imf::Header(kExrWidth, kExrHeight));
@@ -320,7 +320,7 @@ TEST(ExrRead, TakesTheFirstPartWithColour) {
   expect_rgb(read_exr_rgb(out.take(), "parts"));
 }
 
-TEST(ExrRead, RefusesWhatItDoesNotUnderstandNamingTheFile) {
+TEST(ExrRead, RefusesUnsupportedFilesByName) {
   const auto refusal = [](const Foreign& f) {
     const auto got = read_exr_rgb(write(f), "sky.exr");
     return got ? "accepted" : got.error().message;
@@ -332,7 +332,7 @@ TEST(ExrRead, RefusesWhatItDoesNotUnderstandNamingTheFile) {
   EXPECT_FALSE(read_exr_rgb(std::vector<std::byte>{}, "sky.exr"));
 }
 
-TEST(ExrRead, KeepsItsLimits) {
+TEST(ExrRead, EnforcesItsLimits) {
   const auto exr = write({});
 
   EXPECT_THAT(read_exr_rgb(exr, "a", {.max_bytes = 100}).error().message, HasSubstr("limit"));
@@ -343,7 +343,7 @@ TEST(ExrRead, KeepsItsLimits) {
 }
 
 // Small files that claim a large size must be rejected before memory of that size is allocated.
-TEST(ExrRead, DoesNotBelieveLargeClaims) {
+TEST(ExrRead, RefusesClaimedSizesBeyondTheFile) {
   const ExrLimits wide{.max_pixels = std::uint64_t{1} << 32, .max_side = 1 << 30};
   const auto claim = [&](const Foreign& f, std::string_view attribute, std::size_t skip,
                          std::vector<std::int32_t> values) {
@@ -480,7 +480,7 @@ ExrPicture rows_of(int y0, int rows) {
   return picture;
 }
 
-TEST(ExrWrite, APictureInBandsIsTheFileOfTheWholePicture) {
+TEST(ExrWrite, ImageWrittenInBandsEqualsTheWholeImage) {
   ExrPicture whole = rows_of(0, 50);
   whole.strings = {{"lightshaft:test", "hello"}};
   Memory sink;
@@ -499,7 +499,7 @@ TEST(ExrWrite, APictureInBandsIsTheFileOfTheWholePicture) {
   EXPECT_EQ(sink.bytes, write_exr(whole).value());
 }
 
-TEST(ExrWrite, TellsWhyABandCouldNotBeWrittenWhereverThatWas) {
+TEST(ExrWrite, ReportsWhyABandCouldNotBeWritten) {
   const auto length = write_exr(rows_of(0, 50)).value().size();
   for (std::size_t most = 0; most < length; most += 97) {
     Memory sink;
@@ -512,7 +512,7 @@ TEST(ExrWrite, TellsWhyABandCouldNotBeWrittenWhereverThatWas) {
   }
 }
 
-TEST(ExrWrite, RefusesBandsThatAreNotThoseOfThePicture) {
+TEST(ExrWrite, RefusesBandsThatDoNotMatchTheImage) {
   Memory sink;
   EXPECT_FALSE(write_sealed_exr({{7, 40}, {}, [](int) { return rows_of(0, 25); }}, sink)) << "too many rows";
   EXPECT_FALSE(write_sealed_exr({{8, 50}, {}, [](int) { return rows_of(0, 25); }}, sink)) << "too narrow";

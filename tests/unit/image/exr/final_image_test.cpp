@@ -1,4 +1,4 @@
-#include "common/image/exr/final_image.h"
+#include "core/image/exr/final_image.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -9,7 +9,7 @@
 #include <cstring>
 #include <limits>
 
-#include "common/image/exr/exr_file.h"
+#include "core/image/exr/exr_file.h"
 #include "tests/unit/image/support.h"
 
 namespace ls {
@@ -90,7 +90,7 @@ TEST(FinalExr, HoldsMeansErrorsSamplesAndProvenance) {
   for (TileIndex t = 0; t < kFinalGrid.count(); ++t) EXPECT_THAT(text, HasSubstr(film.tile_digest(t).hex()));
 }
 
-TEST(FinalExr, IsAFunctionOfFilmAndProvenance) {
+TEST(FinalExr, DependsOnlyOnFilmAndProvenance) {
   EXPECT_EQ(final_exr(make_film(kFinalGrid, 6), some_provenance(), false)->exr,
             final_exr(make_film(kFinalGrid, 6), some_provenance(), false)->exr);
 }
@@ -124,7 +124,7 @@ TEST(FinalExr, RoundsToTheNearestHalf) {
   EXPECT_NEAR(rgb[2], 3e-8f, 0x1p-25f);
 }
 
-TEST(FinalExr, OfAnUnfinishedFilmHasZerosWhereNothingIs) {
+TEST(FinalExr, UnfinishedFilmHasZerosWithoutSamples) {
   Film film = make_film(kFinalGrid, 4);
   film.discard(0);
 
@@ -134,7 +134,7 @@ TEST(FinalExr, OfAnUnfinishedFilmHasZerosWhereNothingIs) {
   EXPECT_NE(rgb[3 * 8], 0);
 }
 
-TEST(FinalExr, SaysNothingOfTheErrorOfPixelsThatAreNotThere) {
+TEST(FinalExr, HasNoErrorOfMissingPixels) {
   const auto strings = [](const Film& film) {
     return read_final_exr(final_exr(film, some_provenance(), true)->exr, "part").value().strings;
   };
@@ -154,7 +154,7 @@ TEST(FinalExr, SaysNothingOfTheErrorOfPixelsThatAreNotThere) {
     EXPECT_FALSE(none.contains(std::string("lightshaft:") + key)) << key;
 }
 
-TEST(FinalExr, IsTrustedNoMoreThanItsCurve) {
+TEST(FinalExr, IsUntrustedIfItsCurveIs) {
   const Film film = make_film(kFinalGrid, 4);
   Provenance from = some_provenance();
   from.convergence_status =
@@ -214,7 +214,7 @@ TEST(Preview, ShowsNaNInMagentaAndInfinitiesAtTheEnds) {
   EXPECT_EQ(srgb8(std::array{inf, -inf, 0.0}.data(), 1), (Pixel{255, 0, 0}));
 }
 
-TEST(Preview, ShowsADarkCheckerWhereNothingIsRendered) {
+TEST(Preview, ShowsADarkCheckerboardWithoutSamples) {
   const Decoded image = decode(preview_png(Film(kFinalGrid), 0).value());
 
   EXPECT_NE(image.at(0, 0), image.at(8, 0));

@@ -1,11 +1,11 @@
-#include "common/image/exr/pixel_layers.h"
-#include "common/image/frame/frame.h"
+#include "core/image/exr/pixel_layers.h"
+#include "core/image/frame/frame.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "common/image/exr/final_image.h"
+#include "core/image/exr/final_image.h"
 #include "tests/unit/image/support.h"
 #include "worker/fake/fake_pixels.h"
 
@@ -26,7 +26,7 @@ std::vector<float> layer_values(const Film& film, const char* layer, int level, 
   return layer_floats(found, mosaic.bytes());
 }
 
-TEST(PixelLayers, OfTheImageAreItsMeansAndErrorsInHalfFloats) {
+TEST(PixelLayers, ImageLayersAreMeansAndErrorsInHalfFloats) {
   const Film film = test::make_film(kLayerGrid, 32);
 
   const auto rgb = layer_values(film, "rgb", 0, kLayerWhole),
@@ -44,7 +44,7 @@ TEST(PixelLayers, OfTheImageAreItsMeansAndErrorsInHalfFloats) {
   }
 }
 
-TEST(PixelLayers, APartIsThatPartOfTheWhole) {
+TEST(PixelLayers, PartEqualsThatPartOfTheWhole) {
   const Film film = test::make_film(kLayerGrid, 16);
   for (const int level : {0, 1, 3}) {
     const FrameSize size = level_size(kLayerGrid.frame, level);
@@ -60,7 +60,7 @@ TEST(PixelLayers, APartIsThatPartOfTheWhole) {
   }
 }
 
-TEST(PixelLayers, ABlockAtTheEdgeHasTheMeanOfItsOwnPixels) {
+TEST(PixelLayers, EdgeBlockHasTheMeanOfItsOwnPixels) {
   const Film film = test::make_film(kLayerGrid, 16);
   const TilePixels corner = film.pixels(kLayerGrid.count() - 1);  // 19 x 13 pixels, from (64, 32)
   double mean = 0, squares = 0;
@@ -76,7 +76,7 @@ TEST(PixelLayers, ABlockAtTheEdgeHasTheMeanOfItsOwnPixels) {
   EXPECT_EQ(layer_values(film, "stderr", 3, last)[0], as_half(static_cast<float>(std::sqrt(squares))));
 }
 
-TEST(PixelLayers, WithoutSamplesAreNoNumbersAndDoNotCountInBlocks) {
+TEST(PixelLayers, PixelsWithoutSamplesAreNanAndDoNotCountInBlocks) {
   Film film(kLayerGrid);
   ASSERT_TRUE(film.fold(0, 0, test::make_round(kLayerGrid, 0, 0, 16)));
 
@@ -88,7 +88,7 @@ TEST(PixelLayers, WithoutSamplesAreNoNumbersAndDoNotCountInBlocks) {
   EXPECT_EQ(level10[0], static_cast<float>(film.spp(0))) << "the mean of the pixels that have samples";
 }
 
-TEST(PixelLayers, OfAovsAreNamedAsInTheExr) {
+TEST(PixelLayers, AovLayersAreNamedAsInTheExr) {
   const AovSet aovs = AovSet().with(Aov::depth).with(Aov::shape_id).with(Aov::denoising_albedo);
   Film film(kLayerGrid, aovs);
   const UnitHeader header{test::name_of("s"), test::name_of("t"), test::name_of("c"), kLayerGrid.rect(0),
@@ -115,7 +115,7 @@ TEST(PixelLayers, OfAovsAreNamedAsInTheExr) {
   EXPECT_FALSE(pixel_layer(aovs, "albedo")) << "the job did not ask for it";
 }
 
-TEST(PixelLayers, ARequestIsBounded) {
+TEST(PixelLayers, RequestIsBounded) {
   constexpr FrameSize k4K{3840, 2160};
   EXPECT_TRUE(check_layer_rect(k4K, 0, {3328, 1648, 3840, 2160}));
   EXPECT_TRUE(check_layer_rect(k4K, 1, {0, 0, 512, 512}));

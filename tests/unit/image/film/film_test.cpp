@@ -1,4 +1,4 @@
-#include "common/image/film/film.h"
+#include "core/image/film/film.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <random>
 #include <utility>
 
-#include "common/image/exr/final_image.h"
+#include "core/image/exr/final_image.h"
 #include "tests/unit/image/support.h"
 #include "worker/fake/fake_pixels.h"
 
@@ -55,7 +55,7 @@ TEST(Film, MeanIsTheSumOfBothHalvesOverTheirCount) {
   }
 }
 
-TEST(Film, DemandsRoundsInOrderAndSaysWhichIsNext) {
+TEST(Film, RequiresRoundsInOrderAndNamesTheNext) {
   Film film(kFilmGrid);
   ASSERT_TRUE(film.fold(1, 0, make_partial(kFilmGrid, 1, {0, 2})));
   const Film before = film;
@@ -82,7 +82,7 @@ TEST(Film, RefusesPartialsOfAnotherTileOrRound) {
   EXPECT_EQ(film, Film(kFilmGrid));
 }
 
-TEST(Film, IsTheSameWhateverOrderTheTilesComeIn) {
+TEST(Film, DoesNotDependOnTheOrderOfTiles) {
   std::vector<UnitHeader> units;
   std::vector<std::pair<TileIndex, RoundIndex>> order;
   for (TileIndex t = 0; t < kFilmGrid.count(); ++t)
@@ -119,7 +119,7 @@ TEST(Film, ContinuedJobHasTheBitsOfTheOneShotJob) {
   }
 }
 
-TEST(Film, CutRoundCountsUntilALongerOneReplacesIt) {
+TEST(Film, TruncatedRoundCountsUntilALongerOneReplacesIt) {
   Film film(kFilmGrid);
   ASSERT_TRUE(film.fold(0, 0, make_partial(kFilmGrid, 0, {0, 2})));
   ASSERT_TRUE(film.fold(0, 1, make_partial(kFilmGrid, 0, {2, 4})));
@@ -221,7 +221,7 @@ Digest folded_in(const std::vector<RoundIndex>& order) {
   return pixels_sha256(film);
 }
 
-TEST(FakePixels, ShowWhenTwoRoundsAreFoldedInReversedOrder) {
+TEST(FakePixels, RevealTwoRoundsFoldedInReverse) {
   std::vector<RoundIndex> order(kFakeMarkerRounds + 4);  // more than one group of marks (fake_pixels.h)
   std::iota(order.begin(), order.end(), RoundIndex{0});
   const Digest right = folded_in(order);
@@ -236,7 +236,7 @@ TEST(FakePixels, ShowWhenTwoRoundsAreFoldedInReversedOrder) {
     }
 }
 
-TEST(FakePixels, ShowRoundsOfAShortJobFoldedAsTheyCome) {
+TEST(FakePixels, RevealRoundsFoldedInOrderOfArrival) {
   const Digest right = folded_in({0, 1, 2, 3});
   for (const auto& order :
        std::vector<std::vector<RoundIndex>>{{0, 2, 1, 3}, {0, 1, 3, 2}, {2, 0, 1, 3}, {3, 2, 1, 0}})

@@ -1,5 +1,5 @@
 // Problems counted by cause and located: the result does not depend on the order of the units.
-#include "common/image/film/health.h"
+#include "core/image/film/health.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -37,7 +37,7 @@ Health merged(const std::vector<Health>& all) {
   return sum;
 }
 
-TEST(Health, IsTheSameInWhateverOrderItsPartsCome) {
+TEST(Health, DoesNotDependOnTheOrderOfMerging) {
   std::vector<Health> all = scattered();
   const Health expected = merged(all);
   std::mt19937 random(5);
@@ -66,7 +66,7 @@ TEST(Health, KeepsTheFirstPlacesOfEachCauseRowByRowAndCountsAll) {
   EXPECT_EQ(first[5].y, 1);
 }
 
-TEST(Health, CountsAPlaceOnceHoweverOftenSomethingHappensThere) {
+TEST(Health, CountsEachPlaceOnce) {
   Health h;
   h.add(HealthCause::majorant_violation, 3, {4, 5, 6});
   h.add(HealthCause::majorant_violation, 2, {4, 5, 6});
@@ -74,7 +74,7 @@ TEST(Health, CountsAPlaceOnceHoweverOftenSomethingHappensThere) {
   EXPECT_EQ(h.majorant_violations, 5u);
 }
 
-TEST(Health, DoesNotAddUpTheInputsThatEveryUnitTellsOf) {
+TEST(Health, CountsClampedInputsOnceAlthoughEveryUnitReportsThem) {
   Health h;
   h.add(HealthCause::negative_density, 7);
   Health sum = h;
@@ -84,7 +84,7 @@ TEST(Health, DoesNotAddUpTheInputsThatEveryUnitTellsOf) {
   EXPECT_FALSE(sum.clean());
 }
 
-TEST(Health, CleanOnesAddNothing) {
+TEST(Health, HealthyUnitsAddNothing) {
   Health h;
   h.add(HealthCause::none, 1, {1, 2, 3});
   h.add(HealthCause::infinite, 0, {1, 2, 3});
@@ -100,7 +100,7 @@ TEST(Health, IsReadBackAsItWasWritten) {
             R"({"too_large":{"count":1,"first":[[3,4,5]]}})");
 }
 
-TEST(Health, ACauseThatIsNotKnownIsOneWithoutAName) {
+TEST(Health, UnknownCauseHasNoName) {
   const auto h =
       parse_health(R"({"brand_new":{"count":2,"first":[[1,1,1]]},"older":{"count":3,"first":[]}})");
   ASSERT_TRUE(h);
@@ -108,7 +108,7 @@ TEST(Health, ACauseThatIsNotKnownIsOneWithoutAName) {
   EXPECT_EQ(h->causes.at(HealthCause::unnamed).count, 5u);
 }
 
-TEST(Health, RefusesWhatItDoesNotWrite) {
+TEST(Health, RefusesMalformedText) {
   const std::string nine = "[0,0,0],[0,0,1],[0,0,2],[0,0,3],[0,0,4],[0,0,5],[0,0,6],[0,0,7],[0,0,8]";
   for (const std::string& text : {
            std::string(""),
@@ -129,7 +129,7 @@ TEST(Health, RefusesWhatItDoesNotWrite) {
     EXPECT_FALSE(parse_health(text)) << text.substr(0, 60);
 }
 
-TEST(Health, AUnitCanOnlyTellOfItself) {
+TEST(Health, UnitCannotReportPixelsOfOthers) {
   const PixelRect rect{32, 0, 64, 32};
   const SampleRange samples{4, 8};
   EXPECT_TRUE(check_health(of(HealthCause::infinite, 32, 31, 7), rect, samples));
@@ -142,7 +142,7 @@ TEST(Health, AUnitCanOnlyTellOfItself) {
   EXPECT_FALSE(check_health(many, rect, samples));
 }
 
-TEST(Health, SaysWhatIsWrongInASentence) {
+TEST(Health, DescribesProblemsInASentence) {
   EXPECT_EQ(sentence(HealthCause::not_a_number, 1), "1 sample was not a number (NaN); it counts as zero");
   EXPECT_EQ(sentence(HealthCause::infinite, 1204), "1,204 samples were infinite; they count as zero");
   EXPECT_THAT(sentence(HealthCause::too_many_surfaces, 2),

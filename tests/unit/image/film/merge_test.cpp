@@ -1,4 +1,4 @@
-#include "common/image/film/merge.h"
+#include "core/image/film/merge.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <random>
 
-#include "common/image/exr/final_image.h"
-#include "common/image/frame/render_limits.h"
+#include "core/image/exr/final_image.h"
+#include "core/image/frame/render_limits.h"
 #include "tests/unit/image/support.h"
 
 namespace ls {
@@ -40,7 +40,7 @@ std::string refusal(const std::vector<PartialSource>& sources) {
   return got ? "accepted" : got.error().message;
 }
 
-TEST(Merge, GivesTheFilmOfTheCoordinatorWhateverTheOrderOfFiles) {
+TEST(Merge, GivesTheCoordinatorsFilmForAnyOrderOfFiles) {
   for (const std::uint64_t spp : {2u, 6u, 70u}) {
     auto sources = all_of(spp);
     std::shuffle(sources.begin(), sources.end(), std::mt19937(7));
@@ -54,7 +54,7 @@ TEST(Merge, GivesTheFilmOfTheCoordinatorWhateverTheOrderOfFiles) {
   }
 }
 
-TEST(Merge, RefusesAFrameOfMoreTilesThanThereMayBe) {
+TEST(Merge, RefusesAFrameWithTooManyTiles) {
   const TileGrid vast{{kMaxFrameSide, kMaxFrameSide}, 1};
   EXPECT_THAT(refusal({source_of(make_round(vast, 0, 0, 2), "", vast.frame)}), HasSubstr("1073741824 tiles"));
 }
@@ -81,7 +81,7 @@ TEST(Merge, RefusesDuplicatesThatDifferNamingBoth) {
               AllOf(HasSubstr("x0y0s0.exr"), HasSubstr("x0y0s0-wrong.exr"), HasSubstr("differ")));
 }
 
-TEST(Merge, TakesTheFullRoundInsteadOfTheCutOne) {
+TEST(Merge, PrefersTheFullRoundToATruncatedOne) {
   auto sources = all_of(6);
   for (TileIndex t = 0; t < kGrid.count(); ++t) sources.push_back(source_of(make_partial(kGrid, t, {4, 8})));
 
@@ -142,7 +142,7 @@ TEST(Merge, NamesTheFileThatIsDamaged) {
   EXPECT_THAT(refusal({}), HasSubstr("no partials"));
 }
 
-TEST(Merge, NoticesAFileThatChangesBetweenItsTwoReadings) {
+TEST(Merge, DetectsAFileThatChangesWhileReading) {
   auto sources = all_of(2);
   auto count = std::make_shared<int>(0);
   sources[0].read = [count]() {

@@ -1,4 +1,4 @@
-#include "common/image/film/partial.h"
+#include "core/image/film/partial.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <cstring>
 #include <limits>
 
-#include "common/image/frame/render_limits.h"
+#include "core/image/frame/render_limits.h"
 #include "tests/unit/image/support.h"
 
 namespace ls {
@@ -89,7 +89,7 @@ TEST(Partial, SurvivesEncodingBitForBit) {
   }
 }
 
-TEST(Partial, FileTellsItsOwnHeaderAndFrame) {
+TEST(Partial, FileContainsItsHeaderAndFrame) {
   const Partial partial = make_partial(kPartialGrid, 5, {0, 2});
 
   const auto file = decode_partial_file(encoded(partial));
@@ -143,7 +143,7 @@ TEST(PartialGate, RefusesTrailingBytes) {
 
 // If one bit is flipped, the file is rejected, or it decodes to other sums and so has another digest, or the
 // byte is one that is not decoded (aspect ratio, screen window, the "linear" hints of the channels).
-TEST(PartialGate, NoFlippedBitGoesUnnoticed) {
+TEST(PartialGate, DetectsEveryFlippedBit) {
   const Partial partial = make_partial(kPartialGrid, 5, {0, 2});
   const auto good = encoded(partial);
   const Digest digest = unit_digest(partial);

@@ -3,8 +3,8 @@
 
 #include <cstring>
 
-#include "common/image/exr/final_image.h"
-#include "common/image/film/film.h"
+#include "core/image/exr/final_image.h"
+#include "core/image/film/film.h"
 #include "tests/unit/image/support.h"
 
 namespace ls {
@@ -26,7 +26,7 @@ Film alike(double value, RoundIndex rounds) {
   return film;
 }
 
-TEST(Sums, OfMoreOnesThanFloat32CountsAreExact) {
+TEST(Sums, MoreOnesThanFloat32HoldsAddUpExactly) {
   // 64 samples in all but the first few rounds: more than 2^25 together.
   const Film film = alike(1, (1 << 19) + 8);
 
@@ -35,7 +35,7 @@ TEST(Sums, OfMoreOnesThanFloat32CountsAreExact) {
   EXPECT_EQ(film.pixels(0).standard_error[0], 0) << "equal samples have no variance, not even a negative one";
 }
 
-TEST(Sums, OfTenthsDriftByNoMoreThanTheirRounding) {
+TEST(Sums, TenthsDriftByAtMostTheirRounding) {
   const Film film = alike(.1, 1 << 14);
 
   // The float32 sum of each unit has the same relative error of at most 2^-24, so the mean has no larger one.
@@ -73,7 +73,7 @@ void fold_tenths(Film& film, int rounds) {
   }
 }
 
-TEST(Sums, OfABillionTenthsAreExactToTheLastSample) {
+TEST(Sums, BillionTenthsAddUpExactly) {
   constexpr int kMore = 1000;
   Film film = long_ago(1'000'000'000 - 64 * kMore);
 
@@ -86,7 +86,7 @@ TEST(Sums, OfABillionTenthsAreExactToTheLastSample) {
   EXPECT_EQ(film.pixels(0).standard_error[0], 0);
 }
 
-TEST(Sums, OfMoreSamplesThanAnIntHoldsKeepTheirCountInTheImage) {
+TEST(Sums, MoreSamplesThanAnIntHoldsKeepTheirCountInTheImage) {
   Film film = long_ago(3'000'000'000);
 
   fold_tenths(film, 1);

@@ -1,4 +1,4 @@
-#include "common/image/reference/flip.h"
+#include "core/image/reference/flip.h"
 
 #include <gtest/gtest.h>
 
@@ -39,12 +39,12 @@ Picture waves(double power, double scale, bool other) {
 double ldr(const Picture& r, const Picture& t) { return mean_of(ldr_flip(r.view(), t.view())); }
 double hdr(const Picture& r, const Picture& t) { return mean_of(hdr_flip(r.view(), t.view())); }
 
-TEST(Flip, OfEqualImagesIsZero) {
+TEST(Flip, EqualImagesHaveZero) {
   EXPECT_EQ(ldr(waves(1, 1, false), waves(1, 1, false)), 0);
   EXPECT_EQ(hdr(waves(3, 20, false), waves(3, 20, false)), 0);
 }
 
-TEST(Flip, DoesNotDependOnWhichImageIsFirstUntilExposuresAreChosen) {
+TEST(Flip, IsSymmetricAtAFixedExposure) {
   const Picture a = waves(1, 1, false), b = waves(1, 1, true);
   // The results differ only by rounding, since both images are below 1.
   EXPECT_NEAR(ldr(a, b), ldr(b, a), 1e-6);
@@ -55,7 +55,7 @@ TEST(Flip, DoesNotDependOnWhichImageIsFirstUntilExposuresAreChosen) {
 // (87.73, -75.61, 72.98) and blue (32.30, 25.58, -34.84): (55.43 + sqrt(101.19^2 + 107.82^2))^.7 = 41.28. The
 // range above .4 of it, 16.51, is compressed to the width .05: .95 + (25.119 - 16.51) / (41.28 - 16.51) * .05
 // = .96738.
-TEST(Flip, OfBlackAndWhiteIsTheHandComputedValue) {
+TEST(Flip, BlackAndWhiteHaveTheHandComputedValue) {
   const auto error = ldr_flip(flat(0, 0, 0).view(), flat(1, 1, 1).view());
   // Computed by hand to five digits.
   for (const float e : error) EXPECT_NEAR(e, .96738, 2e-5);
@@ -63,21 +63,21 @@ TEST(Flip, OfBlackAndWhiteIsTheHandComputedValue) {
 
 // Greys of Y = .2 and .3 have L* = 116 cbrt(Y) - 16 = 51.837 and 61.654. The difference 9.817^.7 = 4.948 is
 // below the bend at 16.51, so the error is .95 / 16.51 * 4.948 = .2847.
-TEST(Flip, OfTwoGreysIsTheHandComputedValue) {
+TEST(Flip, TwoGreysHaveTheHandComputedValue) {
   EXPECT_NEAR(ldr(flat(.2F, .2F, .2F), flat(.3F, .3F, .3F)), .2847, 1e-4);
 }
 
 // The expected values are those of flip-evaluator 1.7, the authors' own program, for the same float images.
 // It also computes in single precision, but rounds differently, and its white point for HDR differs in the
 // fifth digit.
-TEST(Flip, GivesTheValuesOfTheAuthorsProgram) {
+TEST(Flip, MatchesTheAuthorsProgram) {
   Picture r = waves(1, 1, false), t = waves(1, 1, true);
   EXPECT_NEAR(ldr(r, t), .2094682, 1e-5);
   EXPECT_NEAR(hdr(r, t), .1187420, 2e-5);
   EXPECT_NEAR(hdr(waves(3, 20, false), waves(3, 20, true)), .2896204, 2e-5);
 }
 
-TEST(Flip, ExposuresFollowFromTheReferenceAlone) {
+TEST(Flip, ExposuresDependOnlyOnTheReference) {
   const FlipExposures e = flip_exposures(waves(3, 20, false).rgb);
   EXPECT_NEAR(e.first, -1.93050, 2e-4);
   EXPECT_NEAR(e.last, -.47669, 2e-4);
@@ -87,7 +87,7 @@ TEST(Flip, ExposuresFollowFromTheReferenceAlone) {
 }
 
 // Fine noise is less visible from a distance.
-TEST(Flip, FineNoiseIsSeenLessFromFarAway) {
+TEST(Flip, FineNoiseCountsLessFromFarAway) {
   const Picture grey = flat(.4F, .4F, .4F);
   Picture noisy = grey;
   for (std::size_t i = 0; i < noisy.rgb.size(); ++i) noisy.rgb[i] += i / 3 % 2 ? .05F : -.05F;
@@ -96,7 +96,7 @@ TEST(Flip, FineNoiseIsSeenLessFromFarAway) {
   EXPECT_GT(near_by, 1.5 * far_away);
 }
 
-TEST(Flip, StaysBetweenZeroAndOneWhateverThePixels) {
+TEST(Flip, StaysBetweenZeroAndOneForAllPixels) {
   Picture wild = waves(3, 1e6, true);
   wild.rgb[0] = std::nanf("");
   wild.rgb[7] = -5;

@@ -7,9 +7,9 @@
 #include <random>
 #include <vector>
 
-#include "common/image/error/convergence.h"
-#include "common/image/error/error_estimate.h"
-#include "common/image/reference/reference.h"
+#include "core/image/error/convergence.h"
+#include "core/image/error/error_estimate.h"
+#include "core/image/reference/reference.h"
 #include "tests/support/significance.h"
 
 namespace ls {
@@ -127,7 +127,7 @@ TEST(NoisyReference, DoesNotBiasTheRelativeError) {
 // over many references. For grey noise the computation is exact. The standard deviation of 2000 figures is
 // known to 1 / sqrt(2 * 2000) = 1.6 % (one standard deviation), the mean of the computed standard errors more
 // precisely.
-TEST(NoisyReference, TellsTheStandardErrorOfWhatItLeaves) {
+TEST(NoisyReference, ReportsTheStandardErrorOfTheRest) {
   constexpr int kTrials = 2000;
   double sum = 0, squares = 0, variance = 0;
   Render job(1, .25);
@@ -142,7 +142,7 @@ TEST(NoisyReference, TellsTheStandardErrorOfWhatItLeaves) {
   EXPECT_NEAR(std::sqrt(variance / kTrials) / strays, 1, 4 * .016);
 }
 
-TEST(NoisyReference, OfTheSameErrorLeavesNothingAboveItsNoise) {
+TEST(NoisyReference, EqualErrorLeavesNothingAboveItsNoise) {
   Render right(1, .25), exact(2, .25), job(3, .25);
   right.to(8), exact.to(2048), job.to(2048);
   const TrueError noisy = true_error(right.reference(), job.image()),

@@ -1,4 +1,4 @@
-#include "common/image/reference/reference.h"
+#include "core/image/reference/reference.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <random>
 
-#include "common/image/error/error_estimate.h"
-#include "common/image/exr/final_image.h"
+#include "core/image/error/error_estimate.h"
+#include "core/image/exr/final_image.h"
 #include "tests/support/significance.h"
 #include "tests/unit/image/support.h"
 
@@ -37,7 +37,7 @@ Result<Reference> read(const ExrPicture& p, FrameSize size = kSize) {
   return read_reference(write_exr(p).value(), "right.exr", size);
 }
 
-TEST(Reference, WithoutItsOwnErrorGivesThePlainDifference) {
+TEST(Reference, ReferenceWithoutErrorLayersGivesThePlainDifference) {
   const auto reference = read(picture(2));
   ASSERT_TRUE(reference) << reference.error().message;
 
@@ -49,7 +49,7 @@ TEST(Reference, WithoutItsOwnErrorGivesThePlainDifference) {
   EXPECT_EQ(noise_of(*reference).relmse, 0);
 }
 
-TEST(Reference, TakesItsOwnErrorAway) {
+TEST(Reference, SubtractsItsOwnError) {
   const auto reference = read(with_error(picture(2), .25F));
   ASSERT_TRUE(reference);
 
@@ -70,7 +70,7 @@ TEST(Reference, TakesItsOwnErrorAway) {
 // found. The mean over 2000 images would be known to 1 / sqrt(2000 * 576 / 2) = .13 % from the image's noise
 // alone, but subtracting the reference's noise adds to this, so the tolerance is computed from the measured
 // standard error.
-TEST(Reference, LeavesTheErrorOfTheImageInTheMean) {
+TEST(Reference, IsUnbiasedForTheImagesError) {
   std::mt19937_64 random(7);
   std::normal_distribution<float> normal;
   double sum = 0, squares = 0, raw = 0;
@@ -97,7 +97,7 @@ TEST(Reference, LeavesTheErrorOfTheImageInTheMean) {
             .045 - test::kStandardErrors * sigma);  // without the error layers the reference's noise remains
 }
 
-TEST(Reference, RefusesWhatCannotBeOne) {
+TEST(Reference, RefusesUnusableFiles) {
   ExrPicture nan = picture(1);
   std::get<ExrFloat>(nan.channels["G"]).values[5] = std::nanf("");
   EXPECT_THAT(read(nan).error().message, HasSubstr("1 of its values are NaN or infinite"));
@@ -106,7 +106,7 @@ TEST(Reference, RefusesWhatCannotBeOne) {
   EXPECT_THAT(read_reference({}, "right.exr", kSize).error().message, HasSubstr("right.exr"));
 }
 
-TEST(Reference, ReadsOurOwnFinalImageWithItsError) {
+TEST(Reference, ReadsAFinalImageWithItsErrorLayers) {
   const Film film = test::make_film({kSize, 8}, 8);
   const auto exr = final_exr(film, {}, true);
   ASSERT_TRUE(exr);

@@ -11,7 +11,7 @@
 namespace ls::render {
 namespace {
 
-TEST(InOrder, TakesEveryResultInOrder) {
+TEST(InOrder, ConsumesAllResultsInOrder) {
   for (const int threads : {0, 1, 3, 8})
     for (const std::size_t count : {0u, 1u, 7u, 8u, 50u}) {
       std::vector<std::size_t> taken, expected(count);
@@ -27,7 +27,7 @@ TEST(InOrder, TakesEveryResultInOrder) {
     }
 }
 
-TEST(InOrder, EndsWhereTakeSaysSo) {
+TEST(InOrder, EndsWhereTheConsumerStops) {
   for (const int threads : {1, 3, 8}) {
     std::atomic<std::size_t> made = 0;
     std::size_t taken = 0;
@@ -59,7 +59,7 @@ TEST(InOrder, ComputesSeveralAtOnce) {
   EXPECT_EQ(sum, 3u);
 }
 
-TEST(InOrder, PassesOnWhatIsThrown) {
+TEST(InOrder, RethrowsExceptions) {
   for (const int threads : {1, 4}) {
     std::size_t taken = 0;
     EXPECT_THROW(in_order(

@@ -36,7 +36,7 @@ TEST(Camera, LooksAlongItsZWithXToTheLeftAndYUp) {
   EXPECT_LT(c.ray(200, 100, {}).d.x, 0.f);
 }
 
-TEST(Camera, FieldOfViewIsMeasuredAlongTheAxisAsked) {
+TEST(Camera, FieldOfViewIsMeasuredAlongTheChosenAxis) {
   Sensor s;
   s.fov = 40;
   const double tolerance = 1e-4;  // degrees; directions are float32
@@ -67,7 +67,7 @@ TEST(Camera, ExtremeFieldsOfViewGiveUnitDirections) {
   }
 }
 
-TEST(Camera, WithoutApertureTheLensNumbersChangeNothing) {
+TEST(Camera, LensParametersHaveNoEffectWithoutAnAperture) {
   Sensor s;
   s.focus_distance = 3;
   const Camera c = camera(s);
@@ -78,7 +78,7 @@ TEST(Camera, WithoutApertureTheLensNumbersChangeNothing) {
   }
 }
 
-TEST(Camera, AllRaysOfAPixelThroughTheLensMeetInThePlaneOfFocus) {
+TEST(Camera, RaysOfAPixelMeetInTheFocalPlane) {
   Sensor s, pinhole;
   s.aperture_radius = .25;
   s.focus_distance = 3;
@@ -140,7 +140,7 @@ void expect_rays(const Camera& c, std::array<int, 2> offset, FrameSize part,
   }
 }
 
-TEST(Camera, PrincipalPointIsMitsubas) {
+TEST(Camera, PrincipalPointMatchesMitsuba) {
   Sensor s;
   s.fov = 60;
   s.principal_point_offset = {.1, .2};
@@ -155,7 +155,7 @@ TEST(Camera, PrincipalPointIsMitsubas) {
                {1, 1, {.0023094f, -.00173205f, .01f}, {.22188f, -.16641f, .960769f}}});
 }
 
-TEST(Camera, OrthographicRaysAreMitsubas) {
+TEST(Camera, OrthographicRaysMatchMitsuba) {
   Sensor s;
   s.projection = Projection::orthographic;
   s.to_world.m = {2, 0, 0, 0, 0, 3, 0, 0, 0, 0, 4, 0, 0, 0, 0, 1};
@@ -202,7 +202,7 @@ TEST(Camera, SphericalSeesEveryDirectionInLatitudeAndLongitude) {
   }
 }
 
-TEST(Camera, AThinLensWithoutAnApertureIsAPinholeToTheLastBit) {
+TEST(Camera, ThinLensWithoutAnApertureEqualsAPinhole) {
   Sensor pinhole, lens;
   pinhole.to_world = lens.to_world = test::rotate_x(20) * test::rotate_y(-50) * test::translate({1, 2, 3});
   lens.focus_distance = 3.7;
@@ -231,7 +231,7 @@ test::SceneBuilder with_aperture_map(double closed, double open) {
   return builder;
 }
 
-TEST(ApertureMap, MultipliesTheRadiusWherePixelsAre) {
+TEST(ApertureMap, MultipliesTheRadiusPerPixel) {
   const auto mapped = test::world_of(with_aperture_map(0, 1));
   test::SceneBuilder builder = with_aperture_map(0, 1);
   builder.scene.sensor.aperture_scale.reset();
@@ -249,7 +249,7 @@ TEST(ApertureMap, MultipliesTheRadiusWherePixelsAre) {
   }
 }
 
-TEST(ApertureMap, DoesNotHideALensThatIsTooLarge) {
+TEST(ApertureMap, DoesNotHideATooLargeLens) {
   // The checkerboard repeats, so at the four corners of the frame itself the aperture is closed
   test::SceneBuilder builder = with_aperture_map(0, 1);
   builder.scene.sensor.aperture_radius = 1e39;  // infinite in single precision
@@ -260,7 +260,7 @@ TEST(ApertureMap, DoesNotHideALensThatIsTooLarge) {
   EXPECT_NE(world.error().message.find("aperture_radius"), std::string::npos) << world.error().message;
 }
 
-TEST(ApertureMap, OfOneAndOfNothingChangeNoBit) {
+TEST(ApertureMap, MapOfOnesChangesNoBit) {
   const auto render = [](const test::SceneBuilder& builder) {
     return render_tile(*test::world_of(builder), {0, 0, 16, 8}, {0, 4}, nullptr, nullptr).sums;
   };
@@ -295,7 +295,7 @@ TileResult render_size(const test::SceneBuilder& builder, FrameSize size) {
   return render_tile(**w, {0, 0, size.width, size.height}, {0, 8}, nullptr, nullptr);
 }
 
-TEST(Crop, IsThatPartOfTheFrameToTheLastBit) {
+TEST(Crop, EqualsThatPartOfTheFrame) {
   const auto whole = render_size(cropped({0, 0}, {0, 0}), {16, 8}),
              part = render_size(cropped({5, 2}, {7, 4}), {7, 4});
   for (std::size_t plane = 0; plane < 6; ++plane)
@@ -304,7 +304,7 @@ TEST(Crop, IsThatPartOfTheFrameToTheLastBit) {
         ASSERT_EQ(part.sums[plane * 28 + y * 7 + x], whole.sums[plane * 128 + (y + 2) * 16 + x + 5]);
 }
 
-TEST(Crop, AtAnotherSizeIsTheSamePartOfALargerFrame) {
+TEST(Crop, CropAtAnotherSizeShowsTheSamePart) {
   test::SceneBuilder twice = cropped({10, 4}, {14, 8});
   twice.scene.film.size = {32, 16};
   EXPECT_EQ(render_size(cropped({5, 2}, {7, 4}), {14, 8}).sums, render_size(twice, {14, 8}).sums);
@@ -353,7 +353,7 @@ TEST(PixelFilter, GaussianIsCutAtFourDeviationsAndShiftedToReachZero) {
   EXPECT_GE(PixelFilter(GaussianFilter{deviation}).offset(0), -4 * deviation);
 }
 
-TEST(PixelFilter, OffsetsGrowWithTheNumber) {
+TEST(PixelFilter, OffsetsIncreaseWithTheRandomNumber) {
   for (const ReconstructionFilter& f :
        {ReconstructionFilter{BoxFilter{.5}}, ReconstructionFilter{TentFilter{1}},
         ReconstructionFilter{GaussianFilter{.5}}}) {

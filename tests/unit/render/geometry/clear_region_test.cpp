@@ -74,7 +74,7 @@ TEST(ClearRegion, IsTheInsideOfASphereAndOfATurnedBox) {
   }
 }
 
-TEST(ClearRegion, IsNotWhereAnotherSurfaceMayBe) {
+TEST(ClearRegion, IsNotUsedNearOtherSurfaces) {
   const auto changed = [](auto&& change) {
     SceneBuilder b = body(CubeShape{}, {});
     change(b);
@@ -101,7 +101,7 @@ bool has_region(const std::string& corners, const std::string& faces) {
   return region_of(*made(b)) != nullptr;
 }
 
-TEST(ClearRegion, IsInClosedConvexMeshesOfAFewFaces) {
+TEST(ClearRegion, IsUsedInSmallConvexMeshes) {
   const std::string below = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\n",
                     above = "v -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n", ends = "f 1 4 3 2\nf 5 6 7 8\n",
                     sides = "f 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
@@ -120,7 +120,7 @@ TEST(ClearRegion, IsInClosedConvexMeshesOfAFewFaces) {
       << "six faces that are not convex";
 }
 
-TEST(ClearRegion, IsNotWhereAFlightHasToKnowItsEnd) {
+TEST(ClearRegion, IsNotUsedIfAFlightNeedsItsEnd) {
   const auto changed = [](auto&& change) {
     SceneBuilder b = body(SphereShape{}, {});
     change(b);
@@ -148,7 +148,7 @@ std::optional<float> way_out(const SceneBuilder& b, const V3& d) {
   return t;
 }
 
-TEST(ClearRegion, KnowsWhereRaysLeaveTheBodyForGood) {
+TEST(ClearRegion, KnowsWhereRaysFinallyLeaveTheBody) {
   const V3 up(0, 0, 1), down(0, 0, -1), aslant(.6f, 0, .8f);
   const SceneBuilder cube = body(CubeShape{}, {}), sphere = body(SphereShape{}, {});
   // A few ulps of the coordinates
@@ -193,7 +193,7 @@ void expect_rounded_alike(const std::vector<float>& a, const std::vector<float>&
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 0x1p-15f * b[i]) << what << i;
 }
 
-TEST(ClearRegion, ChangesPixelsByRoundingAlone) {
+TEST(ClearRegion, ChangesPixelsOnlyByRounding) {
   for (const bool grid : {false, true})
     for (const bool cube : {false, true}) {
       const auto w = made(

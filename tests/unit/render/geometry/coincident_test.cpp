@@ -51,7 +51,7 @@ TEST(FogOnAFloor, LetsNoLightThroughTheFloor) {
   }
 }
 
-TEST(Coincident, AreFoundWhereSurfacesShareAPlaceOnly) {
+TEST(Coincident, AreFoundOnlyWhereSurfacesCoincide) {
   const auto found = [](const ls::Geometry& g, const Transform& t) {
     SceneBuilder builder({1, 1});
     const MediumIndex fog = builder.homogeneous({1, 1, 1}, {0, 0, 0});
@@ -83,7 +83,7 @@ TEST(Coincident, AreFoundAmongRoundShapes) {
 
 // Only the general instantiation of the path tracer (`everything`) handles coincident surfaces. They do not
 // imply that media overlap.
-TEST(Coincident, AreAMatterOfTheGeneralInstantiationWithOrWithoutMedia) {
+TEST(Coincident, NeedTheGeneralVariantWithAndWithoutMedia) {
   for (const bool foggy : {false, true}) {
     SceneBuilder builder({1, 1});
     if (foggy)
@@ -115,7 +115,7 @@ TEST(Coincident, AreAllListedByTheAccelerationStructure) {
 }
 
 // The spheres are apart from each other, but there are too many to compare all pairs.
-TEST(Coincident, AreTakenForGrantedOnceWhereThereAreTooManyToCompare) {
+TEST(Coincident, AreAssumedWithoutComparingIfThereAreTooManyShapes) {
   constexpr int kSpheres = 12'000;
   SceneBuilder builder({1, 1});
   const BsdfIndex null = builder.null();
@@ -131,7 +131,7 @@ TEST(Coincident, AreTakenForGrantedOnceWhereThereAreTooManyToCompare) {
 }
 
 // Many instances of a group of many shapes: more boxes than can be listed.
-TEST(Coincident, AreTakenForGrantedWhereInstancesMakeTooManyBoxes) {
+TEST(Coincident, AreAssumedIfInstancesMakeTooManyBoxes) {
   constexpr int kShapes = 3'000, kInstances = 3'000;
   SceneBuilder builder({1, 1});
   const BsdfIndex null = builder.null();
@@ -148,7 +148,7 @@ TEST(Coincident, AreTakenForGrantedWhereInstancesMakeTooManyBoxes) {
 }
 
 // A glass body and the fog in it have the same faces: a ray crosses either both or none.
-TEST(Coincident, MediaBeginWithTheGlassThatTheyFill) {
+TEST(Coincident, MediaBeginAtTheGlassThatTheyFill) {
   SceneBuilder builder({1, 1});
   HomogeneousMedium m;
   m.sigma_t = {0, 0, 0};
@@ -197,7 +197,7 @@ BsdfIndex thin_glass(SceneBuilder& builder) {
   return builder.bsdf(ThinDielectricBsdf{1.5, 1, white, white});
 }
 
-TEST(PaneOnABoundary, TakesItsShareOfShadowRaysWhicheverOfTheTwoIsMet) {
+TEST(PaneOnABoundary, DimsShadowRaysWhicheverSurfaceIsHitFirst) {
   const double fog = std::exp(-1.), lit = .5 / test::kPi;
   for (const double face : {1., 2.})
     for (const double aside : {0., 1e-7, -1e-7, 5e-7, -5e-7, 1e-2, -1e-2})
@@ -215,7 +215,7 @@ TEST(PaneOnABoundary, TakesItsShareOfShadowRaysWhicheverOfTheTwoIsMet) {
 
 // A room in which a light that lets all light pass coincides with the walls. Whichever of the two surfaces a
 // ray meets, the radiance is L + rho L + rho^2 L ... = L / (1 - rho) everywhere.
-TEST(LightThatLetsLightPass, ShinesOnTheWallThatItLiesOn) {
+TEST(LightThatLetsLightPass, LightsTheWallThatItCoincidesWith) {
   for (const double aside : {0., 1e-7, -1e-7, 5e-7, -5e-7})
     for (const bool first : {false, true}) {
       SCOPED_TRACE(fmt::format("{:+g} outside, {}", aside, first ? "first" : "last"));
@@ -239,7 +239,7 @@ TEST(LightThatLetsLightPass, ShinesOnTheWallThatItLiesOn) {
 }
 
 // A light on one face of a box of fog, seen either through all of the fog or in front of it.
-TEST(LightThatLetsLightPass, ShinesOnTheFaceOfAMediumThatItLiesOn) {
+TEST(LightThatLetsLightPass, LightsTheMediumBoundaryThatItCoincidesWith) {
   for (const double face : {-1., 1.})
     for (const bool first : {false, true}) {
       SCOPED_TRACE(fmt::format("at {}, {}", face, first ? "first" : "last"));

@@ -112,7 +112,7 @@ TEST(Cylinders, NormalsUvAndTangentsAreMitsubas) {
   }
 }
 
-TEST(Cylinders, AFlipTurnsTheirNormalsInwards) {
+TEST(Cylinders, FlippedNormalsPointInwards) {
   for (const bool mirrored : {false, true}) {
     SceneBuilder builder;
     builder.shape(CylinderShape{}, test::scale(1, mirrored ? -1 : 1, 1), builder.diffuse(.5)).flip_normals =
@@ -177,7 +177,7 @@ TEST(CylinderLights, GiveTheIrradianceOfTheirConfigurationFactor) {
   }
 }
 
-TEST(CylinderLights, ShineInwardsWhereFlipped) {
+TEST(CylinderLights, EmitInwardsIfFlipped) {
   // From the middle of the axis, a tube of half length L covers the polar angles theta from `edge` to pi -
   // edge. The irradiance of a plane that contains the axis is the integral of sin^2 theta over these angles,
   // times the integral of the cosine of the azimuth over half a turn, which is 2.

@@ -42,7 +42,7 @@ TEST(SphereIntersection, IsExactForDistantTinyAndGrazingRays) {
 
 // A box of size 2, and a lamp of radius 1e5 at 1e7. If the world were centred on both, 2 would be two ulps of
 // float32 coordinates.
-TEST(World, IsAboutTheMeshThatElseWouldHaveNoFormLeft) {
+TEST(World, IsCentredAtAMeshThatWouldOtherwiseLoseItsShape) {
   SceneBuilder builder;
   builder.shape(CubeShape{}, {}, builder.diffuse(.5));
   builder.shape(SphereShape{}, translate({0, 1e7, 0}) * test::scale(1e5), builder.diffuse(0));
@@ -58,7 +58,7 @@ TEST(World, IsAboutTheMeshThatElseWouldHaveNoFormLeft) {
   EXPECT_GE(g->radius, far);
 }
 
-TEST(World, IsAboutItsMiddleWhereEveryMeshIsWellResolved) {
+TEST(World, IsCentredAtItsMiddleIfAllMeshesAreWellResolved) {
   SceneBuilder builder;
   builder.shape(CubeShape{}, {}, builder.diffuse(.5));
   builder.shape(CubeShape{}, translate({100, 0, 0}), builder.diffuse(.5));
@@ -188,7 +188,7 @@ TEST(Shapes, NormalsUvAndTangentsAreMitsubas) {
 
 // The side that shines in Mitsuba 3.9.1: flat shapes and cubes keep the transformed normal, a mirrored sphere
 // is inside out, and flip_normals reverses the normals of each.
-TEST(Shapes, ShineToTheSideThatMitsubaSays) {
+TEST(Shapes, EmitToMitsubasSide) {
   for (const char* name : {"cube", "rectangle", "disk", "sphere"}) {
     for (const bool mirror : {false, true}) {
       for (const bool flip : {false, true}) {
@@ -231,7 +231,7 @@ TEST(Meshes, FollowTheirNormalsEvenAgainstTheirWinding) {
 
 // A closed room that emits light. Its vertex normals point inwards, against its winding, and its medium is on
 // the side that is inside by the winding.
-TEST(Meshes, ShineToTheSideOfTheirNormalsAndKeepTheirMediaInside) {
+TEST(Meshes, EmitTowardsTheirNormalsAndKeepTheirMediaInside) {
   std::string text =
       "v -1 -1 -1\nv 1 -1 1\nv -1 1 1\nv 1 1 -1\nvn 1 1 1\nvn -1 1 -1\nvn 1 -1 -1\nvn -1 -1 1\n";
   text += "f 1//1 4//4 2//2\nf 1//1 3//3 4//4\nf 1//1 2//2 3//3\nf 2//2 4//4 3//3\n";
@@ -282,7 +282,7 @@ TEST(Normals, ShadingFrameIsRightHandedAndAgreesWithTheGeometricNormal) {
   }
 }
 
-TEST(Offset, LeavesToTheSideOfTheDirection) {
+TEST(Offset, MovesToTheSideOfTheDirection) {
   for (const float z : {-1.f, 1.f}) {
     const V3 p = offset_point(V3(.5f, .25f, .125f), V3(0, 0, 1), 1, V3(.1f, 0, z));
     EXPECT_EQ(p.z > .125f, z > 0);
@@ -294,7 +294,7 @@ constexpr float kInf = std::numeric_limits<float>::infinity();
 
 // Debian's build of Embree aborts for rays whose origin is farther than 1.8e18. A flight through an extremely
 // thin medium can get there.
-TEST(FarAway, RaysMeetNothingAndNothingHidesLight) {
+TEST(FarAway, DistantRaysMissEverythingAndLightIsUnblocked) {
   SceneBuilder builder;
   builder.shape(SphereShape{}, {}, builder.diffuse(.5));
   const auto w = test::world_of(builder);
@@ -308,7 +308,7 @@ TEST(FarAway, RaysMeetNothingAndNothingHidesLight) {
   EXPECT_TRUE(w->accel.occluded({0, 0, std::nanf("")}, {0, 0, -1}, kInf));
 }
 
-TEST(FarAway, AMediumThatIsAllButNothingRendersClean) {
+TEST(FarAway, ExtremelyThinMediumRendersWithoutBadSamples) {
   SceneBuilder builder({8, 8});
   builder.shape(SphereShape{}, {}, builder.diffuse(.5));
   builder.scene.emitters.push_back(PointEmitter{{0, 0, 3}, {1, 1, 1}});
@@ -327,7 +327,7 @@ std::string refusal(const Sensor& sensor) {
   return w ? "" : w.error().message;
 }
 
-TEST(FarAway, CamerasWhoseRaysAreNoNumbersAreRefused) {
+TEST(FarAway, CamerasWithNonFiniteRaysAreRefused) {
   constexpr double kHuge = 1.7e308;
   const auto refused = testing::HasSubstr("the rays of the sensor leave the range of single precision");
   EXPECT_THAT(refusal({.principal_point_offset = {-kHuge, 0}}), refused);

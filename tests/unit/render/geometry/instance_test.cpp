@@ -114,7 +114,7 @@ void expect_alike(const SceneBuilder& a, const SceneBuilder& b, const char* name
 // complete() must confirm each hit that the BVH finds. The BVH transforms rays to a group's space in float32,
 // so for rays that barely touch a small ball the two could disagree. A path that lost such a hit would see
 // what is behind everything.
-TEST(Instances, WhatTheBvhFindsIsFoundAgain) {
+TEST(Instances, HitsOfTheBvhAreReproduced) {
   for (const bool ball : {true, false}) {
     SceneBuilder builder;
     if (ball)
@@ -150,7 +150,7 @@ const Transform kStretched =
     translate({-2, 1, 1}) * test::rotate_y(70) * test::scale(2, .5, .8) * test::rotate_x(20);
 const Transform kMirrored = translate({0, 3, 0}) * test::rotate_x(10) * test::scale(-1.2, .9, 1);
 
-TEST(Instances, ShowMeshesAsIfTheyWerePlacedThemselves) {
+TEST(Instances, MeshesLookAsIfPlacedDirectly) {
   SceneBuilder builder;
   builder.shape(sheet(builder), test::rotate_x(15), brushed(builder));
   expect_alike(instanced(builder, {kSimilar}), copied(builder, {kSimilar}), "similar");
@@ -160,7 +160,7 @@ TEST(Instances, ShowMeshesAsIfTheyWerePlacedThemselves) {
                copied(builder, {kSimilar, kStretched, kMirrored}), "all", .01f);
 }
 
-TEST(Instances, ShowAnalyticShapesAsIfTheyWerePlacedThemselves) {
+TEST(Instances, AnalyticShapesLookAsIfPlacedDirectly) {
   for (const ls::Geometry& g :
        {ls::Geometry{SphereShape{}}, ls::Geometry{CylinderShape{}}, ls::Geometry{DiskShape{}},
         ls::Geometry{CubeShape{}}, ls::Geometry{RectangleShape{}}}) {
@@ -171,7 +171,7 @@ TEST(Instances, ShowAnalyticShapesAsIfTheyWerePlacedThemselves) {
 }
 
 // An ellipsoid, x^2/4 + y^2 + z^2/9 = 1, which is possible only as an instance of a sphere.
-TEST(Instances, StretchSpheres) {
+TEST(Instances, MayStretchSpheres) {
   SceneBuilder builder;
   builder.shape(SphereShape{}, {}, builder.diffuse(.5));
   const auto w = test::world_of(instanced(builder, {test::scale(2, 1, 3)}));
@@ -286,7 +286,7 @@ TEST(Instances, GiveTheLightOfTheirCopies) {
   EXPECT_EQ(a.health.nonfinite + a.health.negative, 0u);
 }
 
-TEST(Instances, HoldMediaWhoseLengthsAreTheWorlds) {
+TEST(Instances, MediaInsideUseWorldLengths) {
   SceneBuilder builder;
   const MediumIndex fog = builder.homogeneous({.25, .5, 1}, {0, 0, 0});
   builder.container(CubeShape{}, test::scale(.5), builder.null(), fog);
@@ -299,7 +299,7 @@ TEST(Instances, HoldMediaWhoseLengthsAreTheWorlds) {
                 5 * e.standard_error[c] + 1e-5);
 }
 
-TEST(Instances, OfMasksLetTheirShareOfLightThrough) {
+TEST(Instances, InstancedMasksPassTheirShareOfLight) {
   SceneBuilder builder;
   const BsdfIndex grey = builder.diffuse(.5);
   builder.shape(
@@ -317,7 +317,7 @@ TEST(Instances, OfMasksLetTheirShareOfLightThrough) {
   EXPECT_NEAR(e.mean[0], .5625, 5 * e.standard_error[0] + 1e-5);
 }
 
-TEST(Instances, AreOpaqueToShadowRays) {
+TEST(Instances, BlockShadowRays) {
   SceneBuilder builder;
   builder.shape(RectangleShape{}, {}, builder.diffuse(.5));
   builder = instanced(std::move(builder), {translate({0, 0, 1})});
@@ -344,7 +344,7 @@ TEST(Instances, KeepAGroupInMemoryOnce) {
   EXPECT_EQ(meet(*many, {50, 50, 5}, {0, 0, -1}).hit.primitive.instance, 50u * 100 + 50);
 }
 
-TEST(Instances, AScaleByAPowerOfTwoChangesNoBit) {
+TEST(Instances, ScaleByAPowerOfTwoChangesNoBit) {
   const auto render = [](const SceneBuilder& builder) {
     return render_tile(*test::world_of(builder), {0, 0, 12, 8}, {0, 8}, nullptr, nullptr).sums;
   };
@@ -361,7 +361,7 @@ std::string error_of(const SceneBuilder& builder) {
   return w ? "" : w.error().message;
 }
 
-TEST(Instances, ThatCannotBePlacedAreRefused) {
+TEST(Instances, SingularTransformIsRefused) {
   const SceneBuilder builder = furniture();
   EXPECT_THAT(error_of(instanced(builder, {{}, test::scale(1, 0, 1)})),
               HasSubstr("instance 2: its to_world has no inverse"));
@@ -380,7 +380,7 @@ TEST(Instances, ThatCannotBePlacedAreRefused) {
   EXPECT_THAT(error_of(wrong), HasSubstr("emits light in a group"));
 }
 
-TEST(Instances, OfAWorldThatHasNothingElseAreSeen) {
+TEST(Instances, AreVisibleInAWorldOfInstancesOnly) {
   SceneBuilder builder;
   builder.shape(SphereShape{}, {}, builder.diffuse(.5));
   const auto w = test::world_of(instanced(builder, {translate({7, 0, 0})}));

@@ -57,7 +57,7 @@ void expect_near(const C3& a, const C3& b) {
 }
 
 // From these corners mesh_attribute.eval of Mitsuba 3.9.1 gave (.32, .53, .74) at (.2, .3, 0).
-TEST(MeshAttributes, OfVerticesAreInterpolatedAndThoseOfFacesAreNot) {
+TEST(MeshAttributes, AreInterpolatedOfVerticesAndConstantOfFaces) {
   for (const char* name : {"vertex_color", "face_stamp"}) {
     SceneBuilder builder;
     const BsdfIndex b = builder.bsdf(DiffuseBsdf{attribute(builder, name)});
@@ -77,7 +77,7 @@ TEST(MeshAttributes, OfVerticesAreInterpolatedAndThoseOfFacesAreNot) {
   }
 }
 
-TEST(MeshAttributes, OfOneNameAreThoseOfEachMesh) {
+TEST(MeshAttributes, EachMeshHasItsOwnAttributeOfAName) {
   SceneBuilder builder;
   const BsdfIndex b = builder.bsdf(DiffuseBsdf{attribute(builder, "vertex_color", .5)});
   add_mesh(builder, kSquare, b);
@@ -102,7 +102,7 @@ TEST(MeshAttributes, AreSeenThroughInstances) {
   expect_near(albedo_at(bench, {2.2, 1.3, 0}), {.32f, .53f, .74f});
 }
 
-TEST(MeshAttributes, OfCheckerboardsAndInNormalMapsAndMasksAreReadToo) {
+TEST(MeshAttributes, AreReadInCheckerboardsNormalMapsAndMasks) {
   SceneBuilder builder;
   const TextureIndex stamp = attribute(builder, "face_stamp");
   const TextureIndex checks =
@@ -118,7 +118,7 @@ TEST(MeshAttributes, OfCheckerboardsAndInNormalMapsAndMasksAreReadToo) {
 
 // A light whose faces have different radiances: light samples and hits must agree, and each face must get
 // half of the samples.
-TEST(MeshAttributes, ShineAsTheyAreSampled) {
+TEST(MeshAttributes, EmissionMatchesItsSampling) {
   SceneBuilder builder;
   const BsdfIndex black = builder.diffuse(0);
   const TextureIndex light = attribute(builder, "face_stamp", 4);
@@ -153,7 +153,7 @@ std::string refusal(const std::string& mesh, const std::function<void(SceneBuild
   return w ? "" : w.error().message;
 }
 
-TEST(MeshAttributes, ThatAMeshDoesNotHaveAreRefusedByName) {
+TEST(MeshAttributes, MissingAttributeIsRefusedByName) {
   const auto diffuse = [](const char* name) {
     return [name](SceneBuilder& builder) { builder.bsdf(DiffuseBsdf{attribute(builder, name)}); };
   };
@@ -187,7 +187,7 @@ TEST(MeshAttributes, ThatAMeshDoesNotHaveAreRefusedByName) {
 }
 
 // Mitsuba 3.9.1 uses bytes as numbers from 0 to 255.
-TEST(MeshAttributes, OfBytesNeedAScale) {
+TEST(MeshAttributes, ByteAttributesNeedAScale) {
   const std::string bytes = square("property uchar red\nproperty uchar green\nproperty uchar blue\n",
                                    {"0 128 255", "0 128 255", "0 128 255", "0 128 255"}, "", {"", "", ""});
   const auto diffuse = [](double scale) {

@@ -112,7 +112,7 @@ const Format kFormats[] = {{"obj", MeshFormat::obj, obj},
 // At (.5, .7) Mitsuba 3.9.1 gave the normal (0, 0, 1), the shading normal (.17465, .08753, .98073) and the uv
 // (.32, .505). flip_normals reversed both normals, face_normals made the shading normal (0, 0, 1), and
 // flip_tex_coords gave the uv (.32, .495).
-TEST(MeshFlags, TurnNormalsAndCoordinatesAsInMitsuba) {
+TEST(MeshFlags, FlipNormalsAndCoordinatesAsInMitsuba) {
   for (const Format& f : kFormats)
     for (int k = 0; k < 8; ++k) {
       const Flags flags{(k & 1) != 0, (k & 2) != 0, (k & 4) != 0};
@@ -130,7 +130,7 @@ TEST(MeshFlags, TurnNormalsAndCoordinatesAsInMitsuba) {
 
 // A roof of two triangles without normals. Its ridge is x = 0; the left side has the normal (-1, 0, 1) / sqrt
 // 2.
-TEST(MeshFlags, AMeshWithoutNormalsIsSmoothUnlessItIsToBeFlat) {
+TEST(MeshFlags, MeshWithoutNormalsIsSmoothUnlessFlatIsRequested) {
   const std::string roof = "v 0 0 1\nv 0 2 1\nv -1 1 0\nv 1 1 0\nf 1 2 3\nf 2 1 4\n";
   const float side = std::sqrt(.5f);
   for (const bool flat : {false, true}) {

@@ -46,7 +46,7 @@ std::uint64_t leaks(const World& w, const V3d& center, std::uint32_t others, int
 // A box of size 1e-4 in a scene of size 1e6. The centre of the world is that of the scene, so boxes near it
 // have small coordinates: their size is at least 1e-4 / 2 of their largest coordinate, about 800 times
 // float32's resolution of 2^-24.
-TEST(Offsets, AreAsSmallAsWhatTheyLeave) {
+TEST(Offsets, ScaleWithTheSurface) {
   const Transform turn = test::rotate_x(33) * test::rotate_y(21);
   for (const V3d& at : {V3d(0, 0, 0), V3d(.3, -.2, .1), V3d(2, 1, -1)})
     for (const ls::Geometry& shape : {ls::Geometry{CubeShape{}}, ls::Geometry{SphereShape{}}}) {
@@ -60,7 +60,7 @@ TEST(Offsets, AreAsSmallAsWhatTheyLeave) {
 
 // In a closed grey box that emits light the radiance is Le / (1 - .5), for sizes from 1e-4 to 1e6, alone and
 // next to something huge.
-TEST(Offsets, KeepTheLightOfAFurnace) {
+TEST(Offsets, PreserveTheLightOfAFurnace) {
   for (const double size : {1e-4, 1., 1e6})
     for (const double beside : {0., 1e6}) {
       SceneBuilder builder({4, 4});

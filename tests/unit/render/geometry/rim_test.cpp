@@ -49,7 +49,7 @@ SceneBuilder ball(bool lamp_inside) {
   return builder;
 }
 
-TEST(Rims, LetNoLightOutOfAClosedBody) {
+TEST(Rims, ClosedBodyLeaksNoLight) {
   const auto seen = test::estimate(ball(true), 256);
   EXPECT_EQ(seen.mean[0], 0);
   EXPECT_EQ(seen.mean[1], 0);

@@ -28,7 +28,7 @@ SceneBuilder bumpy(const ls::Geometry& g, bool flip) {
   return builder;
 }
 
-TEST(Slopes, SayHowFarNeighboursAreApart) {
+TEST(Slopes, MatchTheDistanceOfNeighbours) {
   const ls::Geometry kinds[] = {RectangleShape{}, DiskShape{}, SphereShape{}, CubeShape{}};
   for (const ls::Geometry& g : kinds)
     for (const bool flip : {false, true}) {
@@ -64,7 +64,7 @@ TEST(Slopes, SayHowFarNeighboursAreApart) {
 }
 
 // A slope is a ratio of lengths, in units of the scene: du and dv do not depend on the world's scale.
-TEST(Slopes, AreThoseOfTheSceneNotOfTheWorld) {
+TEST(Slopes, AreInSceneUnits) {
   const LightBench b(bumpy(RectangleShape{}, false));
   SurfaceHit hit;
   const V3 o = V3(b.at({300, 20, -40}));

@@ -1,6 +1,6 @@
 // Tests of AOVs on scenes in which their values are known, and of the light AOVs, whose sum must be the whole
 // light.
-#include "common/image/aov/aov.h"
+#include "core/image/aov/aov.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -8,8 +8,8 @@
 
 #include <cmath>
 
-#include "common/image/aov/identifiers.h"
-#include "common/image/film/partial.h"
+#include "core/image/aov/identifiers.h"
+#include "core/image/film/partial.h"
 #include "tests/support/render_check.h"
 
 namespace ls::render {
@@ -79,7 +79,7 @@ SceneBuilder wall(double x = .4, double y = .6, const Vec3& at = {0, 0, 0}) {
 const std::vector<std::string> kOfSurface = {"albedo", "coverage", "depth",    "normal",     "geo_normal",
                                              "uv",     "position", "shape_id", "material_id"};
 
-TEST(Aovs, OfAWallAreItsOwn) {
+TEST(Aovs, WallHasItsOwnValues) {
   for (const Vec3& at : {Vec3{0, 0, 0}, Vec3{100, -200, 50}}) {
     const Picture p(wall(.4, .6, at), kOfSurface);
     for (std::size_t pixel = 0; pixel < 4; ++pixel) {
@@ -102,7 +102,7 @@ TEST(Aovs, OfAWallAreItsOwn) {
   }
 }
 
-TEST(Aovs, DepthIsFromTheCameraWhateverItsNearClip) {
+TEST(Aovs, DepthIsMeasuredFromTheCameraNotTheNearClip) {
   SceneBuilder builder = wall();
   builder.scene.sensor.near_clip = 3;
   EXPECT_NEAR(Picture(builder, {"depth"}).of_hits("aov.depth.Z"), 5, 8 * kClose);
@@ -147,7 +147,7 @@ TEST(Aovs, SphereGivesNormalAndUv) {
   EXPECT_NEAR(flipped.of_hits("aov.uv.U"), .25, 1e-4);
 }
 
-TEST(Aovs, AlbedoIsTheShareOfLightThatAMaterialSendsOn) {
+TEST(Aovs, AlbedoIsTheReflectedOrTransmittedShareOfLight) {
   const auto albedo = [](BsdfIndex (*make)(SceneBuilder&)) {
     SceneBuilder builder = wall();
     builder.scene.shapes[0].bsdf = make(builder);
@@ -199,7 +199,7 @@ TEST(Aovs, GuidesOfADenoiserMixInMediaByTheirTransmittance) {
   EXPECT_NEAR(guide(p, "denoising_normal", 'Z'), through, 16 * kClose);
 }
 
-TEST(Aovs, NothingIsZeroAndMeansAreOfHits) {
+TEST(Aovs, MissesAreZeroAndMeansAreOverHits) {
   SceneBuilder builder({1, 1});
   builder.shape(RectangleShape{}, translate({-2, 0, 0}) * test::scale(2),
                 builder.diffuse(.5));  // covers x in [-4, 0]
@@ -218,7 +218,7 @@ TEST(Aovs, NothingIsZeroAndMeansAreOfHits) {
   EXPECT_EQ(none.ids(0), IdSlots{});
 }
 
-TEST(Aovs, MattesCountTheSamplesOfEachThing) {
+TEST(Aovs, CryptomattesCountTheSamplesOfEachObject) {
   SceneBuilder builder = wall();
   const BsdfIndex inner = builder.diffuse(.5), both = builder.bsdf(TwoSidedBsdf{inner, inner});
   const BsdfIndex mask = builder.bsdf(MaskBsdf{builder.texture({.25, .25, .25}), both});
@@ -239,7 +239,7 @@ TEST(Aovs, MattesCountTheSamplesOfEachThing) {
   EXPECT_EQ(shape.more + material.more, 0);
 }
 
-TEST(Aovs, InstancesAreThingsOfTheirOwn) {
+TEST(Aovs, InstancesAreSeparateObjectsInCryptomattes) {
   SceneBuilder builder({1, 1});
   builder.shape(SphereShape{}, translate({0, 0, 0}), builder.diffuse(.5)).group = GroupIndex{0};
   builder.scene.groups.emplace_back();
@@ -282,7 +282,7 @@ const std::vector<std::string> kOfLight = {"direct", "indirect", "surface", "vol
 // Each AOV sums the same float32 numbers in another order, in double, and is rounded once. The radiance of a
 // sample is summed in float32: with n contributions of one sign its error is n 2^-24 of the sum. These paths
 // have fewer than 256 contributions.
-TEST(Aovs, PartsOfTheLightAddUpToIt) {
+TEST(Aovs, LightLayersAddUpToTheColour) {
   for (const char* integrator : {"volpath", "volpath_distant_mis"})
     for (const int media : {0, 1, 2}) {
       SceneBuilder builder = hall(media > 0, media > 1);
@@ -320,7 +320,7 @@ TEST(Aovs, BeautyHasTheSameBitsWithAndWithoutThem) {
     }
 }
 
-TEST(Aovs, LightSeenStraightIsEmission) {
+TEST(Aovs, DirectlyVisibleLightIsEmission) {
   SceneBuilder builder = wall();
   builder.scene.shapes[0].emitter = AreaEmitter{builder.texture({3, 2, 1})};
   builder.scene.shapes[0].bsdf = builder.diffuse(0);
@@ -330,7 +330,7 @@ TEST(Aovs, LightSeenStraightIsEmission) {
   EXPECT_EQ(p.of_all("aov.surface.R") + p.of_all("aov.indirect.R"), 0);
 }
 
-TEST(Aovs, WithOneScatteringThereIsNoIndirectLightAndNoMultiple) {
+TEST(Aovs, SingleScatteringHasNoIndirectAndNoMultipleLight) {
   SceneBuilder builder = hall(true, false);
   builder.scene.integrator.max_depth = 2;
   const Picture p(builder, kOfLight);

@@ -26,7 +26,7 @@ const TestSegment kSegments[] = {{-3, 3, .5f},         {-3, 3, 1e-5f},  {100, 10
                                  {-101, -100, .01f},   {0, 1, 1},       {0, 4, 1e-3f},
                                  {-.5f, .25f, 1e4f},   {-1, 1, 1e7f},   {5, 5.0001f, 2}};
 
-TEST(EquiAngular, DensityIsThatOfTheAngle) {
+TEST(EquiAngular, DensityIsUniformInAngle) {
   for (const TestSegment& s : kSegments) {
     const EquiAngular e = s.make();
     for (int i = 0; i <= 16; ++i) {
@@ -81,7 +81,7 @@ TEST(EquiAngular, SamplesLieOnTheSegmentAndFollowTheAngle) {
   }
 }
 
-TEST(EquiAngular, DensityOfASampleIsTheDensityAtItsPlace) {
+TEST(EquiAngular, SampleAndDensityFunctionAgree) {
   RandomStream r(9);
   for (const TestSegment& s : kSegments) {
     for (int i = 0; i < 200; ++i) {

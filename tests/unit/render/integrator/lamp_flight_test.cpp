@@ -52,7 +52,7 @@ void fly(const Medium& medium, const Lamps& all, Take take) {
 // the weight albedo (1 - e^(-sigma end)) and pass with e^(-sigma end); the mean of t times the weight is
 // albedo (1 - (1 + sigma end) e^(-sigma end)) / sigma. Each check allows five standard errors and fails by
 // chance with probability 6e-7.
-TEST(LampFlight, HasTheMeansOfTheMedium) {
+TEST(LampFlight, HasTheMeanFreePathOfTheMedium) {
   for (const Lamps& all : {lamps({{1, .01f, 0}}), lamps({{1, .2f, .1f}, {-2, 1, 0}, {2.9f, 0, .001f}})})
     for (const C3& sigma : {C3(.5f, .5f, .5f), C3(0, .3f, 4), C3(1e-4f, 2, 30)}) {
       const Medium medium = homogeneous(sigma, {.9f * sigma.x, .5f * sigma.y, .8f * sigma.z});
@@ -97,7 +97,7 @@ TEST(LampFlight, BoundsTheSecondMomentOfLightNearALamp) {
               5 * light.error() + s * s / d * pi);
 }
 
-TEST(LampFlight, StaysFiniteInMediaWithoutAndBeyondAnyExtinction) {
+TEST(LampFlight, StaysFiniteForZeroAndHugeExtinction) {
   const Lamps all = lamps({{1, 0, 0}, {0, 0, 0}, {kEnd, 0, 0}});
   for (const float sigma : {0.f, 1e-30f, 1e6f, 1e30f})
     fly(homogeneous({sigma, 1, 1e20f}, {sigma, 1, 1e20f}), all, [&](const Flight& f) {
@@ -112,7 +112,7 @@ TEST(LampFlight, StaysFiniteInMediaWithoutAndBeyondAnyExtinction) {
 // Directions that are sampled near a lamp have a small weight, and lead to bright light. Roulette by the
 // weight alone would end most of these paths, and the few others would be fireflies. Measured: the error with
 // roulette is 1.21 times that without; with roulette by the weight alone it is 1.87 times.
-TEST(Roulette, SparesPathsThatAreAimedNearALamp) {
+TEST(Roulette, KeepsPathsThatAreAimedNearALamp) {
   const auto error = [](int rr_depth) {
     test::SceneBuilder b({16, 16});
     b.scene.integrator.max_depth = 8;

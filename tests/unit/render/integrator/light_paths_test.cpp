@@ -71,7 +71,7 @@ TEST(LightPaths, AreTheSameForAnyNumberOfThreads) {
 
 // Rays of the sun start in a vacuum and pass the media that the boundaries on their way declare. If camera
 // paths find other media there, the scene does not connect paths.
-TEST(LightPaths, AreNotThereIfMediaDifferByTheWay) {
+TEST(LightPaths, AreUnusedIfMediaDependOnTheDirection) {
   const SunnyRoom room{.light_vertices = 1};
   SceneBuilder fog_everywhere = room.builder();  // the fog also fills the space outside the room
   fog_everywhere.scene.sensor.medium = fog_everywhere.homogeneous({.1, .1, .1}, {.9, .9, .9});
@@ -89,7 +89,7 @@ TEST(LightPaths, AreNotThereIfMediaDifferByTheWay) {
 }
 
 // The slit of the room is closed, so paths find no sun. Then the settings cannot enforce connections.
-TEST(LightPaths, AreNotThereIfTheSunIsNot) {
+TEST(LightPaths, AreUnusedWithoutASun) {
   SceneBuilder dark = SunnyRoom{.light_vertices = 1}.builder();
   dark.shape(RectangleShape{}, test::translate({1.1, 0, 0}) * test::rotate_y(90) * test::scale(2),
              dark.diffuse(0));
@@ -98,7 +98,7 @@ TEST(LightPaths, AreNotThereIfTheSunIsNot) {
 
 // The test prints the ratios of the squared errors: 0.15 without fog and 0.25 with it. The limit of one half
 // leaves room for other sequences of random numbers.
-TEST(LightPaths, TakeTheNoiseFromIndirectLight) {
+TEST(LightPaths, ReduceNoiseOfIndirectLight) {
   for (const double fog : {0., .5}) {
     const auto squared_error = [&](int light_vertices) {
       const auto e =
@@ -165,7 +165,7 @@ TEST(LightPaths, SeeHowBrightGlossySurfacesAre) {
   }
 }
 
-TEST(LightPaths, GiveTheSameSumsHoweverSamplesAreSplit) {
+TEST(LightPaths, GiveTheSameSumsForAnyDivisionOfSamples) {
   constexpr std::uint64_t kAt = LightVertexCache::kEpoch;
   const auto world = test::world_of(SunnyRoom{.fog = .3, .light_vertices = 1}.builder());
   const PixelRect tile{3, 2, 7, 5};
@@ -188,7 +188,7 @@ TEST(LightPaths, GiveTheSameSumsHoweverSamplesAreSplit) {
 }
 
 // In deep white fog light is scattered a hundred times and more before it leaves.
-TEST(LightPaths, OfLightThatIsNeverLostAreBounded) {
+TEST(LightPaths, AreBoundedWithoutAbsorption) {
   SceneBuilder room = SunnyRoom{.fog = 100, .light_vertices = 1, .max_depth = -1}.builder();
   for (auto& medium : room.scene.media) std::get<HomogeneousMedium>(medium).albedo = {1, 1, 1};
   const auto world = test::world_of(room);
@@ -198,7 +198,7 @@ TEST(LightPaths, OfLightThatIsNeverLostAreBounded) {
   EXPECT_LT(count, 10u << 14) << "ten for each of the 2^14 rays";
 }
 
-TEST(LightPaths, OfACropAreThoseOfTheWholeFrame) {
+TEST(LightPaths, CropUsesThoseOfTheWholeFrame) {
   SceneBuilder whole = SunnyRoom{}.builder(), crop = whole;
   crop.scene.film.crop_offset = {12, 12};
   crop.scene.film.crop_size = {4, 4};
@@ -223,7 +223,7 @@ TEST(LightPaths, GiveTheSameBitsByEveryVariant) {
 #ifdef LIGHTSHAFT_COUNT
 
 // 2,000 index-matched panes stand between the camera and a floor in the sun, in thin fog.
-TEST(LightPaths, LearnNoLongerWherePathsPassThousandsOfBoundaries) {
+TEST(LightPaths, LearningIsSkippedWherePathsPassThousandsOfBoundaries) {
   constexpr int kPanes = 2000;
   SceneBuilder b({8, 8});
   b.look({0, 0, 4}, {0, 0, 0}, 20, {0, 1, 0});

@@ -18,7 +18,7 @@ using test::kPi;
 using test::SceneBuilder;
 using test::operator*;
 
-TEST(MisWeight, IsThatOfItsHeuristic) {
+TEST(MisWeight, MatchesItsHeuristic) {
   EXPECT_FLOAT_EQ(balance_weight(1, 3), .25f);
   EXPECT_FLOAT_EQ(mis_weight(MisHeuristic::balance, 1, 3), .25f);
   EXPECT_FLOAT_EQ(mis_weight(MisHeuristic::power, 1, 3), .1f);
@@ -64,7 +64,7 @@ void expect_moments(const TwoMoments& m, double mean, double square) {
 // next-event estimation for the half of its directions above the floor, whose c is uniform, and BSDF sampling
 // for c of density 2 c. With the power heuristic the squares would add up to 1.5 times as much for the one
 // strategy and to a fifth more for the other.
-TEST(MisWeight, AtSurfacesIsTheBalanceHeuristic) {
+TEST(MisWeight, SurfacesUseTheBalanceHeuristic) {
   constexpr double kAlbedo = .5;
   SceneBuilder builder({kSide, kSide});
   builder.lamp(SphereShape{}, {}).flip_normals = true;
@@ -86,7 +86,7 @@ TEST(MisWeight, AtSurfacesIsTheBalanceHeuristic) {
 // ray is sampled by depth, with density e_D, and one by angle, with density e_A. If the single-scattered
 // light is f(t), a strategy with weight w and density e has the second moment int w^2 f^2 / e dt. The lamp is
 // so far from the ray that the second moments of the two heuristics differ by fifteen standard errors.
-TEST(MisWeight, AlongSegmentsIsThatWhichIsAskedFor) {
+TEST(MisWeight, SegmentsUseTheRequestedHeuristic) {
   constexpr float kSigma = 2, kAside = .4f, kAlong = .7f;
   const auto f = [](double t) {
     const double r = std::hypot(t - kAlong, kAside);

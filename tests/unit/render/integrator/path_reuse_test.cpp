@@ -24,7 +24,7 @@ SceneBuilder changed(auto&& change, LampRoom room = {.fog = .5, .path_reuse = 8}
   return b;
 }
 
-TEST(PathReuse, IsThereIfAskedForAndPossible) {
+TEST(PathReuse, IsUsedIfRequestedAndPossible) {
   EXPECT_TRUE(shares(LampRoom{.path_reuse = 8}.builder()));
   EXPECT_TRUE(shares(LampRoom{.glossy = true, .fog = .5, .chromatic = true, .path_reuse = 2}.builder()));
   EXPECT_FALSE(shares(LampRoom{}.builder()));
@@ -92,7 +92,7 @@ SceneBuilder caustic() {
   return b;
 }
 
-TEST(PathReuse, IsThereByDefaultWhereNoiseIsOfLightScatteredSeveralTimes) {
+TEST(PathReuse, IsOnByDefaultWhereMultipleScatteringCausesTheNoise) {
   EXPECT_TRUE(shares(LampRoom{.path_reuse = 0}.builder({64, 64})));
   EXPECT_TRUE(shares(LampRoom{.fog = .5, .path_reuse = 0}.builder()));
   EXPECT_FALSE(shares(open_floor()));
@@ -161,7 +161,7 @@ TEST(PathReuse, GivesTheSamePixelsInEveryTileCropAndSampleRange) {
 
 // Whether sharing pays depends neither on the job's seed nor on a crop, and the pilot leaves the world
 // unchanged.
-TEST(PathReuse, IsTheSameByDefaultAsIfAskedFor) {
+TEST(PathReuse, DefaultEqualsTheExplicitSetting) {
   constexpr PixelRect kAll{0, 0, 16, 16};
   for (const std::uint64_t seed : {0, 1, 2}) {
     const auto sums = [&](LampRoom room) {
@@ -177,7 +177,7 @@ TEST(PathReuse, IsTheSameByDefaultAsIfAskedFor) {
 }
 
 // The decision does not depend on the pilot's number of threads. Frames of this size have 64 groups.
-TEST(PathReuse, IsDecidedAlikeByAnyNumberOfThreads) {
+TEST(PathReuse, DecisionIsTheSameForAnyNumberOfThreads) {
   for (SceneBuilder b : {LampRoom{.path_reuse = 0}.builder(), open_floor(), caustic()}) {
     b.scene.film.size = {256, 256};
     for (const int threads : {2, 3, 16})
@@ -209,7 +209,7 @@ TEST(PathReuse, GivesTheSameBitsInEveryVariant) {
 // The test prints the ratios of the squared errors: 0.58 without fog and 0.29 with it. A square in which
 // pixels share is a quarter of this small image. The limit of three quarters leaves room for other sequences
 // of random numbers.
-TEST(PathReuse, TakesTheNoiseFromIndirectLight) {
+TEST(PathReuse, ReducesNoiseOfIndirectLight) {
   for (const double fog : {0., .8}) {
     const auto squared_error = [&](int path_reuse) {
       // The sum of the pixels' squared errors, which may depend on each other

@@ -20,7 +20,7 @@ using test::operator*;
 
 // The density integrates to 1 over [0, length] at any optical depth; the test uses midpoints between
 // quantiles. The textbook form returns 0 everywhere below depths of 6e-8.
-TEST(TruncatedExponential, HasItsMassInTheStretchAtAnyDepth) {
+TEST(TruncatedExponential, HasItsMassInTheInterval) {
   for (const double depth : {1e-30, 1e-12, 1e-7, 1e-3, 1., 30., 1e6}) {
     for (const float length : {1e-3f, 1.f, 1e4f}) {
       const auto sigma = static_cast<float>(depth / length);
@@ -39,7 +39,7 @@ TEST(TruncatedExponential, HasItsMassInTheStretchAtAnyDepth) {
   }
 }
 
-TEST(TruncatedExponential, IsTheExponentialWithoutAnEndAndNothingWithoutDepth) {
+TEST(TruncatedExponential, EqualsTheExponentialWithoutALimitAndIsZeroWithoutDepth) {
   EXPECT_FLOAT_EQ(truncated_pdf(2, kInfinity, .5f), 2 * std::exp(-1.f));
   EXPECT_FLOAT_EQ(truncated_sample(2, kInfinity, .5), std::log(2.f) / 2);
   EXPECT_EQ(truncated_pdf(0, kInfinity, .5f), 0);
@@ -83,7 +83,7 @@ SceneBuilder cloud_builder() {
   return builder;
 }
 
-TEST(StretchOfAGrid, AnswersBothWaysRoundAndLeavesEmptyEndsOut) {
+TEST(StretchOfAGrid, IsSymmetricAndSkipsEmptyEnds) {
   const auto world = test::world_of(cloud_builder());
   const Medium& m = world->media.at(0);
   ASSERT_TRUE(m.grid);
@@ -144,7 +144,7 @@ TEST(DistantMis, IsTheDefaultIntegratorToTheBitWhereNoLightCanBeSampled) {
   EXPECT_EQ(render("volpath_distant_mis"), render("volpath"));
 }
 
-TEST(DistantMis, ItsSettingsReachTheRenderer) {
+TEST(DistantMis, SettingsReachTheRenderer) {
   SceneBuilder builder = cloud_builder();
   builder.scene.integrator.name = "volpath_distant_mis";
   std::vector<std::vector<float>> pictures;

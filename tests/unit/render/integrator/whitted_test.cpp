@@ -42,7 +42,7 @@ BsdfIndex tinted_mirror(SceneBuilder& b, double r) {
 }
 
 // The emission, plus half of it reflected once, is 1.5. With all reflections it is 1 / (1 - .5) = 2.
-TEST(Whitted, EndsWithTheDirectLightOfADiffuseSurface) {
+TEST(Whitted, EndsAtTheDirectLightOfADiffuseSurface) {
   expect_brightness(diffuse_room(), "whitted", -1, 1.5);
   expect_brightness(diffuse_room(), "path", 2, 1.5);
   expect_brightness(diffuse_room(), "path", -1, 2);
@@ -58,7 +58,7 @@ TEST(Whitted, FollowsMirrorsToTheEnd) {
 
 // Half of the material is a mirror and half is diffuse: L = 1 + .5 * .8 L + .5 * .5, since the diffuse half
 // reflects direct light only.
-TEST(Whitted, TellsThePartsOfAMaterialApart) {
+TEST(Whitted, DistinguishesThePartsOfAMaterial) {
   expect_brightness(room([](SceneBuilder& b) {
                       const BsdfIndex first = tinted_mirror(b, .8), second = b.diffuse(.5);
                       return b.bsdf(BlendBsdf{b.texture({.5, .5, .5}), first, second});
@@ -70,7 +70,7 @@ TEST(Whitted, TellsThePartsOfAMaterialApart) {
 // the ball's image at (2, 0, 2). A ball at distance d, all of it above the horizon, gives the irradiance pi
 // r^2 / d^2 cos: pi / 16 directly, and pi .25 / 8 * sqrt(.5) through the mirror, which `whitted` leaves out.
 // The mirror shows the floor at (2, 0, 0) with the same radiance.
-TEST(Whitted, LeavesOutWhatMirrorsThrowOnASurface) {
+TEST(Whitted, LeavesOutCausticsOfMirrors) {
   SceneBuilder builder;
   builder.shape(RectangleShape{}, test::scale(.2), builder.diffuse(.5));
   builder.shape(SphereShape{{0, 0, 2}, .5}, {}, builder.diffuse(0)).emitter =

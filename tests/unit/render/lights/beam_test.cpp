@@ -73,7 +73,7 @@ TEST(AreaBeam, SendsTheFluxOfTheClosedForm) {
   }
 }
 
-TEST(AreaBeam, AHitHasTheRadianceAndDensityOfItsSample) {
+TEST(AreaBeam, HitHasTheRadianceAndDensityOfItsSample) {
   const Transform up = translate({0, 0, 3}) * test::rotate_x(170);
   const ls::Geometry kinds[] = {RectangleShape{}, DiskShape{}, CubeShape{}, SphereShape{}};
   for (const ls::Geometry& g : kinds)
@@ -92,7 +92,7 @@ TEST(AreaBeam, AHitHasTheRadianceAndDensityOfItsSample) {
 }
 
 // The estimate combines light samples, by MIS, with directions that the floor samples and that hit the light.
-TEST(AreaBeam, LightsAFloorAsItsSamplingAlone) {
+TEST(AreaBeam, HitsAndSamplesGiveTheSameIrradiance) {
   for (const Beam& beam : {kBeams[1], kBeams[3]}) {
     SceneBuilder builder = shining(RectangleShape{}, translate({0, 0, 1}) * test::rotate_x(180), beam);
     const BsdfIndex floor = builder.diffuse(.5);
@@ -105,7 +105,7 @@ TEST(AreaBeam, LightsAFloorAsItsSamplingAlone) {
   }
 }
 
-TEST(AreaBeam, WithoutAnglesIsTheSameLightToTheBit) {
+TEST(AreaBeam, WithoutAnglesHasTheSameBitsAsAnAreaLight) {
   const LightBench plain(area(RectangleShape{}, {})), wide(shining(RectangleShape{}, {}, {90, 90, 7}));
   RandomStream r(2);
   for (int i = 0; i < 100; ++i) {

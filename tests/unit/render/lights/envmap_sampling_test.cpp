@@ -85,7 +85,7 @@ TEST(EnvironmentMap, DensityIntegratesToOne) {
   }
 }
 
-TEST(EnvironmentMap, SamplesFallAsTheirDensitySays) {
+TEST(EnvironmentMap, SamplesFollowTheirDensity) {
   test::ChiSquareTally tally("render/envmap");
   for (const NamedSky& n : skies()) {
     const EnvironmentMap m = map_of(n.image);
@@ -122,7 +122,7 @@ std::uint64_t first_where(const std::function<bool(std::uint32_t)>& holds) {
 // Finite differences must not cross the kinks of the map between its cells. So each cell is tested alone,
 // with the words that choose it: its share of all words, times the Jacobian of the map from the unit square
 // onto it, is 1 over the density.
-TEST(EnvironmentMap, EachCellStretchesItsWordsByOneOverTheDensity) {
+TEST(EnvironmentMap, SamplingJacobianIsOneOverTheDensity) {
   std::vector<NamedSky> all = skies();
   SkyImage overcast(12, 7);
   std::mt19937 rng(6);
@@ -163,7 +163,7 @@ TEST(EnvironmentMap, EachCellStretchesItsWordsByOneOverTheDensity) {
   EXPECT_GT(cells, 50);
 }
 
-TEST(EnvironmentMap, AConstantMapIsSampledUniformly) {
+TEST(EnvironmentMap, ConstantMapIsSampledUniformly) {
   const EnvironmentMap m = map_of(SkyImage(16, 9, 3));
   RandomStream r(3);
   for (int i = 0; i < 1000; ++i) {
@@ -202,7 +202,7 @@ TEST(EnvironmentMap, DensityFollowsTheLight) {
   EXPECT_LT(relative, 1e-3);
 }
 
-TEST(EnvironmentMap, TheFirstAndTheLastWordMeanPlacesWithLight) {
+TEST(EnvironmentMap, ExtremeRandomNumbersSamplePlacesWithLight) {
   for (const NamedSky& n : skies()) {
     const EnvironmentMap m = map_of(n.image);
     for (const std::uint32_t x : {0u, 1u, 0x80000000u, 0xffffffffu})

@@ -44,7 +44,7 @@ constexpr float kEps = 32 * 0x1p-20f;
 
 // In Mitsuba 3 (u, v) = (atan2(x, -z) / 2 pi, acos(y) / pi). The centres of the columns are at u = 1/8, 3/8,
 // 5/8 and 7/8, halfway between the axes of the horizon: from -z over +x to +z and -x.
-TEST(EnvironmentMap, TexelsLieWhereMitsubaPutsThem) {
+TEST(EnvironmentMap, TexelPositionsMatchMitsuba) {
   const EnvironmentMap m = map_of(numbered());
   EXPECT_NEAR(value(m, {1, 0, -1}), 11, kEps) << "u = 1/8: from -z towards +x";
   EXPECT_NEAR(value(m, {1, 0, 1}), 12, kEps) << "u = 3/8";
@@ -68,7 +68,7 @@ TEST(EnvironmentMap, IsBilinearBetweenTexelsAndRepeatsAround) {
   EXPECT_NEAR(value(m, {r, -1, r}), (12 + 21) / 2., kEps);
 }
 
-TEST(EnvironmentMap, ToWorldTurnsAndMirrorsItAndNothingElse) {
+TEST(EnvironmentMap, OnlyRotationAndMirroringOfToWorldMatter) {
   const SkyImage s = numbered();
   // Turns z to x, so the middle of the image is at +x.
   EXPECT_NEAR(value(map_of(s, test::rotate_y(90)), {1, 0, 0}), 12.5, kEps);
@@ -90,7 +90,7 @@ TEST(EnvironmentMap, NegativeTexelsBecomeBlackAndAreCounted) {
   EXPECT_NEAR(m.at(normalize(V3(1, 0, -1))).radiance.y, 1, kEps);
 }
 
-TEST(EnvironmentMap, WhatCannotBeLightIsRefusedByName) {
+TEST(EnvironmentMap, InvalidMapIsRefusedByName) {
   SkyImage bad(4, 3, 1);
   bad.set(2, 1, {1, std::numeric_limits<double>::quiet_NaN(), 1});
   EXPECT_THAT(refusal(bad), HasSubstr("the texel at x 2, y 1"));
@@ -176,7 +176,7 @@ TEST(EnvironmentMap, IsSeenByTheCameraUnlessEmittersAreHidden) {
   EXPECT_NEAR(e.mean[0], .25, 6 * e.standard_error[0] + 1e-5);
 }
 
-TEST(EnvironmentMap, IsSampledAsOftenAsItsPowerSays) {
+TEST(EnvironmentMap, IsSampledInProportionToItsPower) {
   // A light is chosen with the probability 1/2 in proportion to power, else uniformly. The power of the map
   // is the flux through the ball that bounds the world.
   SceneBuilder builder = under_sky(SkyImage(8, 5, 1));
@@ -193,7 +193,7 @@ TEST(EnvironmentMap, IsSampledAsOftenAsItsPowerSays) {
   EXPECT_FLOAT_EQ(world->lights.environment(V3(0), l->direction, kInfinity, {}).x, 1);
 }
 
-TEST(EnvironmentMap, IsSampledApartFromAConstantSky) {
+TEST(EnvironmentMap, IsSampledSeparatelyFromAConstantSky) {
   SceneBuilder builder = under_sky(SkyImage(8, 5, 1));
   builder.scene.emitters.push_back(ConstantEmitter{{.25, .25, .25}});
   const auto world = test::world_of(builder);
@@ -219,7 +219,7 @@ TEST(EnvironmentMap, IsCountedInTheReport) {
   EXPECT_THAT(black.left_out, ::testing::Contains(HasSubstr("environment map")));
 }
 
-TEST(EnvironmentMap, ASecondOneIsRefused) {
+TEST(EnvironmentMap, SecondMapIsRefused) {
   SceneBuilder builder = under_sky(SkyImage(8, 5, 1));
   test::add_sky(builder, SkyImage(8, 5, 2));
   EXPECT_THROW(test::world_of(builder), std::runtime_error);

@@ -43,7 +43,7 @@ V3d book_direction(double px, double py) {
           std::copysign(1 - r * r, distance)};
 }
 
-TEST(EqualArea, AxesLieWherePbrtPutsThem) {
+TEST(EqualArea, AxesMatchPbrt) {
   const auto place = [](float x, float y, float z) { return equal_area_place({x, y, z}); };
   const auto is = [](const V2& p, float x, float y) { return p.x == x && p.y == y; };
   EXPECT_TRUE(is(place(0, 0, 1), .5f, .5f));
@@ -55,7 +55,7 @@ TEST(EqualArea, AxesLieWherePbrtPutsThem) {
   EXPECT_TRUE((below.x == 0 || below.x == 1) && (below.y == 0 || below.y == 1));
 }
 
-TEST(EqualArea, DirectionsAreThoseOfTheBook) {
+TEST(EqualArea, DirectionsMatchTheFormulaInTheBook) {
   for (int i = 0; i <= 64; ++i)
     for (int j = 0; j <= 64; ++j) {
       const V3 d = equal_area_direction({static_cast<float>(i) / 64, static_cast<float>(j) / 64});
@@ -65,7 +65,7 @@ TEST(EqualArea, DirectionsAreThoseOfTheBook) {
     }
 }
 
-TEST(EqualArea, PlacesAndDirectionsAreInverse) {
+TEST(EqualArea, MappingAndItsInverseAgree) {
   RandomStream r(5);
   for (int i = 0; i < 100000; ++i) {
     const V2 p(r.uniform(), r.uniform()), back = equal_area_place(equal_area_direction(p));
@@ -77,14 +77,14 @@ TEST(EqualArea, PlacesAndDirectionsAreInverse) {
   }
 }
 
-TEST(EqualArea, StretchesAllAreasAlike) {
+TEST(EqualArea, PreservesAreas) {
   test::expect_jacobian("equal area", [](const V2& u) -> std::optional<test::Mapped> {
     return test::Mapped{V3d(equal_area_direction(u)), 1 / kWholeSphere};
   });
 }
 
 // Texels are not filtered: a direction that is not next to a texel's edge has exactly that texel's radiance.
-TEST(EqualArea, EachTexelIsWhereItsPlaceIs) {
+TEST(EqualArea, TexelsAreAtTheirPositions) {
   constexpr int kSide = 7;
   SkyImage s(kSide, kSide);
   for (int y = 0; y < kSide; ++y)
@@ -150,14 +150,14 @@ bool is_above_square(const V3& d) { return d.z > 0; }
 // limit is three times as large.
 constexpr double kStrataError = 3 * 8 * kPiBook * 2 / (512. * 512);
 
-TEST(EqualArea, AConstantMapHasItsIrradianceAndIsSampledUniformly) {
+TEST(EqualArea, ConstantMapHasItsIrradianceAndIsSampledUniformly) {
   const EnvironmentMap m = square_map(SkyImage(6, 6, 2));
   EXPECT_NEAR(m.flux(), 2 * kWholeSphere, 1e-5);  // float32 weights of the luminance
   EXPECT_NEAR(m.at({0, .6f, .8f}).pdf * kWholeSphere, 1, 1e-6);
   EXPECT_NEAR(light_flow(m, is_above_square).z, 2 * kPiBook, kStrataError);
 }
 
-TEST(EqualArea, AHemisphereHasTheIrradiancePi) {
+TEST(EqualArea, HemisphereHasIrradiancePi) {
   // Half of each texel on the fold is in the lit hemisphere, so it has half of the radiance. The half of the
   // light that these texels lack above the fold lies within 2 / side of it: 8 pi / (3 side^2), as derived
   // below.
@@ -178,7 +178,7 @@ TEST(EqualArea, AHemisphereHasTheIrradiancePi) {
   EXPECT_NEAR(m.flux(), kWholeSphere / 2, 1e-5);
 }
 
-TEST(EqualArea, ACosineHasTwoThirdsOfPi) {
+TEST(EqualArea, CosineMapHasIrradianceTwoThirdsOfPi) {
   // A texel has the side h = 2 / side in s. The z of its centre exceeds its mean z by h^2 / 6. Its mean z^2
   // exceeds the square of its mean z by 2 r^2 h^2 / 3, because z = 1 - r^2 has the slope 2 r along each axis.
   // In all, the irradiance is 2 pi / side^2 below that of the smooth map.
@@ -196,7 +196,7 @@ TEST(EqualArea, ACosineHasTwoThirdsOfPi) {
   EXPECT_NEAR(light_flow(square_map(s), is_above_square).z, want, fold + kStrataError);
 }
 
-TEST(EqualArea, OneBrightTexelGivesItsLight) {
+TEST(EqualArea, SingleBrightTexelHasItsIrradiance) {
   constexpr int kSide = 16;
   // Texels next to the centre, within a quadrant, across the fold, at the middle of an edge, in a corner, and
   // at the border
@@ -218,7 +218,7 @@ TEST(EqualArea, OneBrightTexelGivesItsLight) {
 
 // In a stratified square of words, the strata of rows and of columns that choose a texel match its share to
 // within one stratum each.
-TEST(EqualArea, TexelsAreChosenAsTheirDensitySays) {
+TEST(EqualArea, TexelsAreSampledByTheirDensity) {
   constexpr int kSide = 5, kWords = 1024;
   SkyImage s(kSide, kSide);
   for (int y = 0; y < kSide; ++y)
@@ -252,7 +252,7 @@ TEST(EqualArea, TheSmallestMapIsOneTexel) {
   }
 }
 
-TEST(EqualArea, OnlySquaresAreMaps) {
+TEST(EqualArea, OnlySquareImagesAreAccepted) {
   EXPECT_THAT(try_square_map(SkyImage(8, 4, 1)).error().message,
               HasSubstr("'sky.pfm' has 8 x 4 pixels; an equal-area map is square"));
   ImageData huge;

@@ -47,7 +47,7 @@ C3 arriving(const LightBench& b, const V3d& p) {
   return s ? s->radiance / s->pdf : C3(0);
 }
 
-TEST(Goniometric, ShinesInEachDirectionByItsTexel) {
+TEST(Goniometric, EmitsInEachDirectionByItsTexel) {
   GoniometricEmitter e;
   e.intensity = {3, 2, 1};
   const LightBench b(shining(image(), e));
@@ -64,7 +64,7 @@ TEST(Goniometric, ShinesInEachDirectionByItsTexel) {
         }
 }
 
-TEST(Goniometric, StandsTurnedAndMovedAsItsTransformSays) {
+TEST(Goniometric, FollowsItsTransform) {
   GoniometricEmitter e;
   e.to_world = test::translate({1, 2, 3}) * test::rotate_x(90);  // +z becomes -y
   const LightBench b(shining(image(), e));
@@ -108,13 +108,13 @@ TEST(Goniometric, MapsThePolesAndAxesToTheirPlaces) {
   EXPECT_EQ(std::abs(below.y - .5f), .5f);
 }
 
-TEST(Goniometric, OfABlackImageIsLeftOut) {
+TEST(Goniometric, BlackImageIsLeftOut) {
   const LightBench b(shining(test::SkyImage(2, 2)));
   EXPECT_FALSE(b.world->lights.can_sample());
   EXPECT_EQ(b.world->lights.left_out(), 1u);
 }
 
-TEST(Goniometric, WantsASquareImage) {
+TEST(Goniometric, RequiresASquareImage) {
   const SceneBuilder builder = shining(test::SkyImage(4, 2));
   const auto world = build_world(builder.scene, test::settings_of(builder.scene), builder.files, 1);
   ASSERT_FALSE(world);

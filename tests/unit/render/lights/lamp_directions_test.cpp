@@ -49,7 +49,7 @@ Mean mean_of(const LampDirections& directions, Value value) {
 
 // The mean of a function over the density is the integral of the function if, and only if, the samples have
 // this density. Each test allows five standard errors, which are exceeded with probability 6e-7.
-TEST(LampDirections, HaveTheDensityThatTheySay) {
+TEST(LampDirections, HaveTheirStatedDensity) {
   for (const Lamps& all : {lamps({{1, 2, 3}}), lamps({{1, 2, 3}, {-4, 0, 1}, {.5f, -1, 2.1f}})}) {
     const LampDirections directions(all, kVertex);
     ASSERT_TRUE(directions.any());
@@ -82,7 +82,7 @@ TEST(LampDirections, BoundTheSecondMomentOfLightNearALamp) {
   EXPECT_NEAR(found.value, expected, 5 * found.error);
 }
 
-TEST(LampDirections, LeaveTheOwnDistributionAloneWithoutALamp) {
+TEST(LampDirections, KeepThePhaseFunctionWithoutALamp) {
   for (const LampDirections& none : {LampDirections(), LampDirections(lamps({kVertex}), kVertex)}) {
     float choice = .1f;
     EXPECT_FALSE(none.any());

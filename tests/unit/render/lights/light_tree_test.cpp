@@ -82,7 +82,7 @@ std::vector<LightBounds> random_bounds(std::size_t n, RandomStream& r) {
   return all;
 }
 
-TEST(LightTree, SharesAllWordsAmongItsLightsAndFindsByThem) {
+TEST(LightTree, DividesAllRandomNumbersAmongItsLights) {
   RandomStream r(1);
   for (const std::size_t n : {1u, 2u, 3u, 50u, 1000u}) {
     const LightTree tree = LightTree::build(random_bounds(n, r));
@@ -104,7 +104,7 @@ TEST(LightTree, SharesAllWordsAmongItsLightsAndFindsByThem) {
 }
 
 // Each light is found by exactly as many words as words_of() returns.
-TEST(LightTree, FindsEachLightByItsNumberOfWords) {
+TEST(LightTree, SelectsEachLightForItsShareOfRandomNumbers) {
   RandomStream r(2);
   constexpr std::uint64_t words = 5000;
   const LightTree tree = LightTree::build(random_bounds(40, r));
@@ -116,7 +116,7 @@ TEST(LightTree, FindsEachLightByItsNumberOfWords) {
   }
 }
 
-TEST(LightTree, GoesForTheNearTheBrightAndThoseThatFaceThePoint) {
+TEST(LightTree, PrefersNearAndBrightLightsThatFaceThePoint) {
   const auto share = [](LightBounds a, LightBounds b, const V3& n) {
     const LightTree tree = LightTree::build({a, b});
     return static_cast<double>(tree.words_of(0, kWords, V3(0), n)) / static_cast<double>(kWords);
@@ -139,7 +139,7 @@ TEST(LightTree, GoesForTheNearTheBrightAndThoseThatFaceThePoint) {
   EXPECT_EQ(share(turned, away, up), 1) << "away";
 }
 
-TEST(LightTree, CopesWithLightsInOnePlaceAndWithExtremes) {
+TEST(LightTree, HandlesCoincidentAndExtremeLights) {
   LightBounds b;
   b.low = b.high = V3(.5f);
   b.intensity = 1e-30;
@@ -157,7 +157,7 @@ TEST(LightTree, CopesWithLightsInOnePlaceAndWithExtremes) {
 // only where its node has fewer words than lights, so the lost intensity is at most one word's share per
 // light (here 4e-7 of the sum). Lights below 1e9 have 1e-10 of the total intensity and get at most one word
 // each, 2.3e-4 of all words; so at most ten of a thousand words find such a light.
-TEST(LightTree, SharesAllWordsAmongAMillionLightsFortyOrdersApart) {
+TEST(LightTree, DividesRandomNumbersAmongAMillionVeryUnequalLights) {
   constexpr std::size_t n = 1'000'000;
   RandomStream r(30);
   std::vector<LightBounds> lights = random_bounds(n, r);
@@ -188,7 +188,7 @@ TEST(LightTree, SharesAllWordsAmongAMillionLightsFortyOrdersApart) {
 }
 
 // The tree as a part of Lights
-TEST(ManyLights, ProbabilitiesSumToOneAndAreThoseOfTheWords) {
+TEST(ManyLights, ProbabilitiesSumToOneAndMatchTheSampling) {
   const LightBench b(hall(200));
   const Lights& lights = b.world->lights;
   ASSERT_TRUE(lights.has_tree());
@@ -216,7 +216,7 @@ TEST(ManyLights, ProbabilitiesSumToOneAndAreThoseOfTheWords) {
   }
 }
 
-TEST(ManyLights, AHitHasTheDensityOfItsSample) {
+TEST(ManyLights, HitHasTheDensityOfItsSample) {
   const LightBench b(hall(150));
   const Lights& lights = b.world->lights;
   RandomStream r(6);
@@ -276,7 +276,7 @@ double variance_gain(const LightBench& b, const std::vector<Vec3>& places) {
   return std::exp(gain / static_cast<double>(places.size()));
 }
 
-TEST(ManyLights, TheTreeIsRightAndLessNoisyThanTheTable) {
+TEST(ManyLights, LightTreeIsUnbiasedAndLessNoisyThanTheTable) {
   for (const int n : {40, 150, 500}) {
     const LightBench b(hall(n));
     ASSERT_TRUE(b.world->lights.has_tree());
@@ -287,7 +287,7 @@ TEST(ManyLights, TheTreeIsRightAndLessNoisyThanTheTable) {
 }
 
 // Equal lamps along a street.
-TEST(ManyLights, OfAStreetTheNearLampsAreFound) {
+TEST(ManyLights, NearLampsOfAStreetAreChosen) {
   SceneBuilder builder;
   builder.shape(RectangleShape{}, test::scale(600, 10, 1), builder.diffuse(.5));
   const BsdfIndex black = builder.diffuse(0);
@@ -303,7 +303,7 @@ TEST(ManyLights, OfAStreetTheNearLampsAreFound) {
   EXPECT_GT(gain, 20);
 }
 
-TEST(ManyLights, FewAreLeftToTheTable) {
+TEST(ManyLights, FewLightsUseTheTable) {
   const LightBench few(hall(20)), many(hall(60));
   EXPECT_FALSE(few.world->lights.has_tree());
   EXPECT_TRUE(many.world->lights.has_tree());
@@ -317,7 +317,7 @@ TEST(ManyLights, FewAreLeftToTheTable) {
 }
 
 // Renders an image, in which directions that the floor samples hit some of the lights.
-TEST(ManyLights, LightAFloorAsOneByOne) {
+TEST(ManyLights, LightAFloorLikeTheSumOfSingleLights) {
   SceneBuilder builder = hall(60);
   builder.look({0, -3, 4}, {0, 0, 0}, 20);
   const auto all = test::estimate(builder, 256);

@@ -12,7 +12,7 @@
 
 #include "worker/render/math/random.h"
 
-#include "common/image/error/area_error.h"
+#include "core/image/error/area_error.h"
 namespace ls::render {
 namespace {
 
@@ -35,7 +35,7 @@ TEST(SunMap, IsEmptyUntilTheSunIsFound) {
 }
 
 // A ray has the density of all points on it, and the mean of 1 / density over rays is the area of the plane.
-TEST(SunMap, RaysHaveTheDensityOfTheirPoints) {
+TEST(SunMap, RayDensityMatchesItsPoints) {
   const SunMap map = learned();
   RandomStream random(7);
   double area = 0, squares = 0;
@@ -61,7 +61,7 @@ TEST(SunMap, RaysHaveTheDensityOfTheirPoints) {
 }
 
 // The paths saw only a small room of a large scene, so the rays start towards this room.
-TEST(SunMap, FitsTheRaysToWhereTheSunWasFound) {
+TEST(SunMap, AimsRaysWhereTheSunWasFound) {
   SunMap map({0, 0, 1}, 1000);
   map.learn({1, 2, 3}, 1);
   map.learn({2, 1, 3}, 1);
@@ -79,7 +79,7 @@ TEST(SunMap, FitsTheRaysToWhereTheSunWasFound) {
 
 // Compares with the densities of all strategies that find a path of five vertices, of which the sun lights
 // the last.
-TEST(SubpathDensities, AddUpTheDensitiesOfAllWaysToFindAPath) {
+TEST(SubpathDensities, SumOverAllWaysToFindAPath) {
   constexpr std::size_t kLast = 4;
   RandomStream random(5);
   const auto number = [&] { return .1f + random.uniform(); };
@@ -152,7 +152,7 @@ LightVertices some(std::size_t count) {
 
 // The weight is 1 over the expected number of times that a vertex is chosen. With u on a grid of kSteps
 // points, the share of u for which a vertex is chosen is off by at most 2 / kSteps.
-TEST(LightVertices, AreChosenWithTheProbabilityThatTheirWeightSays) {
+TEST(LightVertices, AreChosenWithTheProbabilityUsedInTheirWeight) {
   constexpr std::size_t kCount = LightVertices::kCandidates + 11;
   constexpr int kSteps = 20000;
   const LightVertices all = some(kCount);
@@ -178,7 +178,7 @@ TEST(LightVertices, AreChosenWithTheProbabilityThatTheirWeightSays) {
   }
 }
 
-TEST(LightVertices, BehindASurfaceAreNotChosen) {
+TEST(LightVertices, ThoseBehindASurfaceAreNotChosen) {
   Receiver x;
   x.p = {0, 0, 1};
   x.n = {0, 0, 1};
@@ -207,7 +207,7 @@ TEST(LightVertices, AreSeenFromTheSidesThatTheyLight) {
   }
 }
 
-TEST(LightVertices, AtTheReceiverItselfAreNoTrouble) {
+TEST(LightVertices, ThoseAtTheReceiverItselfAreHandled) {
   LightVertices all;
   LightVertex y;
   y.medium = 0;
@@ -226,7 +226,7 @@ TEST(LightVertices, AtTheReceiverItselfAreNoTrouble) {
 }
 
 // With g so close to 1, the denominator of the phase function consists of rounding errors.
-TEST(LightVertices, InMediaThatScatterSharplyAreChosen) {
+TEST(LightVertices, ThoseInForwardScatteringMediaAreChosen) {
   for (const float g : {-.99999f, .9995f, .9999f, .99999f}) {
     LightVertices all;
     LightVertex y;
@@ -277,7 +277,7 @@ TEST(LightVertices, AreChosenByTheirLobes) {
 static_assert(LightVertexCache::kEpoch == kSetSamples,
               "intervals of the image's mean are for another length");
 
-TEST(LightVertexCache, GivesEachHalfAndEachEpochASetOfItsOwn) {
+TEST(LightVertexCache, EachHalfAndEpochHasASeparateSet) {
   constexpr std::uint64_t e = LightVertexCache::kEpoch;
   EXPECT_NE(LightVertexCache::set_of(0), LightVertexCache::set_of(1));
   EXPECT_EQ(LightVertexCache::set_of(0), LightVertexCache::set_of(e - 2));
@@ -285,7 +285,7 @@ TEST(LightVertexCache, GivesEachHalfAndEachEpochASetOfItsOwn) {
   EXPECT_NE(LightVertexCache::set_of(1), LightVertexCache::set_of(e));
 }
 
-TEST(LightVertexCache, BuildsASetOnceHoweverManyThreadsAsk) {
+TEST(LightVertexCache, BuildsASetOnceForAllThreads) {
   LightVertexCache cache;
   std::atomic<int> built{0};
   const auto build = [&](std::uint64_t) {

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "common/base/clock.h"
+#include "core/base/clock.h"
 #include "tests/unit/render/light_bench.h"
 
 namespace ls::render {
@@ -47,7 +47,7 @@ TEST(Lights, SphereGivesPiTimesTheSquareOfRadiusOverDistance) {
   }
 }
 
-TEST(Lights, InsideAShiningSphereIrradianceIsPiEverywhere) {
+TEST(Lights, IrradianceInsideAnEmittingSphereIsPi) {
   const LightBench bench(area(SphereShape{}, {}, true));
   // Directions are sampled uniformly, so the relative variance of the cosine, whose mean is 1/4, is 5/3.
   for (const V3d& x : {V3d(0, 0, 0), V3d(.3, -.5, .2), V3d(0, 0, -.999), V3d(0, 0, -1)}) {
@@ -89,7 +89,7 @@ TEST(Lights, PointFollowsTheInverseSquareAtAllScales) {
 }
 
 // pdf() of a hit equals the density of a sample at the same point.
-TEST(Lights, DensityOfAHitIsThatOfItsSample) {
+TEST(Lights, HitAndSampleHaveTheSameDensity) {
   struct Named {
     const char* name;
     SceneBuilder builder;
@@ -128,7 +128,7 @@ SceneBuilder checkered_sphere(bool flip) {
   return builder;
 }
 
-TEST(Lights, ACheckeredSphereGivesTheMeanOfItsColours) {
+TEST(Lights, CheckeredSphereLightsWithTheMeanOfItsColours) {
   const LightBench outside(checkered_sphere(false)), inside(checkered_sphere(true));
   constexpr double kMean = (.25 + 1.5) / 2;
   expect_close(outside.irradiance({0, 0, -3}, {0, 0, 1}, 256), kMean * M_PI / 9);
@@ -137,7 +137,7 @@ TEST(Lights, ACheckeredSphereGivesTheMeanOfItsColours) {
 }
 
 // As of a glTF material with emission and alphaMode MASK: of the card passes less than its alphaCutoff.
-TEST(Lights, ACardOfWhichAQuarterPassesTheCutShines) {
+TEST(Lights, CutOutCardEmitsOnlyFromItsRemainingQuarter) {
   SceneBuilder builder = area(RectangleShape{}, translate({0, 0, 100}) * test::rotate_x(180));
   std::vector<Texture>& textures = builder.scene.textures;
   const auto add = [&](const Texture& t) {
@@ -160,7 +160,7 @@ TEST(Lights, ACardOfWhichAQuarterPassesTheCutShines) {
   EXPECT_NEAR(e.mean, .25 * 2 * 4 / 1e4, 5 * e.se + 1e-7);
 }
 
-TEST(Lights, ASampleOfATexturedLightHasTheColourThatIsSeenThere) {
+TEST(Lights, SampleOfATexturedLightHasTheColourAtItsPoint) {
   for (const bool flip : {false, true}) {
     const LightBench b(checkered_sphere(flip));
     const V3 x = b.at(flip ? V3d(.3, -.2, .4) : V3d(1.5, -.9, .8));
@@ -180,7 +180,7 @@ TEST(Lights, ASampleOfATexturedLightHasTheColourThatIsSeenThere) {
   }
 }
 
-TEST(Lights, EachOfManyIsChosenAsOftenAsItsProbabilitySays) {
+TEST(Lights, AreChosenWithTheirStatedProbability) {
   SceneBuilder builder = area(RectangleShape{}, {});
   constexpr int kLights = 20000;
   for (int i = 1; i < kLights; ++i) {
@@ -240,7 +240,7 @@ TEST(Lights, TakeTimeInProportionToShapesNotToShapesTimesTriangles) {
   EXPECT_LT(t3 - t2, 5 * (t1 - t0));
 }
 
-TEST(Lights, ADarkSideIsNeitherSampledNorGivenADensity) {
+TEST(Lights, DarkSideIsNeverSampledAndHasNoDensity) {
   const LightBench outside(area(SphereShape{}, {}, true)), inside(area(SphereShape{}, {}));
   SurfaceHit hit;
   const V3 from_out = outside.at({0, 0, -3}), from_in = inside.at({0, 0, .5});
@@ -251,7 +251,7 @@ TEST(Lights, ADarkSideIsNeitherSampledNorGivenADensity) {
   EXPECT_EQ(inside.world->lights.pdf(hit, from_in, {0, 0, 1}), 0.f);
 }
 
-TEST(Lights, AreSeenFromTheirFrontAlone) {
+TEST(Lights, AreVisibleOnlyFromTheirFront) {
   const LightBench bench(area(RectangleShape{}, {}));
   SurfaceHit hit;
   const V3 origin = bench.at({.1, .1, 2});

@@ -38,7 +38,7 @@ TEST(LocalLights, AreChosenWhereTheyReach) {
   }
 }
 
-TEST(LocalLights, AreDrawnWithTheProbabilityThatTheyHave) {
+TEST(LocalLights, AreSampledWithTheirStatedProbability) {
   const LocalLights lights(two_rooms(2000), kTable);
   RandomStream random(9);
   for (int i = 0; i < 200; ++i) {
@@ -84,7 +84,7 @@ TEST(LocalLights, KnowMediaOnlyIfTheyWereVisited) {
   EXPECT_LT(lights.probability(2, {-.5f, .5f, 1}, {1, 0, 0}), .2f);
 }
 
-TEST(LocalLights, KnowSidesThatNobodyVisited) {
+TEST(LocalLights, HandleUnvisitedSides) {
   LightVisits visits;
   for (int i = 0; i < 1000; ++i)
     visits.add({static_cast<float>(i), 0, 0}, {0, 0, 1}, std::array{1.f, 0.f, 0.f});
@@ -92,7 +92,7 @@ TEST(LocalLights, KnowSidesThatNobodyVisited) {
   EXPECT_NEAR(lights.probability(0, {5, 5, 5}, {0, -1, 0}), .75 + .25 * .6, 1e-6) << "the mean of all visits";
 }
 
-TEST(LocalLights, TakeOddVisits) {
+TEST(LocalLights, HandleOddVisits) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   LightVisits visits;
   visits.add({0, 0, 0}, {0, 0, 1}, std::array{0.f, 0.f, 0.f});

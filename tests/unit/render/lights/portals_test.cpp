@@ -86,7 +86,7 @@ std::vector<Found> through(std::initializer_list<Window> windows) {
 // The mean of a function over sampled directions is the integral of the function times the density, and the
 // integral of the density is the share of samples that have a direction. Both integrals are estimated by
 // uniform directions. Each test allows five standard errors.
-TEST(Portals, HaveTheDensityThatTheySay) {
+TEST(Portals, HaveTheirStatedDensity) {
   const std::vector<Found> found = through({Window{0, .8f}, Window{1, -.7f}, Window{2, .9f}});
   const Portals portals(found);
   for (const V3& p : {V3(0, 0, 0), V3(.5f, -.2f, .6f), V3(-.9f, .9f, -.9f), V3(.95f, 0, 0), V3(2, 3, 4)}) {
@@ -133,7 +133,7 @@ TEST(Portals, HaveTheDensityThatTheySay) {
   }
 }
 
-TEST(Portals, AreNotInFrontOfPointsBehindThem) {
+TEST(Portals, AreIgnoredByPointsBehindThem) {
   const Portals portals(through({Window{0, .8f}}));
   RandomStream random(1);
   for (int i = 0; i < 1000; ++i) {
@@ -159,7 +159,7 @@ TEST(Portals, AreFoundDespiteRaysFromFarOutside) {
   EXPECT_GT(share_through(window, portals, random), kUseful);
 }
 
-TEST(Portals, BearOddInput) {
+TEST(Portals, HandleOddInput) {
   EXPECT_FALSE(Portals({}).any());
   const V3 p(.1f, .2f, .3f), d(1, 0, 0);
   EXPECT_FALSE(Portals(std::vector<Found>{{p, d, 1}}).any()) << "one point encloses no room";

@@ -68,7 +68,7 @@ C3 arriving_through(const LightBench& b, const V3d& p) {
   return s ? s->radiance / s->pdf : C3(0);
 }
 
-TEST(Projector, ArrivesAsInMitsuba) {
+TEST(Projector, MatchesMitsuba) {
   // The size of the scene, and so of the world's unit of length
   for (const double size : {.01, 1., 300.})
     for (const OracleRow& row : kOracle) {
@@ -85,7 +85,7 @@ TEST(Projector, ArrivesAsInMitsuba) {
     }
 }
 
-TEST(Projector, LightsAPlaneAsTheImageIs) {
+TEST(Projector, ProjectsItsImageOntoAPlane) {
   ProjectorEmitter e;
   e.to_world = test::look_at({0, 0, 0}, {0, 0, 1}, {0, 1, 0});
   e.fov = 90;
@@ -102,7 +102,7 @@ TEST(Projector, LightsAPlaneAsTheImageIs) {
   EXPECT_EQ(arriving_through(b, {0, 0, 0}), C3(0)) << "in it";
 }
 
-TEST(Projector, AsIntensityIsEvenInAllDirections) {
+TEST(Projector, AsIntensityIsUniformInAllDirections) {
   ProjectorEmitter e;
   e.to_world = test::look_at({0, 0, 0}, {0, 0, 1}, {0, 1, 0});
   e.fov = 90;
@@ -120,7 +120,7 @@ TEST(Projector, AsIntensityIsEvenInAllDirections) {
 
 // The light tree chooses by this intensity. If it were the intensity along the axis, a wide projector would
 // be chosen too seldom where its corners shine.
-TEST(Projector, HasTheMeanIntensityOfItsDirectionsInTheTree) {
+TEST(Projector, LightTreeUsesItsMeanIntensity) {
   for (const bool even : {false, true}) {
     ProjectorEmitter e;
     e.fov = 120;
@@ -149,7 +149,7 @@ TEST(Projector, HasTheMeanIntensityOfItsDirectionsInTheTree) {
   }
 }
 
-TEST(Projector, StandsUpright) {
+TEST(Projector, IsUpright) {
   ProjectorEmitter e;
   e.to_world = test::look_at({0, 0, 0}, {0, 0, 1}, {0, 1, 0});  // its left is +x
   e.fov = 90;
@@ -161,7 +161,7 @@ TEST(Projector, StandsUpright) {
   EXPECT_EQ(arriving_through(b, {.5, -.5, 1}), C3(0));
 }
 
-TEST(Projector, OfABlackImageIsLeftOut) {
+TEST(Projector, BlackImageIsLeftOut) {
   const LightBench b(projecting(test::SkyImage(2, 2), ProjectorEmitter{}));
   EXPECT_FALSE(b.world->lights.can_sample());
   EXPECT_EQ(b.world->lights.left_out(), 1u);

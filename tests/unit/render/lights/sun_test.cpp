@@ -21,7 +21,7 @@ SceneBuilder sunny(double radius, const Vec3& direction = {0, 0, -1}) {
 }
 double radiance(double degrees) { return 2 / (M_PI * std::pow(std::sin(degrees * M_PI / 180), 2)); }
 
-TEST(Sun, GivesAPlaneThatFacesItTheStatedIrradiance) {
+TEST(Sun, LightsAFacingPlaneWithItsIrradiance) {
   for (const double radius : kRadii) {
     const LightBench b(sunny(radius));
     const auto e = b.irradiance({0, 0, 0}, {0, 0, 1}, 256);
@@ -40,7 +40,7 @@ TEST(Sun, FollowsTheCosineWhileItIsUp) {
     }
 }
 
-TEST(Sun, EverySampleIsSeenAsWhatItIs) {
+TEST(Sun, SamplesAndVisibleDiskAgree) {
   for (const double radius : kRadii) {
     const LightBench b(sunny(radius, {.3, -.5, -.7}));
     const double a = radius * M_PI / 180, solid_angle = 4 * M_PI * std::pow(std::sin(a / 2), 2);
@@ -85,7 +85,7 @@ TEST(Sun, EndsAtItsRim) {
   }
 }
 
-TEST(Sun, OfNoSizeIsTheParallelLight) {
+TEST(Sun, WithoutSizeItIsAParallelLight) {
   for (const double radius : {0., 9e-4}) {
     const LightBench b(sunny(radius));
     const auto s = b.world->lights.sample(b.world->lights.choose(numbers(.5f, .1f, .2f)), b.at({0, 0, 0}));
@@ -98,7 +98,7 @@ TEST(Sun, OfNoSizeIsTheParallelLight) {
 
 // Next-event estimation and paths that leave the scene share the light by their densities. Together they must
 // find all of it: on a floor (radiance .5 E / pi), in a mirror and for the camera.
-TEST(Sun, IsCountedOnceByAllWaysOfFindingIt) {
+TEST(Sun, AllTechniquesTogetherCountItOnce) {
   for (const double radius : {2., 30., 80.}) {
     SceneBuilder builder = sunny(radius);
     builder.look({.5, 0, 1}, {0, 0, 0});

@@ -34,7 +34,7 @@ TEST(TwoSidedLight, GivesTheSameIrradianceOnBothSides) {
 }
 
 // Inside a sphere of radius 1 the irradiance is pi, at the distance d outside it is pi / d^2.
-TEST(TwoSidedLight, ASphereShinesInwardsAndOutwards) {
+TEST(TwoSidedLight, SphereEmitsInwardsAndOutwards) {
   const LightBench bench(two_sided(SphereShape{}, {}));
 
   for (const V3d& x : {V3d(0, 0, 0), V3d(.3, -.5, .2), V3d(0, 0, -.999), V3d(0, 0, -1)})
@@ -45,14 +45,14 @@ TEST(TwoSidedLight, ASphereShinesInwardsAndOutwards) {
 // A cylinder of radius 1 and length 2 h about the z axis, seen from its middle by a plane whose normal is
 // along z. The upper half of the cylinder gives pi minus the share of the open end, a disk at height h: pi -
 // pi / (1 + h^2).
-TEST(TwoSidedLight, ACylinderShinesInwards) {
+TEST(TwoSidedLight, CylinderEmitsInwards) {
   const double h = 1.5;
   const LightBench bench(two_sided(CylinderShape{{0, 0, -h}, {0, 0, h}, 1}, {}));
 
   expect_close(bench.irradiance({0, 0, 0}, {0, 0, 1}, 512), M_PI - M_PI / (1 + h * h));
 }
 
-TEST(TwoSidedLight, AHitHasTheRadianceAndDensityOfItsSample) {
+TEST(TwoSidedLight, HitHasTheRadianceAndDensityOfItsSample) {
   const Transform turned = test::rotate_x(170);
   const ls::Geometry kinds[] = {RectangleShape{}, DiskShape{}, CubeShape{}, SphereShape{},
                                 CylinderShape{{0, 0, -1}, {0, 0, 1}, .5}};
@@ -71,7 +71,7 @@ TEST(TwoSidedLight, AHitHasTheRadianceAndDensityOfItsSample) {
 }
 
 // From outside only the near wall is sampled.
-TEST(TwoSidedLight, TheFarWallOfASphereIsFoundByDirectionsAlone) {
+TEST(TwoSidedLight, FarWallOfASphereIsFoundOnlyBySampledDirections) {
   for (const bool flip : {false, true}) {
     const LightBench b(two_sided(SphereShape{}, {}, flip));
     const V3 outside = b.at({0, 0, 3}), inside = b.at({0, 0, 0}), down(0, 0, -1);
@@ -107,7 +107,7 @@ TEST(TwoSidedLight, BothWallsOfAClearSphereLightTheFloor) {
   EXPECT_LT(e.standard_error[0], .01 / 64);
 }
 
-TEST(TwoSidedLight, OnlyItsOwnBackShines) {
+TEST(TwoSidedLight, OnlyItsOwnBackEmits) {
   SceneBuilder builder = two_sided(RectangleShape{}, {});
   builder.lamp(RectangleShape{}, translate({5, 0, 0}));
   const LightBench b(builder);
@@ -132,7 +132,7 @@ TEST(TwoSidedLight, HasThePowerOfTwo) {
 }
 
 // Beams of 30 degrees to both sides: each has sin^2 30 of the flux pi of a plain light.
-TEST(TwoSidedLight, ABeamShinesBothWays) {
+TEST(TwoSidedLight, BeamEmitsBothWays) {
   SceneBuilder builder = two_sided(RectangleShape{}, test::scale(.5));
   builder.scene.shapes[0].emitter->cutoff_angle = builder.scene.shapes[0].emitter->beam_width = 30;
   const LightBench b(builder);
@@ -147,7 +147,7 @@ TEST(TwoSidedLight, ABeamShinesBothWays) {
 
 // 40 two-sided lights in a plane, chosen by the tree, and 20 faint ones that only shine down. The irradiance
 // on each side is the sum of those of the lights that shine there.
-TEST(TwoSidedLight, ManyAreFoundFromBehindByTheTree) {
+TEST(TwoSidedLight, LightTreeFindsThemFromBehind) {
   SceneBuilder builder;
   constexpr double kSize = .05, kHeight = 3, kFaint = .01;
   double of_all = 0, of_faint = 0;

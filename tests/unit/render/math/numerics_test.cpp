@@ -9,7 +9,7 @@
 namespace ls::render {
 namespace {
 
-TEST(Frame, IsOrthonormalWhereverTheNormalPoints) {
+TEST(Frame, IsOrthonormalForEveryNormal) {
   for (const V3& n : {V3(0, 0, -1), V3(0, 0, 1), V3(1e-20f, 0, -1), V3(1e-4f, -1e-4f, -1), V3(1, 0, -0.f),
                       V3(0, 1, 0.f), V3(-.6f, .8f, -1e-30f)}) {
     const V3 unit = normalize(n);

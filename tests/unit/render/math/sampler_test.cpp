@@ -29,7 +29,7 @@ bool is_net(const std::vector<std::array<std::uint32_t, 2>>& points, int k) {
   return true;
 }
 
-TEST(Sobol, EveryPrefixOfAPowerOfTwoIsANetInItsFirstTwoDimensions) {
+TEST(Sobol, PowerOfTwoPrefixesAreNetsInTwoDimensions) {
   for (const std::uint64_t key : {0ull, 1ull, 0x123456789abcdefull, ~0ull}) {
     for (int k = 0; k <= 10; ++k) {
       std::vector<std::array<std::uint32_t, 2>> points;
@@ -42,7 +42,7 @@ TEST(Sobol, EveryPrefixOfAPowerOfTwoIsANetInItsFirstTwoDimensions) {
   }
 }
 
-TEST(Sobol, EveryDimensionIsStratifiedOnItsOwn) {
+TEST(Sobol, EveryDimensionIsStratified) {
   for (int k = 0; k <= 12; ++k) {
     for (std::size_t d = 0; d < 4; ++d) {
       std::set<std::uint32_t> cells;
@@ -52,7 +52,7 @@ TEST(Sobol, EveryDimensionIsStratifiedOnItsOwn) {
   }
 }
 
-TEST(Sobol, AlignedBlocksOfARoundAreNetsToo) {
+TEST(Sobol, AlignedBlocksAreNets) {
   // A round has a power of two of samples in each half
   for (const std::uint32_t start : {32u, 64u, 96u, 1024u}) {
     std::vector<std::array<std::uint32_t, 2>> points;
@@ -64,7 +64,7 @@ TEST(Sobol, AlignedBlocksOfARoundAreNetsToo) {
   }
 }
 
-TEST(SampleStream, HalvesAreTheEvenAndTheOddSamplesEachStratified) {
+TEST(SampleStream, HalvesAreEvenAndOddSamplesEachStratified) {
   for (const std::uint64_t half : {0u, 1u}) {
     std::vector<std::array<std::uint32_t, 2>> points;
     for (std::uint64_t i = 0; i < 64; ++i) {
@@ -104,7 +104,7 @@ TEST(SampleStream, PixelsHalvesSeedsVerticesAndPurposesAreUncorrelated) {
             kLimit);
 }
 
-TEST(SampleStream, NoKeyRepeatsOverAJobOfAMillionNumbers) {
+TEST(SampleStream, MillionKeysOfAJobAreDistinct) {
   // The first words of trackers' streams are 64-bit hashes; among 2^20 of them a collision has the
   // probability 3e-8.
   std::vector<std::uint64_t> keys;
@@ -127,7 +127,7 @@ TEST(SampleStream, SamplesBeyondTheSequenceAreDrawnByHash) {
             SampleStream(0, 0, 0, last + 3).group(0, Purpose::camera).bits);
 }
 
-TEST(Exponential, IsTheLogarithmToTheLastPlacesAtBothEnds) {
+TEST(Exponential, MatchesTheLogarithmAtBothEnds) {
   const auto check = [](std::uint32_t bits) {
     const double x = (static_cast<double>(~bits) + .5) * 0x1p-32, y = (bits + .5) * 0x1p-32;
     const double exact = x < .5 ? -std::log1p(-x) : -std::log(y);
@@ -147,7 +147,7 @@ TEST(Exponential, IsTheLogarithmToTheLastPlacesAtBothEnds) {
 
 // A medium of optical depth `depth` scatters the share 1 - e^-depth of all flights: that share of the 2^32
 // inputs, to within one input.
-TEST(Exponential, TheShareBelowAThinDepthIsThatDepth) {
+TEST(Exponential, ThinDepthAbsorbsItsOwnShare) {
   for (const double depth : {1e-9, 1e-8, 3e-8, 1e-7, 1e-6, 1e-3, .5, .7, 2.}) {
     std::uint64_t lo = 0, hi = 1ull << 32;  // bisection: depths decrease with the input
     while (lo < hi) {
@@ -178,7 +178,7 @@ TEST(RandomStream, HasTheMomentsOfItsDistributions) {
   EXPECT_NEAR(e / kN, 1, 5 * std::sqrt(1. / kN));
 }
 
-TEST(RandomStream, ItsExponentialsResolveThinDepths) {
+TEST(RandomStream, ExponentialsResolveThinDepths) {
   RandomStream r(43);
   constexpr int kN = 1 << 22;
   int odd = 0, below = 0;

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "common/base/digest.h"
+#include "core/base/digest.h"
 #include "tests/support/render_check.h"
 
 namespace ls::render {
@@ -31,7 +31,7 @@ double lit_through(double half_thickness, double sigma_t) {
 // The ray that continues behind a boundary starts 2^-20 of the world inside the medium. Positions are rounded
 // to 2^-24 at both faces, so the length through a slab of 8 * 2^-20 has the error 2 * 2^-24 / (8 * 2^-20) =
 // 1/64. If the part before the ray's start did not count, the length would be too short by 1/8.
-TEST(Boundaries, LoseNoneOfTheWayThroughAMedium) {
+TEST(Boundaries, KeepTheFullLengthThroughAMedium) {
   EXPECT_NEAR(lit_through(.1, 0), 1, 1e-5);
   EXPECT_NEAR(lit_through(.1, 5), std::exp(-1), 1e-5);
   // The world's scale is a power of two that brings its radius, here about 1.5, to at most 1. So it is one
@@ -77,7 +77,7 @@ TEST(Boundaries, KeepPathsInsideOfABallThatTheyGraze) {
 // Between a floor and the sun stand more null sheets than a shadow ray may cross. They form a column over the
 // small part of the floor that the camera sees. So most paths leave the scene beside the column after their
 // shadow ray was cut off.
-TEST(Boundaries, RejectSamplesWhoseShadowRaysAreCutOff) {
+TEST(Boundaries, RejectSamplesWhoseShadowRaysWereTruncated) {
   std::string text;
   constexpr int kSheets = (1 << 16) + 1;
   for (int i = 0; i < kSheets; ++i) {

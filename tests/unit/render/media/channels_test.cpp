@@ -112,7 +112,7 @@ TEST(Channels, TransmittancesAverageToEachChannelsOwn) {
 }
 
 // Light scattered within each third of the ray: the albedo times the light that is lost there.
-TEST(Channels, FlightsScatterWhereEachChannelIsLost) {
+TEST(Channels, FlightsScatterAccordingToEachChannelsExtinction) {
   for (const Coloured& m : media()) {
     const Medium medium = m.medium();
     Sums scattered[3];
@@ -137,7 +137,7 @@ TEST(Channels, FlightsScatterWhereEachChannelIsLost) {
   }
 }
 
-TEST(Channels, WhatPassedIsExactForEveryHero) {
+TEST(Channels, TransmittanceIsExactForEveryHeroChannel) {
   for (const Coloured& m : media())
     for (const int hero : {0, 1, 2}) {
       const Flight f = passed(m.medium(), hero, kFrom, kAlong, 8);
@@ -166,7 +166,7 @@ TEST(Channels, NoWeightIsAboveThree) {
 }
 
 // With a constant source radiance, each channel emits that radiance times 1 - transmittance.
-TEST(Channels, GlowIsEachChannelsOwn) {
+TEST(Channels, EmissionIsPerChannel) {
   for (const Coloured& m : media()) {
     Medium medium = m.medium();
     medium.sigma_s = C3(0);
@@ -243,7 +243,7 @@ TEST(Channels, ThreeEqualOnesAreAGreyGridToTheLastBit) {
 
 // A file whose three channels are multiples of one grid gives the same light as a colour times that grid.
 // Light that is scattered once differs only by noise; light that involves no random numbers is equal.
-TEST(Channels, AFileOfThreeChannelsIsReadInOrder) {
+TEST(Channels, ThreeChannelFileIsReadInOrder) {
   std::vector<float> three;
   for (int i = 0; i < 60; ++i)
     for (const float c : {0.f, .5f, 2.f}) three.push_back(c);
@@ -264,7 +264,7 @@ TEST(Channels, AFileOfThreeChannelsIsReadInOrder) {
 }
 
 // The same with one channel and a tint. The medium only absorbs, and the only light is the environment.
-TEST(Channels, ATintIsAFactorByChannel) {
+TEST(Channels, TintIsAFactorPerChannel) {
   const std::vector<float> one(60, 1);
   SceneBuilder builder = lit_box(one, 1);
   builder.scene.emitters.clear();
@@ -283,7 +283,7 @@ TEST(Channels, ATintIsAFactorByChannel) {
   }
 }
 
-TEST(Channels, ATintOfADensityOfThreeChannelsIsRefused) {
+TEST(Channels, TintOfAThreeChannelDensityIsRefused) {
   std::vector<float> three;
   for (int i = 0; i < 180; ++i) three.push_back(static_cast<float>(i % 5));
   SceneBuilder builder = lit_box(three, 3);

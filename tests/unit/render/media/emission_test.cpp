@@ -33,14 +33,14 @@ Medium of_grid(const Grid& density, const C3& sigma, EmissionKind emission_kind,
 }
 void emit(Medium& m, const Grid& g) { m.emitter = {&g, &g, &g}; }
 
-TEST(MediumEmission, WithoutExtinctionIsEmissionTimesLength) {
+TEST(MediumEmission, WithoutExtinctionItIsEmissionTimesLength) {
   const C3 light = emission_of_length(homogeneous(C3(0)), 3.5f);
 
   for (int c = 0; c < 3; ++c) EXPECT_EQ(light[c], kEmission[c] * 3.5f);
 }
 
 // In the thin limit the emission is e L (1 - tau/2 + tau^2/6 - ...). In float32 1 - e^-tau would be 0 there.
-TEST(MediumEmission, OfThinMediaHasFullPrecision) {
+TEST(MediumEmission, ThinMediaHaveFullPrecision) {
   for (const double tau : {1e-30, 1e-12, 1e-9, 1e-6, 1e-3}) {
     const C3 light = emission_of_length(homogeneous(C3(static_cast<float>(tau / 2))), 2);
     const double expected = 2 * (1 - tau / 2 + tau * tau / 6);
@@ -48,7 +48,7 @@ TEST(MediumEmission, OfThinMediaHasFullPrecision) {
   }
 }
 
-TEST(MediumEmission, OfOpaqueAndEndlessMediaIsEmissionOverExtinction) {
+TEST(MediumEmission, OpaqueInfiniteMediumShowsEmissionOverExtinction) {
   for (const float s : {1e-3f, 1.f, 1e20f}) {
     const C3 light = emission_of_length(homogeneous(C3(s)), kInfinity);
     for (int c = 0; c < 3; ++c) EXPECT_FLOAT_EQ(light[c], kEmission[c] / s);
@@ -62,7 +62,7 @@ TEST(MediumEmission, OfOpaqueAndEndlessMediaIsEmissionOverExtinction) {
 }
 
 // In each channel, every random number gives the closed form.
-TEST(MediumEmission, OfAConstantGridIsThatOfAHomogeneousMedium) {
+TEST(MediumEmission, ConstantGridEmitsLikeAHomogeneousMedium) {
   const Grid one = voxel_grid({3, 3, 3}, std::vector<float>(27, 1), kTrilinear, Wrap::clamp);
   for (const C3& sigma : {C3(0), C3(.3f), C3(0, 1, 16), C3(1e-9f, 1e3f, 1e9f)}) {
     // In the grid's cells of 4 voxels, some of these extinctions are tracked and some integrated exactly.
@@ -76,7 +76,7 @@ TEST(MediumEmission, OfAConstantGridIsThatOfAHomogeneousMedium) {
   }
 }
 
-TEST(MediumEmission, PerLengthGoesOnAroundTheDensity) {
+TEST(MediumEmission, EmissionPerLengthExtendsBeyondTheDensity) {
   const Grid one = voxel_grid({3, 3, 3}, std::vector<float>(27, 1), kTrilinear, Wrap::clamp);
   const Medium m = of_grid(one, C3(.5f), EmissionKind::per_length);
 
@@ -88,7 +88,7 @@ TEST(MediumEmission, PerLengthGoesOnAroundTheDensity) {
 }
 
 // Nothing is absorbed, so the result is the integral of the emission grid, without noise.
-TEST(MediumEmission, OfAGridInClearAirIsItsIntegral) {
+TEST(MediumEmission, GridWithoutExtinctionEmitsItsIntegral) {
   const Grid none = unit_grid({2, 2, 2}, std::vector<float>(8, 0));
   const Grid fire = unit_grid({9, 9, 9}, random_values({9, 9, 9}, 3, true));
   Medium m = of_grid(none, C3(1), EmissionKind::per_length);
@@ -126,7 +126,7 @@ Mean mean_of(const Medium& m, const V3& o, const V3& d, int n) {
 // With the source radiance B everywhere, the emission is B (1 - transmittance) for any density. Means are
 // within 5 standard errors (each of 24 checks fails by chance with probability 6e-7) and the float32 rounding
 // of 40 steps.
-TEST(MediumEmission, OfAnIsothermalGridIsWhatItDoesNotLetThrough) {
+TEST(MediumEmission, IsothermalGridEmitsOneMinusItsTransmittance) {
   const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
   for (const bool sparse : {false, true})
     for (const C3& sigma : {C3(.3f), C3(0, .3f, 6), C3(1e3f), C3(.1f, 1e2f, 1e7f)}) {
@@ -169,7 +169,7 @@ double quadrature(const Grid& density, double sigma, const std::function<double(
 
 // The grids have different positions and sizes, and the channels different optical depths. The tolerance is 5
 // standard errors plus 1e-3 of the quadrature, whose steps do not end at voxel boundaries.
-TEST(MediumEmission, OfTwoGridsAgreesWithQuadrature) {
+TEST(MediumEmission, TwoGridsMatchQuadrature) {
   const Grid density = unit_grid({9, 9, 9}, random_values({9, 9, 9}, 5, true), 0, 3);
   const Affine finer = Affine::scale_translate(1.7, V3d(1, 2, 1.5));
   const Grid fire({11, 8, 9}, random_values({11, 8, 9}, 8), finer, V3d(0), V3d(10, 7, 8), 1);
@@ -216,7 +216,7 @@ TEST(MediumEmission, OfTwoGridsAgreesWithQuadrature) {
 
 // Density, temperatures and weights have different positions, and the ray leaves the box of the weights where
 // there is still density. The tolerance is 5 standard errors plus 1e-3 of the quadrature, as above.
-TEST(MediumEmission, OfBodiesOfPeakOneIsWeighted) {
+TEST(MediumEmission, NormalisedBlackBodiesAreWeighted) {
   const Grid density = unit_grid({9, 9, 9}, random_values({9, 9, 9}, 5), 0, 3);
   const Grid fire({11, 8, 9}, random_values({11, 8, 9}, 8), Affine::scale_translate(1.7, V3d(1, 2, 1.5)),
                   V3d(0), V3d(10, 7, 8), 1);
@@ -251,7 +251,7 @@ TEST(MediumEmission, OfBodiesOfPeakOneIsWeighted) {
   }
 }
 
-TEST(MediumEmission, OfGridsWithoutInterpolationAgreesToo) {
+TEST(MediumEmission, AgreesForGridsWithoutInterpolation) {
   const Grid density = voxel_grid({7, 7, 7}, random_values({7, 7, 7}, 5), kNearest, Wrap::clamp, 3);
   const Medium m = of_grid(density, C3(1), EmissionKind::per_absorption);
   const V3 o(-1, 1.3f, 1.1f), d = normalize(V3(9, 3.1f, 4.2f));
@@ -262,7 +262,7 @@ TEST(MediumEmission, OfGridsWithoutInterpolationAgreesToo) {
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(r.mean[c] / kEmission[c], expected, 5 * r.error[c] + 1e-5);
 }
 
-TEST(MediumEmission, OfRaysThatAreNoneIsDark) {
+TEST(MediumEmission, InvalidRaysAreDark) {
   const Grid g = unit_grid({3, 3, 3}, random_values({3, 3, 3}, 5));
   const Medium m = of_grid(g, C3(1), EmissionKind::per_absorption);
   const float nan = std::numeric_limits<float>::quiet_NaN();
@@ -292,7 +292,7 @@ TEST(BlackBody, HasTheColourAndLuminanceOfItsTemperature) {
 // Planck's law, with its constants; its largest value is found by trying wavelengths in steps of 1e-4. The
 // nearest one is off the peak by at most 5e-5, so the error is at most (5e-5)^2 / 2 times the curvature,
 // which is below 20 there.
-TEST(BlackBody, OfPeakOneIsDividedByItsLargestValue) {
+TEST(BlackBody, NormalisedSpectrumIsDividedByItsLargestValue) {
   const double h = 6.62607015e-34, c = 299792458, k = 1.380649e-23;
   for (const double t : {250., 1500., 2856., 6500., 30000.}) {
     double largest = 0;
@@ -307,7 +307,7 @@ TEST(BlackBody, OfPeakOneIsDividedByItsLargestValue) {
 }
 
 // No component is above the bound by which media_build.cpp checks emission, and cold bodies are black.
-TEST(BlackBody, OfPeakOneIsBounded) {
+TEST(BlackBody, NormalisedSpectrumIsBounded) {
   EXPECT_EQ(black_body_of_peak_one(199), C3(0));
   EXPECT_EQ(black_body_of_peak_one(std::numeric_limits<float>::quiet_NaN()), C3(0));
   for (float t = 200; t < 1e12f; t *= 1.07f) {
@@ -317,7 +317,7 @@ TEST(BlackBody, OfPeakOneIsBounded) {
   }
 }
 
-TEST(BlackBody, IsDarkWhereItIsColdAndNeverMoreThanRayleighAndJeans) {
+TEST(BlackBody, IsDarkWhenColdAndNeverAboveRayleighJeans) {
   for (const float t : {-5.f, 0.f, 199.f, -kInfinity, std::numeric_limits<float>::quiet_NaN()})
     EXPECT_EQ(black_body_radiance(t), C3(0)) << t;
   float before = 0;

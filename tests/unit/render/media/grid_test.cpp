@@ -53,7 +53,7 @@ TEST(Grid, IntegralsOfTentRampAndConstantMatchClosedForms) {
   EXPECT_EQ(exact_integral(constant, {-9, 7, 1}, {1, 0, 0}, 0, 99), 0);
 }
 
-TEST(Grid, WithoutInterpolationEachVoxelHasItsOwnValue) {
+TEST(Grid, VoxelsAreConstantWithoutInterpolation) {
   const Size n{3, 2, 4};
   const auto values = random_values(n, 9);
   for (const Wrap wrap : {Wrap::clamp, Wrap::repeat, Wrap::mirror}) {
@@ -95,7 +95,7 @@ TEST(Grid, RepeatedEndsAreInterpolatedWithEachOther) {
   EXPECT_NEAR(first_half(repeated), .5 * (1.5 + 0) / 2, 1e-14);  // a trapezium
 }
 
-TEST(Grid, BeyondItsBoxAGridGoesOnAsItsWrapModeSays) {
+TEST(Grid, WrapModeExtendsAGridBeyondItsBox) {
   const Size n{3, 2, 2};
   const auto values = random_values(n, 10);
   std::mt19937 rng(2);
@@ -122,7 +122,7 @@ TEST(Grid, BeyondItsBoxAGridGoesOnAsItsWrapModeSays) {
   }
 }
 
-TEST(Grid, ASceneChoosesFilterAndWrapMode) {
+TEST(Grid, SceneChoosesFilterAndWrapMode) {
   const auto grid_of = [](VolumeFilter filter, Wrap wrap) {
     test::SceneBuilder builder({1, 1});
     const VolumeIndex v = builder.grid({2, 1, 1}, {1, 3}, Transform());
@@ -146,7 +146,7 @@ TEST(Grid, ASceneChoosesFilterAndWrapMode) {
   EXPECT_EQ(value_at(grid_of(kNearest, Wrap::mirror), outside), 3);
 }
 
-TEST(Grid, NodesReachFromFaceToFaceAndNothingIsBeyond) {
+TEST(Grid, NodesSpanTheBoxAndBeyondItIsZero) {
   const auto load = [](const std::array<int, 3>& size, const std::vector<float>& values) {
     test::SceneBuilder builder({1, 1});
     const VolumeIndex v = builder.grid(size, values, Transform());
@@ -171,7 +171,7 @@ TEST(Grid, NodesReachFromFaceToFaceAndNothingIsBeyond) {
 }
 
 // The grid has four voxels along x, of which the middle two fill the box.
-TEST(Grid, ABorderOnlyTakesPartInTheInterpolation) {
+TEST(Grid, BorderIsUsedOnlyForInterpolation) {
   const auto load = [](const std::array<int, 3>& size, Wrap wrap, bool node_centred) {
     test::SceneBuilder builder({1, 1});
     std::vector<float> values;
@@ -204,7 +204,7 @@ TEST(Grid, ABorderOnlyTakesPartInTheInterpolation) {
   EXPECT_FALSE(load({4, 3, 3}, Wrap::clamp, true));
 }
 
-TEST(Grid, AConstantVolumeFillsTheCubeThatItsTransformMoves) {
+TEST(Grid, ConstantVolumeFillsItsTransformedCube) {
   const test::SceneBuilder builder({1, 1});
   using test::operator*;
   const auto length = [&](const Transform& to_world, const V3d& o, double center, double scale) {
@@ -242,7 +242,7 @@ std::vector<Ray> awkward_rays() {
   return rays;
 }
 
-TEST(CellWalk, CoversTheRaysPartInTheDomainOnceAndInOrder) {
+TEST(CellWalk, CoversTheRayInTheDomainOnceAndInOrder) {
   const Grid g = unit_grid({13, 14, 11}, random_values({13, 14, 11}, 2), 0, 10);
   ASSERT_EQ(g.cell_size(), 4);
   const auto cells = g.cells();
@@ -324,7 +324,7 @@ TEST(CellWalk, MajorantDepthDoesNotDependOnHowARayIsCut) {
 
 // A grid of a thousandth of the world, seen from the other end of the world. It has 128 voxels of width 8e-6.
 // Float32 positions of the ray's origin, and distances from it, are at least 1.2e-7 apart.
-TEST(CellWalk, TellsTheVoxelsOfASmallGridApartFromAfar) {
+TEST(CellWalk, DistinguishesVoxelsOfASmallDistantGrid) {
   const Size n{128, 128, 128};
   constexpr double kSide = 1e-3;
   Affine to_index;
@@ -357,7 +357,7 @@ TEST(CellWalk, TellsTheVoxelsOfASmallGridApartFromAfar) {
   EXPECT_GT(cells, 300 * 5);
 }
 
-TEST(CellWalk, WalksNothingAlongARayThatIsNotFinite) {
+TEST(CellWalk, IgnoresRaysThatAreNotFinite) {
   const Grid g = unit_grid({13, 14, 11}, random_values({13, 14, 11}, 2), 0, 10);
   const float nan = std::nanf(""), inf = std::numeric_limits<float>::infinity();
   const V3 o(6, 6, 6), d(0, 0, 1);
@@ -374,7 +374,7 @@ TEST(CellWalk, WalksNothingAlongARayThatIsNotFinite) {
   EXPECT_TRUE(CellWalk(g, o, d, 0, inf).next());
 }
 
-TEST(Grid, AnyIndexCoordinatesReadTheGridsOwnValues) {
+TEST(Grid, AnyCoordinatesReadWithinTheGrid) {
   const Size n{3, 4, 5};
   const float inf = std::numeric_limits<float>::infinity();
   for (const VolumeFilter filter : {kNearest, kTrilinear}) {
@@ -387,7 +387,7 @@ TEST(Grid, AnyIndexCoordinatesReadTheGridsOwnValues) {
   }
 }
 
-TEST(Grid, PassagesAgreeWithTheExactIntegral) {
+TEST(Grid, TransmittanceMatchesTheExactIntegral) {
   const Size n{13, 14, 11};
   for (const VolumeFilter filter : {kNearest, kTrilinear}) {
     const Grid g = voxel_grid(n, random_values(n, 3, true), filter, Wrap::clamp);

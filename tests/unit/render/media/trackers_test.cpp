@@ -79,7 +79,7 @@ TEST(Trackers, TransmittancesAverageToTheExactOnes) {
 
 // One voxel of density 1e6 among empty ones: rays that miss it are not attenuated, rays through it are
 // blocked.
-TEST(Trackers, AHotVoxelDoesNotDarkenItsCell) {
+TEST(Trackers, DenseVoxelDoesNotDarkenItsCell) {
   const Size n{16, 16, 16};
   std::vector<float> values(16 * 16 * 16, 0);
   values[(8 * 16 + 8) * 16 + 8] = 1e6f;
@@ -112,7 +112,7 @@ TEST(Trackers, AHotVoxelDoesNotDarkenItsCell) {
 
 // The densities are so high that a tracker's steps would be smaller than the rounding of its distance. The
 // number of voxels limits the work.
-TEST(Trackers, DensitiesBeyondAllBoundsTakeNoTimeAndStopLightAtOnce) {
+TEST(Trackers, HugeDensitiesCostNoTimeAndStopLightAtOnce) {
   const Size n{64, 64, 64};
   std::vector<float> v = random_values(n, 15, true);
   for (const float sigma : {1e6f, 1e9f, 1e20f, 1e30f}) {

@@ -88,7 +88,7 @@ TEST(Aim, LeavesOutWhatASceneDoesNotNeed) {
 }
 
 // A crop must have the pixels of the full frame, so the decision must not depend on the crop.
-TEST(Aim, ChoosesForACropAsForTheWholeFrame) {
+TEST(Aim, CropMakesTheSameChoiceAsTheWholeFrame) {
   SceneBuilder whole = fog(.1);
   add_sun(whole);
   SceneBuilder crop = whole;
@@ -108,7 +108,7 @@ double squared_error(const SceneBuilder& builder) {
 // that is scattered there: the variance of a sample is (1 - p) / p = 4.5 times the square of its mean. With
 // points on the segment only the sun's transmittance through the fog varies, between 1 and exp(-0.2), so the
 // variance is below 0.01 times that square.
-TEST(Aim, TakesTheNoiseFromLightScatteredOnceInThinFog) {
+TEST(Aim, ReducesNoiseOfLightScatteredOnceInThinFog) {
   for (const bool grid : {false, true}) {
     SceneBuilder points = fog(.1, grid, 0);
     add_sun(points);
@@ -132,7 +132,7 @@ bool looks_with(Change change) {
   return looks(b);
 }
 
-TEST(SkySamples, AreTakenWhereTheSkyLightsTheScene) {
+TEST(SkySamples, AreUsedIfTheSkyLightsTheScene) {
   EXPECT_TRUE(looks(yard()));
   EXPECT_FALSE(looks_with([](SceneBuilder& b) {
     std::get<ConstantEmitter>(b.scene.emitters.front()).radiance = {1e-5, 1e-5, 1e-5};

@@ -16,7 +16,7 @@ namespace {
 using test::SceneBuilder;
 using test::operator*;
 
-TEST(Health, SamplesTooLargeToBeAddedUpAreCountedAndContributeNothing) {
+TEST(Health, SamplesTooLargeToAddAreCountedAndContributeNothing) {
   // Two samples of the second value already exceed the range of float32.
   for (const double radiance : {1e30, 2e38}) {
     SceneBuilder builder({2, 2});
@@ -125,7 +125,7 @@ std::shared_ptr<const World> over_its_bound(const OverItsBound& how, bool spoil)
   return world;
 }
 
-TEST(Health, DensitiesAboveTheirBoundAreCountedAndLocatedByEveryTracker) {
+TEST(Health, EveryTrackerCountsAndLocatesDensitiesAboveTheirBound) {
   for (const OverItsBound& how : {OverItsBound{"trilinear", VolumeFilter::trilinear, false, false},
                                   {"nearest", VolumeFilter::nearest, false, false},
                                   {"of each channel", VolumeFilter::trilinear, true, false},
@@ -145,7 +145,7 @@ TEST(Health, DensitiesAboveTheirBoundAreCountedAndLocatedByEveryTracker) {
   }
 }
 
-TEST(Health, TellsOfChangedInputsByCause) {
+TEST(Health, CountsChangedInputsByCause) {
   SceneBuilder builder({2, 2});
   const VolumeIndex grid = builder.grid({2, 1, 1}, {-1, 1}, test::translate({-1, -1, -1}) * test::scale(2));
   builder.container(CubeShape{}, {}, builder.null(), builder.heterogeneous(grid, {1, 1, 1}));

@@ -4,8 +4,8 @@
 
 #include <random>
 
-#include "common/scene/analysis/prune.h"
-#include "common/scene/schema/validate.h"
+#include "core/scene/analysis/prune.h"
+#include "core/scene/schema/validate.h"
 #include "tests/support/render_check.h"
 #include "worker/render/world/world.h"
 
@@ -64,13 +64,13 @@ void expect_same_without_medium(SceneBuilder builder, const std::string& variant
   EXPECT_EQ(after, variant);
 }
 
-TEST(LeaveOutInteriors, OfATwoSidedBallOnAFloor) {
+TEST(LeaveOutInteriors, TwoSidedBallOnAFloorKeepsItsPixels) {
   SceneBuilder builder = room();
   builder.container(SphereShape{}, translate({0, 0, -.6}) * test::scale(.5), whole(builder), cloud(builder));
   expect_same_without_medium(std::move(builder), "surfaces");
 }
 
-TEST(LeaveOutInteriors, OfACubeSunkIntoAFloorWhoseOutsideIsNamed) {
+TEST(LeaveOutInteriors, CubeSunkIntoAFloorKeepsItsExterior) {
   SceneBuilder builder = room();
   const MediumIndex chromatic = builder.homogeneous({1, 2, 4}, {.9, .5, .2});
   const MediumIndex thin = builder.homogeneous({.05, .05, .05}, {.9, .9, .9});
@@ -83,21 +83,21 @@ TEST(LeaveOutInteriors, OfACubeSunkIntoAFloorWhoseOutsideIsNamed) {
   expect_same_without_medium(std::move(builder), "homogeneous grey media");
 }
 
-TEST(LeaveOutInteriors, BehindABlackBackBesideGlass) {
+TEST(LeaveOutInteriors, BlackBackBesideGlassKeepsItsPixels) {
   SceneBuilder builder = room();
   builder.container(CubeShape{}, test::rotate_x(20) * test::scale(.5), builder.diffuse(.7), cloud(builder));
   builder.shape(CubeShape{}, test::rotate_x(20) * test::scale(.5), builder.glass(1.5));
   expect_same_without_medium(std::move(builder), "surfaces");
 }
 
-TEST(LeaveOutInteriors, BesideMediaThatStay) {
+TEST(LeaveOutInteriors, OtherMediaKeepTheirPixels) {
   SceneBuilder builder = room();
   builder.container(SphereShape{}, translate({.8, 0, -.6}) * test::scale(.4), whole(builder), cloud(builder));
   add_fog(builder);
   expect_same_without_medium(std::move(builder), "homogeneous grey media");
 }
 
-TEST(LeaveOutInteriors, BesideMediaThatOverlap) {
+TEST(LeaveOutInteriors, OverlappingMediaKeepTheirPixels) {
   SceneBuilder builder = room();
   builder.container(CubeShape{}, translate({.8, 0, -.6}) * test::scale(.3), whole(builder), cloud(builder));
   add_fog(builder);
@@ -110,7 +110,7 @@ TEST(LeaveOutInteriors, BesideMediaThatOverlap) {
 }
 
 // Pruning must keep this medium: without it the image changes.
-TEST(LeaveOutInteriors, OfGlassShow) {
+TEST(LeaveOutInteriors, InteriorsOfGlassAreVisible) {
   SceneBuilder builder = room();
   Shape& ball = builder.container(SphereShape{}, test::scale(.5), builder.glass(1.5), cloud(builder));
   const TileResult before = render(builder);
@@ -155,7 +155,7 @@ SceneBuilder random_room(std::uint32_t seed) {
   return builder;
 }
 
-TEST(LeaveOutInteriors, OfRandomRooms) {
+TEST(LeaveOutInteriors, RandomRoomsKeepTheirPixels) {
   int pruned = 0;
   for (std::uint32_t seed = 0; seed < 150; ++seed) {
     SceneBuilder builder = random_room(seed);
@@ -171,7 +171,7 @@ TEST(LeaveOutInteriors, OfRandomRooms) {
   EXPECT_GT(pruned, 20);
 }
 
-TEST(LeaveOutPhases, OfMediaThatScatterNothing) {
+TEST(LeaveOutPhases, PurelyAbsorbingMediaKeepTheirPixels) {
   for (const bool overlapping : {false, true}) {
     SceneBuilder builder = room();
     add_fog(builder, 0, .7);

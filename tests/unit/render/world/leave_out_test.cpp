@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/analysis/prune.h"
+#include "core/scene/analysis/prune.h"
 #include "tests/support/render_check.h"
 #include "worker/render/base/work_counters.h"
 #include "worker/render/world/world.h"
@@ -90,7 +90,7 @@ std::vector<SceneBuilder> scenes_with_dead_parts() {
   return all;
 }
 
-TEST(LeaveOut, TakingOutDeadPartsDoesNotChangeABit) {
+TEST(LeaveOut, RemovingUnusedPartsChangesNoBit) {
   int changed = 0, scene = 0;
   for (SceneBuilder builder : scenes_with_dead_parts()) {
     const auto before = render(*test::world_of(builder));
@@ -106,7 +106,7 @@ TEST(LeaveOut, TakingOutDeadPartsDoesNotChangeABit) {
   EXPECT_EQ(changed, 0);
 }
 
-TEST(LeaveOut, AWorldHasNoStructureThatItsSceneDoesNotUse) {
+TEST(LeaveOut, WorldHasOnlyStructuresThatItsSceneUses) {
   const auto bytes = [](const SceneBuilder& builder) {
     std::map<std::string, std::uint64_t> b;
     for (const auto& s : describe(*test::world_of(builder)).structures) b[s.name] = s.bytes;
@@ -126,7 +126,7 @@ TEST(LeaveOut, AWorldHasNoStructureThatItsSceneDoesNotUse) {
   EXPECT_GT(many.at("light tree"), 0u);
 }
 
-TEST(LeaveOut, TheTreeOfLightsSaysWhatItHasOrWhyItIsNone) {
+TEST(LeaveOut, ListsTheLightTreesLightsOrWhyThereIsNoTree) {
   const auto tree_of = [](int lamps, int setting) {
     const auto world = test::world_of(with(plain_room(), [&](SceneBuilder& k) {
       for (int i = 0; i < lamps; ++i) k.scene.emitters.push_back(PointEmitter{{1. * i, -1, 3}, {1, 1, 1}});
@@ -143,7 +143,7 @@ TEST(LeaveOut, TheTreeOfLightsSaysWhatItHasOrWhyItIsNone) {
   EXPECT_EQ(tree_of(3, 0), "too few lights with a place to choose among");
 }
 
-TEST(LeaveOut, TheCheapestInstantiationIsTheOneThatTheNeedsName) {
+TEST(LeaveOut, ChoosesTheCheapestVariantThatMeetsTheNeeds) {
   const auto variant = [](const SceneBuilder& builder) { return describe(*test::world_of(builder)).variant; };
   EXPECT_EQ(variant(plain_room()), "surfaces");
   EXPECT_EQ(variant(with(plain_room(),
@@ -169,7 +169,7 @@ TEST(LeaveOut, TheCheapestInstantiationIsTheOneThatTheNeedsName) {
   EXPECT_THAT(covering_variants(*world), testing::Contains(all_variants(*world).back()));
 }
 
-TEST(LeaveOut, OneLightNeedsNoChoiceAndNoTree) {
+TEST(LeaveOut, SingleLightNeedsNoChoiceAndNoTree) {
   SceneBuilder builder = plain_room();
   builder.scene.emitters.clear();
   const auto world = test::world_of(builder);
@@ -187,7 +187,7 @@ WorkCounters counted(const SceneBuilder& builder) {
   return work_counters();
 }
 
-TEST(LeaveOutCounters, AreExactlyZeroForWhatASceneDoesNotUse) {
+TEST(LeaveOutCounters, AreZeroForUnusedFeatures) {
   const WorkCounters vacuum = counted(plain_room());
   EXPECT_GT(vacuum.shadow_rays, 0u);
   EXPECT_EQ(

@@ -23,7 +23,7 @@ bool is_local_with(Change change, LampRooms rooms = {}) {
   return is_local(b);
 }
 
-TEST(LocalLights, AreUsedWhereMostLampsAreInOtherRooms) {
+TEST(LocalLights, AreUsedIfMostLampsAreInOtherRooms) {
   EXPECT_TRUE(is_local(LampRooms{}.builder()));
   for (const bool points : {false, true})
     EXPECT_TRUE(is_local(LampRooms{.points = points, .fog = .3}.builder())) << points;
@@ -41,7 +41,7 @@ TEST(LocalLights, AreLeftOutWhereTheyAreNotNeeded) {
 
 // Two equal lamps shine everywhere. The table of all lights is nearly as good, so learning leaves the image
 // unchanged.
-TEST(LocalLights, LeaveNoTraceWhereTheyDoNotPay) {
+TEST(LocalLights, AreUnusedWhereTheyDoNotPay) {
   SceneBuilder room = test::SunnyRoom{.light_vertices = -1}.builder();
   room.scene.integrator.path_reuse = -1;
   room.scene.emitters = {PointEmitter{{-.5, .2, 0}, {1, 1, 1}}, PointEmitter{{.5, .2, 0}, {1, 1, 1}}};

@@ -49,7 +49,7 @@ TEST(NearPlane, HidesNoMediumBehindIt) {
     }
 }
 
-TEST(NearPlane, IsBehindAMediumThatEndsBeforeIt) {
+TEST(NearPlane, IgnoresAMediumThatEndsBeforeIt) {
   SceneBuilder builder = before_sky(-.05, .1);
   const MediumIndex fog = builder.homogeneous({1, 1, 1}, {0, 0, 0});
   builder.container(CubeShape{}, translate({0, -1, 0}), builder.null(), fog);
@@ -60,7 +60,7 @@ TEST(NearPlane, IsBehindAMediumThatEndsBeforeIt) {
 
 // The camera stands on the face of the fog that it names, or just before it. Another body in this medium
 // makes the media overlap.
-TEST(NearPlane, IsOnceInTheMediumThatTheSensorNames) {
+TEST(NearPlane, UsesTheSensorsMediumOnce) {
   for (const bool overlaps : {false, true})
     for (const auto& [eye, near] : {std::pair{-1., 1e-4}, {-1.05, .1}}) {
       SceneBuilder builder = before_sky(eye, near);
@@ -90,7 +90,7 @@ TEST(NearPlane, IsInTheInnermostOfSeveralBodies) {
 }
 
 // Where nothing lies before the near plane, rays start as ever, and cost nothing.
-TEST(NearPlane, IsAskedOnlyIfABoundaryMayLieBeforeIt) {
+TEST(NearPlane, IsCheckedOnlyIfABoundaryMayLieBeforeIt) {
   const auto asked = [](double eye, double x) {
     SceneBuilder builder = before_sky(eye, .1, x);
     builder.container(CubeShape{}, {}, builder.null(), builder.homogeneous({1, 1, 1}, {0, 0, 0}));

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "common/base/digest.h"
+#include "core/base/digest.h"
 #include "tests/support/render_check.h"
 #include "worker/render/world/overlap.h"
 #include "worker/render/world/world.h"
@@ -95,7 +95,7 @@ SceneBuilder scene_of(const std::vector<Body>& bodies, const std::vector<Glow>& 
 // it.
 constexpr double kPerBoundary = 1e-4;
 
-TEST(Overlaps, AddUpOrGiveWayByPriorityInRandomCrowds) {
+TEST(Overlaps, AddUpOrYieldByPriorityInRandomScenes) {
   std::mt19937 rng(7);
   std::uniform_real_distribution<double> u(-2, 2), size(.3, 2);
   const std::vector<Glow> media{{1, 0}, {3, 0}, {10, 1}, {30, -1}, {.1, 1}};
@@ -116,7 +116,7 @@ TEST(Overlaps, AddUpOrGiveWayByPriorityInRandomCrowds) {
 }
 
 // Cubes on a lattice, so that most of their faces coincide.
-TEST(Overlaps, AreRightWhereManyFacesLieOnEachOther) {
+TEST(Overlaps, AreRightWithManyCoincidentFaces) {
   std::mt19937 rng(8);
   const std::vector<Glow> media{{1, 0}, {3, 0}, {10, 1}, {30, -1}, {.1, 1}};
   for (int scene = 0; scene < 60; ++scene) {
@@ -136,7 +136,7 @@ TEST(Overlaps, AreRightWhereManyFacesLieOnEachOther) {
 }
 
 // The camera is inside several media. The sensor names one of them; the others must be found.
-TEST(Overlaps, AreAroundTheCameraToo) {
+TEST(Overlaps, WorkAroundTheCamera) {
   std::mt19937 rng(9);
   std::uniform_real_distribution<double> u(-.5, .5), size(.8, 2);
   const std::vector<Glow> media{{1, 0}, {3, 0}, {10, 1}, {30, -1}};
@@ -161,7 +161,7 @@ TEST(Overlaps, AreAroundTheCameraToo) {
 
 // A camera on one side of a boundary gets the same light as on the other, up to the distance between the two
 // places.
-TEST(Overlaps, AreSeenAlikeFromBothSidesOfABoundary) {
+TEST(Overlaps, AreTheSameFromBothSidesOfABoundary) {
   const std::vector<Glow> media{{1, 0}, {3, 0}};
   const std::vector<Body> bodies{{false, {0, 0, 0}, 2, 0}, {true, {0, 0, 0}, 1, 1}};
   for (const double boundary : {-2., -1., 1.}) {
@@ -180,7 +180,7 @@ TEST(Overlaps, AreSeenAlikeFromBothSidesOfABoundary) {
 }
 
 // A boundary that names an exterior medium replaces this medium inside, and restores it where the ray leaves.
-TEST(Overlaps, ReplaceTheExteriorThatABoundaryNames) {
+TEST(Overlaps, ReplaceTheNamedExterior) {
   SceneBuilder builder({1, 1});
   const MediumIndex fog = glowing(builder, 1), amber = glowing(builder, 10);
   const BsdfIndex null = builder.null();
@@ -193,7 +193,7 @@ TEST(Overlaps, ReplaceTheExteriorThatABoundaryNames) {
 // The exterior that a ball names is not the medium around it. This must not replace the medium around it: the
 // medium at a point depends neither on the path to the point nor on whether a medium without effect is left
 // out.
-TEST(Overlaps, DoNotReplaceTheCamerasMediumByAnExteriorThatIsNot) {
+TEST(Overlaps, DoNotReplaceTheCamerasMediumByAMissingExterior) {
   for (const bool named : {false, true}) {
     SceneBuilder builder({1, 1});
     const MediumIndex fog = glowing(builder, 1), amber = glowing(builder, 10), nothing = glowing(builder, 0);
@@ -207,7 +207,7 @@ TEST(Overlaps, DoNotReplaceTheCamerasMediumByAnExteriorThatIsNot) {
 }
 
 // Neither surfaces nor media are visible beyond far_clip.
-TEST(Overlaps, AndOtherMediaEndWhereTheCameraSeesNoFarther) {
+TEST(Overlaps, MediaEndAtTheFarClip) {
   for (const bool two : {false, true}) {
     SceneBuilder builder({1, 1});
     const MediumIndex fog = glowing(builder, 1), amber = glowing(builder, 10);
@@ -232,7 +232,7 @@ TEST(Overlaps, CanBeHollowedOut) {
 
 // Six rectangles around a place enclose it: a path may leave through another one than the one through which
 // it entered.
-TEST(Overlaps, EndWhereARoomOfSheetsEnds) {
+TEST(Overlaps, EndAtTheWallsOfThinSheets) {
   SceneBuilder builder({1, 1});
   const MediumIndex fog = glowing(builder, 1), amber = glowing(builder, 10);
   const BsdfIndex null = builder.null();
@@ -245,7 +245,7 @@ TEST(Overlaps, EndWhereARoomOfSheetsEnds) {
   EXPECT_NEAR(seen(builder), 2 * 1 + 1 * 10, 1e-3);
 }
 
-TEST(Overlaps, RejectSamplesInsideOfTooMuchAtOnce) {
+TEST(Overlaps, RejectSamplesInTooManyMedia) {
   SceneBuilder builder({1, 1});
   const MediumIndex fog = glowing(builder, 1);
   const BsdfIndex null = builder.null();
@@ -278,7 +278,7 @@ SceneBuilder nested_by_the_book() {
   return builder;
 }
 
-TEST(Overlaps, ThatAreNoneChangeNoBit) {
+TEST(Overlaps, SeparateMediaKeepAllBits) {
   const SceneBuilder builder = nested_by_the_book();
   const auto world = test::world_of(builder);
   ASSERT_TRUE(world->overlaps);  // their bounding boxes overlap
@@ -290,7 +290,7 @@ TEST(Overlaps, ThatAreNoneChangeNoBit) {
   EXPECT_EQ(with.health.nonfinite, 0u);
 }
 
-TEST(Overlaps, AreNeededByScenesThatHaveThemOnly) {
+TEST(Overlaps, AreUsedOnlyByScenesWithOverlaps) {
   const auto needs = [](const Vec3& second, bool named) {
     SceneBuilder builder({1, 1});
     const MediumIndex fog = builder.homogeneous({1, 1, 1}, {0, 0, 0});

@@ -97,7 +97,7 @@ TEST(Splitting, IsLeftOutWhereItIsNotNeeded) {
 }
 
 // A box of fog 2 units deep, or two of them in a row, covers the left half of the frame.
-TEST(CameraCollisions, AreThoseOfTheOpticalDepth) {
+TEST(CameraCollisions, FollowTheOpticalDepth) {
   SceneBuilder b({32, 32});
   b.look({0, 0, 1000}, {0, 0, 0}, .1, {0, 1, 0});
   const MediumIndex fog = b.homogeneous({.3, .3, .3}, {.5, .5, .5});
@@ -119,7 +119,7 @@ TEST(CameraCollisions, AreThoseOfTheOpticalDepth) {
 
 TEST(Splitting, GivesTheSameImageOverDarkGround) { expect_same_image(cloud_over_ground(), 256); }
 
-TEST(Splitting, GivesTheSameImageOfCloudsWithinFogAndAcrossEachOther) {
+TEST(Splitting, GivesTheSameImageOfCloudsInFogAndOfOverlappingClouds) {
   SceneBuilder b = cloud_over_ground();
   const MediumIndex fog = b.homogeneous({.2, .3, .4}, {.9, .8, .7}, .3);
   b.container(CubeShape{}, translate({0, .2, 0}) * scale(.7), b.null(), fog);
@@ -127,7 +127,7 @@ TEST(Splitting, GivesTheSameImageOfCloudsWithinFogAndAcrossEachOther) {
   expect_same_image(b, 256);
 }
 
-TEST(Splitting, GivesTheSameImageOfAGlowingCloudOfColouredExtinction) {
+TEST(Splitting, GivesTheSameImageOfAnEmittingCloudWithColouredExtinction) {
   SceneBuilder b(kFrame);
   b.look({0, 0, 4}, {0, 0, 0}, 60, {0, 1, 0});
   std::vector<float> values;
@@ -156,13 +156,13 @@ void expect_same_bits(const World& w, std::size_t fewest_variants) {
     EXPECT_EQ(render_tile_as(w, name, tile, {0, 8}).sums, first.sums) << name;
 }
 
-TEST(Splitting, EveryVariantSplitsAlike) {
+TEST(Splitting, AllVariantsSplitTheSame) {
   const auto world = test::world_of(cloud_over_ground());
   ASSERT_TRUE(world->paths_split);
   expect_same_bits(*world, 3);
 }
 
-TEST(Splitting, EveryVariantThatAimsSplitsAlike) {
+TEST(Splitting, AllAimingVariantsSplitTheSame) {
   SceneBuilder b = cloud_over_ground();
   b.scene.emitters.push_back(PointEmitter{{.3, .2, .1}, {1, 1, 1}});
   const auto world = test::world_of(b);
@@ -174,7 +174,7 @@ TEST(Splitting, EveryVariantThatAimsSplitsAlike) {
 // pixels; for normal distributions each would be accurate to 1 / sqrt(2 * 512) = 3 %.
 double noise(const SceneBuilder& b) { return test::estimate(b, 64).standard_error[1]; }
 
-TEST(Splitting, OfPathsAloneReducesNoise) {
+TEST(Splitting, PathSplittingAloneReducesNoise) {
   SceneBuilder b = cloud_in_the_sky();
   b.scene.integrator.rr_depth = b.scene.integrator.max_depth;  // no roulette
   EXPECT_LT(noise(b), .9 * noise(without_splitting(b)));

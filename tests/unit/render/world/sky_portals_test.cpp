@@ -24,7 +24,7 @@ bool has_portals_with(Change change, SkyRoom room = {}) {
   return has_portals(b);
 }
 
-TEST(SkyPortals, AreUsedWhereTheSkyIsRarelySeen) {
+TEST(SkyPortals, AreUsedIfTheSkyIsRarelyVisible) {
   for (const bool image : {false, true})
     for (const double fog : {0., .3}) EXPECT_TRUE(has_portals(SkyRoom{.image = image, .fog = fog}.builder()));
   EXPECT_TRUE(has_portals_with([](Scene& s) { s.integrator.camera_points = 0; }, {.fog = .1}))
@@ -33,7 +33,7 @@ TEST(SkyPortals, AreUsedWhereTheSkyIsRarelySeen) {
 }
 
 // In these scenes paths find portals that do not pay: the image is that without portals.
-TEST(SkyPortals, LeaveNoTraceWhereTheyDoNotPay) {
+TEST(SkyPortals, AreUnusedWhereTheyDoNotPay) {
   const auto with = [](auto&& change, SkyRoom room) {
     SceneBuilder b = room.builder();
     change(b);

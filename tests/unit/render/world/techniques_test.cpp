@@ -1,5 +1,5 @@
 // Which techniques a world uses; and that each can be switched off, which does not change the expected image.
-#include "common/job/techniques.h"
+#include "core/job/techniques.h"
 
 #include <gtest/gtest.h>
 
@@ -110,7 +110,7 @@ SceneBuilder switched_off(const Case& c) {
   return out;
 }
 
-TEST(Techniques, EachIsUsedWhereItPaysAndGoneWhenItIsSwitchedOff) {
+TEST(Techniques, EachIsUsedWhereItPaysAndUnusedWhenSwitchedOff) {
   for (const Case& c : cases()) {
     const std::string name(techniques()[static_cast<std::size_t>(c.technique)].name);
     EXPECT_TRUE(techniques_of(*test::world_of(c.builder)).has(c.technique)) << name;
@@ -118,7 +118,7 @@ TEST(Techniques, EachIsUsedWhereItPaysAndGoneWhenItIsSwitchedOff) {
   }
 }
 
-TEST(Techniques, WithoutOneOfThemTheImageIsTheSame) {
+TEST(Techniques, SwitchingOneOffKeepsTheImage) {
   for (const Case& c : cases()) {
     // The pixels of path reuse depend on each other: tests/property/path_reuse_test.cpp tests it
     if (c.technique == Technique::path_reuse) continue;
@@ -130,7 +130,7 @@ TEST(Techniques, WithoutOneOfThemTheImageIsTheSame) {
   }
 }
 
-TEST(Techniques, ASceneThatNeedsNoneHasNone) {
+TEST(Techniques, SceneThatNeedsNoneHasNone) {
   SceneBuilder builder({24, 16});
   builder.shape(RectangleShape{}, {}, builder.diffuse(.5));
   builder.scene.emitters.push_back(PointEmitter{{0, 0, 2}, {1, 1, 1}});

@@ -165,7 +165,7 @@ TEST(World, EveryVariantThatCoversASceneGivesTheSameBits) {
   }
 }
 
-TEST(World, EveryVariantLooksForTheSkyAlike) {
+TEST(World, AllVariantsSampleTheSkyTheSame) {
   const auto world = test::world_of(test::sky_yard({16, 16}));
   ASSERT_TRUE(world->sky_samples);
   const auto names = covering_variants(*world);
@@ -192,7 +192,7 @@ TEST(World, EveryVariantThatAimsGivesTheSameBits) {
   EXPECT_GE(found, 8);
 }
 
-TEST(World, ASubsetOfATileIsThatPartOfTheTile) {
+TEST(World, PartOfATileEqualsThatPart) {
   const auto world = test::world_of(room());
   const TileResult all = render(*world), part = render_tile(*world, {3, 2, 7, 5}, {0, 32}, nullptr, nullptr);
   for (std::size_t plane = 0; plane < 6; ++plane)
@@ -201,7 +201,7 @@ TEST(World, ASubsetOfATileIsThatPartOfTheTile) {
         ASSERT_EQ(part.sums[plane * 12 + (y - 2) * 4 + x - 3], all.sums[plane * 96 + y * 12 + x]);
 }
 
-TEST(World, RoundsContinueTheSequenceWhateverTheirGrouping) {
+TEST(World, GroupingOfRoundsDoesNotChangeTheSampleSequence) {
   const auto world = test::world_of(room());
   const PixelRect all{0, 0, 12, 8};
   const auto sums = [&](SampleRange r) { return render_tile(*world, all, r, nullptr, nullptr).sums; };
@@ -212,7 +212,7 @@ TEST(World, RoundsContinueTheSequenceWhateverTheirGrouping) {
   }
 }
 
-TEST(World, BuiltByOneThreadOrTwoItGivesTheSamePixels) {
+TEST(World, PixelsDoNotDependOnBuildThreads) {
   for (const Named& n : scenes()) {
     EXPECT_EQ(render(*test::world_of(n.builder, 0, 1)).sums, render(*test::world_of(n.builder, 0, 2)).sums)
         << n.name;
@@ -223,7 +223,7 @@ TEST(World, AnotherSeedGivesOtherSamples) {
   EXPECT_NE(render(*test::world_of(room(), 0)).sums, render(*test::world_of(room(), 1)).sums);
 }
 
-TEST(World, TheSamplesOfASampleRangeAreThoseThatReplayGives) {
+TEST(World, SamplesOfARangeMatchTheirReplay) {
   const auto world = test::world_of(room());
   const TileResult r = render_tile(*world, {5, 3, 6, 4}, {0, 8}, nullptr, nullptr);
   double even[3] = {}, odd[3] = {};
@@ -267,7 +267,7 @@ SceneBuilder scaled(SceneBuilder builder, int k) {
   return builder;
 }
 
-TEST(World, ScalingASceneByAPowerOfTwoChangesNoBit) {
+TEST(World, ScalingByAPowerOfTwoChangesNoBit) {
   for (const Named& n : scenes()) {
     const auto reference = render(*test::world_of(n.builder)).sums;
     for (int k = -13; k <= 13; ++k) {
@@ -276,7 +276,7 @@ TEST(World, ScalingASceneByAPowerOfTwoChangesNoBit) {
   }
 }
 
-TEST(World, AThinLensScalesWithTheScene) {
+TEST(World, ThinLensScalesWithTheScene) {
   SceneBuilder builder = room();
   builder.scene.sensor.aperture_radius = .2;
   builder.scene.sensor.focus_distance = 5;
@@ -292,7 +292,7 @@ std::string error_of(const SceneBuilder& builder) {
   return w ? "" : w.error().message;
 }
 
-TEST(World, RefusesReferencesToWhatTheSceneDoesNotHave) {
+TEST(World, RefusesReferencesToMissingObjects) {
   SceneBuilder builder = room();
   builder.scene.shapes[0].bsdf = {99};
   EXPECT_THAT(error_of(builder), HasSubstr("does not have"));
@@ -319,7 +319,7 @@ TEST(World, RefusesShapesWithoutAnInverseOrBeyondAllBounds) {
   EXPECT_THAT(error_of(builder), HasSubstr("uniformly"));
 }
 
-TEST(World, RefusesGridsThatAreNotNumbersOrHaveNoPlace) {
+TEST(World, RefusesGridsWithNonFiniteValuesOrASingularTransform) {
   const auto with_grid = [](float value, const Transform& t) {
     return with_medium([&](SceneBuilder& k) {
       return k.heterogeneous(k.grid({2, 2, 2}, std::vector<float>(8, value), t), {1, 1, 1});
@@ -334,7 +334,7 @@ TEST(World, RefusesGridsThatAreNotNumbersOrHaveNoPlace) {
   EXPECT_EQ(error_of(with_grid(1, kBox)), "");
 }
 
-TEST(World, RefusesPhaseFunctionsThatRoundToAMirrorOrNoMediumAtAll) {
+TEST(World, RefusesPhaseFunctionsThatRoundToForwardOrBackwardOnly) {
   const auto with_g = [](double g) {
     return with_medium([&](SceneBuilder& k) { return k.homogeneous({1, 1, 1}, {1, 1, 1}, g); });
   };
@@ -377,7 +377,7 @@ TEST(World, RefusesBodiesOfPeakOneWhoseRadianceIsBeyondFloat32) {
   }
 }
 
-TEST(World, LoadsNothingOfAMediumThatNothingContains) {
+TEST(World, UnusedMediumIsNotLoaded) {
   SceneBuilder builder = room();
   builder.heterogeneous(builder.grid({2, 2, 2}, std::vector<float>(8, 1), kBox), {1, 1, 1});
   const auto bytes_of_grids = [](const SceneBuilder& k) {
@@ -392,7 +392,7 @@ TEST(World, LoadsNothingOfAMediumThatNothingContains) {
   EXPECT_GT(bytes_of_grids(scenes()[3].builder), 0u);
 }
 
-TEST(World, NamesAFileThatWasNotBrought) {
+TEST(World, NamesAMissingFile) {
   SceneBuilder builder = scenes()[3].builder;
   builder.files.clear();
   EXPECT_THAT(error_of(builder), HasSubstr("grid.vol"));
@@ -418,7 +418,7 @@ TEST(World, CountsAlbedosOfAGridThatAreAboveOne) {
   }
 }
 
-TEST(World, AnEmptySceneIsItsSky) {
+TEST(World, EmptySceneShowsItsSky) {
   SceneBuilder builder({2, 2});
   builder.environment(.25);
   const TileResult r = render_tile(*test::world_of(builder), {0, 0, 2, 2}, {0, 4}, nullptr, nullptr);
@@ -426,7 +426,7 @@ TEST(World, AnEmptySceneIsItsSky) {
 }
 
 // Light that media emit counts at the same depth as that of an emitter that the path hits.
-TEST(World, LightGivenOffByMediaCountsAtTheDepthOfItsPath) {
+TEST(World, EmissionOfMediaCountsAtItsDepth) {
   const auto mean = [](int max_depth, bool hidden, double floor) {
     SceneBuilder builder({4, 4});
     const MediumIndex m = builder.homogeneous({0, 0, 0}, {0, 0, 0});

@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/analysis/needs.h"
-#include "common/scene/analysis/prune.h"
-#include "common/scene/schema/validate.h"
+#include "core/scene/analysis/needs.h"
+#include "core/scene/analysis/prune.h"
+#include "core/scene/schema/validate.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -51,7 +51,7 @@ std::string bsdf(std::string_view type, std::string_view inside = "") {
 
 std::size_t media(std::string_view objects) { return pruned(objects).scene.media.size(); }
 
-TEST(PruneInteriors, OfAnOpaqueBodyGoesWithItsGrid) {
+TEST(PruneInteriors, InteriorOfAnOpaqueBodyIsRemovedWithItsGrid) {
   const Pruned p = pruned(cube(kWhole + kGrid) + R"(<emitter type="point"/>)");
   EXPECT_TRUE(p.scene.media.empty());
   EXPECT_TRUE(p.scene.assets.empty());
@@ -65,7 +65,7 @@ TEST(PruneInteriors, OfAnOpaqueBodyGoesWithItsGrid) {
               Contains(AllOf(Field(&scene::LeftOut::what, "cloud.vol"), Field(&scene::LeftOut::bytes, 6u))));
 }
 
-TEST(PruneInteriors, OfEveryOpaqueMaterialGo) {
+TEST(PruneInteriors, InteriorsOfAllOpaqueMaterialsAreRemoved) {
   const std::string rough = bsdf("roughconductor");
   for (const std::string& b :
        {kGrey, bsdf("conductor"), rough, bsdf("plastic"), bsdf("roughplastic"), bsdf("principled"), kWhole,
@@ -78,7 +78,7 @@ TEST(PruneInteriors, OfEveryOpaqueMaterialGo) {
   }
 }
 
-TEST(PruneInteriors, WhatLiesOutsideOfABodyStays) {
+TEST(PruneInteriors, ExteriorOfABodyStays) {
   const std::string outside = R"(<medium type="homogeneous" name="exterior"/>)";
   const Pruned p = pruned(cube(kWhole + kGrid + outside));
   ASSERT_EQ(p.scene.media.size(), 1u);
@@ -86,7 +86,7 @@ TEST(PruneInteriors, WhatLiesOutsideOfABodyStays) {
   EXPECT_TRUE(p.scene.shapes.at(0).exterior && p.scene.shapes.at(0).is_medium_transition);
 }
 
-TEST(PruneInteriors, ThatSomeLightGetsIntoStay) {
+TEST(PruneInteriors, InteriorsThatLightReachesStay) {
   const std::string opacity =
       R"(<texture type="bitmap" name="opacity"><string name="filename" value="wood.png"/></texture>)";
   for (const std::string& b :
@@ -171,7 +171,7 @@ TEST(PruneInteriors, StayWhereASurfaceThatLightPassesTouchesTheBody) {
 }
 
 // If the back of a surface is black, no path leaves the surface to that side, whatever is there.
-TEST(PruneInteriors, BehindABlackBackGoWhateverLiesAbout) {
+TEST(PruneInteriors, AreRemovedBehindABlackBack) {
   const std::string mesh = R"(<string name="filename" value="mesh.obj"/>)",
                     flat = R"(<boolean name="face_normals" value="true"/>)";
   const std::string glass = shape("obj", mesh + kGlassWithInterior);
@@ -185,7 +185,7 @@ TEST(PruneInteriors, BehindABlackBackGoWhateverLiesAbout) {
 }
 
 // Flipped normals put the interior medium on the outside of a shape, and mirroring may put it in front.
-TEST(PruneInteriors, OfBodiesTurnedRoundStay) {
+TEST(PruneInteriors, InteriorsOfInvertedBodiesStay) {
   const std::string flip = R"(<boolean name="flip_normals" value="true"/>)";
   EXPECT_EQ(media(cube(flip + kWhole + kFog)), 1u);
   const std::string mirrored = R"(<transform name="to_world"><scale x="-1"/><translate z="5"/></transform>)";
@@ -194,14 +194,14 @@ TEST(PruneInteriors, OfBodiesTurnedRoundStay) {
   EXPECT_EQ(media(shape("rectangle", mirrored + kGrey + kFog)), 1u);
 }
 
-TEST(PruneInteriors, OfBodiesInGroupsStay) {
+TEST(PruneInteriors, InteriorsOfBodiesInGroupsStay) {
   const std::string group = "<shape type=\"shapegroup\" id=\"g\">" + cube(kWhole + kFog) + "</shape>";
   EXPECT_EQ(media(group + R"(<shape type="instance"><ref id="g"/></shape>)"), 1u);
 }
 
 // A medium without effect is kept only if it displaces other media. After these are removed, it is removed
 // too.
-TEST(PruneInteriors, TakeThoseAlongThatOnlyMatterToThem) {
+TEST(PruneInteriors, RemovalIncludesMediaThatOnlyTheyNeed) {
   const std::string gap =
       R"(<medium type="homogeneous" name="interior"><float name="scale" value="0"/><integer name="priority" value="1"/></medium>)";
   EXPECT_EQ(media(cube(kWhole + kFog) + shape("sphere", at(9, 0, 9) + bsdf("null") + gap)), 0u);
@@ -215,7 +215,7 @@ std::string medium(std::string_view type, std::string_view inside) {
                              fmt::format("<medium type=\"{}\" name=\"interior\">{}</medium>", type, inside));
 }
 
-TEST(PrunePhases, OfMediaThatScatterNothingAreNotNeeded) {
+TEST(PrunePhases, MediaWithoutScatteringNeedNoPhaseFunction) {
   const std::string
       black = R"(<rgb name="albedo" value="0"/>)",
       grid =
@@ -234,7 +234,7 @@ TEST(PrunePhases, OfMediaThatScatterNothingAreNotNeeded) {
   }
 }
 
-TEST(PrunePhases, OfMediaThatScatterStay) {
+TEST(PrunePhases, PhaseFunctionsOfScatteringMediaStay) {
   const std::string albedo =
       R"(<volume type="gridvolume" name="albedo"><string name="filename" value="cloud.vol"/></volume>)";
   for (const std::string& m :

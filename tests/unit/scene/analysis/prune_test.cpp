@@ -3,10 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/analysis/needs.h"
-#include "common/scene/analysis/prune.h"
-#include "common/scene/schema/integrators.h"
-#include "common/scene/schema/validate.h"
+#include "core/scene/analysis/needs.h"
+#include "core/scene/analysis/prune.h"
+#include "core/scene/schema/integrators.h"
+#include "core/scene/schema/validate.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -52,7 +52,7 @@ std::string grid_medium(std::string_view more, std::string_view file = "cloud.vo
 }
 const std::string kNull = R"(<bsdf type="null"/>)";
 
-TEST(Prune, ABlendOfWeight0Or1IsThatBranchAndTheOthersFilesGo) {
+TEST(Prune, BlendOfWeight0Or1KeepsOneBranchAndDropsTheOthersFiles) {
   const Pruned first = pruned_text(sphere(weighted("blendbsdf", "weight", "0", kMetal + kWood)));
   ASSERT_EQ(first.scene.bsdfs.size(), 1u);
   EXPECT_TRUE(std::holds_alternative<ConductorBsdf>(first.scene.bsdfs[0]));
@@ -71,13 +71,13 @@ TEST(Prune, ABlendOfWeight0Or1IsThatBranchAndTheOthersFilesGo) {
   EXPECT_TRUE(both.left_out.empty());
 }
 
-TEST(Prune, AWeightThatDiffersBetweenChannelsKeepsBothBranches) {
+TEST(Prune, WeightWithDifferentChannelsKeepsBothBranches) {
   EXPECT_EQ(pruned_text(sphere(weighted("blendbsdf", "weight", "0, 0, 1", kMetal + kGreyMaterial)))
                 .scene.bsdfs.size(),
             3u);
 }
 
-TEST(Prune, NestedBranchesGoLevelByLevel) {
+TEST(Prune, RemovesNestedBranchesLevelByLevel) {
   const std::string inner = weighted("blendbsdf", "weight", "0", kGreyMaterial + kWood);
   const std::string mask = weighted("mask", "opacity", "1", inner);
   const Pruned p = pruned_text(sphere(weighted("blendbsdf", "weight", "1", kMetal + mask)));
@@ -86,7 +86,7 @@ TEST(Prune, NestedBranchesGoLevelByLevel) {
   EXPECT_TRUE(p.scene.assets.empty());
 }
 
-TEST(Prune, ATwoSidedMaterialThatHeldABlendOfOneHoldsWhatThatShowed) {
+TEST(Prune, TwoSidedMaterialKeepsTheVisibleBranchOfItsBlend) {
   const std::string two = R"(<bsdf type="twosided">)" + kMetal + kWood + "</bsdf>";
   const std::string blend = weighted("blendbsdf", "weight", "0", two + kGreyMaterial);
   const Pruned p = pruned_text(sphere(R"(<bsdf type="twosided">)" + blend + "</bsdf>"));
@@ -94,14 +94,14 @@ TEST(Prune, ATwoSidedMaterialThatHeldABlendOfOneHoldsWhatThatShowed) {
   EXPECT_TRUE(p.scene.assets.empty());
 }
 
-TEST(Prune, AMaskOfOpacity0IsNoSurfaceAndGoes) {
+TEST(Prune, RemovesAMaskOfOpacity0) {
   const Pruned p = pruned_text(sphere(weighted("mask", "opacity", "0", kWood)) + sphere(kGreyMaterial));
   EXPECT_EQ(p.scene.shapes.size(), 1u);
   EXPECT_TRUE(p.scene.assets.empty());
   EXPECT_FALSE(scene::needs_of(p.scene, true).null_transmission);
 }
 
-TEST(Prune, SurfacesWithoutEffectGoUnlessTheyShineOrPartMedia) {
+TEST(Prune, RemovesSurfacesWithoutEffectUnlessTheyEmitOrSeparateMedia) {
   const std::string lit = R"(<emitter type="area"><rgb name="radiance" value="1"/></emitter>)";
   const std::string fog = R"(<medium type="homogeneous" name="interior"/>)";
   EXPECT_EQ(pruned_text(sphere(kNull)).scene.shapes.size(), 0u);
@@ -110,7 +110,7 @@ TEST(Prune, SurfacesWithoutEffectGoUnlessTheyShineOrPartMedia) {
   EXPECT_EQ(pruned_text(sphere(kGreyMaterial)).scene.shapes.size(), 1u);
 }
 
-TEST(Prune, AGroupOfUnseenShapesGoesWithItsInstances) {
+TEST(Prune, RemovesAGroupOfInvisibleShapesWithItsInstances) {
   const std::string group = "<shape type=\"shapegroup\" id=\"g\">" + sphere(kNull) + "</shape>";
   const std::string instance = R"(<shape type="instance"><ref id="g"/></shape>)";
   const Pruned p = pruned_text(group + instance + sphere(kGreyMaterial));
@@ -118,7 +118,7 @@ TEST(Prune, AGroupOfUnseenShapesGoesWithItsInstances) {
   EXPECT_EQ(p.scene.shapes.size(), 1u);
 }
 
-TEST(Prune, LightsWithoutPowerGoWithTheirFiles) {
+TEST(Prune, RemovesLightsWithoutPowerAndTheirFiles) {
   const std::string dark = R"(<emitter type="area"><rgb name="radiance" value="0"/></emitter>)";
   const Pruned p = pruned_text(sphere(kGreyMaterial + dark) +
                                R"(<emitter type="point"><rgb name="intensity" value="0"/></emitter>
@@ -135,7 +135,7 @@ TEST(Prune, LightsWithoutPowerGoWithTheirFiles) {
   EXPECT_TRUE(map.scene.assets.empty());
 }
 
-TEST(Prune, AMediumThatDoesNothingGoesWithItsGrid) {
+TEST(Prune, RemovesAnEmptyMediumWithItsGrid) {
   const Pruned p =
       pruned_text(sphere(kNull + grid_medium(R"(<float name="scale" value="0"/>)")) + sphere(kGreyMaterial));
   EXPECT_TRUE(p.scene.media.empty());
@@ -145,7 +145,7 @@ TEST(Prune, AMediumThatDoesNothingGoesWithItsGrid) {
   EXPECT_EQ(live.scene.assets.size(), 1u);
 }
 
-TEST(Prune, ADeadMediumBesideALiveOneLeavesItsBoundary) {
+TEST(Prune, EmptyMediumBesideAnotherKeepsItsBoundary) {
   const std::string dead =
       R"(<medium type="homogeneous" name="interior"><float name="scale" value="0"/></medium>)";
   const std::string live = R"(<medium type="homogeneous" name="exterior"/>)";
@@ -155,7 +155,7 @@ TEST(Prune, ADeadMediumBesideALiveOneLeavesItsBoundary) {
   EXPECT_TRUE(p.scene.shapes[0].exterior && p.scene.shapes[0].is_medium_transition);
 }
 
-TEST(Prune, AMediumThatDoesNothingStaysWhereItKeepsOthersOut) {
+TEST(Prune, EmptyMediumStaysWhereItDisplacesOthers) {
   const std::string gap =
       R"(<medium type="homogeneous" name="interior"><float name="scale" value="0"/><integer name="priority" value="1"/></medium>)";
   const std::string fog = R"(<medium type="homogeneous" name="interior"/>)";
@@ -164,7 +164,7 @@ TEST(Prune, AMediumThatDoesNothingStaysWhereItKeepsOthersOut) {
   EXPECT_TRUE(p.scene.shapes.at(0).interior);
 }
 
-TEST(Prune, AnIntegratorWithoutMediaNeedsNoneOfTheirFiles) {
+TEST(Prune, IntegratorWithoutMediaNeedsNoFilesOfMedia) {
   const std::string objects = sphere(kNull + grid_medium("")) + sphere(kGreyMaterial);
   EXPECT_EQ(pruned_text(objects, true).scene.assets.size(), 1u);
   const Pruned p = pruned_text(objects, false);
@@ -176,7 +176,7 @@ TEST(Prune, AnIntegratorWithoutMediaNeedsNoneOfTheirFiles) {
   EXPECT_TRUE(scene::sees_media("volpath_distant_mis"));
 }
 
-TEST(Prune, SurfacesThatUseUpTheDepthOfPathsStay) {
+TEST(Prune, KeepsSurfacesThatCountForMaxDepth) {
   const Scene s = must_read(with_sensor(sphere(kNull) + sphere(kGreyMaterial)));
   EXPECT_EQ(scene::pruned(s, scene::pruned_for("path", 3)).scene.shapes.size(), 2u);
   EXPECT_EQ(scene::pruned(s, scene::pruned_for("path", -1)).scene.shapes.size(), 1u);
@@ -191,12 +191,12 @@ TEST(Prune, LightOfStrength0NeedsNoGrid) {
   EXPECT_FALSE(scene::needs_of(p.scene, true).emission);
 }
 
-TEST(Prune, TheExampleOfEverythingStaysAsItIs) {
+TEST(Prune, KeepsTheExampleWithEveryFeature) {
   const Scene s = must_read(kExample);
   EXPECT_EQ(scene::pruned(s, {}).scene, s);
 }
 
-TEST(Needs, AreWhatTheSceneHas) {
+TEST(Needs, MatchTheScene) {
   const Needs none = needs(sphere(kGreyMaterial));
   EXPECT_FALSE(none.media || none.grids || none.chromatic || none.emission || none.boundaries ||
                none.null_transmission);
@@ -220,13 +220,13 @@ TEST(Needs, AreWhatTheSceneHas) {
   EXPECT_TRUE(needs(R"(<emitter type="point"/>)").only_delta_lights);
 }
 
-TEST(Needs, OfAnIntegratorWithoutMediaHaveNone) {
+TEST(Needs, IntegratorWithoutMediaNeedsNone) {
   const Scene s = must_read(with_sensor(sphere(kNull + grid_medium(""))));
   EXPECT_TRUE(scene::needs_of(s, true).media);
   EXPECT_FALSE(scene::needs_of(s, false).media);
 }
 
-TEST(Needs, HaveOneTextAndADifferenceIsNamed) {
+TEST(Needs, HaveOneCanonicalTextAndNameDifferences) {
   const std::string a = canonical_json(needs(sphere(kGreyMaterial))),
                     b = canonical_json(needs(sphere(kGreyMaterial) + sphere(kMetal)));
   EXPECT_EQ(a, canonical_json(needs(sphere(kGreyMaterial))));
@@ -238,7 +238,7 @@ TEST(Needs, HaveOneTextAndADifferenceIsNamed) {
   EXPECT_NE(scene::first_difference(a, "{\"future\":true}"), "");
 }
 
-TEST(Needs, SayOfEveryPartWhy) {
+TEST(Needs, ExplainEveryPart) {
   for (const scene::Need& n : in_words(needs(sphere(kNull + grid_medium("")) + kGreyMaterial))) {
     EXPECT_FALSE(n.part.empty());
     EXPECT_FALSE(n.why.empty()) << n.part;

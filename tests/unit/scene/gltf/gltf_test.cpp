@@ -110,7 +110,7 @@ TEST(Gltf, ReadsBase64InTheText) {
   EXPECT_TRUE(made->first.ends_with(".png"));
 }
 
-TEST(Gltf, StripsAndFansTurnAsTrianglesDo) {
+TEST(Gltf, StripsAndFansKeepTheWindingOfTriangles) {
   GltfFile file;
   file.attributes()["POSITION"] = file.add(Floats{0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 2, 0}, "VEC3");
 
@@ -120,7 +120,7 @@ TEST(Gltf, StripsAndFansTurnAsTrianglesDo) {
   EXPECT_EQ(ply_of(file).corners, (Corners{1, 2, 0, 2, 3, 0, 3, 4, 0}));
 }
 
-TEST(Gltf, IndicesAreOfThreeKinds) {
+TEST(Gltf, IndicesHaveThreeIntegerTypes) {
   GltfFile file;
   const std::size_t all[] = {file.add(std::vector<std::uint8_t>{2, 1, 0}, "SCALAR"),
                              file.add(std::vector<std::uint16_t>{2, 1, 0}, "SCALAR"),
@@ -148,7 +148,7 @@ TEST(Gltf, NumbersMayBeInterleavedAndSparse) {
   EXPECT_EQ(ply_of(file).numbers, (Floats{1, 2, 3, 4, 5, 6, 7, 8, 9}));
 }
 
-TEST(Gltf, QuantizedNumbersAreShares) {
+TEST(Gltf, NormalizedIntegersAreFractions) {
   GltfFile file;
   file.attributes()["POSITION"] = file.add(std::vector<std::int16_t>{0, 0, 0, 300, 0, 0, 0, -300, 0}, "VEC3");
   file.attributes()["TEXCOORD_0"] = file.add(std::vector<std::uint8_t>{0, 255, 51, 0, 0, 0}, "VEC2");
@@ -160,7 +160,7 @@ TEST(Gltf, QuantizedNumbersAreShares) {
             (Floats{0, 0, 0, 0, 0, 1, 0, 1, 300, 0, 0, 0, -1, 0, .2f, 0, 0, -300, 0, -1, 0, 0, 0, 0}));
 }
 
-TEST(Gltf, ColoursOfCornersMultiplyTheBaseColour) {
+TEST(Gltf, VertexColoursMultiplyTheBaseColour) {
   GltfFile file;
   file.attributes()["COLOR_0"] =
       file.add(std::vector<std::uint8_t>{255, 0, 0, 255, 0, 255, 0, 51, 0, 0, 255, 0}, "VEC4");
@@ -180,7 +180,7 @@ TEST(Gltf, ColoursOfCornersMultiplyTheBaseColour) {
   EXPECT_EQ(names, (std::vector<std::string>{"vertex_color", "vertex_opacity"}));
 }
 
-TEST(Gltf, NodesCarryTheirChildren) {
+TEST(Gltf, NodesTransformTheirChildren) {
   GltfFile file;
   file.j["scenes"][0]["nodes"] = {3, 1, 2};
   // A scale, a quarter turn about z and a translation; the inner node has a matrix.
@@ -199,7 +199,7 @@ TEST(Gltf, NodesCarryTheirChildren) {
 
 // Under a mirror normals of the file keep their side, and those of flat triangles follow the winding. What is
 // seen is compared in tests/system/test_mirrors.py.
-TEST(Gltf, MirrorsFlipFlatTrianglesAlone) {
+TEST(Gltf, MirroringFlipsOnlyFlatTriangles) {
   GltfFile file;
   file.j["nodes"][0]["scale"] = {-1, 1, 1};
   EXPECT_TRUE(gltf(file).shapes.at(0).flip_normals);
@@ -240,7 +240,7 @@ TEST(Gltf, MeshesOfSeveralNodesAreInstances) {
   EXPECT_EQ(s.instances[1].to_world.m[3], 3);
 }
 
-TEST(Gltf, WhatShinesStandsByItselfInEveryPlace) {
+TEST(Gltf, EmittingPartsAreSeparateShapesInEveryInstance) {
   GltfFile file;
   file.j["nodes"].push_back({{"mesh", 0}, {"translation", {3, 0, 0}}});
   file.j["scenes"][0]["nodes"].push_back(3);
@@ -253,7 +253,7 @@ TEST(Gltf, WhatShinesStandsByItselfInEveryPlace) {
   EXPECT_TRUE(s.shapes[1].emitter);
 }
 
-TEST(Gltf, InstancingByAttributes) {
+TEST(Gltf, ReadsInstancingAttributes) {
   GltfFile file;
   const std::size_t moves = file.add(Floats{1, 0, 0, 2, 0, 0, 3, 0, 0}, "VEC3");
   const std::size_t scales = file.add(Floats{1, 1, 1, 2, 2, 2, 3, 3, 3}, "VEC3");
@@ -317,14 +317,14 @@ TEST(Gltf, CamerasAreChosenByName) {
             std::string::npos);
 }
 
-TEST(Gltf, AspectRatioIsTheFrames) {
+TEST(Gltf, AspectRatioSetsTheFrame) {
   GltfFile file;
   file.j["cameras"][0]["perspective"]["aspectRatio"] = 1.5;
 
   EXPECT_EQ(gltf(file).film.size, (FrameSize{1080, 720}));
 }
 
-TEST(Gltf, WithoutACameraAllIsSeen) {
+TEST(Gltf, DefaultCameraShowsEverything) {
   GltfFile file;
   file.j["scenes"][0]["nodes"] = {0, 2};
   file.j["nodes"][0]["translation"] = {100, 0, 0};
@@ -344,7 +344,7 @@ TEST(Gltf, WithoutACameraAllIsSeen) {
   EXPECT_GT(along * std::sin(r.scene->sensor.fov / 2 * kPi / 180), radius);  // the bounding sphere fits
 }
 
-TEST(Gltf, WithoutLightThereIsAWarningAndASkyByChoice) {
+TEST(Gltf, SceneWithoutLightsIsAWarningAndCanGetASky) {
   GltfFile file;
   file.j["scenes"][0]["nodes"] = {0, 1};
   ReadOptions sky;
@@ -357,7 +357,7 @@ TEST(Gltf, WithoutLightThereIsAWarningAndASkyByChoice) {
   EXPECT_EQ(std::get<ConstantEmitter>(r.scene->emitters.at(0)).radiance, (Rgb{2.5, 2.5, 2.5}));
 }
 
-TEST(Gltf, WhatIsFlattenedOrHiddenIsLeftOut) {
+TEST(Gltf, FlattenedAndHiddenNodesAreLeftOut) {
   GltfFile file;
   file.j["nodes"].push_back({{"mesh", 0}, {"scale", {1, 0, 1}}});
   file.j["nodes"].push_back({{"mesh", 0}, {"extensions", {{"KHR_node_visibility", {{"visible", false}}}}}});

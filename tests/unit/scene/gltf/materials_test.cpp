@@ -43,7 +43,7 @@ TEST(GltfMaterials, DielectricIsACoatOverADiffuseBase) {
   EXPECT_EQ(constant(s, coat->diffuse_reflectance), (Rgb{.1, .2, .3}));
 }
 
-TEST(GltfMaterials, MetalIsPrincipledAndAShareBlends) {
+TEST(GltfMaterials, PartialMetalIsABlend) {
   GltfFile file;
   file.pbr()["metallicFactor"] = 1;
   const Scene metal = gltf(file);
@@ -108,7 +108,7 @@ TEST(GltfMaterials, CutOutsHaveAThreshold) {
   EXPECT_FALSE(bitmap(s, cut.second).alpha);
 }
 
-TEST(GltfMaterials, CutOutsOfAnImageAloneAreCutToo) {
+TEST(GltfMaterials, CutOutsWorkWithAnImageAlone) {
   GltfFile file;
   file.pbr()["baseColorTexture"] = {{"index", 0}};
   file.material()["alphaMode"] = "MASK";
@@ -118,7 +118,7 @@ TEST(GltfMaterials, CutOutsOfAnImageAloneAreCutToo) {
   EXPECT_EQ(product(s, only<MaskBsdf>(s)->opacity).threshold, .5);
 }
 
-TEST(GltfMaterials, BlendIsAShareAndOpaqueIgnoresAlpha) {
+TEST(GltfMaterials, BlendUsesAlphaAndOpaqueIgnoresIt) {
   GltfFile file;
   file.pbr()["baseColorFactor"] = {1, 1, 1, .5};
   for (const Bsdf& b : gltf(file).bsdfs) EXPECT_FALSE(std::holds_alternative<MaskBsdf>(b));
@@ -181,7 +181,7 @@ TEST(GltfMaterials, EmissionIsCutOutByAnImage) {
   EXPECT_EQ(product(s, only<MaskBsdf>(s)->opacity).threshold, .5);
 }
 
-TEST(GltfMaterials, SharesMayLieBeyondOneByTheRoundingOfSinglePrecision) {
+TEST(GltfMaterials, SharesMayExceedOneByRoundingOfSinglePrecision) {
   GltfFile file;
   file.pbr() = {{"baseColorFactor", {1.0000001192092896, -1e-9, 0, 1}},
                 {"metallicFactor", 1.0000001192092896}};
@@ -192,7 +192,7 @@ TEST(GltfMaterials, SharesMayLieBeyondOneByTheRoundingOfSinglePrecision) {
   EXPECT_EQ(constant(s, only<PrincipledBsdf>(s)->metallic), (Rgb{1, 1, 1}));
 }
 
-TEST(GltfMaterials, BodiesOfGlassHoldWhatAbsorbs) {
+TEST(GltfMaterials, GlassBodiesContainAbsorbingMedia) {
   GltfFile file;
   file.pbr() = {{"metallicFactor", 0}, {"roughnessFactor", 0}, {"baseColorFactor", {.25, 1, 1, 1}}};
   file.material()["extensions"] = {
@@ -256,7 +256,7 @@ TEST(GltfMaterials, RoughSheetsBlurWhatIsBehindThem) {
   EXPECT_EQ(bitmap(textured, square.second).channel, Channel::green);
 }
 
-TEST(GltfMaterials, TheMetalOfASheetLetsNothingThrough) {
+TEST(GltfMaterials, MetallicShareOfASheetIsOpaque) {
   GltfFile file;
   file.pbr() = {{"metallicFactor", .25}, {"roughnessFactor", 0}};
   file.material()["extensions"]["KHR_materials_transmission"]["transmissionFactor"] = 1;
@@ -269,7 +269,7 @@ TEST(GltfMaterials, TheMetalOfASheetLetsNothingThrough) {
   EXPECT_EQ(constant(s, only<PrincipledBsdf>(s)->metallic), (Rgb{1, 1, 1}));
 }
 
-TEST(GltfMaterials, RoughOrPartlyClearBodies) {
+TEST(GltfMaterials, ReadsRoughAndPartlyTransparentBodies) {
   GltfFile file;
   file.material()["extensions"] = {{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
                                    {"KHR_materials_volume", {{"thicknessFactor", 1}}}};
@@ -283,7 +283,7 @@ TEST(GltfMaterials, RoughOrPartlyClearBodies) {
   EXPECT_EQ(constant(partly, *only<PrincipledBsdf>(partly)->spec_trans), (Rgb{.5, .5, .5}));
 }
 
-TEST(GltfMaterials, NormalMapsAreRaw) {
+TEST(GltfMaterials, NormalMapsAreNotColourConverted) {
   GltfFile file;
   file.material()["normalTexture"] = {{"index", 0}};
 
@@ -293,7 +293,7 @@ TEST(GltfMaterials, NormalMapsAreRaw) {
   EXPECT_TRUE(only<NormalMapBsdf>(s)->follow_mirroring);
 }
 
-TEST(GltfMaterials, SpecularScalesTheReflectionStraightOn) {
+TEST(GltfMaterials, SpecularScalesTheReflectionAtNormalIncidence) {
   GltfFile file;
   file.material()["extensions"]["KHR_materials_specular"]["specularFactor"] = .25;
 
@@ -303,7 +303,7 @@ TEST(GltfMaterials, SpecularScalesTheReflectionStraightOn) {
   EXPECT_NEAR(f0, .04 / 4, 1e-15);
 }
 
-TEST(GltfMaterials, ClearCoatIsBurleys) {
+TEST(GltfMaterials, ClearCoatIsThatOfPrincipled) {
   GltfFile file;
   file.material()["extensions"]["KHR_materials_clearcoat"] = {{"clearcoatFactor", .5},
                                                               {"clearcoatRoughnessFactor", 0}};
@@ -313,7 +313,7 @@ TEST(GltfMaterials, ClearCoatIsBurleys) {
   EXPECT_EQ(constant(s, only<PrincipledBsdf>(s)->clearcoat), (Rgb{.5, .5, .5}));
 }
 
-TEST(GltfMaterials, UnlitShinesByItself) {
+TEST(GltfMaterials, UnlitMaterialEmitsItsColour) {
   GltfFile file;
   file.pbr()["baseColorFactor"] = {.2, .4, .6, 1};
   file.material()["extensions"]["KHR_materials_unlit"] = nlohmann::json::object();
@@ -335,7 +335,7 @@ TEST(GltfMaterials, WithoutAMaterialItIsWhiteMetal) {
   EXPECT_TRUE(only<PrincipledBsdf>(s)->multiple_scattering);
 }
 
-TEST(GltfMaterials, MeshesHaveTheTextureCoordinatesThatTheirMaterialAsksFor) {
+TEST(GltfMaterials, MeshesHaveTheTextureCoordinatesThatTheirMaterialUses) {
   GltfFile file;
   file.attributes()["TEXCOORD_0"] = file.add(std::vector<float>{0, 0, 1, 0, 0, 1}, "VEC2");
   file.attributes()["TEXCOORD_1"] = file.add(std::vector<float>{5, 5, 6, 5, 5, 6}, "VEC2");

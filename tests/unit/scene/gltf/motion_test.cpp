@@ -1,7 +1,7 @@
 // glTF's skins, morph targets and animations: the corners and transforms that result from them.
 #include <cmath>
 
-#include "common/scene/gltf/translation.h"
+#include "formats/gltf/translation.h"
 #include "tests/unit/scene/gltf/gltf_testing.h"
 
 namespace ls {
@@ -60,7 +60,7 @@ GltfFile skinned() {
   return file;
 }
 
-TEST(GltfMotion, ASkinCarriesCornersWithTheirJoints) {
+TEST(GltfMotion, SkinMovesVerticesWithTheirJoints) {
   GltfFile file = skinned();
   EXPECT_EQ(corners_of(file), (Floats{10, 0, 0, 12, 20, 0, 10, 11.5f, 0}));
   EXPECT_EQ(stands(file, {}), Transform{}.m);
@@ -75,7 +75,7 @@ TEST(GltfMotion, ASkinCarriesCornersWithTheirJoints) {
   EXPECT_EQ(corners_of(file), (Floats{0, 0, 0, 12, 20, 0, 5, 11.5f, 0}));
 }
 
-TEST(GltfMotion, ASkinTurnsNormalsAcrossItsStretching) {
+TEST(GltfMotion, SkinTransformsNormalsByTheInverseTranspose) {
   GltfFile file = skinned();
   file.attributes()["NORMAL"] = file.add(Floats{.6f, .8f, 0, .6f, .8f, 0, 0, 0, 1}, "VEC3");
   file.j["nodes"][4]["scale"] = {2, 1, 1};
@@ -88,7 +88,7 @@ TEST(GltfMotion, ASkinTurnsNormalsAcrossItsStretching) {
   for (std::size_t i = 0; i < 9; ++i) EXPECT_NEAR(all[6 * (i / 3) + 3 + i % 3], expected[i], 1e-6f) << i;
 }
 
-TEST(GltfMotion, JointsThatAreHiddenCarryWhatIsVisible) {
+TEST(GltfMotion, HiddenJointsMoveVisibleMeshes) {
   GltfFile file = skinned();
   const Floats seen = corners_of(file);
   file.j["nodes"][3]["extensions"]["KHR_node_visibility"]["visible"] = false;
@@ -100,7 +100,7 @@ TEST(GltfMotion, JointsThatAreHiddenCarryWhatIsVisible) {
   EXPECT_EQ(gltf(file).shapes.size(), 1u);
 }
 
-TEST(GltfMotion, AMirroredJointKeepsTheFrontInFront) {
+TEST(GltfMotion, MirroredJointKeepsTheFrontSide) {
   using Order = std::array<std::int32_t, 3>;
   GltfFile file = skinned();
   EXPECT_EQ(triangle_of(file).order, (Order{0, 1, 2}));
@@ -144,7 +144,7 @@ TEST(GltfMotion, MorphTargetsAreAddedByTheirWeights) {
   EXPECT_EQ(corners_of(file), (Floats{0, 0, 0, 1, 1, 0, 0, 1, 0}));
 }
 
-TEST(GltfMotion, AMeshInTwoFormsIsTwoMeshes) {
+TEST(GltfMotion, MeshWithTwoShapesBecomesTwoMeshes) {
   GltfFile file;
   file.primitive()["targets"] = {{{"POSITION", file.add(Floats{1, 0, 0, 0, 0, 0, 0, 0, 2}, "VEC3")}}};
   file.j["nodes"].push_back({{"mesh", 0}, {"weights", {1}}});
@@ -159,7 +159,7 @@ TEST(GltfMotion, AMeshInTwoFormsIsTwoMeshes) {
 }
 
 // A list of weights may be long, and many nodes may use it.
-TEST(GltfMotion, EqualWeightsTakeMemoryOnce) {
+TEST(GltfMotion, EqualWeightsAreStoredOnce) {
   GltfFile file;
   file.primitive()["targets"] = {json::object()};
   file.j["meshes"][0]["weights"] = {1};
@@ -204,7 +204,7 @@ GltfFile moving(const std::string& path, const Floats& times, const Floats& valu
   return file;
 }
 
-TEST(GltfMotion, IsSampledAtASecondOrAFrame) {
+TEST(GltfMotion, IsEvaluatedAtATimeOrFrame) {
   const GltfFile file = moving("translation", {1, 3}, {0, 0, 0, 8, 0, 0}, "VEC3", "LINEAR");
   for (const auto& [time, x] : {std::pair{"0", 0.}, {"1", 0.}, {"1.5", 2.}, {"3", 8.}, {"9", 8.}})
     EXPECT_EQ(stands(file, at_second(time))[3], x) << time;
@@ -232,7 +232,7 @@ TEST(GltfMotion, CubicSplinesHaveTangentsPerSecond) {
 
 // From no rotation to one by 90 degrees about z, whose quaternion has the opposite sign. After a third of the
 // time the rotation is 30 degrees.
-TEST(GltfMotion, RotationsTakeTheShortWayAtAnEvenPace) {
+TEST(GltfMotion, RotationsUseSphericalInterpolation) {
   const float h = std::sqrt(.5f);
   const GltfFile file = moving("rotation", {0, 3}, {0, 0, 0, 1, 0, 0, -h, -h}, "VEC4", "LINEAR");
   const auto m = stands(file, at_second("1"));
@@ -240,14 +240,14 @@ TEST(GltfMotion, RotationsTakeTheShortWayAtAnEvenPace) {
   EXPECT_NEAR(m[4], .5, 1e-7);
 }
 
-TEST(GltfMotion, WeightsMove) {
+TEST(GltfMotion, AnimatesMorphWeights) {
   GltfFile file = moving("weights", {0, 2}, {0, 0, 1, .5f}, "SCALAR", "LINEAR");
   file.primitive()["targets"] = {{{"POSITION", file.add(Floats{1, 0, 0, 0, 0, 0, 0, 0, 2}, "VEC3")}},
                                  {{"POSITION", file.add(Floats{0, 0, 0, 0, 4, 0, 0, 0, 0}, "VEC3")}}};
   EXPECT_EQ(corners_of(file, at_second("1")), (Floats{.5f, 0, 0, 1, 1, 0, 0, 1, 1}));
 }
 
-TEST(GltfMotion, OneOfSeveralAnimationsIsSeenOrAll) {
+TEST(GltfMotion, PlaysOneAnimationOrAll) {
   GltfFile file = moving("translation", {0}, {1, 0, 0}, "VEC3", "LINEAR");
   json second = file.j["animations"][0];
   second["name"] = "grow";
@@ -270,7 +270,7 @@ TEST(GltfMotion, OneOfSeveralAnimationsIsSeenOrAll) {
       std::string::npos);
 }
 
-TEST(GltfMotion, WhatIsWrongIsNamed) {
+TEST(GltfMotion, ErrorsAreNamed) {
   const auto expect = [](const GltfFile& file, const std::string& want, const ReadOptions& options = {}) {
     const ReadResult r = read_gltf(file, options);
     EXPECT_FALSE(r.scene) << want;

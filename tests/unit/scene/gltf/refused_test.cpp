@@ -1,8 +1,8 @@
 // Errors in glTF files: their places and messages. No file causes a crash or a long run.
 #include <functional>
 
-#include "common/scene/gltf/support_table.h"
-#include "common/scene/limits.h"
+#include "core/scene/limits.h"
+#include "formats/gltf/support_table.h"
 #include "tests/unit/scene/gltf/gltf_testing.h"
 
 namespace ls {
@@ -19,7 +19,7 @@ void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
 class GltfRefuses : public ::testing::TestWithParam<Case> {};
 
-TEST_P(GltfRefuses, WithAPathAndAdvice) {
+TEST_P(GltfRefuses, RefusalsHaveAPathAndAdvice) {
   GltfFile file;
   GetParam().spoil(file);
 
@@ -184,7 +184,7 @@ INSTANTIATE_TEST_SUITE_P(
              "materials[0]: an object is wanted here"}),
     [](const auto& info) { return info.param.name; });
 
-TEST(GltfHostile, CutOffAtEveryByte) {
+TEST(GltfHostile, SurvivesTruncationAtEveryByte) {
   GltfFile file;
   file.primitive()["indices"] = file.add(std::vector<std::uint8_t>{0, 1, 2}, "SCALAR");
   const std::string whole = file.glb();
@@ -194,7 +194,7 @@ TEST(GltfHostile, CutOffAtEveryByte) {
             std::string::npos);
 }
 
-TEST(GltfHostile, HeadersThatLie) {
+TEST(GltfHostile, RefusesFalseHeaders) {
   const std::string whole = GltfFile().glb();
   const auto with = [&](std::size_t at, std::uint32_t x) {
     std::string out = whole;
@@ -210,7 +210,7 @@ TEST(GltfHostile, HeadersThatLie) {
   EXPECT_FALSE(said_of(with(12, 0)).empty());
 }
 
-TEST(GltfHostile, TextThatIsNoGltf) {
+TEST(GltfHostile, RefusesTextThatIsNotGltf) {
   for (const char* text :
        {"", "{", "[]", "3", "\"a\"", "null", "{}", "{\"asset\":3}", "{\"asset\":{\"version\":2}}", "<scene/>",
         "\xff", "{\"asset\":{\"version\":\"2.0\"},\"nodes\":3}",
@@ -218,7 +218,7 @@ TEST(GltfHostile, TextThatIsNoGltf) {
     EXPECT_FALSE(said_of(text).empty()) << text;
 }
 
-TEST(GltfHostile, PlacesAreThoseOfTheText) {
+TEST(GltfHostile, ErrorPlacesMatchTheText) {
   const std::string said =
       said_of("{\n  \"asset\": {\n    \"version\": \"2.0\"\n  },\n  \"scene\": true,\n  \"scenes\": [{}]\n}");
 
@@ -233,7 +233,7 @@ TEST(GltfHostile, NestingIsLimited) {
   EXPECT_NE(said_of("{\"extras\":" + deep).find("values are nested more than 64 deep"), std::string::npos);
 }
 
-TEST(GltfHostile, NodesNestOnlySoDeep) {
+TEST(GltfHostile, NodeNestingIsLimited) {
   GltfFile file;
   for (std::size_t i = 3; i < scene::kMaxGltfNodes + 5; ++i)
     file.j["nodes"].push_back({{"children", {i + 1}}});
@@ -301,7 +301,7 @@ TEST(GltfHostile, ManySetsOfJointsAreRefused) {
             std::string::npos);
 }
 
-TEST(Gltf, ChoicesThatDoNotExistAreRefused) {
+TEST(Gltf, UnknownChoicesAreRefused) {
   const std::string file = GltfFile().glb();
   ReadOptions unknown, dark;
   unknown.defines["camra"] = "x";
@@ -314,7 +314,7 @@ TEST(Gltf, ChoicesThatDoNotExistAreRefused) {
   EXPECT_NE(said_of(file, dark).find("-D environment=-1 wants a number from"), std::string::npos);
 }
 
-TEST(Gltf, ExtensionsOfTheTableAreKnown) {
+TEST(Gltf, ReaderKnowsAllExtensionsOfTheTable) {
   for (const auto& row : scene::gltf::extensions()) {
     GltfFile file;
     file.j["extensionsUsed"] = {row.name};
@@ -328,7 +328,7 @@ TEST(Gltf, ExtensionsOfTheTableAreKnown) {
   }
 }
 
-TEST(Gltf, WhatHasNoEffectIsAWarning) {
+TEST(Gltf, UnusedContentIsAWarning) {
   GltfFile file;
   file.j["animations"] = {json::object()};
   file.material()["normalTexture"] = {{"index", 0}, {"scale", .5}};
@@ -357,7 +357,7 @@ TEST(Gltf, WhatHasNoEffectIsAWarning) {
   EXPECT_EQ(r.diagnostics.size(), 8u) << "quiet are extras and _MINE: " << messages(r);
 }
 
-TEST(Gltf, WhatHasNoEffectIsToldOnce) {
+TEST(Gltf, UnusedContentIsReportedOnce) {
   GltfFile file;
   file.j["extensionsUsed"] = {"ACME_paint"};
   for (int i = 0; i < 3; ++i)
@@ -368,7 +368,7 @@ TEST(Gltf, WhatHasNoEffectIsToldOnce) {
   EXPECT_EQ(r.diagnostics.size(), 2u) << messages(r);
 }
 
-TEST(Gltf, MeshesWithoutAFileSayWhoSendsThem) {
+TEST(Gltf, MissingMeshFileNamesItsSource) {
   MemoryAssets assets;
 
   const ReadResult r = read_scene("t.glb", GltfFile().glb(), assets);

@@ -1,4 +1,4 @@
-#include "common/scene/json/serialize.h"
+#include "core/scene/json/serialize.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -54,7 +54,7 @@ TEST(SceneJson, HasSortedKeysAndNoBlanks) {
   EXPECT_EQ(json.find(' '), std::string::npos);
 }
 
-TEST(SceneJson, AnyChangeChangesTheDigest) {
+TEST(SceneJson, EveryChangeChangesTheDigest) {
   const Scene s = must_read(kExample);
   std::vector<Scene> others(8, s);
   others[0].sample_count += 1;
@@ -94,7 +94,7 @@ TEST(SceneJson, WrongInputIsRefusedByName) {
   EXPECT_THAT(error(replaced(good, "\"sha256\":\"", "\"sha256\":\"x")), HasSubstr("not a digest"));
 }
 
-TEST(SceneJson, CirclesAreRefused) {
+TEST(SceneJson, CyclesAreRefused) {
   Scene s;
   s.textures = {CheckerboardTexture{{1}, {1}, {}}, CheckerboardTexture{{0}, {0}, {}}};
   EXPECT_THAT(deserialize_scene(serialize(s)).error().message, HasSubstr("circle"));
@@ -103,7 +103,7 @@ TEST(SceneJson, CirclesAreRefused) {
   EXPECT_THAT(deserialize_scene(serialize(t)).error().message, HasSubstr("twosided"));
 }
 
-TEST(SceneJson, RandomDamageIsAnsweredNeverACrash) {
+TEST(SceneJson, RandomDamageNeverCrashes) {
   const std::string good = serialize(must_read(kExample));
   std::mt19937 random(11);
   for (int n = 0; n < 3000; ++n) {

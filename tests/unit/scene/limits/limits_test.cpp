@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/limits.h"
+#include "core/scene/limits.h"
 #include "tests/unit/scene/gltf/gltf_testing.h"
 #include "tests/unit/scene/nori_testing.h"
 #include "tests/unit/scene/pbrt/pbrt_testing.h"
@@ -15,7 +15,7 @@ using nlohmann::json;
 using ::testing::HasSubstr;
 
 // Comparing each reference with every id, letter by letter, would take days.
-TEST(HostileScenes, ManyUnresolvedReferencesBesideManyIdsAreSoonAnswered) {
+TEST(HostileScenes, ManyUnresolvedReferencesAndIdsAreHandledQuickly) {
   const std::string filler(40, 'y');
   std::string text;
   for (int i = 0; i < 150'000; ++i) text += fmt::format("<bsdf type=\"null\" id=\"{}{}\"/>", filler, i);
@@ -27,7 +27,7 @@ TEST(HostileScenes, ManyUnresolvedReferencesBesideManyIdsAreSoonAnswered) {
 }
 
 // The same for references in nested objects, which are resolved only when the outer object is converted.
-TEST(HostileScenes, AFullReportEndsReadingWithinAnObject) {
+TEST(HostileScenes, ReadingEndsWithinAnObjectWhenTheReportIsFull) {
   const std::string filler(40, 'y');
   std::string text;
   for (int i = 0; i < 100'000; ++i) text += fmt::format("<bsdf type=\"null\" id=\"{}{}\"/>", filler, i);
@@ -38,7 +38,7 @@ TEST(HostileScenes, AFullReportEndsReadingWithinAnObject) {
   EXPECT_LE(read(with_sensor(text + "</shape>")).diagnostics.size(), scene::kMaxDiagnostics);
 }
 
-TEST(HostileScenes, PlacesInOneLongLineAreNotCountedOutForWarningsThatAreNotShown) {
+TEST(HostileScenes, ColumnsInAHugeLineAreNotComputedForHiddenWarnings) {
   std::string text = std::string(std::size_t{12} << 20, ' ') + kSensor;
   for (int i = 0; i < 300'000; ++i) text += "<sensor type=\"perspective\"/>";
   const auto r = read("<scene version=\"3.0.0\">" + text + "</scene>");
@@ -47,7 +47,7 @@ TEST(HostileScenes, PlacesInOneLongLineAreNotCountedOutForWarningsThatAreNotShow
   EXPECT_THAT(first(r), HasSubstr("a second sensor; the first (line 1) is used"));
 }
 
-TEST(HostileScenes, ALongRunAfterADollarIsNotTriedPrefixByPrefix) {
+TEST(HostileScenes, LongNameAfterADollarIsFoundWithoutTryingAllPrefixes) {
   std::string text = "<default name=\"a\" value=\"\"/>";
   const std::string run(65'000, 'a');
   for (int i = 0; i < 450; ++i) text += "<bsdf type=\"null\" id=\"$" + run + "\"/>";
@@ -55,7 +55,7 @@ TEST(HostileScenes, ALongRunAfterADollarIsNotTriedPrefixByPrefix) {
 }
 
 // Comparing each name with all names before it would take half an hour.
-TEST(HostileScenes, ANoriObjectOfCountlessElementsIsRefusedBeforeAnyIsLookedAt) {
+TEST(HostileScenes, HugeNoriObjectIsRefusedBeforeItsElementsAreRead) {
   std::string text = "<mesh type=\"sphere\">";
   for (int i = 0; i < 400'000; ++i) text += fmt::format("<float name=\"a{}\" value=\"1\"/>", i);
   const auto r = read(nori_scene(text + "</mesh>"));
@@ -64,7 +64,7 @@ TEST(HostileScenes, ANoriObjectOfCountlessElementsIsRefusedBeforeAnyIsLookedAt) 
   EXPECT_THAT(first(r), HasSubstr("mesh \"sphere\" has 400000 elements in it; 4096 are allowed"));
 }
 
-TEST(HostileScenes, CountlessDefinesThatNothingAsksForAreSoonToldOf) {
+TEST(HostileScenes, CountlessUnusedDefinesAreReportedQuickly) {
   std::map<std::string, std::string> defines;
   std::string text;
   for (int i = 0; i < 2000; ++i) {
@@ -85,7 +85,7 @@ TEST(GltfHostile, ManyValuesAreRefused) {
 }
 
 // Every primitive looks up several members of its material. A linear search for them would take hours.
-TEST(GltfHostile, MembersAreFoundAmongAMillion) {
+TEST(GltfHostile, FindsMembersAmongAMillion) {
   GltfFile file;
   json& primitives = file.j["meshes"][0]["primitives"];
   primitives = json(50'000, primitives[0]);
@@ -104,7 +104,7 @@ TEST(GltfHostile, ManyInstancesAreRefused) {
   EXPECT_NE(said_of(file.glb()).find("the scene is too large"), std::string::npos);
 }
 
-TEST(GltfHostile, ManyFormsOfManyPrimitivesAreRefused) {
+TEST(GltfHostile, TooManyMeshVariantsAreRefused) {
   GltfFile file;
   json& primitives = file.j["meshes"][0]["primitives"];
   primitives = json(10'000, {{"attributes", {{"POSITION", file.add(std::vector<float>{0, 0, 0}, "VEC3")}}},
@@ -126,7 +126,7 @@ TEST(Pbrt, SizeIsLimited) {
   EXPECT_NE(refusal(grouped + many).find("the scene is too large"), std::string::npos);
 }
 
-TEST(PbrtMedia, CloudsOfTooFineNoiseAreCoarser) {
+TEST(PbrtMedia, TooFineCloudNoiseIsCoarsened) {
   KeepingAssets assets;
   const ReadResult r =
       read_scene("t.pbrt", pbrt_scene(R"(MakeNamedMedium "m" "string type" "cloud" "float frequency" 3
@@ -142,7 +142,7 @@ MediumInterface "m" "" Material "interface" Shape "sphere")"),
   EXPECT_GT(nodes, std::size_t{1} << 23);
 }
 
-TEST(Pbrt, CornersOfTheirOwnAreLimited) {
+TEST(Pbrt, VerticesInTheTextAreLimited) {
   std::string corners = R"(Texture "t" "spectrum" "imagemap" "string filename" "wood.png"
 Material "diffuse" "texture reflectance" "t"
 Shape "trianglemesh" "point3 P" [ 0 0 0  1 0 0  0 1 0 ] "integer indices" [ )";

@@ -28,7 +28,7 @@ TEST(NoriDiagnostics, ShowTheLineWithACaret) {
 )");
 }
 
-TEST(NoriDiagnostics, TellWhatIsUnknown) {
+TEST(NoriDiagnostics, NameUnknownElements) {
   EXPECT_THAT(first(R"(<mesh type="spheer"/>)"),
               HasSubstr("2:13 Nori has no mesh \"spheer\"; did you mean 'sphere'?"));
   EXPECT_THAT(first("<mush type=\"obj\"/>"),
@@ -39,10 +39,10 @@ TEST(NoriDiagnostics, TellWhatIsUnknown) {
   EXPECT_THAT(first(R"(<mesh type="sphere"><camera type="perspective"/></mesh>)"),
               HasSubstr("mesh \"sphere\" has no use for a <camera>"));
   EXPECT_THAT(first(R"(<emitter type="spotlight"/>)"),
-              HasSubstr("is not supported: each author's falls off otherwise"));
+              HasSubstr("is not supported: its falloff differs between versions of Nori"));
 }
 
-TEST(NoriDiagnostics, TellWrongTypesAndRanges) {
+TEST(NoriDiagnostics, NameWrongTypesAndRanges) {
   const auto sphere = [](const std::string& inside) {
     return first("<mesh type=\"sphere\">" + inside + "</mesh>");
   };
@@ -68,7 +68,7 @@ TEST(NoriDiagnostics, TellWrongTypesAndRanges) {
               HasSubstr("'value' of <translate> wants 3 numbers"));
 }
 
-TEST(NoriDiagnostics, TellWhatMediaCannotBe) {
+TEST(NoriDiagnostics, NameImpossibleMedia) {
   const auto medium = [](const std::string& type, const std::string& inside) {
     return first(fmt::format(
         R"(<mesh type="obj"><string name="filename" value="mesh.obj"/><medium type="{}">{}</medium></mesh>)",
@@ -86,7 +86,7 @@ TEST(NoriDiagnostics, TellWhatMediaCannotBe) {
               HasSubstr("it can only be the same in all channels"));
 }
 
-TEST(NoriDiagnostics, WarnOfWhatHasNoEffect) {
+TEST(NoriDiagnostics, WarnAboutUnusedParameters) {
   const auto warning = [](const std::string& text) {
     const auto r = read(text);
     EXPECT_TRUE(r.scene) << messages(r);
@@ -103,7 +103,7 @@ TEST(NoriDiagnostics, WarnOfWhatHasNoEffect) {
       HasSubstr("'photonCount' of integrator \"photonmapper\" has no effect here"));
 }
 
-TEST(NoriDiagnostics, TellThatMitsubaFilesNeedAVersion) {
+TEST(NoriDiagnostics, SayThatMitsubaFilesNeedAVersion) {
   EXPECT_THAT(messages(read("<scene><shape type=\"cube\"/></scene>")), HasSubstr("<scene> has no version"));
   EXPECT_THAT(messages(read("<test type=\"ttest\"/>")), HasSubstr("run it by lightshaft validate FILE"));
   EXPECT_THAT(messages(read("<scene><mesh type=\"sphere\"/></scene>")),
@@ -111,7 +111,7 @@ TEST(NoriDiagnostics, TellThatMitsubaFilesNeedAVersion) {
 }
 
 // No misspelt name is ignored: a letter added to any name of the example gives an error in that line.
-TEST(NoriDiagnostics, AMisspeltNameAnywhereIsAnErrorInItsLine) {
+TEST(NoriDiagnostics, MisspeltNameIsAnErrorInItsLine) {
   int tried = 0;
   for (const std::string key : {"name=\"", "type=\"", "<"})
     for (std::size_t at = kNoriExample.find(key); at != std::string::npos;
@@ -136,7 +136,7 @@ TEST(NoriDiagnostics, AMisspeltNameAnywhereIsAnErrorInItsLine) {
   EXPECT_GT(tried, 150);
 }
 
-TEST(NoriDiagnostics, TruncatedScenesSayWhereTheyEnd) {
+TEST(NoriDiagnostics, TruncatedSceneIsReportedWithItsEnd) {
   for (std::size_t n = 0; n + 1 < kNoriExample.size(); n += 11) {
     const auto r = read(kNoriExample.substr(0, n));
     ASSERT_FALSE(r.scene) << n;

@@ -4,7 +4,7 @@
 
 #include <numbers>
 
-#include "common/scene/reader/xml_write.h"
+#include "formats/reader/xml_write.h"
 #include "tests/unit/scene/nori_testing.h"
 
 namespace ls {
@@ -42,9 +42,9 @@ void expect_same_objects(const std::string& nori, const std::string& mitsuba) {
   expect_same(nori_scene(nori), "<scene version=\"3.0.0\">" + mitsuba + kSameCamera + "</scene>");
 }
 
-TEST(NoriScene, IsTheSceneThatMitsubaHasWithItsDefaults) { expect_same_objects("", ""); }
+TEST(NoriScene, EqualsTheMitsubaSceneWithNorisDefaults) { expect_same_objects("", ""); }
 
-TEST(NoriScene, MayCallItsMeshesShapes) {
+TEST(NoriScene, MeshesMayBeCalledShapes) {
   const std::string inside =
       R"(type="sphere"><emitter type="area"><color name="radiance" value="1 1 1"/></emitter>)";
   const Scene meshes = must_read_quietly(nori_scene("<mesh " + inside + "</mesh>"));
@@ -54,7 +54,7 @@ TEST(NoriScene, MayCallItsMeshesShapes) {
   EXPECT_EQ(digest_of(shapes), digest_of(meshes));
 }
 
-TEST(NoriScene, OfOneOfEverythingIsTheSameInMitsuba) {
+TEST(NoriScene, SceneWithEveryFeatureMatchesMitsuba) {
   const double quarter = 1 / (4 * std::numbers::pi);
   expect_same(kNoriExample, fmt::format(R"(<scene version="3.0.0">
   <integrator type="volpath_distant_mis"><string name="distance" value="equiangular"/><string name="heuristic" value="balance"/></integrator>
@@ -112,7 +112,7 @@ TEST(NoriScene, OfOneOfEverythingIsTheSameInMitsuba) {
                                         1.5046 / 1.000277, 4 * quarter, 5 * quarter, 6 * quarter));
 }
 
-TEST(NoriScene, WithoutItsMirrorShowsTheWorldMirrored) {
+TEST(NoriScene, CameraWithoutItsMirrorScaleShowsTheWorldMirrored) {
   const Scene s = must_read_quietly(R"(<scene><integrator type="path"/><camera type="perspective">
     <transform name="toWorld"><lookat origin="0 0 0" target="0 0 1" up="0 1 0"/></transform></camera></scene>)");
   EXPECT_EQ(s.sensor.to_world.m[0], -1);  // +x of the world is on the right of the image, unlike in Mitsuba
@@ -120,7 +120,7 @@ TEST(NoriScene, WithoutItsMirrorShowsTheWorldMirrored) {
   EXPECT_EQ(s.film.size, (FrameSize{1280, 720}));
 }
 
-TEST(NoriScene, HasSurfacesThatFollowFromWhatElseStandsInAMesh) {
+TEST(NoriScene, DefaultSurfaceDependsOnTheOtherObjectsInAMesh) {
   expect_same_objects(
       R"(<mesh type="sphere"/><mesh type="sphere"><emitter type="area"><color name="radiance" value="1 1 1"/></emitter></mesh>)",
       R"(<shape type="sphere"/><shape type="sphere"><bsdf type="diffuse"/><emitter type="area"><rgb name="radiance" value="1"/></emitter></shape>)");
@@ -139,7 +139,7 @@ TEST(NoriScene, MicrofacetIsAllGlossOrAllDiffuseAtTheEndsOfItsRange) {
   EXPECT_EQ(std::get<ConstantTexture>(s.textures[blend.weight.value]).value, (Rgb{1, 1, 1}));
 }
 
-TEST(NoriScene, BlendsAreMitsubas) {
+TEST(NoriScene, BlendsMatchMitsuba) {
   const std::string mitsuba_parts =
       R"(<bsdf type="conductor"/><bsdf type="diffuse"><rgb name="reflectance" value="0.2 0.4 0.6"/></bsdf>)";
   const std::string nori_parts =
@@ -200,7 +200,7 @@ TEST(NoriScene, ReadsGridsOfDensities) {
          <float name="albedo" value="0.6"/></medium></shape>)");
 }
 
-TEST(NoriScene, AMediumOfItsOwnIsEverywhereElse) {
+TEST(NoriScene, TopLevelMediumFillsTheRest) {
   const Scene s = must_read_quietly(nori_scene(
       R"(<medium type="homogeneous"><color name="sigma_a" value="1 1 1"/></medium>
          <mesh type="sphere"><medium type="homogeneous"><color name="sigma_s" value="2 2 2"/></medium></mesh>)"));
@@ -209,7 +209,7 @@ TEST(NoriScene, AMediumOfItsOwnIsEverywhereElse) {
   EXPECT_NE(*s.sensor.medium, *s.shapes[0].interior);
 }
 
-TEST(NoriScene, TheCameraCanBeInTheMediumOfTheMeshAroundIt) {
+TEST(NoriScene, CameraCanBeInsideAMeshWithAMedium) {
   const std::string spheres = R"(
     <mesh type="sphere"><point name="center" value="9 0 0"/><medium type="homogeneous"><color name="sigma_s" value="1 1 1"/></medium></mesh>
     <mesh type="sphere"><float name="radius" value="5"/><medium type="homogeneous"><color name="sigma_s" value="2 2 2"/></medium></mesh>)";
@@ -245,7 +245,7 @@ TEST(NoriScene, ImagesAreUprightOnMeshesOfBothLanguages) {
       (Matrix{-.5, 0, .5, 0, -.25, .25, 0, 0, 1}));
 }
 
-TEST(NoriScene, TakesIntegratorsByTheirNames) {
+TEST(NoriScene, ReadsIntegratorsByName) {
   const auto of = [](const std::string& name) {
     const ReadResult r =
         read(fmt::format(R"(<scene><integrator type="{}"/><camera type="perspective"/></scene>)", name));
@@ -260,11 +260,11 @@ TEST(NoriScene, TakesIntegratorsByTheirNames) {
   EXPECT_EQ(of("volpath_distant_mis"), "volpath_distant_mis -1 0");
   EXPECT_EQ(of("whitted"), "whitted -1 0");
   EXPECT_EQ(of("photonmapper"), "path -1 1");
-  EXPECT_THAT(of("normals"), ::testing::HasSubstr("what it draws is not light"));
+  EXPECT_THAT(of("normals"), ::testing::HasSubstr("it does not render light"));
   EXPECT_THAT(of("path_miss"), ::testing::HasSubstr("did you mean 'path_mis'?"));
 }
 
-TEST(NoriScene, ADiskOfLightAllAroundIsAConstantOne) {
+TEST(NoriScene, FullDiskOfLightIsAConstantEmitter) {
   expect_same_objects(
       R"(<emitter type="distantdisk"><color name="radiance" value="5 5 5"/><float name="thetaA" value="180"/></emitter>)",
       R"(<emitter type="constant"><rgb name="radiance" value="5"/></emitter>)");
@@ -277,7 +277,7 @@ TEST(NoriScene, ADiskOfLightAllAroundIsAConstantOne) {
 }
 
 // Some descendants of Nori write a version. Mitsuba called its sensors cameras before 0.4.
-TEST(NoriScenes, AreKnownByTheirElements) {
+TEST(NoriScenes, AreRecognisedByTheirElements) {
   const std::string objects = R"(<mesh type="sphere"/>)" + kNoriCamera;
   const ReadResult with = read("<scene version=\"0.5.0\">" + objects + "</scene>"),
                    without = read("<scene>" + objects + "</scene>");

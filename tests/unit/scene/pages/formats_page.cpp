@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <tuple>
 
-#include "common/scene/gltf/support_table.h"
-#include "common/scene/pbrt/vocabulary.h"
-#include "common/scene/schema/mitsuba_plugins.h"
-#include "common/scene/schema/nori_words.h"
+#include "formats/gltf/support_table.h"
+#include "formats/nori/words.h"
+#include "formats/pbrt/vocabulary.h"
+#include "formats/reader/mitsuba_plugins.h"
 #include "tests/unit/scene/pages/pages.h"
 
 namespace ls::scene {
@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::string_view kGltfHead = R"(# Scenes of glTF
 
-<!-- Made by gltf_markdown() from the table in common/scene/gltf/support_table.cpp; do not edit. -->
+<!-- Made by gltf_markdown() from the table in formats/gltf/support_table.cpp; do not edit. -->
 
 A scene file whose name ends in `.gltf` or `.glb` is read as glTF 2.0, and becomes the same scene that our XML describes: every
 command takes it, and `lightshaft convert` writes it as XML. Errors name the file, the line of its JSON and the path of the value, as in
@@ -83,7 +83,7 @@ namespace {
 
 constexpr std::string_view kMitsubaHead = R"(# Plugins of Mitsuba
 
-<!-- Made by mitsuba_markdown() from the table in common/scene/schema/mitsuba_plugins.cpp; do not edit. -->
+<!-- Made by mitsuba_markdown() from the table in formats/reader/mitsuba_plugins.cpp; do not edit. -->
 
 Every plugin of Mitsuba 3.9 and, marked 0.x, those that only earlier versions have; "ours" are Lightshaft's own. Their
 parameters are in the [scene format](scene-format.md). What is refused is an error with its place, and this reason.
@@ -92,7 +92,7 @@ parameters are in the [scene format](scene-format.md). What is refused is an err
 - **in part**: as the note says; what is left out is an error or a warning.
 - **refused**: why, and what to use instead.
 
-`tests/bench/mitsuba_plugins.py` compares this page with an installed Mitsuba.
+`bench/mitsuba_plugins.py` compares this page with an installed Mitsuba.
 
 | element | plugin | of | here | note |
 |---|---|---|---|---|
@@ -122,7 +122,7 @@ using pbrt::Word;
 
 constexpr std::string_view kPbrtHead = R"(# Scenes of pbrt
 
-<!-- Made by pbrt_markdown() from the table in common/scene/pbrt/vocabulary.cpp; do not edit. -->
+<!-- Made by pbrt_markdown() from the table in formats/pbrt/vocabulary.cpp; do not edit. -->
 
 A scene file whose name ends in `.pbrt` is read as pbrt-v4 reads it, and becomes the same scene that our XML describes:
 every command takes it, and `lightshaft convert` writes it as XML. What is not in this table is an error with its place;

@@ -20,12 +20,12 @@ void expect_committed(const std::string& page, const std::string& text) {
       << "run LIGHTSHAFT_UPDATE_DOCS=1 scene_test --gtest_filter='*Page.*' and commit the page";
 }
 
-TEST(SceneFormatPage, IsWhatTheTableSays) { expect_committed("scene-format.md", scene_format_markdown()); }
-TEST(MitsubaPage, IsWhatTheTableSays) { expect_committed("mitsuba.md", mitsuba_markdown()); }
-TEST(PbrtPage, IsWhatTheTableSays) { expect_committed("pbrt.md", pbrt_markdown()); }
-TEST(GltfPage, IsWhatTheTableSays) { expect_committed("gltf.md", gltf_markdown()); }
+TEST(SceneFormatPage, MatchesTheTable) { expect_committed("scene-format.md", scene_format_markdown()); }
+TEST(MitsubaPage, MatchesTheTable) { expect_committed("mitsuba.md", mitsuba_markdown()); }
+TEST(PbrtPage, MatchesTheTable) { expect_committed("pbrt.md", pbrt_markdown()); }
+TEST(GltfPage, MatchesTheTable) { expect_committed("gltf.md", gltf_markdown()); }
 
-TEST(SceneFormatPage, ShowsASceneThatReadsWithoutComplaint) {
+TEST(SceneFormatPage, ExampleSceneReadsWithoutDiagnostics) {
   const std::string page = scene_format_markdown();
   const std::size_t begin = page.find("```xml\n") + 7, end = page.find("```", begin);
   ASSERT_NE(end, std::string::npos);

@@ -4,11 +4,11 @@
 #include <cctype>
 #include <cmath>
 
-#include "common/scene/reader/unsupported.h"
-#include "common/scene/reader/upgrade.h"
-#include "common/scene/schema/describe_fields.h"
-#include "common/scene/schema/integrators.h"
-#include "common/scene/schema/materials.h"
+#include "core/scene/schema/describe_fields.h"
+#include "core/scene/schema/integrators.h"
+#include "core/scene/schema/materials.h"
+#include "formats/reader/unsupported.h"
+#include "formats/reader/upgrade.h"
 #include "tests/unit/scene/pages/pages.h"
 
 namespace ls::scene {
@@ -126,7 +126,7 @@ void add_variant(std::string& out, std::string_view title) {
 
 constexpr std::string_view kPreamble = R"(# Scene format
 
-<!-- Made by scene_format_markdown() from the table in common/scene/schema/describe_fields.h; do not edit. -->
+<!-- Made by scene_format_markdown() from the table in core/scene/schema/describe_fields.h; do not edit. -->
 
 Scenes are Mitsuba 3 XML files, with Mitsuba's meaning and defaults. What a parameter is called, what it may be and what it is
 if it is not given stands below: this page is made from the same table that reads the files. Lengths are scene units, angles

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "common/scene/pbrt/vocabulary.h"
-#include "common/scene/xml/transform_element.h"
+#include "formats/pbrt/vocabulary.h"
+#include "formats/xml/transform_element.h"
 #include "tests/unit/scene/pbrt/pbrt_testing.h"
 
 namespace ls {
@@ -45,7 +45,7 @@ Seen edges(const Sensor& s, double aspect) {
 
 constexpr double kRoundings = 8 * 16 * 2.3e-16;  // a few roundings of doubles below 8
 
-TEST(PbrtWindow, OfThePerspectiveCameraIsInUnitsOfItsFieldOfView) {
+TEST(PbrtWindow, PerspectiveWindowIsInUnitsOfTheFieldOfView) {
   const double unit = std::tan(22.5 * kDegree);
   const Seen e = edges(
       sensor_of(32, 24, R"("perspective" "float fov" 45 "float screenwindow" [ -1 1 -0.75 0.75 ])"), 4. / 3);
@@ -56,7 +56,7 @@ TEST(PbrtWindow, OfThePerspectiveCameraIsInUnitsOfItsFieldOfView) {
   EXPECT_NEAR(e.top, .75 * unit, kRoundings);
 }
 
-TEST(PbrtWindow, OffTheMiddleMovesThePrincipalPoint) {
+TEST(PbrtWindow, OffCentreWindowMovesThePrincipalPoint) {
   for (const std::string_view lens : {"", R"("float lensradius" 0.1 "float focaldistance" 3)"}) {
     const Seen e =
         edges(sensor_of(20, 10,
@@ -70,7 +70,7 @@ TEST(PbrtWindow, OffTheMiddleMovesThePrincipalPoint) {
   }
 }
 
-TEST(PbrtWindow, ThatIsMirroredMirrorsThePicture) {
+TEST(PbrtWindow, MirroredWindowMirrorsTheImage) {
   const Sensor plain = sensor_of(20, 10, R"("perspective" "float screenwindow" [ -0.5 1.5 -0.5 0.5 ])"),
                mirrored = sensor_of(20, 10, R"("perspective" "float screenwindow" [ 1.5 -0.5 -0.5 0.5 ])");
   const Seen one = edges(plain, 2), other = edges(mirrored, 2);
@@ -80,7 +80,7 @@ TEST(PbrtWindow, ThatIsMirroredMirrorsThePicture) {
   EXPECT_NEAR(other.right, -one.left, kRoundings);
 }
 
-TEST(PbrtWindow, OfTheOrthographicCameraMayHaveAnyShape) {
+TEST(PbrtWindow, OrthographicWindowMayHaveAnyShape) {
   const Sensor s = sensor_of(30, 10, R"("orthographic" "float screenwindow" [ -2 6 1 2 ])");
   // Our frame reaches from x = 1 on its left to -1 on its right, and from y = 1/3 above to -1/3.
   const Vec3 top_left = scene::transform_point(s.to_world, Vec3{{1, 1. / 3, 0}}),
@@ -92,7 +92,7 @@ TEST(PbrtWindow, OfTheOrthographicCameraMayHaveAnyShape) {
   EXPECT_NEAR(bottom_right[1], 1, kRoundings);
 }
 
-TEST(PbrtWindow, ThatIsTheDefaultSeesTheSame) {
+TEST(PbrtWindow, DefaultWindowChangesNothing) {
   const Sensor given =
       sensor_of(20, 10, R"("perspective" "float fov" 40 "float screenwindow" [ -2 2 -1 1 ])");
   const Sensor shaped = sensor_of(20, 10, R"("perspective" "float fov" 40 "float frameaspectratio" 2)");
@@ -102,11 +102,11 @@ TEST(PbrtWindow, ThatIsTheDefaultSeesTheSame) {
   EXPECT_EQ(shaped, sensor_of(20, 10, R"("perspective" "float fov" 40)"));
 }
 
-TEST(PbrtWindow, IsReadIfItsShapeIsThatOfTheFilmToFourDigits) {
+TEST(PbrtWindow, IsReadIfItsShapeMatchesTheFilmToFourDigits) {
   EXPECT_TRUE(seen(1998, 1080, R"("perspective" "float screenwindow" [ -1 1 -0.5405 0.5405 ])").scene);
 }
 
-TEST(PbrtWindow, OfOblongPixelsIsRefused) {
+TEST(PbrtWindow, NonSquarePixelsAreRefused) {
   for (const std::string_view camera : {R"("perspective" "float screenwindow" [ -1 1 -1 1 ])",
                                         R"("perspective" "float frameaspectratio" 1)"}) {
     const ReadResult r = seen(20, 10, camera);
@@ -119,7 +119,7 @@ TEST(PbrtWindow, OfOblongPixelsIsRefused) {
               HasSubstr("wants four numbers: x0 x1 y0 y1"));
 }
 
-TEST(Pbrt, HalfAFieldOfViewIsReadInItsPlace) {
+TEST(Pbrt, HalffovReplacesFov) {
   EXPECT_EQ(sensor_of(10, 10, R"("perspective" "float halffov" 20)"),
             sensor_of(10, 10, R"("perspective" "float fov" 40)"));
 }
@@ -137,7 +137,7 @@ TEST(Pbrt, SphericalCamerasByLatitudeAreRead) {
     EXPECT_NEAR(at[1], std::cos(theta), kRoundings);
     EXPECT_NEAR(at[2], std::sin(theta) * std::sin(phi), kRoundings);
   }
-  EXPECT_THAT(messages(seen(20, 10, R"("spherical")")), HasSubstr("only equirectangular is read"));
+  EXPECT_THAT(messages(seen(20, 10, R"("spherical")")), HasSubstr("only equirectangular is supported"));
 }
 
 // On which side of a shape pbrt has its normal, and the media: outside of a sphere or cylinder, or +z of a
@@ -161,7 +161,7 @@ Sides rendered(const Shape& s, bool vertex_normals) {
   return {original, s.interior ? interior_is_original : !interior_is_original};
 }
 
-TEST(PbrtSides, OfMirroredAndReversedShapesAreThoseOfPbrt) {
+TEST(PbrtSides, MirroredAndReversedShapesHavePbrtsSides) {
   struct Kind {
     std::string_view shape;
     bool quadric, vertex_normals;
@@ -191,14 +191,14 @@ TEST(PbrtSides, OfMirroredAndReversedShapesAreThoseOfPbrt) {
       }
 }
 
-TEST(PbrtSides, AMirroredLampIsAWarning) {
+TEST(PbrtSides, MirroredLampIsAWarning) {
   const ReadResult r = read_pbrt(pbrt_scene(R"(AreaLightSource "diffuse" Scale -1 1 1 Shape "sphere")"));
 
   EXPECT_TRUE(r.scene);
   EXPECT_THAT(messages(r), HasSubstr("when it samples lights, pbrt takes the other side"));
 }
 
-TEST(PbrtSides, OfAMirroredFileAreNotKnown) {
+TEST(PbrtSides, SidesOfAMirroredFileAreUnknown) {
   EXPECT_THAT(
       refusal(R"(Material "dielectric" Scale -1 1 1 Shape "plymesh" "string filename" "mesh.ply")"),
       HasSubstr("whether the file has normals, which decides which side is which, is not known here"));
@@ -242,7 +242,7 @@ TEST(PbrtColours, AreConvertedFromTheirSpace) {
               {.25 - .25 * .2249, .25 + .25 * 1.0420, .25 - .25 * .0786}, 1e-4);
 }
 
-TEST(PbrtColours, OfMatterKeepTheirGrey) {
+TEST(PbrtColours, ReflectanceColoursKeepTheirGrey) {
   for (const std::string_view space : {"rec2020", "dci-p3", "ACES2065-1"})
     EXPECT_EQ(reflectance(space, "0.3 0.3 0.3"), (Rgb{.3, .3, .3})) << space;
   const Scene s = pbrt(R"(ColorSpace "aces2065-1"
@@ -253,7 +253,7 @@ MediumInterface "fog" "" Material "interface" Shape "sphere")");
 
 // ACES AP0 to linear sRGB with the Bradford adaptation, as it is printed for ACES (for example in the OCIO
 // configurations): 2.5216 -1.1341 -0.3876; -0.2765 1.3727 -0.0962; -0.0154 -0.1530 1.1684.
-TEST(PbrtColours, OfAcesAreAdaptedToTheWhite) {
+TEST(PbrtColours, AcesColoursAreAdaptedToTheWhitePoint) {
   expect_near(reflectance("aces2065-1", "0.3 0.25 0.2"),
               {2.5216 * .3 - 1.1341 * .25 - .3876 * .2, -.2765 * .3 + 1.3727 * .25 - .0962 * .2,
                -.0154 * .3 - .1530 * .25 + 1.1684 * .2},
@@ -261,7 +261,7 @@ TEST(PbrtColours, OfAcesAreAdaptedToTheWhite) {
 }
 
 // Light is not adapted: the white of ACES, (x, y) = (.32168, .33767), is what it is.
-TEST(PbrtColours, OfLightAreThoseThatTheObserverSees) {
+TEST(PbrtColours, LightColoursUseTheCieObserver) {
   const Scene s = pbrt(R"(ColorSpace "aces2065-1" LightSource "point" "rgb I" [ 1 1 1 ] Shape "sphere")");
   const double x = .32168 / .33767, z = (1 - .32168 - .33767) / .33767;
   const Rgb want{3.2404542 * x - 1.5371385 - .4985314 * z, -.9692660 * x + 1.8760108 + .0415560 * z,
@@ -272,7 +272,7 @@ TEST(PbrtColours, OfLightAreThoseThatTheObserverSees) {
   expect_near(light.intensity, want, 1e-3);
 }
 
-TEST(PbrtColours, ThatSrgbCannotHoldAreCutOffWithAWarning) {
+TEST(PbrtColours, ColoursOutsideSrgbAreClippedWithAWarning) {
   const ReadResult r = read_pbrt(
       pbrt_scene(R"(ColorSpace "rec2020" Material "diffuse" "rgb reflectance" [ 0 1 0 ] Shape "sphere")"));
 
@@ -291,7 +291,7 @@ Material "diffuse" "rgb reflectance" [ 0.25 0.5 0.25 ] Shape "sphere")");
   EXPECT_THAT(refusal(R"(ColorSpace "rec202")"), HasSubstr("did you mean 'rec2020'?"));
 }
 
-TEST(PbrtTextures, OfNumbersAndOfColoursMayHaveOneName) {
+TEST(PbrtTextures, NumberAndColourMayShareAName) {
   const Scene s = pbrt(R"(Texture "t" "float" "constant" "float value" 0.25
 Texture "t" "spectrum" "constant" "rgb value" [ 0.5 0.5 0.5 ]
 Texture "alpha" "float" "imagemap" "string filename" "wood.png"
@@ -306,7 +306,7 @@ Material "diffuse" "texture reflectance" "t" Shape "sphere" "texture alpha" "t")
               HasSubstr("a second Texture \"t\" of the type \"float\""));
 }
 
-TEST(PbrtTextures, AreMultiplied) {
+TEST(PbrtTextures, ScaleMultipliesTextures) {
   const Scene s = pbrt(R"(Texture "wood" "spectrum" "imagemap" "string filename" "wood.png" "float scale" 0.5
 Texture "t" "spectrum" "scale" "texture tex" "wood" "float scale" 0.25
 Material "diffuse" "texture reflectance" "t" Shape "sphere")");
@@ -320,7 +320,7 @@ Material "diffuse" "texture reflectance" "t" Shape "sphere")");
   EXPECT_THAT(factors, ::testing::UnorderedElementsAre(.5, .25));
 }
 
-TEST(PbrtTextures, LieOtherwiseOnPatchesThatAreNoParallelograms) {
+TEST(PbrtTextures, DifferOnPatchesThatAreNotParallelograms) {
   const auto said = [](std::string_view last) {
     return messages(read_pbrt(pbrt_scene(fmt::format(
         R"(Shape "bilinearmesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 {} ] "normal N" [ 0 0 1 0 0 1 0 0 1 0 0 1 ])",
@@ -331,7 +331,7 @@ TEST(PbrtTextures, LieOtherwiseOnPatchesThatAreNoParallelograms) {
   EXPECT_EQ(said("1 1 0"), "");
 }
 
-TEST(Pbrt, AByteOrderMarkIsSkipped) {
+TEST(Pbrt, SkipsAByteOrderMark) {
   EXPECT_TRUE(read_pbrt("\xEF\xBB\xBF" + pbrt_scene("Shape \"sphere\"")).scene);
   KeepingAssets assets;
   assets.memory.files["in.pbrt"] = "\xEF\xBB\xBFShape \"sphere\"";
@@ -354,7 +354,7 @@ Shape "sphere")");
 }
 
 // Asks every parameter of the table that is not read: it is named, as an error or as a warning.
-TEST(Pbrt, NoParameterIsPassedOverInSilence) {
+TEST(Pbrt, NoParameterIsIgnoredSilently) {
   for (const auto& row : scene::pbrt::rows()) {
     if (!row.is_read || row.directive == "MakeNamedMedium") continue;
     for (const auto& word : row.words) {
@@ -410,7 +410,7 @@ TEST(Pbrt, OptionsAreANameAndAValue) {
     EXPECT_THAT(messages(with(option)), HasSubstr("the Option 'seed' wants one value")) << option;
 }
 
-TEST(Pbrt, MovingObjectsStandWhereTheyAreWhenTheShutterOpens) {
+TEST(Pbrt, MovingObjectsAreRenderedAtTheOpeningOfTheShutter) {
   const ReadResult r = read_pbrt(pbrt_scene(R"(AttributeBegin ActiveTransform StartTime Translate 1 0 0
 ActiveTransform EndTime Translate 5 0 0 ActiveTransform All Translate 0 2 0 Shape "sphere" AttributeEnd
 AttributeBegin ActiveTransform EndTime AttributeEnd Translate 7 0 0 Shape "sphere")"));

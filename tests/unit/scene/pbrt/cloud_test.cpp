@@ -1,5 +1,5 @@
 // Perlin noise, and pbrt's clouds, which are made of it.
-#include "common/scene/pbrt/cloud.h"
+#include "formats/pbrt/cloud.h"
 
 #include <gtest/gtest.h>
 
@@ -39,7 +39,7 @@ TEST(Noise, IsZeroAtWholeNumbersAndRepeatsAfter256) {
   }
 }
 
-TEST(Noise, OfPlacesThatAreNoneIsZero) {
+TEST(Noise, InvalidPositionsGiveZero) {
   for (const double x : {1e30, -1e300, HUGE_VAL, -HUGE_VAL, std::nan("")}) {
     EXPECT_EQ(noise(vec(x, 0, 0)), 0) << x;
     EXPECT_TRUE(std::isfinite(noise_slope(vec(0, x, .5))[1])) << x;
@@ -58,7 +58,7 @@ constexpr double kSlope = 8.5, kBend = 30.7;
 // y), where f is the sum of octaves of noise, so its second derivatives follow from the bounds above. The
 // cloud's box begins at the height 1/2, above which the second term is 0. Only points are tested around which
 // all nodes are within (0, 1), where the density is not clamped.
-TEST(Cloud, GridIsTheFormulaWithinTheErrorOfInterpolation) {
+TEST(Cloud, GridMatchesTheFormulaWithinInterpolationError) {
   Cloud cloud;
   cloud.density = .7;
   cloud.wispiness = 0;
@@ -118,7 +118,7 @@ TEST(Cloud, GridIsTheFormulaWithinTheErrorOfInterpolation) {
   EXPECT_GT(largest, 0);
 }
 
-TEST(Cloud, IsDenseBelowAndGoneAtHeightOne) {
+TEST(Cloud, IsDenseBelowAndEmptyAtHeightOne) {
   Cloud cloud;
   for (const double x : {.1, .37, 5.5}) {
     EXPECT_EQ(density_at(cloud, vec(x, 0, x)), 1);
@@ -135,7 +135,7 @@ TEST(Cloud, IsDenseBelowAndGoneAtHeightOne) {
   EXPECT_EQ(density_at(cloud, vec(.3, .6, .4)), 0);
 }
 
-TEST(Cloud, WispinessMovesPointsByTheSlopeOfNoise) {
+TEST(Cloud, WispinessDisplacesPointsByTheGradientOfNoise) {
   Cloud plain, wispy;
   plain.wispiness = 0;
   wispy.wispiness = .5;
@@ -167,7 +167,7 @@ TEST(Cloud, WispinessMovesPointsByTheSlopeOfNoise) {
   EXPECT_LT(same, 1e-12);
 }
 
-TEST(Cloud, NodesAreBoundedAndAsManyAsThatAllows) {
+TEST(Cloud, UsesAsManyNodesAsTheLimitAllows) {
   Cloud cloud;
   const auto wanted = nodes_for(cloud, std::size_t{1} << 30);
   ASSERT_TRUE(wanted);

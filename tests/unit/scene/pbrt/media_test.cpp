@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "common/scene/pbrt/media_parts.h"
+#include "formats/pbrt/media_parts.h"
 #include "tests/unit/scene/pbrt/pbrt_testing.h"
 
 namespace ls {
@@ -151,7 +151,7 @@ TEST(PbrtMedia, LightOfANanoVdbFileIsItsTemperature) {
   EXPECT_THAT(r.said, testing::Not(HasSubstr("temperature")));
 }
 
-TEST(PbrtMedia, ANanoVdbFileGlowsOnlyIfTheSceneSaysSo) {
+TEST(PbrtMedia, NanoVdbFileEmitsOnlyIfTheSceneRequestsIt) {
   const Read quiet = medium_of(R"("nanovdb" "string filename" "fire.nvdb")");
   const Read dark = medium_of(R"("nanovdb" "string filename" "fire.nvdb" "float Lescale" 0)");
   const Read lit = medium_of(R"("nanovdb" "string filename" "fire.nvdb" "float temperaturescale" 9)");
@@ -176,7 +176,7 @@ TEST(PbrtMedia, LightOfAnRgbGridIsNotScaledToTheWhite) {
   EXPECT_THAT(r.said, testing::Not(HasSubstr("interpolated")));
 }
 
-TEST(PbrtMedia, AnAlbedoThatDiffersIsAGridThatGoesOnWhereNothingIs) {
+TEST(PbrtMedia, VaryingAlbedoIsAGridThatExtendsIntoEmptyVoxels) {
   const Read r = medium_of(R"("rgbgrid" "integer nx" 3 "rgb sigma_a" [ 1 1 1  0 0 0  1 1 1 ]
 "rgb sigma_s" [ 1 1 1  0 0 0  3 3 3 ])");
 
@@ -191,7 +191,7 @@ TEST(PbrtMedia, AnAlbedoThatDiffersIsAGridThatGoesOnWhereNothingIs) {
 }
 
 // In pbrt a missing coefficient is 1 everywhere, also outside the grid of the other.
-TEST(PbrtMedia, AMissingCoefficientDoesNotFade) {
+TEST(PbrtMedia, MissingCoefficientStaysConstant) {
   const Read r = medium_of(R"("rgbgrid" "rgb sigma_a" [ 2 2 2 ])");
 
   const auto density = r.values(r.medium().sigma_t), albedo = r.values(r.medium().albedo);
@@ -201,7 +201,7 @@ TEST(PbrtMedia, AMissingCoefficientDoesNotFade) {
   EXPECT_EQ(albedo[39], 1 / 3.f);
 }
 
-TEST(PbrtMedia, PresetsAreSubstancesByTheMillimetre) {
+TEST(PbrtMedia, PresetsArePerMillimetre) {
   const Scene s = pbrt(in_sphere(R"("homogeneous" "string preset" "Ketchup" "float scale" 10)"));
 
   const auto& m = std::get<HomogeneousMedium>(s.media.at(0));
@@ -246,7 +246,7 @@ TEST(PbrtMedia, CloudsAreGridsFromFaceToFace) {
   EXPECT_THAT(r.said, testing::Not(HasSubstr("cloud")));
 }
 
-TEST(PbrtMedia, CloudsThatAreAlikeAreOneFile) {
+TEST(PbrtMedia, EqualCloudsShareOneFile) {
   const std::string cloud = R"("string type" "cloud" "float frequency" 1 "point3 p1" [ .5 .5 .5 ] )";
   KeepingAssets assets;
   const ReadResult r =
@@ -263,7 +263,7 @@ MediumInterface "c" "" Shape "sphere" "float radius" 2)",
   EXPECT_EQ(r.scene->assets.size(), 2u);
 }
 
-TEST(PbrtMedia, CloudsOfTooFineNoiseForTheirBoxAreRefused) {
+TEST(PbrtMedia, CloudNoiseTooFineForItsBoxIsRefused) {
   EXPECT_THAT(refused(R"("cloud" "float frequency" 1000)"), HasSubstr("is too fine for its box"));
   EXPECT_THAT(refused(R"("cloud" "point3 p1" [ 1e30 1e30 1e30 ])"), HasSubstr("is too fine for its box"));
   EXPECT_THAT(refused(R"("cloud" "float frequency" -1e30)"), HasSubstr("is too fine for its box"));
@@ -308,7 +308,7 @@ MediumInterface "" "{0}" Shape "sphere" "float radius" 2)",
   }
 }
 
-TEST(PbrtMedia, MistakesAreRefusedWithTheirPlace) {
+TEST(PbrtMedia, ErrorsAreReportedWithTheirPlace) {
   const struct {
     const char *medium, *said;
   } rows[] = {

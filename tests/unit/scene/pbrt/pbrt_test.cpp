@@ -3,7 +3,7 @@
 #include <cstring>
 #include <numbers>
 
-#include "common/scene/xml/transform_element.h"
+#include "formats/xml/transform_element.h"
 #include "tests/unit/scene/pbrt/pbrt_testing.h"
 
 namespace ls {
@@ -78,7 +78,7 @@ TEST(Pbrt, MeshesMayBePackedByGzip) {
   EXPECT_EQ(r.scene->assets.at(0).name, "a.ply.gz");
 }
 
-TEST(Pbrt, TurnsAsTheXmlTurns) {
+TEST(Pbrt, RotationsMatchTheXml) {
   const Scene s = pbrt("Rotate 90 0 1 0\nScale 2 3 4\nShape \"plymesh\" \"string filename\" \"mesh.ply\"");
   const ReadResult other = read(with_sensor(
       R"(<shape type="ply"><string name="filename" value="mesh.ply"/><boolean name="flat_without_normals" value="true"/><transform name="to_world"><scale x="2" y="3" z="4"/><rotate y="1" angle="90"/></transform></shape>)"));
@@ -88,7 +88,7 @@ TEST(Pbrt, TurnsAsTheXmlTurns) {
     EXPECT_NEAR(s.shapes.at(0).to_world.m[i], other.scene->shapes.at(0).to_world.m[i], 16 * 2.3e-16);
 }
 
-TEST(Pbrt, MatricesGoColumnByColumn) {
+TEST(Pbrt, MatricesAreColumnMajor) {
   const Scene s = pbrt("Transform [ 1 0 0 0  0 1 0 0  0 0 1 0  5 6 7 1 ]\nShape \"sphere\"");
 
   EXPECT_EQ(s.shapes.at(0).to_world.m[3], 5);
@@ -110,7 +110,7 @@ TEST(Pbrt, ScaleBeforeTheCameraMirrorsIt) {
   EXPECT_EQ(s.sensor.to_world, Transform{});
 }
 
-TEST(Pbrt, LensesGrowWithTheirCamera) {
+TEST(Pbrt, LensesScaleWithTheCamera) {
   const Scene s =
       pbrt("Shape \"sphere\"",
            "Scale 0.5 0.5 0.5\nCamera \"perspective\" \"float lensradius\" 0.25 \"float focaldistance\" 3");
@@ -119,7 +119,7 @@ TEST(Pbrt, LensesGrowWithTheirCamera) {
   EXPECT_DOUBLE_EQ(s.sensor.focus_distance, 6);
 }
 
-TEST(Pbrt, OrthographicShorterSideSeesTwo) {
+TEST(Pbrt, OrthographicShorterSideIsTwoUnits) {
   const Scene s = [] {
     const ReadResult r = read_pbrt(
         "Camera \"orthographic\" Film \"rgb\" \"integer xresolution\" 30 \"integer yresolution\" "
@@ -159,7 +159,7 @@ AreaLightSource "diffuse" "rgb L" [ 1 1 1 ] Shape "sphere")");
 }
 
 // A source that keeps no files (the coordinator's) needs the grid from the sender. It is not computed for it.
-TEST(Pbrt, ACloudIsNotComputedForASourceThatKeepsNothing) {
+TEST(Pbrt, CloudIsNotComputedIfItsFileWouldBeDiscarded) {
   const std::string scene = pbrt_scene(
       R"(MakeNamedMedium "c" "string type" "cloud" MediumInterface "c" "" Material "interface" Shape "sphere")");
   MemoryAssets nothing;
@@ -171,7 +171,7 @@ TEST(Pbrt, ACloudIsNotComputedForASourceThatKeepsNothing) {
 }
 
 // pbrt multiplies light by the time for which the shutter is open, here 1/2.
-TEST(Pbrt, AShorterShutterDarkensAllLight) {
+TEST(Pbrt, ShorterShutterDarkensAllLight) {
   const ReadResult r = read_pbrt(
       R"(Camera "perspective" "float shutteropen" 0.25 "float shutterclose" 0.75 Film "rgb" "float iso" 400
 WorldBegin
@@ -184,7 +184,7 @@ LightSource "infinite" "rgb L" [ 1 2 4 ] MediumInterface "glow" "" Material "int
   EXPECT_EQ(medium.source_radiance, (Rgb{2, 4, 8}));
 }
 
-TEST(Pbrt, ExposureStandsBeforeWhatItMultiplies) {
+TEST(Pbrt, ExposureAppliesOnlyToLaterLights) {
   const std::string medium = R"(MakeNamedMedium "glow" "string type" "homogeneous" "rgb Le" [ 1 2 4 ] )",
                     camera = R"(Camera "perspective" "float shutterclose" 0.5 )";
 
@@ -194,7 +194,7 @@ TEST(Pbrt, ExposureStandsBeforeWhatItMultiplies) {
   EXPECT_TRUE(read_pbrt(camera + medium + "WorldBegin Shape \"sphere\"").scene);
 }
 
-TEST(Pbrt, AShutterThatNeverOpensIsRefused) {
+TEST(Pbrt, ShutterThatNeverOpensIsRefused) {
   const ReadResult r =
       read_pbrt("Camera \"perspective\" \"float shutteropen\" 1 WorldBegin Shape \"sphere\"");
 
@@ -263,7 +263,7 @@ Rotate 90 1 0 0 LightSource "infinite" "string filename" "wood.png" "float scale
   EXPECT_NEAR(map.to_world.m[0], 1, 1e-15);
 }
 
-TEST(Pbrt, MapsByLatitudeHaveTheirTopAtZ) {
+TEST(Pbrt, LatitudeMapsHaveTheirTopAtZ) {
   const Scene s =
       pbrt("LightSource \"infinite\" \"string mapname\" \"wood.png\" \"rgb L\" [ 2 2 2 ] Shape \"sphere\"");
 
@@ -273,7 +273,7 @@ TEST(Pbrt, MapsByLatitudeHaveTheirTopAtZ) {
   EXPECT_EQ(map.to_world.m[9], 1) << "its +y becomes +z";
 }
 
-TEST(Pbrt, APortalIsAWarningAndLeavesTheWholeMap) {
+TEST(Pbrt, PortalIsAWarningAndTheWholeMapIsUsed) {
   const std::string corners = R"( "point3 portal" [ 0 0 0  1 0 0  1 1 0  0 1 0 ])";
   for (const std::string light : {R"(LightSource "infinite" "string filename" "wood.png")",
                                   R"(LightSource "infinite" "rgb L" [ 1 2 3 ])"}) {
@@ -293,7 +293,7 @@ TEST(Pbrt, APortalIsAWarningAndLeavesTheWholeMap) {
   }
 }
 
-TEST(Pbrt, ProjectionsAreOfTheSameIntensityAtAllAngles) {
+TEST(Pbrt, ProjectionsHaveEqualIntensityAtAllAngles) {
   const Scene s = pbrt(
       "Translate 1 2 3 Scale 2 2 2 LightSource \"projection\" \"string filename\" \"wood.png\" \"float fov\" "
       "40 "
@@ -310,7 +310,7 @@ TEST(Pbrt, ProjectionsAreOfTheSameIntensityAtAllAngles) {
   EXPECT_EQ(image.filter, TextureFilter::nearest);
 }
 
-TEST(Pbrt, IntegratorsOfTheSameLightAreRead) {
+TEST(Pbrt, EquivalentIntegratorsAreRead) {
   for (const std::string_view type : {"simplepath", "simplevolpath", "bdpt", "lightpath", "mlt", "sppm"}) {
     const ReadResult r = read_pbrt(
         pbrt_scene("Shape \"sphere\"",
@@ -320,7 +320,7 @@ TEST(Pbrt, IntegratorsOfTheSameLightAreRead) {
     EXPECT_EQ(r.scene->integrator.max_depth, 8);
     EXPECT_NE(messages(r).find(fmt::format("Integrator \"{}\" is read as \"volpath\"", type)),
               std::string::npos);
-    EXPECT_EQ(messages(r).find("what the light and") != std::string::npos, type == "sppm");
+    EXPECT_EQ(messages(r).find("from the light and") != std::string::npos, type == "sppm");
   }
 }
 
@@ -347,7 +347,7 @@ TEST(Pbrt, WarnsWhereTexturesAndAlphaDifferFromPbrt) {
       says(told(R"(AreaLightSource "diffuse" Shape "sphere" "float alpha" 0)"), "does not mask its light"));
 }
 
-TEST(Pbrt, InterfacesGiveNoLight) {
+TEST(Pbrt, InterfaceMaterialsEmitNoLight) {
   const std::string lamp = "AreaLightSource \"diffuse\" Shape \"sphere\" ";
   EXPECT_TRUE(pbrt(lamp).shapes.at(0).emitter);
 
@@ -359,7 +359,7 @@ TEST(Pbrt, InterfacesGiveNoLight) {
 }
 
 // In pbrt `encoding` applies to PNG files only.
-TEST(Pbrt, TakesTheEncodingOfPngFilesAlone) {
+TEST(Pbrt, EncodingAppliesOnlyToPng) {
   const auto is_raw = [](std::string_view file) {
     KeepingAssets assets;
     assets.memory.files[std::string(file)] = "pixels";
@@ -381,7 +381,7 @@ TEST(Pbrt, TakesTheEncodingOfPngFilesAlone) {
 }
 
 // A sphere with a texture is mirrored to get pbrt's uv. This must not exchange its media.
-TEST(Pbrt, ASphereKeepsItsMediaWithATexture) {
+TEST(Pbrt, SphereWithATextureKeepsItsMedia) {
   for (const std::string_view reversed : {"", "ReverseOrientation "}) {
     const auto media = [&](std::string_view alpha) {
       const Scene s = pbrt(fmt::format(
@@ -480,7 +480,7 @@ Material "conductor" Shape "sphere")");
 }
 
 // The reflectance at normal incidence for eta = 1 and k is k^2 / (4 + k^2).
-TEST(Pbrt, ReflectanceOfAConductorIsThatAtRightAngles) {
+TEST(Pbrt, ReflectanceOfAConductorIsAtNormalIncidence) {
   const Scene s = pbrt("Material \"conductor\" \"rgb reflectance\" [ 0.2 0.5 0.8 ] Shape \"sphere\"");
 
   const auto& metal = std::get<ConductorBsdf>(
@@ -541,7 +541,7 @@ TEST(Pbrt, OnlyRoughCoatedConductorsWarnOfTheirModel) {
     EXPECT_TRUE(says(said(rough), "warning: a rough \"coatedconductor\" is approximated")) << rough;
 }
 
-TEST(Pbrt, LightsOfTwoSidesShineOnBothAndHalveTheirPower) {
+TEST(Pbrt, TwoSidedLightsHalveTheirPower) {
   const Scene s = pbrt(R"(
 AreaLightSource "diffuse" "rgb L" [ 1 1 1 ] "bool twosided" true Shape "disk"
 AreaLightSource "diffuse" "rgb L" [ 1 1 1 ] Shape "disk"
@@ -561,7 +561,7 @@ Scale -1 1 1 Shape "sphere")");
   EXPECT_TRUE(s.shapes.at(3).emitter->two_sided) << "a mirrored one is read, as its sides do not matter";
 }
 
-TEST(Pbrt, MixTakesTheAmountOfTheSecond) {
+TEST(Pbrt, MixAmountWeighsTheSecondMaterial) {
   const Scene s = pbrt(R"(MakeNamedMaterial "a" "string type" "diffuse"
 MakeNamedMaterial "b" "string type" "conductor"
 Material "mix" "string materials" [ "a" "b" ] "float amount" 0.25 Shape "sphere")");
@@ -570,7 +570,7 @@ Material "mix" "string materials" [ "a" "b" ] "float amount" 0.25 Shape "sphere"
   EXPECT_EQ(std::get<ConstantTexture>(s.textures.at(blend.weight.value)).value[0], .25);
 }
 
-TEST(Pbrt, ImagesStandUpright) {
+TEST(Pbrt, ImagesAreUpright) {
   const Scene s = pbrt(R"(Texture "t" "spectrum" "imagemap" "string filename" "wood.png" "float uscale" 2
 Material "diffuse" "texture reflectance" "t" Shape "sphere")");
 
@@ -584,7 +584,7 @@ Material "diffuse" "texture reflectance" "t" Shape "sphere")");
 
 // At the north pole of a sphere, +z, v is 1 in pbrt and 0 in Mitsuba's format. The reader mirrors the sphere
 // along z.
-TEST(Pbrt, ImagesStandUprightOnSpheres) {
+TEST(Pbrt, ImagesAreUprightOnSpheres) {
   const std::string image = R"(Texture "t" "spectrum" "imagemap" "string filename" "wood.png"
 Material "diffuse" "texture reflectance" "t" Scale 2 2 2 Shape "sphere" ReverseOrientation Shape "sphere"
 MakeNamedMaterial "image" "string type" "diffuse" "texture reflectance" "t"
@@ -612,7 +612,7 @@ Translate 0 5 0 ObjectInstance "ball" ObjectInstance "ball")");
   EXPECT_EQ(s.shapes.at(0).to_world.m[3], 1);
 }
 
-TEST(Pbrt, AttributesEndWhereTheySay) {
+TEST(Pbrt, AttributesEndAtAttributeEnd) {
   const Scene s = pbrt(R"(AttributeBegin Translate 1 0 0 ReverseOrientation
 TransformBegin Translate 0 1 0 Shape "sphere" TransformEnd Shape "sphere" AttributeEnd Shape "sphere")");
 
@@ -658,7 +658,7 @@ float float_at(const std::string& bytes, std::size_t at) {
   return x;
 }
 
-TEST(Pbrt, GridsGetALayerOfZeros) {
+TEST(Pbrt, GridsArePaddedWithZeros) {
   KeepingAssets assets;
   const ReadResult r = read_scene("t.pbrt", pbrt_scene(R"(MakeNamedMedium "smoke" "string type" "uniformgrid"
 "integer nx" 2 "integer ny" 1 "integer nz" 1 "float density" [ 3 4 ] "point3 p0" [ 0 0 0 ] "point3 p1" [ 2 1 1 ]
@@ -702,7 +702,7 @@ TEST(Pbrt, FlatPatchesAreTriangles) {
 }
 
 // The corners of each patch have the uv (0, 0), (1, 0), (0, 1) and (1, 1), even if two patches share corners.
-TEST(Pbrt, PatchesHaveTheirOwnUv) {
+TEST(Pbrt, PatchesHaveTheirUv) {
   KeepingAssets assets;
   const ReadResult r =
       read_scene("t.pbrt", pbrt_scene(R"(Shape "bilinearmesh" "integer indices" [ 0 1 2 3 1 4 3 5 ]

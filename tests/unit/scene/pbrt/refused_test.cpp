@@ -1,6 +1,6 @@
 // Errors in pbrt files: their places and messages.
-#include "common/scene/limits.h"
-#include "common/scene/pbrt/vocabulary.h"
+#include "core/scene/limits.h"
+#include "formats/pbrt/vocabulary.h"
 #include "tests/unit/scene/pbrt/pbrt_testing.h"
 
 namespace ls {
@@ -12,7 +12,7 @@ struct Case {
 
 class PbrtRefuses : public ::testing::TestWithParam<Case> {};
 
-TEST_P(PbrtRefuses, WithAPlaceAndAdvice) {
+TEST_P(PbrtRefuses, RefusalsHaveAPlaceAndAdvice) {
   const std::string said = refusal(GetParam().world);
 
   EXPECT_NE(said.find(GetParam().want), std::string::npos) << said;
@@ -35,8 +35,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"Shape \"sphere\" \"radius\" 1", "a parameter is written as"},
         Case{"Shape \"sphere", "a \" is missing"},
         Case{"Shape \"sphere\" \"float zmin\" 0", "only whole spheres are read"},
-        Case{"Shape \"curve\" \"point3 P\" [ 1 2 3 ]",
-             "Shape \"curve\" is not read: hair is not rendered here"},
+        Case{"Shape \"curve\" \"point3 P\" [ 1 2 3 ]", "Shape \"curve\" is not read: hair is not supported"},
         Case{"Shape \"loopsubdiv\"", "write it as a plymesh"},
         Case{"Shape \"plymesh\" \"string filename\" \"a.ply.gz\"", "there is no file \"a.ply.gz\""},
         Case{"Shape \"trianglemesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 ] \"integer indices\" [ 0 1 3 ]",
@@ -87,7 +86,7 @@ INSTANTIATE_TEST_SUITE_P(
              "reflectance and transmittance of bsdf \"diffusetransmission\" sum up to 1.5"},
         Case{"LightSource \"goniometric\"", "LightSource \"goniometric\" needs 'filename'"},
         Case{"LightSource \"goniometric\" \"string filename\" \"wood.png\" \"float power\" 3",
-             "what it means depends on the image"},
+             "the meaning of power depends on the image"},
         Case{"Material \"diffuse\" \"texture reflectance\" \"none\"",
              "no Texture \"none\" stands before this"},
         Case{"Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.ptx\"",
@@ -149,7 +148,7 @@ TEST(Pbrt, DirectivesOfTheTableAreKnown) {
   }
 }
 
-TEST(Pbrt, MeshesWithoutAFileSayWhoSendsThem) {
+TEST(Pbrt, MissingMeshFileNamesItsSource) {
   MemoryAssets assets;
   const ReadResult r =
       read_scene("t.pbrt", pbrt_scene("Shape \"trianglemesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 ]"), assets);

@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/reader/xml_write.h"
+#include "formats/reader/xml_write.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -19,7 +19,7 @@ std::string number(const char* name, const char* value) {
   return std::string("<float name=\"") + name + "\" value=\"" + value + "\"/>";
 }
 
-TEST(Emission, OfAHomogeneousMediumIsByLengthAndByAbsorption) {
+TEST(Emission, HomogeneousMediumEmitsByLengthAndAbsorption) {
   const Scene s = must_read(
       medium("homogeneous", "<rgb name=\"emission\" value=\"1 2 3\"/>" + number("source_radiance", "4")));
   const auto& m = std::get<HomogeneousMedium>(s.media.at(0));
@@ -28,7 +28,7 @@ TEST(Emission, OfAHomogeneousMediumIsByLengthAndByAbsorption) {
   EXPECT_EQ(must_read(write_xml(s)), s);
 }
 
-TEST(Emission, OfAHeterogeneousMediumIsAVolume) {
+TEST(Emission, HeterogeneousMediumHasAnEmissionVolume) {
   const Scene s = must_read(medium("heterogeneous",
                                    "<volume type=\"gridvolume\" name=\"temperature\"><string "
                                    "name=\"filename\" value=\"cloud.vol\"/></volume>" +
@@ -44,7 +44,7 @@ TEST(Emission, OfAHeterogeneousMediumIsAVolume) {
   EXPECT_EQ(must_read(write_xml(s)), s);
 }
 
-TEST(Emission, WhatContradictsItselfIsRefused) {
+TEST(Emission, ContradictoryParametersAreRefused) {
   const struct {
     std::string type, inside, said;
   } rows[] = {
@@ -71,7 +71,7 @@ TEST(Emission, WhatContradictsItselfIsRefused) {
   }
 }
 
-TEST(Emission, ADensityOfVersion0ThatIsEverywhereCannotGlow) {
+TEST(Emission, ConstantDensityOfVersion0CannotEmit) {
   const auto r = read(
       "<scene version=\"0.5.0\"><medium type=\"heterogeneous\"><volume type=\"constvolume\" name=\"density\">"
       "<float name=\"value\" value=\"2\"/></volume><volume type=\"constvolume\" name=\"albedo\"><spectrum "
@@ -81,7 +81,7 @@ TEST(Emission, ADensityOfVersion0ThatIsEverywhereCannotGlow) {
   EXPECT_THAT(messages(r), HasSubstr("write it as a medium \"homogeneous\" to give it an emission"));
 }
 
-TEST(RawGrid, AloneHasAnOrder) {
+TEST(RawGrid, OnlyRawGridsHaveAnOrder) {
   MemoryAssets assets;
   assets.files.emplace("smoke.bin", "s");
   const auto volume = [&](const std::string& file, const std::string& inside) {
@@ -117,7 +117,7 @@ TEST(ConstVolume, IsMovedByItsTransform) {
   EXPECT_EQ(must_read(write_xml(*r.scene)), *r.scene);
 }
 
-TEST(ConstVolume, ThatIsFlattenedIsRefused) {
+TEST(ConstVolume, FlattenedVolumeIsRefused) {
   const auto r = read(with_sensor(
       R"(<volume type="constvolume" id="v"><transform name="to_world"><scale x="0"/></transform></volume>)"));
   EXPECT_FALSE(r.scene);

@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/reader/xml_write.h"
+#include "formats/reader/xml_write.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -30,7 +30,7 @@ std::string float_named(const std::string& name, const std::string& value) {
   return "<float name=\"" + name + "\" value=\"" + value + "\"/>";
 }
 
-TEST(Emitters, ASunHasAnAngularRadius) {
+TEST(Emitters, DirectionalLightMayHaveAnAngularRadius) {
   EXPECT_EQ(emitter<DirectionalEmitter>("", "directional").angular_radius, 0);
   EXPECT_EQ(emitter<DirectionalEmitter>(float_named("angular_radius", ".267"), "directional").angular_radius,
             .267);
@@ -38,7 +38,7 @@ TEST(Emitters, ASunHasAnAngularRadius) {
               HasSubstr("out of its range 0 <= angular_radius <= 90"));
 }
 
-TEST(Emitters, AnAreaLightMayBeABeam) {
+TEST(Emitters, AreaLightMayBeABeam) {
   const AreaEmitter plain = area("");
   EXPECT_EQ(plain.cutoff_angle, 90);
   EXPECT_EQ(plain.beam_width, 90);
@@ -58,7 +58,7 @@ TEST(Emitters, AnAreaLightMayBeABeam) {
   EXPECT_THAT(refused(float_named("cutoff_angle", "120")), HasSubstr("out of its range"));
 }
 
-TEST(Emitters, AnAreaLightMayShineOnBothSides) {
+TEST(Emitters, AreaLightMayEmitOnBothSides) {
   const std::string on = "<boolean name=\"two_sided\" value=\"true\"/>",
                     shape = "<shape type=\"disk\"><emitter type=\"area\">";
   const Scene plain = must_read(with_sensor(shape + "</emitter></shape>")),
@@ -71,7 +71,7 @@ TEST(Emitters, AnAreaLightMayShineOnBothSides) {
   EXPECT_EQ(must_read(write_xml(both)), both);
 }
 
-TEST(Emitters, WhatIsOurOwnIsWrittenOnlyWhereItSaysSomething) {
+TEST(Emitters, LightshaftsOwnParametersAreWrittenOnlyIfNotDefault) {
   const std::string disk = "<shape type=\"disk\"><emitter type=\"area\">", end = "</emitter></shape>";
   const auto written = [](const std::string& objects) { return write_xml(must_read(with_sensor(objects))); };
   const std::string plain = written(disk + end + "<emitter type=\"directional\"/>");
@@ -91,7 +91,7 @@ TEST(Emitters, WhatIsOurOwnIsWrittenOnlyWhereItSaysSomething) {
 const std::string kImage =
     "<texture type=\"bitmap\" name=\"irradiance\"><string name=\"filename\" value=\"wood.png\"/></texture>";
 
-TEST(Emitters, AProjectorIsGivenAsACamera) {
+TEST(Emitters, ProjectorIsDescribedLikeACamera) {
   const auto plain = emitter<ProjectorEmitter>(kImage, "projector");
   EXPECT_EQ(plain.scale, 1);
   EXPECT_EQ(plain.fov_axis, FovAxis::diagonal) << "50 mm, over the diagonal of 36 mm x 24 mm";
@@ -109,7 +109,7 @@ TEST(Emitters, AProjectorIsGivenAsACamera) {
   EXPECT_EQ(deserialize_scene(serialize(s)).value(), s);
 }
 
-TEST(Emitters, AProjectorNeedsAnImageAndIsNotStretched) {
+TEST(Emitters, ProjectorNeedsAnImageAndNoStretchingTransform) {
   EXPECT_THAT(refusal("<emitter type=\"projector\"/>"), HasSubstr("needs 'irradiance'"));
   EXPECT_THAT(refusal("<emitter type=\"projector\">" + kImage +
                       "<transform name=\"to_world\"><scale value=\"2\"/></transform></emitter>"),
@@ -119,7 +119,7 @@ TEST(Emitters, AProjectorNeedsAnImageAndIsNotStretched) {
               HasSubstr("gives both fov and focal_length"));
 }
 
-TEST(Emitters, AGoniometricLightNeedsAnImageAndIsNotStretched) {
+TEST(Emitters, GoniometricLightNeedsAnImageAndNoStretchingTransform) {
   const std::string image =
       "<texture type=\"bitmap\" name=\"texture\"><string name=\"filename\" value=\"wood.png\"/></texture>";
   const auto plain = emitter<GoniometricEmitter>(image, "goniometric");
@@ -161,14 +161,14 @@ TEST(EnvmapScenes, AreReadWithFileScaleAndTransform) {
   EXPECT_EQ(deserialize_scene(serialize(s)).value(), s);
 }
 
-TEST(EnvmapScenes, DefaultsAreScaleOneAndNoTurn) {
+TEST(EnvmapScenes, DefaultsAreScaleOneWithoutRotation) {
   const Scene s = must_read(with_sensor(sky("")));
   const auto& e = std::get<EnvmapEmitter>(s.emitters.at(0));
   EXPECT_EQ(e.scale, 1);
   EXPECT_EQ(e.to_world, Transform{});
 }
 
-TEST(EnvmapScenes, AMapMayBeASquareOfEqualAreas) {
+TEST(EnvmapScenes, EqualAreaSquareMapIsRead) {
   const Scene s = must_read(with_sensor(sky("<string name=\"mapping\" value=\"equal_area\"/>")));
   EXPECT_EQ(std::get<EnvmapEmitter>(s.emitters.at(0)).mapping, SkyMapping::equal_area);
   EXPECT_EQ(deserialize_scene(serialize(s)).value(), s);
@@ -177,7 +177,7 @@ TEST(EnvmapScenes, AMapMayBeASquareOfEqualAreas) {
   EXPECT_THAT(messages(wrong), HasSubstr("latlong"));
 }
 
-TEST(EnvmapScenes, OldFilesMayTurnThemByToWorld) {
+TEST(EnvmapScenes, OldFilesMayRotateThemByToWorld) {
   const Scene s = must_read(
       "<scene version=\"0.6.0\"><emitter type=\"envmap\"><transform name=\"toWorld\"><matrix "
       "value=\"-4.37114e-008 "
@@ -187,13 +187,13 @@ TEST(EnvmapScenes, OldFilesMayTurnThemByToWorld) {
   EXPECT_EQ(std::get<EnvmapEmitter>(s.emitters.at(0)).to_world.m[2], 1);
 }
 
-TEST(EnvmapScenes, WhatSteersOnlySamplingIsAWarning) {
+TEST(EnvmapScenes, SamplingParametersCauseAWarning) {
   const auto r = read(with_sensor(sky("<boolean name=\"mis_compensation\" value=\"true\"/>")));
   ASSERT_TRUE(r.scene);
   EXPECT_THAT(messages(r), HasSubstr("'mis_compensation' of emitter \"envmap\" has no effect here"));
 }
 
-TEST(EnvmapScenes, WhatIsWrongIsTold) {
+TEST(EnvmapScenes, ErrorsAreReported) {
   const auto said = [](const std::string& objects) {
     const auto r = read(with_sensor(objects));
     return r.scene ? "accepted" : messages(r);
@@ -209,7 +209,7 @@ TEST(EnvmapScenes, WhatIsWrongIsTold) {
   EXPECT_EQ(said(sky("<transform name=\"to_world\"><scale x=\"-1\"/></transform>")), "accepted");
 }
 
-TEST(EnvmapScenes, ASceneHasOneEnvironmentAtMost) {
+TEST(EnvmapScenes, SecondEnvironmentIsRefused) {
   for (const std::string& two : {sky("") + sky(""), sky("") + "<emitter type=\"constant\"/>",
                                  "<emitter type=\"constant\"/>" + sky("")}) {
     const auto r = read(with_sensor(two));
@@ -219,7 +219,7 @@ TEST(EnvmapScenes, ASceneHasOneEnvironmentAtMost) {
   }
 }
 
-TEST(Emitters, AnAreaLightMayStandApartFromItsShape) {
+TEST(Emitters, AreaLightMayBeSeparateFromItsShape) {
   const std::string lamp = R"(<emitter type="area" id="lamp"><rgb name="radiance" value="1 2 3"/></emitter>)",
                     ball = R"(<shape type="sphere"><ref id="lamp"/></shape>)";
   for (const std::string& objects : {lamp + ball, ball + lamp}) {

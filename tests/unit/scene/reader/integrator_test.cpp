@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/reader/xml_write.h"
+#include "formats/reader/xml_write.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -14,7 +14,7 @@ std::string integrator(const std::string& type, const std::string& inside) {
   return with_sensor("<integrator type=\"" + type + "\">" + inside + "</integrator>");
 }
 
-TEST(Integrator, OfDistantMisHasItsSettingsThereAndBack) {
+TEST(Integrator, DistantMisKeepsItsSettingsInARoundTrip) {
   const IntegratorSettings plain = must_read(integrator("volpath_distant_mis", "")).integrator;
   EXPECT_EQ(plain.distance, DistanceSampling::mis);
   EXPECT_EQ(plain.heuristic, MisHeuristic::power);
@@ -31,7 +31,7 @@ TEST(Integrator, OfDistantMisHasItsSettingsThereAndBack) {
       digest_of(must_read(integrator("volpath_distant_mis", "<integer name=\"max_depth\" value=\"3\"/>"))));
 }
 
-TEST(Integrator, OfAnyOtherNameRefusesWhatItWouldIgnore) {
+TEST(Integrator, OtherIntegratorsRefuseParametersTheyWouldIgnore) {
   for (const char* type : {"volpath", "path", "volpathmis"}) {
     for (const char* name : {"distance", "heuristic"}) {
       const auto r = read(integrator(type, std::string("<string name=\"") + name + "\" value=\"mis\"/>"));
@@ -45,7 +45,7 @@ TEST(Integrator, OfAnyOtherNameRefusesWhatItWouldIgnore) {
   }
 }
 
-TEST(Integrator, OfVolpathSaysWhereItLooksForLightThereAndBack) {
+TEST(Integrator, VolpathKeepsItsSettingsInARoundTrip) {
   const Scene plain = must_read(integrator("volpath", ""));
   EXPECT_EQ(plain.integrator.camera_points, 0);
   EXPECT_FALSE(plain.integrator.phase_only);
@@ -64,7 +64,7 @@ TEST(Integrator, OfVolpathSaysWhereItLooksForLightThereAndBack) {
             .scene);
 }
 
-TEST(Integrator, OfOtherNamesRefusesTheParametersOfVolpath) {
+TEST(Integrator, OtherIntegratorsRefuseVolpathsParameters) {
   for (const char* type : {"volpath_distant_mis", "path"})
     for (const char* parameter :
          {"<integer name=\"camera_points\" value=\"3\"/>", "<boolean name=\"phase_only\" value=\"true\"/>"}) {
@@ -82,7 +82,7 @@ TEST(Integrator, OfOtherNamesRefusesTheParametersOfVolpath) {
   EXPECT_EQ(serialize(must_read(write_xml(path))), serialize(path));
 }
 
-TEST(Integrator, NamesTheSettingsThatThereAre) {
+TEST(Integrator, ErrorListsTheKnownSettings) {
   const auto r = read(integrator("volpath_distant_mis", "<string name=\"distance\" value=\"equi\"/>"));
   EXPECT_FALSE(r.scene);
   EXPECT_THAT(messages(r), HasSubstr("equiangular"));

@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/json/serialize.h"
-#include "common/scene/reader/xml_write.h"
+#include "core/scene/json/serialize.h"
+#include "formats/reader/xml_write.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -16,7 +16,7 @@ std::string wrapped(std::string_view channels) {
                      "\"/><integrator type=\"path\"/></integrator>");
 }
 
-TEST(Channels, OfMitsubasWrapperAreReadByOurNames) {
+TEST(Channels, MitsubasWrapperIsReadWithLightshaftsNames) {
   const auto r = read(wrapped("depth:depth, normal:sh_normal,uv:uv"));
 
   ASSERT_TRUE(r.scene) << messages(r);
@@ -25,7 +25,7 @@ TEST(Channels, OfMitsubasWrapperAreReadByOurNames) {
   EXPECT_TRUE(r.diagnostics.empty());
 }
 
-TEST(Channels, WithOtherLabelsAreWarnedAbout) {
+TEST(Channels, UnknownLabelsCauseAWarning) {
   const auto r = read(wrapped("dd:depth,nn:sh_normal"));
 
   ASSERT_TRUE(r.scene) << messages(r);
@@ -33,7 +33,7 @@ TEST(Channels, WithOtherLabelsAreWarnedAbout) {
   EXPECT_THAT(r.diagnostics[0].text, HasSubstr("\"dd\" is \"depth\", \"nn\" is \"normal\""));
 }
 
-TEST(Channels, SurviveConversionAndTravel) {
+TEST(Channels, SurviveConversionAndSerialisation) {
   const Scene scene = read(wrapped("depth:depth,normal:sh_normal,shape_id:shape_id")).scene.value();
 
   const auto again = read(write_xml(scene));
@@ -54,7 +54,7 @@ constexpr std::string_view kThings =
     "<shape type=\"instance\"><ref id=\"g\"/></shape>"
     "<shape type=\"shapegroup\"><shape type=\"disk\"/></shape>";
 
-TEST(Labels, AreIdsAndElseKindAndNumber) {
+TEST(Labels, AreIdsOrElseKindAndNumber) {
   const auto r = read(with_sensor(std::string(kThings)), {.labels = true});
 
   ASSERT_TRUE(r.scene) << messages(r);
@@ -71,7 +71,7 @@ TEST(Labels, AreIdsAndElseKindAndNumber) {
   EXPECT_EQ(deserialize_scene(serialize(s)).value(), s);
 }
 
-TEST(Labels, AreDifferentWhateverTheNames) {
+TEST(Labels, AreUniqueForAnyNames) {
   const std::string mesh = R"(<shape type="ply"><string name="filename" value="mesh.ply"/></shape>)";
 
   const auto r = read(with_sensor(R"(<shape type="sphere" id="mesh_2"/>)" + mesh + mesh + mesh +
@@ -84,7 +84,7 @@ TEST(Labels, AreDifferentWhateverTheNames) {
   EXPECT_THAT(names, testing::ElementsAre("mesh_2", "mesh", "mesh_3", "mesh_4", "mesh_4_4"));
 }
 
-TEST(Labels, AreNoPartOfASceneThatIsReadWithoutThem) {
+TEST(Labels, AreAbsentIfTheSceneIsReadWithoutThem) {
   const Scene plain = read(with_sensor(std::string(kThings))).scene.value();
   Scene labelled = read(with_sensor(std::string(kThings)), {.labels = true}).scene.value();
 
@@ -95,11 +95,20 @@ TEST(Labels, AreNoPartOfASceneThatIsReadWithoutThem) {
   EXPECT_EQ(digest_of(labelled), digest_of(plain));
 }
 
-TEST(Labels, OfAnotherNumberThanTheThingsAreRefused) {
+TEST(Labels, WrongNumberOfLabelsIsRefused) {
   Scene s = read(with_sensor(std::string(kThings)), {.labels = true}).scene.value();
   s.shape_labels.pop_back();
 
   EXPECT_THAT(deserialize_scene(serialize(s)).error().message, HasSubstr("shape_labels"));
+}
+
+TEST(Labels, LongNamesAreCutBetweenCharacters) {
+  std::string id = "a";
+  for (int i = 0; i < 128; ++i) id += "\xC3\xA4";
+  const ReadResult r = read(with_sensor("<shape type=\"sphere\" id=\"" + id + "\"/>"), {.labels = true});
+  ASSERT_TRUE(r.scene);
+  EXPECT_EQ(r.scene->shape_labels.at(0).name, id.substr(0, 255));
+  EXPECT_EQ(deserialize_scene(serialize(*r.scene)).value(), *r.scene);
 }
 
 }  // namespace

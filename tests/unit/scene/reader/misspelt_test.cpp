@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <random>
 
-#include "common/scene/diagnostic.h"
+#include "core/scene/diagnostic.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -14,7 +14,7 @@ namespace {
 using ::testing::HasSubstr;
 
 // No misspelt name is ignored: a letter added to any name of the example gives an error in that line.
-TEST(Misspelt, AMisspeltNameAnywhereIsAnErrorInItsLine) {
+TEST(Misspelt, MisspeltNameIsAnErrorInItsLine) {
   int tried = 0;
   for (const std::string key : {"name=\"", "type=\"", "<", " id=\""}) {
     for (std::size_t at = kExample.find(key); at != std::string::npos; at = kExample.find(key, at + 1)) {
@@ -47,7 +47,7 @@ TEST(Misspelt, AMisspeltNameAnywhereIsAnErrorInItsLine) {
 }
 
 // Adds an unknown parameter to each object of the example in turn.
-TEST(Misspelt, AnUnknownParameterInAnyObjectIsAnErrorInItsLine) {
+TEST(Misspelt, UnknownParameterIsAnErrorInItsLine) {
   int tried = 0;
   for (std::size_t at = kExample.find("type=\""); at != std::string::npos;
        at = kExample.find("type=\"", at + 1)) {

@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/reader/nori_test.h"
+#include "formats/reader/nori_test.h"
 #include "tests/unit/scene/nori_testing.h"
 
 namespace ls {
@@ -17,7 +17,7 @@ NoriTestResult read_test(const std::string& text) {
 }
 std::string told(const std::string& text) { return format_diagnostics(read_test(text).diagnostics); }
 
-TEST(NoriTest, OfScenesHoldsThemWithTheirReferences) {
+TEST(NoriTest, SceneTestContainsScenesAndReferences) {
   const std::string text = fmt::format(R"(<?xml version="1.0"?>
 <test type="ttest"><string name="references" value="2,
     5"/><float name="significanceLevel" value="0.05"/><integer name="sampleCount" value="1000"/>
@@ -36,7 +36,7 @@ TEST(NoriTest, OfScenesHoldsThemWithTheirReferences) {
   EXPECT_EQ(r.test->scenes[1].assets.size(), 1u);
 }
 
-TEST(NoriTest, OfBsdfsHoldsEachOnAShape) {
+TEST(NoriTest, BsdfTestPutsEachOnAShape) {
   const auto r = read_test(
       R"(<test type="ttest"><string name="angles" value="0 30 80"/><string name="references" value=".5 .5 .5 1 1 1"/>
     <bsdf type="diffuse"/><bsdf type="mirror"/></test>)");
@@ -48,7 +48,7 @@ TEST(NoriTest, OfBsdfsHoldsEachOnAShape) {
   EXPECT_TRUE(std::holds_alternative<ConductorBsdf>(s.bsdfs[s.shapes[0].bsdf.value]));
 }
 
-TEST(NoriTest, OfDistributionsHasItsOwnSettings) {
+TEST(NoriTest, DistributionTestHasItsOwnSettings) {
   const auto r = read_test(
       R"(<test type="chi2test"><integer name="resolution" value="20"/><integer name="testCount" value="7"/>
     <float name="minExpFrequency" value="4"/><bsdf type="microfacet"/></test>)");
@@ -60,7 +60,7 @@ TEST(NoriTest, OfDistributionsHasItsOwnSettings) {
   EXPECT_EQ(r.test->sample_count, 0u);
 }
 
-TEST(NoriTest, InErrorSaysWhatIsWrong) {
+TEST(NoriTest, ErrorsNameTheProblem) {
   EXPECT_THAT(told(R"(<test type="tttest"/>)"),
               HasSubstr("1:13: error: Nori has no test \"tttest\"; did you mean 'ttest'?"));
   EXPECT_THAT(told(R"(<test type="ttest"/>)"), HasSubstr("nothing stands in this test"));

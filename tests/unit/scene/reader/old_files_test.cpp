@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/scene/diagnostic.h"
-#include "common/scene/reader/upgrade.h"
-#include "common/scene/reader/xml_write.h"
+#include "core/scene/diagnostic.h"
+#include "formats/reader/upgrade.h"
+#include "formats/reader/xml_write.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -34,7 +34,7 @@ Rgb radiance_of(const std::string& property, const char* version) {
   return std::get<ConstantEmitter>(s.emitters.at(0)).radiance;
 }
 
-TEST(OldFiles, SayTheSameAsNewOnesInOtherWords) {
+TEST(OldFiles, EqualTheirNewForm) {
   const Scene before = must_read(R"(<scene version="0.5.0">
     <default name="maxDepth" value="9"/>
     <integrator type="volpath"><integer name="maxDepth" value="$maxDepth"/><integer name="rrDepth" value="3"/>
@@ -82,7 +82,7 @@ TEST(OldFiles, SayTheSameAsNewOnesInOtherWords) {
   EXPECT_EQ(digest_of(before), digest_of(now));
 }
 
-TEST(OldFiles, AreKnownByTheirVersion) {
+TEST(OldFiles, AreRecognisedByTheirVersion) {
   for (const char* version : {"0.5.0", "0.6", "1.0.0", "0"})
     EXPECT_TRUE(scene::is_old_version(version)) << version;
   for (const char* version : {"2.0.0", "3.5.2", "10.0.0", ""})
@@ -93,14 +93,14 @@ TEST(OldFiles, AreKnownByTheirVersion) {
   EXPECT_THAT(messages(r), HasSubstr("did you mean 'max_depth'?"));
 }
 
-TEST(OldFiles, NamesLoseTheirHumps) {
+TEST(OldFiles, CamelCaseNamesAreConverted) {
   EXPECT_EQ(scene::snake_case("toWorld"), "to_world");
   EXPECT_EQ(scene::snake_case("intIOR"), "int_ior");
   EXPECT_EQ(scene::snake_case("sigmaA"), "sigma_a");
   EXPECT_EQ(scene::snake_case("high_quality_edges"), "high_quality_edges");
 }
 
-TEST(OldFiles, AreUpgradedEachByItsOwnVersion) {
+TEST(OldFiles, AreUpgradedFromTheirVersion) {
   MemoryAssets assets;
   assets.files["new.xml"] =
       "<scene version=\"3.0.0\"><shape type=\"sphere\"><boolean name=\"flip_normals\" "
@@ -120,7 +120,7 @@ TEST(OldFiles, AreUpgradedEachByItsOwnVersion) {
   }
 }
 
-TEST(OldFiles, ABoundaryOfMediaWithoutABsdfLetsLightThrough) {
+TEST(OldFiles, MediumBoundaryWithoutABsdfPassesLight) {
   const std::string medium =
       "<medium type=\"homogeneous\" id=\"m\"><float name=\"sigmaT\" value=\"1\"/><float name=\"albedo\" "
       "value=\".5\"/></medium>";
@@ -135,7 +135,7 @@ TEST(OldFiles, ABoundaryOfMediaWithoutABsdfLetsLightThrough) {
   EXPECT_EQ(colour(*r.scene, std::get<DiffuseBsdf>(bsdf_of(*r.scene, 2)).reflectance), (Rgb{.5, .5, .5}));
 }
 
-TEST(OldFiles, MetalsAreCopperUnlessTheySayOtherwise) {
+TEST(OldFiles, MetalsDefaultToCopper) {
   const auto k = [](const std::string& text) {
     return std::get<ConductorBsdf>(bsdf_of(must_read(text), 0)).k;
   };
@@ -152,7 +152,7 @@ TEST(OldFiles, MetalsAreCopperUnlessTheySayOtherwise) {
   EXPECT_EQ(k(old(given)), (Rgb{2, 2, 2}));
 }
 
-TEST(OldFiles, MediaComeByAbsorptionAndScattering) {
+TEST(OldFiles, MediaMayUseAbsorptionAndScattering) {
   const Scene s =
       must_read(in_a_medium("type=\"homogeneous\"><rgb name=\"sigmaA\" value=\"0.5 0 0.25\"/><rgb "
                             "name=\"sigmaS\" value=\"0.5, 0, 0.75\"/><float "
@@ -179,7 +179,7 @@ TEST(OldFiles, GridsAreNodesInTheBoxOfTheirFile) {
   EXPECT_EQ(m.scale, 100);
 }
 
-TEST(OldFiles, AConstantDensityIsEverywhere) {
+TEST(OldFiles, ConstantDensityIsUnbounded) {
   const Scene s = must_read(in_a_medium(
       "type=\"heterogeneous\"><volume type=\"constvolume\" name=\"density\"><float name=\"value\" "
       "value=\"2\"/></volume><volume type=\"constvolume\" name=\"albedo\"><rgb name=\"value\" value=\".1 .2 "
@@ -191,7 +191,7 @@ TEST(OldFiles, AConstantDensityIsEverywhere) {
   EXPECT_TRUE(s.volumes.empty());
 }
 
-TEST(OldFiles, MediaThatSayTooLittleOrTooMuchAreRefused) {
+TEST(OldFiles, IncompleteAndContradictoryMediaAreRefused) {
   const auto said = [](const std::string& medium) {
     const auto r = read(in_a_medium(medium));
     EXPECT_FALSE(r.scene);
@@ -218,7 +218,7 @@ TEST(OldFiles, MediaThatSayTooLittleOrTooMuchAreRefused) {
       HasSubstr("but its albedo is a grid"));
 }
 
-TEST(OldFiles, TexturesAreScaledAndThenMoved) {
+TEST(OldFiles, TexturesAreScaledBeforeTheyAreMoved) {
   const auto to_uv = [](const std::string& inside) {
     const Scene s =
         must_read(old("<shape type=\"cube\"><bsdf type=\"diffuse\"><texture type=\"bitmap\" "
@@ -242,7 +242,7 @@ TEST(OldFiles, TexturesAreScaledAndThenMoved) {
 
 // In version 0.x a checkerboard shows the same squares as a number and as a colour. In version 3 a number
 // needs another checkerboard, with the colours swapped.
-TEST(OldFiles, CheckerboardsAreNumbersAndColoursAlike) {
+TEST(OldFiles, CheckerboardsServeAsNumbersAndColours) {
   const auto objects = [](std::string_view rough, std::string_view other) {
     return fmt::format(R"(
       <texture type="checkerboard" id="inner"><float name="color0" value=".5"/><float name="color1" value=".6"/></texture>
@@ -280,7 +280,7 @@ TEST(OldFiles, CheckerboardsAreNumbersAndColoursAlike) {
   EXPECT_EQ(serialize(again), serialize(before));
 }
 
-TEST(OldFiles, NormalsAreAsTheyAre) {
+TEST(OldFiles, NormalMapsAreUnchanged) {
   const std::string map =
       "<shape type=\"disk\"><bsdf type=\"normalmap\">{}<rgb name=\"normalmap\" value=\".5 .5 1\"/><bsdf "
       "type=\"diffuse\"/></bsdf></shape>";
@@ -295,7 +295,7 @@ TEST(OldFiles, NormalsAreAsTheyAre) {
   EXPECT_TRUE(now.flip_invalid_normals && now.use_shadowing_function);
 }
 
-TEST(OldFiles, WhatTexturesCantBeIsToldAtItsPlace) {
+TEST(OldFiles, ImpossibleTexturesAreReportedWithTheirPlace) {
   const auto r = read(old("<texture type=\"checkerboard\"><float name=\"uscale\" value=\"big\"/></texture>"));
   EXPECT_FALSE(r.scene);
   EXPECT_EQ(r.diagnostics.at(0).place, (SourcePlace{"test.xml", 2, 58}));

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/scene/schema/integrators.h"
+#include "core/scene/schema/integrators.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -27,7 +27,7 @@ Scene with_bsdf(const std::string& bsdf) {
   return must_read(with_sensor("<shape type=\"sphere\">" + bsdf + "</shape>"));
 }
 
-TEST(Reading, TheExampleHasEverythingInItsPlace) {
+TEST(Reading, ReadsTheExample) {
   const Scene s = must_read(kExample);
 
   EXPECT_EQ(s.integrator, (IntegratorSettings{"volpath", 12, 4, true}));
@@ -56,7 +56,7 @@ TEST(Reading, TheExampleHasEverythingInItsPlace) {
 }
 
 // Mitsuba 3.9.1's defaults, as its plugins print them.
-TEST(Reading, WhatIsNotGivenIsMitsubasDefault) {
+TEST(Reading, MissingParametersHaveMitsubasDefaults) {
   const Scene s = must_read(R"(<scene version="3.0.0"><sensor type="perspective"/>
     <medium type="homogeneous" id="a"/><medium type="heterogeneous" id="b"/>
     <shape type="sphere"><ref name="interior" id="a"/><ref name="exterior" id="b"/></shape>
@@ -114,7 +114,7 @@ TEST(Reading, AlphaSetsBothRoughnesses) {
   EXPECT_EQ(r.alpha_u, r.alpha_v);
 }
 
-TEST(Reading, OneBsdfInTwosidedServesBothSides) {
+TEST(Reading, SingleBsdfInTwosidedServesBothSides) {
   const Scene s = with_bsdf("<bsdf type=\"twosided\"><bsdf type=\"diffuse\"/></bsdf>");
   const auto& two = std::get<TwoSidedBsdf>(read_bsdf(s, 0));
   EXPECT_EQ(two.front, two.back);
@@ -132,7 +132,7 @@ TEST(Reading, MeshesFlipTexturesAsTheirFormatsDo) {
   EXPECT_FALSE(std::get<MeshShape>(s.shapes[5].geometry).flip_tex_coords) << "ply";
 }
 
-TEST(Reading, EmittersGoWhereTheirTransformSays) {
+TEST(Reading, EmittersFollowTheirTransform) {
   const Scene s =
       must_read(with_sensor("<emitter type=\"directional\"><transform name=\"to_world\"><rotate x=\"1\" "
                             "angle=\"90\"/><translate x=\"5\"/></transform></emitter>"
@@ -167,7 +167,7 @@ TEST(Reading, ReferencesReachForwardsBackwardsAndInto) {
   EXPECT_EQ(s.bsdfs.size(), 2u);
 }
 
-TEST(Reading, WhatNothingUsesIsLeftOutAndOrderOfDefinitionIsFree) {
+TEST(Reading, UnusedObjectsAreLeftOutAndDefinitionsMayComeInAnyOrder) {
   const std::string a = "<bsdf type=\"diffuse\" id=\"a\"><rgb name=\"reflectance\" value=\".1\"/></bsdf>",
                     b = "<bsdf type=\"null\" id=\"b\"/>";
   const std::string unused =
@@ -184,7 +184,7 @@ TEST(Reading, WhatNothingUsesIsLeftOutAndOrderOfDefinitionIsFree) {
   EXPECT_EQ(digest_of(one), digest_of(other));
 }
 
-TEST(Reading, DefinesWinOverDefaultsAndDefaultsOverLaterOnes) {
+TEST(Reading, DefinesOverrideDefaultsAndFirstDefaultsWin) {
   const std::string text =
       "<scene version=\"3.0.0\"><default name=\"n\" value=\"3\"/><default name=\"n\" value=\"4\"/><default "
       "name=\"nn\" value=\"77\"/>"
@@ -197,7 +197,7 @@ TEST(Reading, DefinesWinOverDefaultsAndDefaultsOverLaterOnes) {
   EXPECT_EQ(must_read(text, {.defines = {{"n", "9"}}}).sample_count, 9u);
 }
 
-TEST(Reading, IncludesBringObjectsAndDefaults) {
+TEST(Reading, IncludesAddObjectsAndDefaults) {
   MemoryAssets assets;
   assets.files["parts/base.xml"] =
       "<scene version=\"3.0.0\"><include filename=\"more.xml\"/><default name=\"spp\" value=\"7\"/></scene>";
@@ -213,7 +213,7 @@ TEST(Reading, IncludesBringObjectsAndDefaults) {
   EXPECT_TRUE(std::holds_alternative<NullBsdf>(read_bsdf(*r.scene, 0)));
 }
 
-TEST(Reading, PathsAreSearchedBeforeTheFolderOfTheScene) {
+TEST(Reading, PathElementsAreSearchedBeforeTheScenesFolder) {
   MemoryAssets assets;
   assets.files["more/mesh.obj"] = "another";
   const auto r = read_scene(
@@ -258,7 +258,7 @@ TEST(Reading, ColoursComeInManyForms) {
                    std::pow((128 / 255. + .055) / 1.055, 2.4));
 }
 
-TEST(Reading, OtherIntegratorsOfTheDialectMapToOurs) {
+TEST(Reading, OtherIntegratorsMapToLightshafts) {
   const auto name = [](const std::string& type) {
     return must_read(with_sensor("<integrator type=\"" + type + "\"/>")).integrator;
   };
@@ -276,7 +276,7 @@ TEST(Reading, OtherIntegratorsOfTheDialectMapToOurs) {
   EXPECT_EQ(wrapped.diagnostics.size(), 1u) << "a warning about the moments";
 }
 
-TEST(Reading, AHomogeneousMediumTakesConstantVolumes) {
+TEST(Reading, HomogeneousMediumAcceptsConstantVolumes) {
   const Scene s = must_read(with_sensor(
       "<volume type=\"constvolume\" id=\"v\"><rgb name=\"value\" value=\"1 2 3\"/></volume>"
       "<shape type=\"cube\"><bsdf type=\"null\"/><medium type=\"homogeneous\" name=\"interior\">"
@@ -288,7 +288,7 @@ TEST(Reading, AHomogeneousMediumTakesConstantVolumes) {
   EXPECT_TRUE(s.volumes.empty());
 }
 
-TEST(Reading, PartsThatNoSensorRefersToChangeNothing) {
+TEST(Reading, UnreferencedPartsOfSensorsChangeNothing) {
   const std::string part =
       "<film type=\"hdrfilm\" id=\"f\"><integer name=\"width\" value=\"99\"/></film>"
       "<sampler type=\"stratified\" id=\"s\"><integer name=\"sample_count\" "
@@ -296,7 +296,7 @@ TEST(Reading, PartsThatNoSensorRefersToChangeNothing) {
   EXPECT_EQ(must_read(with_sensor(part)), must_read(with_sensor("")));
 }
 
-TEST(Reading, ASensorMayBeMirrored) {
+TEST(Reading, SensorMayBeMirrored) {
   const Scene s = must_read(
       "<scene version=\"3.0.0\"><sensor type=\"perspective\"><transform name=\"to_world\">"
       "<scale x=\"-1\"/><lookat origin=\"0,0,1\" target=\"3,1,2\" up=\"0,1,0\"/>"

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/reader/xml_write.h"
+#include "formats/reader/xml_write.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -76,7 +76,7 @@ TEST(ReadInstance, PlacesTheShapesOfAGroup) {
   expect_kept(s);
 }
 
-TEST(ReadInstance, MayStandBeforeItsGroupOrHoldIt) {
+TEST(ReadInstance, MayPrecedeOrContainItsGroup) {
   const std::string instance = R"(<shape type="instance"><ref id="trees"/></shape>)";
   const Scene before = must_read(with_sensor(instance + std::string(kGroup)));
   EXPECT_EQ(before, must_read(with_sensor(std::string(kGroup) + instance)));
@@ -97,14 +97,14 @@ TEST(ReadInstance, KeepsGroupsApartInTheirOrder) {
   expect_kept(s);
 }
 
-TEST(ReadInstance, AGroupThatNothingShowsIsLeftOut) {
+TEST(ReadInstance, UnusedGroupIsLeftOut) {
   const Scene s = must_read(with_sensor(kGroup));
   EXPECT_TRUE(s.shapes.empty());
   EXPECT_TRUE(s.groups.empty());
   EXPECT_TRUE(s.bsdfs.empty());
 }
 
-TEST(ReadInstance, OfAnEmptyGroupIsNothingWithAWarning) {
+TEST(ReadInstance, EmptyGroupIsAWarning) {
   const ReadResult r =
       read(with_sensor(R"(<shape type="shapegroup" id="g"/><shape type="instance"><ref id="g"/></shape>)"));
   ASSERT_TRUE(r.scene);
@@ -141,7 +141,7 @@ TEST(ReadInstance, RefusesWhatMitsubaRefuses) {
 }
 
 // The JSON is one that serialising a scene from the reader never gives.
-TEST(SceneJsonOfGroups, IsRefusedWhereItContradictsItself) {
+TEST(SceneJsonOfGroups, ContradictionIsRefused) {
   const Scene s =
       must_read(with_sensor(std::string(kGroup) + R"(<shape type="instance"><ref id="trees"/></shape>)"));
   const auto error = [](const Scene& wrong) {
@@ -262,11 +262,11 @@ TEST(ReadFilm, CropsToAPartOfTheFrame) {
   EXPECT_EQ(must_read(sensor("perspective", "", crop(-1, -1, 7, -1))).film.image_size(), (FrameSize{7, 10}));
 }
 
-TEST(ReadFilm, ACropOfTheWholeFrameIsNone) {
+TEST(ReadFilm, WholeFrameCropIsNoCrop) {
   EXPECT_EQ(must_read(sensor("perspective", "", crop(0, 0, 20, 10))), must_read(sensor("perspective", "")));
 }
 
-TEST(ReadFilm, RefusesCropsThatAreNotWithinTheFrame) {
+TEST(ReadFilm, RefusesCropsOutsideTheFrame) {
   for (const std::string& bad : {crop(15, 0, 6, 10), crop(0, 8, 20, 3), crop(1, -1, -1, -1), crop(0, 0, 0, 5),
                                  crop(16384, 16384, 16384, 16384), crop(21, 0, 1, 1)})
     EXPECT_THAT(messages(read(sensor("perspective", "", bad))),

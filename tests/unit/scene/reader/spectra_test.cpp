@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/xml/spectrum.h"
+#include "core/scene/spectrum.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -34,7 +34,7 @@ const std::string kRegular =
     "<float name=\"wavelength_min\" value=\"400\"/><float name=\"wavelength_max\" value=\"600\"/>"
     "<string name=\"values\" value=\".1, .3 .2\"/></spectrum>";
 
-TEST(Spectrum, OfPairsIsTheSameAsAnObject) {
+TEST(Spectrum, PairsEqualAnObject) {
   for (const std::string& inside : {"\"irregular\">" + kIrregular, "\"regular\">" + kRegular}) {
     EXPECT_EQ(intensity("<spectrum name=\"intensity\" type=" + inside),
               intensity("<spectrum name=\"intensity\" " + kPairs));
@@ -43,7 +43,7 @@ TEST(Spectrum, OfPairsIsTheSameAsAnObject) {
   }
 }
 
-TEST(Spectrum, ThatIsSharedIsSeenByItsUse) {
+TEST(Spectrum, SharedSpectrumDependsOnItsUse) {
   const Scene s = must_read(with_sensor(
       "<spectrum id=\"s\" type=\"irregular\">" + kIrregular +
       "<emitter type=\"point\"><ref name=\"intensity\" id=\"s\"/></emitter>"
@@ -77,7 +77,7 @@ TEST(Spectrum, BlackbodyIsLightInTheUnitsOfAMedium) {
               HasSubstr("is no light: it can't be a \"blackbody\""));
 }
 
-TEST(Spectrum, ThatIsWrongIsToldOnceWithItsPlace) {
+TEST(Spectrum, ErrorIsReportedOnceWithItsPlace) {
   const auto of = [](const std::string& type, const std::string& inside) {
     return refusal("<emitter type=\"point\"><spectrum name=\"intensity\" type=\"" + type + "\">" + inside +
                    "</spectrum></emitter>");
@@ -116,7 +116,7 @@ TEST(RawConstant, IsOneNumberOrThree) {
               HasSubstr("out of its range"));
 }
 
-TEST(Colour, MayBeATextureThatIsTheSameEverywhere) {
+TEST(Colour, MayBeAConstantTexture) {
   EXPECT_EQ(
       intensity("<texture name=\"intensity\" type=\"uniform\"><float name=\"value\" value=\"3\"/></texture>"),
       (Rgb{3, 3, 3}));
@@ -129,7 +129,7 @@ TEST(Colour, MayBeATextureThatIsTheSameEverywhere) {
 const std::string kMesh = "<shape type=\"ply\"><string name=\"filename\" value=\"mesh.ply\"/></shape>";
 const std::string kOther = "<shape type=\"obj\"><string name=\"filename\" value=\"mesh.obj\"/></shape>";
 
-TEST(Merge, IsItsShapes) {
+TEST(Merge, MergedShapesEqualTheirParts) {
   EXPECT_EQ(serialize(must_read(with_sensor("<shape type=\"merge\">" + kMesh + kOther + "</shape>"))),
             serialize(must_read(with_sensor(kMesh + kOther))));
   const std::string instance = "<shape type=\"instance\"><shape type=\"shapegroup\">{}</shape></shape>";
@@ -138,7 +138,7 @@ TEST(Merge, IsItsShapes) {
             serialize(must_read(with_sensor(fmt::format(fmt::runtime(instance), kMesh + kOther)))));
 }
 
-TEST(Merge, IsUsedOnceAndHoldsNoOther) {
+TEST(Merge, MayNotBeNestedOrReused) {
   EXPECT_THAT(refusal("<shape type=\"merge\" id=\"m\">" + kMesh + "</shape><ref id=\"m\"/>"),
               HasSubstr("is used twice"));
   EXPECT_THAT(refusal("<shape type=\"merge\" id=\"m\"><ref id=\"m\"/></shape>"),

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "common/scene/limits.h"
-#include "common/scene/reader/xml_write.h"
-#include "common/scene/schema/traits.h"
+#include "core/scene/limits.h"
+#include "core/scene/schema/traits.h"
+#include "formats/reader/xml_write.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -37,7 +37,7 @@ Rgb surface_colour(const Scene& s, TextureIndex i) {
 constexpr char kDiffuse[] = "<bsdf type=\"diffuse\"/>", kGlass[] = "<bsdf type=\"thindielectric\"/>";
 
 // The expected defaults are those that the plugins of Mitsuba 3.9.1 print.
-TEST(Surfaces, WhatIsNotGivenIsMitsubasDefault) {
+TEST(Surfaces, MissingParametersHaveMitsubasDefaults) {
   const Scene plastic = scene_with_bsdf("<bsdf type=\"plastic\"/>");
   const auto& p = surface_bsdf<PlasticBsdf>(plastic);
   EXPECT_EQ(p.int_ior, 1.49);
@@ -59,7 +59,7 @@ TEST(Surfaces, WhatIsNotGivenIsMitsubasDefault) {
   EXPECT_EQ(surface_colour(mask, surface_bsdf<MaskBsdf>(mask).opacity), (Rgb{.5, .5, .5}));
 }
 
-TEST(Surfaces, RoughGlassTakesOneRoughnessOrTwoAndNamesOfMaterials) {
+TEST(Surfaces, RoughGlassAcceptsOneOrTwoRoughnessesAndMaterialNames) {
   const Scene one = scene_with_bsdf(
       "<bsdf type=\"roughdielectric\"><float name=\"alpha\" value=\".3\"/><string name=\"int_ior\" "
       "value=\"water\"/><string name=\"distribution\" value=\"ggx\"/></bsdf>");
@@ -73,7 +73,7 @@ TEST(Surfaces, RoughGlassTakesOneRoughnessOrTwoAndNamesOfMaterials) {
               HasSubstr("gives both alpha and alpha_u"));
 }
 
-TEST(Surfaces, ADiffuseSheetHasPbrtsDefaultsAndDifftransMitsubas) {
+TEST(Surfaces, DiffuseTransmissionHasPbrtsDefaultsAndDifftransHasMitsubas) {
   const Scene sheet = scene_with_bsdf("<bsdf type=\"diffusetransmission\"/>");
   const auto& s = surface_bsdf<DiffuseTransmissionBsdf>(sheet);
   EXPECT_EQ(surface_colour(sheet, s.reflectance), (Rgb{.25, .25, .25}));
@@ -97,7 +97,7 @@ TEST(Surfaces, ADiffuseSheetHasPbrtsDefaultsAndDifftransMitsubas) {
               HasSubstr("has no parameter 'reflectance'"));
 }
 
-TEST(Surfaces, ASheetSendsOnNoMoreThanAllLight) {
+TEST(Surfaces, SheetReflectsAndTransmitsAtMostAllLight) {
   const auto sheet = [](const char* reflectance, const char* transmittance) {
     return fmt::format(
         "<bsdf type=\"diffusetransmission\"><rgb name=\"reflectance\" value=\"{}\"/><rgb "
@@ -111,7 +111,7 @@ TEST(Surfaces, ASheetSendsOnNoMoreThanAllLight) {
   EXPECT_THAT(surface_error(sheet("0", "2")), HasSubstr("out of its range"));
 }
 
-TEST(Surfaces, ARoughSheetTakesOneRoughnessOrTwo) {
+TEST(Surfaces, RoughSheetAcceptsOneOrTwoRoughnesses) {
   const Scene plain = scene_with_bsdf("<bsdf type=\"roughthindielectric\"/>");
   const auto& p = surface_bsdf<RoughThinDielectricBsdf>(plain);
   EXPECT_EQ(p.int_ior, 1.5046);
@@ -132,7 +132,7 @@ TEST(Surfaces, ARoughSheetTakesOneRoughnessOrTwo) {
               HasSubstr("needs the same roughness both ways"));
 }
 
-TEST(Surfaces, ASheetPassesLightStraightOnIfItMayBeSmooth) {
+TEST(Surfaces, SheetPassesLightStraightOnIfItMayBeSmooth) {
   const auto traits = [](const std::string& alpha) {
     const Scene s = scene_with_bsdf("<bsdf type=\"roughthindielectric\">" + alpha + "</bsdf>");
     return scene::bsdf_traits(s)->at(s.shapes.at(0).bsdf.value);
@@ -156,7 +156,7 @@ TEST(Surfaces, ASheetPassesLightStraightOnIfItMayBeSmooth) {
   EXPECT_FALSE(of_leaf.passes || of_leaf.black_behind);
 }
 
-TEST(Surfaces, AnOpacityTakesAlphaFromItsImageAndOthersStillItsColour) {
+TEST(Surfaces, OpacityReadsTheImagesAlphaWhileOtherUsesReadItsColour) {
   const Scene s = scene_with_bsdf(
       "<bsdf type=\"mask\"><texture type=\"bitmap\" name=\"opacity\" id=\"leaf\"><string name=\"filename\" "
       "value=\"wood.png\"/></texture><bsdf type=\"diffuse\"><ref name=\"reflectance\" "
@@ -183,7 +183,7 @@ TEST(Surfaces, BlendsAreOrderedByNameOrElseByPlace) {
   EXPECT_EQ(deserialize_scene(serialize(named)).value(), named);
 }
 
-TEST(Surfaces, WhatCannotBeNestedIsRefusedWithItsPlace) {
+TEST(Surfaces, ImpossibleNestingIsRefusedWithItsPlace) {
   EXPECT_THAT(surface_error("<bsdf type=\"mask\"/>"), HasSubstr("needs one nested bsdf, not 0"));
   EXPECT_THAT(surface_error(fmt::format("<bsdf type=\"blendbsdf\">{}</bsdf>", kDiffuse)),
               HasSubstr("needs two nested bsdfs, not 1"));
@@ -202,7 +202,7 @@ TEST(Surfaces, WhatCannotBeNestedIsRefusedWithItsPlace) {
             "");
 }
 
-TEST(Surfaces, ANormalMapHoldsImageAndBsdf) {
+TEST(Surfaces, NormalMapContainsImageAndBsdf) {
   const Scene s = scene_with_bsdf(
       "<bsdf type=\"twosided\"><bsdf type=\"normalmap\"><texture type=\"bitmap\" name=\"normalmap\"><boolean "
       "name=\"raw\" value=\"true\"/><string name=\"filename\" value=\"wood.png\"/></texture><bsdf "
@@ -227,7 +227,7 @@ std::string masks(int count) {
   return s;
 }
 
-TEST(Surfaces, NestOnlySoDeep) {
+TEST(Surfaces, NestingIsLimited) {
   EXPECT_EQ(surface_error(masks(scene::kMaxBsdfNesting - 1)), "");
   EXPECT_THAT(surface_error(masks(scene::kMaxBsdfNesting)), HasSubstr("bsdfs are nested more than 8 deep"));
   // The limit also holds for canonical JSON.
@@ -239,7 +239,7 @@ TEST(Surfaces, NestOnlySoDeep) {
   EXPECT_THAT(deserialize_scene(serialize(s)).error().message, HasSubstr("circle"));
 }
 
-TEST(Surfaces, TraitsFollowFromWhatIsContained) {
+TEST(Surfaces, TraitsDeriveFromNestedSurfaces) {
   Scene s;
   s.textures = {ConstantTexture{}};
   s.bsdfs = {DiffuseBsdf{},      RoughDielectricBsdf{},  BlendBsdf{{0}, {0}, {1}},
@@ -277,7 +277,7 @@ TEST(Surfaces, PrincipledHasMitsubasDefaults) {
               HasSubstr("gives both eta and specular"));
 }
 
-TEST(Surfaces, ACoatedConductorHasASmoothCoatAndAMetalThatReflectsAll) {
+TEST(Surfaces, CoatedConductorDefaultsToASmoothCoatAndAPerfectMirror) {
   const Scene plain = scene_with_bsdf("<bsdf type=\"coatedconductor\"/>");
   const auto& p = surface_bsdf<CoatedConductorBsdf>(plain);
   EXPECT_EQ(p.int_ior, 1.49);
@@ -301,7 +301,7 @@ TEST(Surfaces, ACoatedConductorHasASmoothCoatAndAMetalThatReflectsAll) {
   EXPECT_EQ(must_read(write_xml(given)), given);
 }
 
-TEST(Surfaces, ACoatedConductorRefusesWhatCannotBe) {
+TEST(Surfaces, CoatedConductorRefusesInvalidParameters) {
   const auto error = [](const char* parameters) {
     return surface_error(fmt::format("<bsdf type=\"coatedconductor\">{}</bsdf>", parameters));
   };
@@ -323,7 +323,7 @@ TEST(Surfaces, PrincipledIsTwoSidedOnlyByItsGlass) {
               HasSubstr("has two sides of its own"));
 }
 
-TEST(Surfaces, ABumpMapTakesItsTextureUnderAnyName) {
+TEST(Surfaces, BumpMapAcceptsItsTextureUnderAnyName) {
   const std::string image =
       "<string name=\"filename\" value=\"wood.png\"/><boolean name=\"raw\" value=\"true\"/></texture>";
   for (const char* name : {"", " name=\"texture\"", " name=\"arbitrary\""}) {
@@ -338,7 +338,7 @@ TEST(Surfaces, ABumpMapTakesItsTextureUnderAnyName) {
   }
 }
 
-TEST(Surfaces, ABumpMapNeedsABitmapAndOneBsdf) {
+TEST(Surfaces, BumpMapNeedsABitmapAndOneBsdf) {
   EXPECT_THAT(surface_error(fmt::format("<bsdf type=\"bumpmap\">{}</bsdf>", kDiffuse)),
               HasSubstr("needs a texture \"bitmap\""));
   EXPECT_THAT(surface_error(

@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/diagnostic.h"
+#include "core/scene/diagnostic.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -12,7 +12,7 @@ using ::testing::HasSubstr;
 
 std::string shape(const std::string& inside) { return "<shape type=\"sphere\">" + inside + "</shape>"; }
 
-TEST(Warnings, MeaninglessParametersAreWarningsAndErrorsWhenStrict) {
+TEST(Warnings, ParametersWithoutEffectAreWarningsAndErrorsWhenStrict) {
   const std::string text =
       with_sensor("<bsdf type=\"roughplastic\"><boolean name=\"sample_visible\" value=\"true\"/></bsdf>");
   const auto r = read(text);
@@ -27,7 +27,7 @@ TEST(Warnings, MeaninglessParametersAreWarningsAndErrorsWhenStrict) {
   EXPECT_EQ(strict.diagnostics.at(0).severity, Diagnostic::Severity::error);
 }
 
-TEST(Warnings, ARoughnessOfZeroIsTheLeast) {
+TEST(Warnings, ZeroRoughnessBecomesTheMinimum) {
   const std::string checks =
       "<texture name=\"alpha\" type=\"checkerboard\"><float name=\"color0\" value=\"0\"/><float "
       "name=\"color1\" "
@@ -46,7 +46,7 @@ TEST(Warnings, ARoughnessOfZeroIsTheLeast) {
   }
 }
 
-TEST(Warnings, FieldsWithoutEffectAreToldOf) {
+TEST(Warnings, FieldsWithoutEffectCauseAWarning) {
   const struct {
     std::string sensor, objects, said;
   } rows[] = {
@@ -70,7 +70,7 @@ TEST(Warnings, FieldsWithoutEffectAreToldOf) {
                   .diagnostics.empty());
 }
 
-TEST(Warnings, WhatADefinePutsInMustBeText) {
+TEST(Warnings, DefinedValuesMustBeText) {
   const std::string text = with_sensor("<default name=\"f\" value=\"b\"/><bsdf type=\"null\" id=\"$f\"/>");
   EXPECT_TRUE(read(text, {.defines = {{"f", "ä b"}}}).scene);
   for (const char* bad : {"\xff", "a\x1b[2J", "\xed\xa0\x80"}) {
@@ -81,7 +81,7 @@ TEST(Warnings, WhatADefinePutsInMustBeText) {
   }
 }
 
-TEST(Warnings, DefinesThatNothingAsksForAreWarnedAbout) {
+TEST(Warnings, UnusedDefinesCauseAWarning) {
   const std::string used =
       "<default name=\"radius\" value=\"1\"/>" + shape("<float name=\"radius\" value=\"$radius\"/>");
   EXPECT_TRUE(read(with_sensor(used), {.defines = {{"radius", "2"}}}).diagnostics.empty());
@@ -102,7 +102,7 @@ TEST(Warnings, DefinesThatNothingAsksForAreWarnedAbout) {
               HasSubstr("asks for $n"));
 }
 
-TEST(Warnings, IntegratorsThatAreReadAsOthersSaySo) {
+TEST(Warnings, SubstitutedIntegratorsCauseAWarning) {
   const auto read_integrator = [](const std::string& inside) { return read(with_sensor(inside)); };
   const auto mlt = read_integrator(
       "<integrator type=\"mlt\"><integer name=\"max_depth\" value=\"7\"/><integer "
@@ -125,7 +125,7 @@ TEST(Warnings, IntegratorsThatAreReadAsOthersSaySo) {
   }
 }
 
-TEST(Warnings, SamplersOfOtherNamesGiveANumberOnly) {
+TEST(Warnings, OtherSamplersOnlyGiveTheSampleCount) {
   const auto r = read(
       "<scene version=\"3.0.0\"><sensor type=\"perspective\"><sampler type=\"multijitter\"><integer "
       "name=\"sample_count\" value=\"9\"/></sampler></sensor></scene>");
@@ -136,7 +136,7 @@ TEST(Warnings, SamplersOfOtherNamesGiveANumberOnly) {
               HasSubstr("of sampler \"multijitter\" only the number of samples is used"));
 }
 
-TEST(Warnings, AMediumBehindAnOpaqueDefaultIsWarnedAbout) {
+TEST(Warnings, MediumBehindAnOpaqueDefaultIsAWarning) {
   const auto r =
       read(with_sensor("<medium type=\"homogeneous\" id=\"m\"/><shape type=\"cube\"><ref name=\"interior\" "
                        "id=\"m\"/></shape>"));
@@ -145,7 +145,7 @@ TEST(Warnings, AMediumBehindAnOpaqueDefaultIsWarnedAbout) {
 }
 
 // The camera of kSensor is at the origin.
-TEST(Warnings, TellOfACameraInAMediumThatItsSensorDoesNotName) {
+TEST(Warnings, CameraInAnUnnamedMediumCausesAWarning) {
   const std::string fog = "<medium type=\"homogeneous\" id=\"fog\"/>";
   const auto body = [](const std::string& type, const std::string& inside, const std::string& to_world) {
     return "<shape type=\"" + type + "\"><bsdf type=\"null\"/><ref name=\"" + inside +
@@ -189,7 +189,7 @@ TEST(Warnings, FiltersOfNegativeLobesBecomeGaussians) {
 }
 
 // Mitsuba 3 takes a homogeneous medium whose albedo is a grid: its density has no bounds.
-TEST(Warnings, AHomogeneousMediumMayHaveAGridOfAlbedos) {
+TEST(Warnings, HomogeneousMediumMayHaveAGridOfAlbedos) {
   const auto with = [](std::string_view sigma_t) {
     return read(with_sensor(fmt::format(R"(
 <volume type="gridvolume" id="a"><string name="filename" value="cloud.vol"/></volume>

@@ -1,5 +1,5 @@
 // Written XML reads back to an equal scene.
-#include "common/scene/reader/xml_write.h"
+#include "formats/reader/xml_write.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <limits>
 #include <random>
 
-#include "common/scene/schema/describe_fields.h"
+#include "core/scene/schema/describe_fields.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -36,7 +36,7 @@ TEST(XmlWrite, ReadsBackToTheSameScene) {
       must_read("<scene version=\"0.5.0\"><sensor type=\"perspective\"/><shape type=\"sphere\"/></scene>"));
 }
 
-TEST(XmlWrite, KeepsWhatIsSharedAndWhatIsOnlyAlike) {
+TEST(XmlWrite, KeepsSharedAndMerelyEqualObjects) {
   const std::string shared = proven(must_read(with_sensor(R"(
     <texture type="uniform" id="grey"><float name="value" value="0.3"/></texture>
     <bsdf type="diffuse" id="wall"><ref name="reflectance" id="grey"/></bsdf>
@@ -56,7 +56,7 @@ TEST(XmlWrite, KeepsWhatIsSharedAndWhatIsOnlyAlike) {
   EXPECT_THAT(alike, HasSubstr("id=\"bsdf3\""));
 }
 
-TEST(XmlWrite, KeepsFileNamesWithCharactersThatMeanSomethingInXml) {
+TEST(XmlWrite, EscapesSpecialCharactersInFileNames) {
   Scene s = must_read(kExample);
   MemoryAssets assets;
   for (Asset& a : s.assets) {
@@ -69,7 +69,7 @@ TEST(XmlWrite, KeepsFileNamesWithCharactersThatMeanSomethingInXml) {
   EXPECT_EQ(*again.scene, s);
 }
 
-TEST(XmlWrite, KeepsAFileThatIsNamedInTwoWays) {
+TEST(XmlWrite, KeepsAFileWithTwoNames) {
   const Scene s = must_read(with_sensor(
       R"(<shape type="obj"><string name="filename" value="mesh.obj"/></shape>
          <shape type="obj"><string name="filename" value="./mesh.obj"/></shape>
@@ -149,7 +149,7 @@ TEST(XmlWrite, KeepsEveryBitOfEveryValue) {
   }
 }
 
-TEST(XmlWrite, KeepsAFalloffThatIsAboutNothing) {
+TEST(XmlWrite, KeepsAZeroFalloff) {
   const Scene s = must_read(with_sensor(
       R"(<shape type="disk"><emitter type="area"><float name="cutoff_angle" value="90"/>
          <float name="beam_width" value="90"/><float name="falloff" value="3"/></emitter></shape>)"));
@@ -157,7 +157,7 @@ TEST(XmlWrite, KeepsAFalloffThatIsAboutNothing) {
   proven(s);
 }
 
-TEST(XmlWrite, TellsAPinholeFromALens) {
+TEST(XmlWrite, DistinguishesAPinholeFromALens) {
   Scene s = must_read(with_sensor(""));
   EXPECT_THAT(proven(s), HasSubstr("<sensor type=\"perspective\">"));
   s.sensor.focus_distance = 7;
@@ -167,7 +167,7 @@ TEST(XmlWrite, TellsAPinholeFromALens) {
 }
 
 // Mitsuba 3 takes an <rgb> in place of a volume for a reflectance, and refuses values above 1.
-TEST(XmlWrite, WritesColoursOfMediaAsMitsubaTakesThem) {
+TEST(XmlWrite, WritesColoursOfMediaInAFormThatMitsubaReads) {
   const auto medium = [](std::string_view type, std::string_view colour) {
     return proven(must_read(with_sensor(fmt::format(
         R"(<medium type="{}" id="m"><rgb name="sigma_t" value="{}"/></medium>
@@ -181,7 +181,7 @@ TEST(XmlWrite, WritesColoursOfMediaAsMitsubaTakesThem) {
   }
 }
 
-TEST(XmlWrite, WritesNoDefaultsThatMitsubaDoesNotKnow) {
+TEST(XmlWrite, OmitsDefaultsUnknownToMitsuba) {
   const std::string text = proven(must_read(
       R"(<scene version="3.0.0"><sensor type="thinlens"><float name="aperture_radius" value="0.1"/>
 <film type="hdrfilm"><rfilter type="box"/></film></sensor></scene>)"));
@@ -190,7 +190,7 @@ TEST(XmlWrite, WritesNoDefaultsThatMitsubaDoesNotKnow) {
   EXPECT_THAT(text, HasSubstr("<rfilter type=\"box\"/>"));
 }
 
-TEST(XmlWrite, SaysWhatOnlyLightshaftReads) {
+TEST(XmlWrite, ReportsFeaturesThatOnlyLightshaftReads) {
   const auto ours = [](const std::string& objects) {
     return write_scene(must_read(with_sensor(objects))).only_ours;
   };

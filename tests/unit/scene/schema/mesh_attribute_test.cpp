@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/scene/reader/xml_write.h"
-#include "common/scene/schema/mesh_attributes.h"
+#include "core/scene/schema/mesh_attributes.h"
+#include "formats/reader/xml_write.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -38,7 +38,7 @@ TEST(MeshAttribute, IsReadWithItsNameAndScale) {
   EXPECT_EQ(must_read(write_xml(s)), s);
 }
 
-TEST(MeshAttribute, SaysHowItIsUsed) {
+TEST(MeshAttribute, ErrorExplainsItsUse) {
   const Scene s = must_read(mesh(
       R"(<bsdf type="blendbsdf">)" + attribute("weight", "vertex_w") + R"(<bsdf type="normalmap">)" +
       attribute("normalmap", "face_n") + R"(<bsdf type="roughconductor">)" + attribute("alpha", "vertex_a") +
@@ -58,7 +58,7 @@ TEST(MeshAttribute, SaysHowItIsUsed) {
                                                     "vertex_c any", "face_l any light"));
 }
 
-TEST(MeshAttribute, OfWhatCanHaveNoneIsRefusedWhereItStands) {
+TEST(MeshAttribute, ShapeWithoutAttributesIsRefusedWithItsPlace) {
   const std::string bsdf = "<bsdf type=\"diffuse\">" + attribute("reflectance", "vertex_color") + "</bsdf>";
   EXPECT_THAT(
       attribute_error(with_sensor("<shape type=\"sphere\">" + bsdf + "</shape>")),
@@ -89,7 +89,7 @@ TEST(MeshAttribute, NeedsANameOfAVertexOrFace) {
 }
 
 // Textures that contain each other occur only in hostile JSON. The search ends nevertheless.
-TEST(MeshAttribute, IsFoundInCirclesToo) {
+TEST(MeshAttribute, IsFoundInCyclicReferences) {
   Scene s;
   s.textures = {CheckerboardTexture{{1}, {2}, {}}, CheckerboardTexture{{0}, {7}, {}},
                 MeshAttributeTexture{"face_a"}};
@@ -120,7 +120,7 @@ TEST(MultipleScattering, ChangesTheDigestOfASceneOnlyWhereItIsOn) {
 }
 
 // A scene has only one JSON text, so a default that the writer leaves out must not be present.
-TEST(MultipleScattering, IsNotWrittenTwoWays) {
+TEST(MultipleScattering, HasOneCanonicalForm) {
   std::string json = serialize(must_read(rough("roughplastic", kOn)));
   const std::size_t at = json.find("\"multiple_scattering\":true");
   ASSERT_NE(at, std::string::npos);

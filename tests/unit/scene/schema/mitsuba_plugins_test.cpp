@@ -1,5 +1,5 @@
 // Compares the table of Mitsuba's plugins with the result of reading each plugin.
-#include "common/scene/schema/mitsuba_plugins.h"
+#include "formats/reader/mitsuba_plugins.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <map>
 #include <set>
 
-#include "common/scene/schema/describe_fields.h"
-#include "common/scene/schema/integrators.h"
+#include "core/scene/schema/describe_fields.h"
+#include "core/scene/schema/integrators.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls::scene {
@@ -29,7 +29,7 @@ std::string scene_with(const PluginRow& row) {
   return with_sensor(object);
 }
 
-TEST(MitsubaPlugins, AreReadOrRefusedForTheirReason) {
+TEST(MitsubaPlugins, AreReadOrRefusedWithTheReasonOfTheTable) {
   for (const PluginRow& row : mitsuba_plugins()) {
     const ReadResult r = read(scene_with(row));
 
@@ -60,7 +60,7 @@ void expect_all_read(std::string_view tag, std::set<std::string_view> internal =
     EXPECT_NE(internal.contains(name), is_read_plugin(tag, name)) << tag << " " << name;
 }
 
-TEST(MitsubaPlugins, ListAllThatTheReaderKnows) {
+TEST(MitsubaPlugins, ListAllPluginsOfTheReader) {
   expect_all_read<Bsdf>("bsdf");
   expect_all_read<Texture>("texture", {"constant"});  // in files it is a colour
   expect_all_read<Emitter>("emitter");
@@ -183,7 +183,7 @@ void ask_all(std::vector<std::string>& wrong, std::type_identity<std::variant<Ki
 
 // If this fails for a new parameter: is_our_parameter() has to say that it is ours, so that `convert` does,
 // or Mitsuba has it, and it belongs into the table above.
-TEST(MitsubaPlugins, ParametersThatOnlyWeHaveAreKnown) {
+TEST(MitsubaPlugins, LightshaftsOwnParametersAreKnown) {
   std::vector<std::string> wrong;
   ask<MeshShape>(wrong, {"obj", "ply", "serialized"});
   ask<IntegratorSettings>(wrong, {"path", "volpath"});

@@ -1,7 +1,7 @@
 // Properties of media and emitters that follow from their parameters.
 #include <gtest/gtest.h>
 
-#include "common/scene/schema/traits.h"
+#include "core/scene/schema/traits.h"
 
 namespace ls::scene {
 namespace {
@@ -10,7 +10,7 @@ constexpr Rgb kBlack{0, 0, 0}, kGrey{.5, .5, .5}, kRed{1, 0, 0};
 constexpr VolumeIndex kZero{0}, kOne{1}, kFile{2}, kColour{3};
 const std::vector<Volume> kVolumes{ConstVolume{kBlack}, ConstVolume{kGrey}, GridVolume{}, ConstVolume{kRed}};
 
-TEST(MediumTraits, AHomogeneousMediumIsKnownByItsCoefficients) {
+TEST(MediumTraits, HomogeneousMediumIsKnownByItsCoefficients) {
   const auto traits = [](const HomogeneousMedium& m) { return traits_of(m, kVolumes); };
 
   EXPECT_TRUE(traits({}).extinguishes);
@@ -26,7 +26,7 @@ TEST(MediumTraits, AHomogeneousMediumIsKnownByItsCoefficients) {
   EXPECT_FALSE(traits({.scale = 0, .source_radiance = kRed}).emits) << "it is multiplied by the absorption";
 }
 
-TEST(MediumTraits, AHeterogeneousMediumIsKnownAsFarAsItsVolumesAreConstant) {
+TEST(MediumTraits, HeterogeneousMediumIsKnownIfItsVolumesAreConstant) {
   const auto traits = [](HeterogeneousMedium m) { return traits_of(m, kVolumes); };
 
   EXPECT_TRUE(traits({kFile, kOne}).extinguishes) << "the file may hold anything";
@@ -46,7 +46,7 @@ TEST(MediumTraits, AHeterogeneousMediumIsKnownAsFarAsItsVolumesAreConstant) {
       << "it is multiplied by the absorption";
 }
 
-TEST(EmitterTraits, SayWhatIsDarkWithoutExtentAndWhere) {
+TEST(EmitterTraits, StateDarknessExtentAndPosition) {
   const std::vector<Texture> textures{ConstantTexture{kBlack}, ConstantTexture{kGrey}};
   const auto traits = [&](const Emitter& e) { return traits_of(e, textures); };
   Transform there;

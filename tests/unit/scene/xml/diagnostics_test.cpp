@@ -1,5 +1,5 @@
 // Every kind of error in a scene file gives a message with its place, and with what to do about it.
-#include "common/scene/diagnostic.h"
+#include "core/scene/diagnostic.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <random>
 
-#include "common/scene/xml/source_text.h"
+#include "formats/xml/source_text.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -26,7 +26,7 @@ void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
 class Wrong : public ::testing::TestWithParam<Case> {};
 
-TEST_P(Wrong, IsToldAtItsPlace) {
+TEST_P(Wrong, ErrorIsReportedAtItsPlace) {
   const auto r = read(with_sensor(GetParam().objects));
 
   EXPECT_FALSE(r.scene);
@@ -55,7 +55,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"UnknownPlugin", "<shape type=\"sphre\"/>", 14,
              "there is no shape \"sphre\"; did you mean 'sphere'?"},
         Case{"UnsupportedPlugin", "<shape type=\"hair\"/>", 14,
-             "the shape \"hair\" is not supported: curves are not rendered"},
+             "the shape \"hair\" is not supported: curves are not supported"},
         Case{"UnknownParameter", shape_xml("<float name=\"raduis\" value=\"1\"/>"), 35,
              "shape \"sphere\" has no parameter 'raduis'; did you mean 'radius'?"},
         Case{"UnknownAttribute", "<shape typ=\"cube\"/>", 8,
@@ -339,7 +339,7 @@ TEST(Diagnostics, LongLinesAreCutAroundThePlace) {
   EXPECT_LT(messages(r).size(), 500u);
 }
 
-TEST(Diagnostics, AreUpToTwentyAtOnce) {
+TEST(Diagnostics, ShowAtMostTwenty) {
   std::string many;
   for (int i = 0; i < 50; ++i)
     many += fmt::format("<shape type=\"sphere\"><float name=\"x{}\" value=\"1\"/></shape>\n", i);
@@ -358,7 +358,7 @@ TEST(Diagnostics, ManyWarningsDoNotHideAnError) {
   EXPECT_LE(r.diagnostics.size(), 20u);
 }
 
-TEST(Diagnostics, TheSceneAsAWholeIsChecked) {
+TEST(Diagnostics, WholeSceneIsChecked) {
   const auto first = [](const std::string& text) {
     const auto r = read(text);
     return r.diagnostics.empty() ? ""

@@ -4,8 +4,8 @@
 
 #include <random>
 
-#include "common/scene/limits.h"
-#include "common/scene/xml/source_text.h"
+#include "core/scene/limits.h"
+#include "formats/xml/source_text.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -13,7 +13,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST(HostileScenes, AnIncludeOfItselfIsRefused) {
+TEST(HostileScenes, SelfIncludeIsRefused) {
   MemoryAssets assets;
   assets.files["a.xml"] = "<scene version=\"3.0.0\"><include filename=\"a.xml\"/></scene>";
   const auto r = read_scene("main.xml", with_sensor("<include filename=\"a.xml\"/>"), assets);
@@ -35,7 +35,7 @@ TEST(HostileScenes, IncludesThatMultiplyAreRefusedEarly) {
   EXPECT_LE(assets.reads, 10 * scene::kMaxIncludes);
 }
 
-TEST(HostileScenes, IncludesAreNotFollowedForever) {
+TEST(HostileScenes, IncludeDepthIsLimited) {
   MemoryAssets assets;
   for (int i = 0; i < 40; ++i)
     assets.files[fmt::format("{}.xml", i)] =
@@ -61,7 +61,7 @@ TEST(HostileScenes, EntitiesAreNotExpanded) {
   EXPECT_THAT(first(r), HasSubstr("there is no shape \"&b;\""));
 }
 
-TEST(HostileScenes, ParametersDoNotMultiply) {
+TEST(HostileScenes, NestedParametersDoNotMultiply) {
   std::string text = "<scene version=\"3.0.0\"><default name=\"a\" value=\"aaaaaaaaaa\"/>";
   for (char c = 'b'; c <= 'k'; ++c) {
     std::string tenfold;
@@ -71,7 +71,7 @@ TEST(HostileScenes, ParametersDoNotMultiply) {
   EXPECT_THAT(first(read(text + kSensor + "</scene>")), HasSubstr("longer than"));
 }
 
-TEST(HostileScenes, AnOversizedFileIsRefused) {
+TEST(HostileScenes, OversizedFileIsRefused) {
   const auto r = read(std::string(scene::kMaxTextBytes + 1, ' '));
   EXPECT_THAT(first(r), HasSubstr("limited to 32 MiB"));
 }
@@ -82,7 +82,7 @@ TEST(HostileScenes, TooManyElementsAreRefused) {
   EXPECT_THAT(first(read(text + "</scene>")), HasSubstr("more than 500000 elements"));
 }
 
-TEST(HostileScenes, AnElementWithCountlessAttributesIsRefused) {
+TEST(HostileScenes, ElementWithCountlessAttributesIsRefused) {
   std::string text = "<shape type=\"cube\"";
   for (int i = 0; i < 1'000'000; ++i) text += fmt::format(" a{}=\"\"", i);
   EXPECT_THAT(first(read(with_sensor(text + "/>"))), HasSubstr("<shape> has more than 32 attributes"));
@@ -97,7 +97,7 @@ TEST(HostileScenes, NamesOfParametersAreBounded) {
                   .scene);
 }
 
-TEST(HostileScenes, AnIndexOfLinesStaysSmallBesideATextOfEmptyLines) {
+TEST(HostileScenes, LineIndexOfATextOfEmptyLinesStaysSmall) {
   const std::size_t size = std::size_t{1} << 20;
   const scene::SourceText text("t", std::string(size, '\n'));
   EXPECT_EQ(text.line(size - 1), static_cast<int>(size));
@@ -113,7 +113,7 @@ TEST(HostileScenes, LongChainsOfReferencesAreRefused) {
               HasSubstr("nested more than 64 deep"));
 }
 
-TEST(HostileScenes, ManyPropertiesOfOneObjectTakeNoSquareTime) {
+TEST(HostileScenes, ManyPropertiesTakeLinearTime) {
   std::string text = "<bsdf type=\"diffuse\">";
   for (int i = 0; i < 100'000; ++i) text += fmt::format("<float name=\"n{}\" value=\"1\"/>", i);
   EXPECT_EQ(read(with_sensor(text + "</bsdf>")).diagnostics.size(), scene::kMaxDiagnostics);
@@ -121,7 +121,7 @@ TEST(HostileScenes, ManyPropertiesOfOneObjectTakeNoSquareTime) {
 
 // Damages a good scene at random. It is still read, or refused with a place. A scene that is read is equal
 // after serialisation and reading.
-TEST(HostileScenes, RandomDamageIsAnsweredNeverACrash) {
+TEST(HostileScenes, RandomDamageNeverCrashes) {
   std::mt19937 random(7);
   const auto below = [&](std::size_t n) {
     return std::uniform_int_distribution<std::size_t>(0, n - 1)(random);

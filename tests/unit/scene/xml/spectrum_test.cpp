@@ -1,13 +1,13 @@
 // Compares the colours of spectral curves with published ones.
-#include "common/scene/xml/spectrum.h"
+#include "core/scene/spectrum.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "common/scene/diagnostic.h"
-#include "common/scene/xml/cie.h"
+#include "core/scene/cie.h"
+#include "core/scene/diagnostic.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -85,7 +85,7 @@ TEST(Spectra, NarrowLinesLieOnTheSpectralLocus) {
   }
 }
 
-TEST(Spectra, WhatReflectsAllIsWhiteUnderD65) {
+TEST(Spectra, PerfectReflectorIsWhiteUnderD65) {
   const Rgb white = linear_srgb({{360, 830}, {1, 1}}, Illuminant::d65);
   // The white of BT.709 agrees with D65 in four digits of x and y.
   for (const double part : white) EXPECT_NEAR(part, 1, 1e-3);
@@ -116,7 +116,7 @@ TEST(Spectra, IntegralsAreExactBetweenTheSamples) {
               slack);
 }
 
-TEST(Spectra, BeyondItsEndsACurveIsNothing) {
+TEST(Spectra, CurveIsZeroBeyondItsEnds) {
   const Rgb part = linear_srgb({{400, 700}, {1, 1}}, Illuminant::equal_energy),
             below = linear_srgb({{100, 400}, {1, 1}}, Illuminant::equal_energy),
             above = linear_srgb({{700, 2000}, {1, 1}}, Illuminant::equal_energy),
@@ -131,7 +131,7 @@ TEST(Spectra, BeyondItsEndsACurveIsNothing) {
 // 1000, so its reflectances are 0.1 % too small. It also misses up to half a nanometre at the ends of a
 // curve, which is less than 0.05 % of the integral for ends at 400 and 700 nm.
 constexpr double kMitsubaSum = 1.5e-3;
-TEST(Spectra, AreWhatMitsuba3MakesOfThem) {
+TEST(Spectra, MatchMitsuba3) {
   expect_near(radiance("400:0, 500:8, 600:15.6, 700:18.4"), {20.7108, 10.8546, 2.77115}, kMitsubaSum);
   expect_near(radiance("400:0, 500:0.3, 600:0.8, 700:1.1"), {1.12687, .488194, .0880343}, kMitsubaSum);
   expect_near(radiance("380:1, 780:1"), {1.20478, .948302, .908764}, kMitsubaSum);
@@ -140,14 +140,14 @@ TEST(Spectra, AreWhatMitsuba3MakesOfThem) {
   expect_near(reflectance("360:1, 830:1"), {.998985, .998874, .998802}, kMitsubaSum);
 }
 
-TEST(Spectra, OfLightThatIsEvenAreNotWhiteInMitsuba3) {
+TEST(Spectra, UniformSpectrumIsNotWhiteInMitsuba3) {
   expect_near(radiance("2"), {2.409588, 1.896582, 1.817832}, 1e-6);
   EXPECT_EQ(radiance("2", "0.6.0"), (Rgb{2, 2, 2}));
   EXPECT_EQ(reflectance(".5"), (Rgb{.5, .5, .5}));
 }
 
 // In files of Mitsuba 0.x, curves of reflectances are not multiplied by D65 either.
-TEST(Spectra, OfOldFilesAreSeenWithoutAnIlluminant) {
+TEST(Spectra, OldFilesSpectraHaveNoIlluminant) {
   const std::string curve = "400:0.1, 500:0.2, 600:0.3, 700:0.4";
   expect_near(reflectance(curve, "0.6.0"),
               linear_srgb({{400, 500, 600, 700}, {.1, .2, .3, .4}}, Illuminant::equal_energy), 0);
@@ -155,7 +155,7 @@ TEST(Spectra, OfOldFilesAreSeenWithoutAnIlluminant) {
   EXPECT_NE(reflectance(curve, "3.0.0"), radiance(curve));
 }
 
-TEST(Spectra, OutsideOfWhatCanBeAreCutOffWithAWarning) {
+TEST(Spectra, ImpossibleValuesAreClampedWithAWarning) {
   const auto r =
       read(with_sensor("<shape type=\"cube\"><bsdf type=\"diffuse\"><spectrum name=\"reflectance\" "
                        "value=\"500:1, 540:1\"/></bsdf></shape>"));
@@ -168,7 +168,7 @@ TEST(Spectra, OutsideOfWhatCanBeAreCutOffWithAWarning) {
   EXPECT_GT(c[1], .3);
 }
 
-TEST(Spectra, ThatAreNoCurvesAreToldWhy) {
+TEST(Spectra, InvalidCurvesAreRefusedWithTheReason) {
   const auto said = [](const std::string& attributes) {
     return messages(read(with_sensor("<emitter type=\"constant\"><spectrum name=\"radiance\" " + attributes +
                                      "/></emitter>")));

@@ -1,4 +1,4 @@
-#include "common/scene/xml/transform_element.h"
+#include "formats/xml/transform_element.h"
 
 #include <gtest/gtest.h>
 
@@ -49,13 +49,13 @@ TEST(Transforms, LookatSeesAlongPlusZWithPlusXToTheLeft) {
                 {-1, 0, 0, 1, 0, 1, 0, 2, 0, 0, -1, 3, 0, 0, 0, 1});
 }
 
-TEST(Transforms, MatricesAreRowByRow) {
+TEST(Transforms, MatricesAreRowMajor) {
   EXPECT_EQ(of("<matrix value=\"1 2 3, 4 5 6, 7 8 10\"/>").m,
             (std::array<double, 16>{1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 10, 0, 0, 0, 0, 1}));
   EXPECT_EQ(of("<matrix value=\"1,0,0,9,0,1,0,8,0,0,1,7,0,0,0,1\"/>").m[7], 8);
 }
 
-TEST(Transforms, WithoutAFiniteInverseAreRefused) {
+TEST(Transforms, SingularTransformsAreRefused) {
   const auto made = [](double x, double y, double z, double move) {
     return Transform{{x, 0, 0, move, 0, y, 0, 0, 0, 0, z, 0, 0, 0, 0, 1}};
   };
@@ -71,7 +71,7 @@ TEST(Transforms, WithoutAFiniteInverseAreRefused) {
             0u);
 }
 
-TEST(Transforms, AnAxisThatMitsubaWouldShearByIsWarnedAbout) {
+TEST(Transforms, RotationAxisThatMitsubaWouldShearIsAWarning) {
   const auto warnings = [](const std::string& step) {
     return read(with_sensor("<shape type=\"cube\"><transform name=\"to_world\">" + step +
                             "</transform></shape>"))
@@ -87,7 +87,7 @@ TEST(Transforms, AnAxisThatMitsubaWouldShearByIsWarnedAbout) {
 
 // The expected matrix is that of Mitsuba 3.9.1 for the same steps (scalar_rgb, in single precision; the axis
 // has length 1). The rounding of its four products of terms up to 4 is at most 4 x 4 x 4 x 2^-24 = 4e-6.
-TEST(Transforms, AgreeWithMitsubaOnAMixture) {
+TEST(Transforms, MatchMitsubaOnAMixture) {
   const Transform t =
       of("<scale x=\"2\" y=\"3\" z=\".5\"/><rotate x=\".48\" y=\".6\" z=\"-.64\" angle=\"33\"/><translate "
          "value=\"1,-2,.25\"/>"

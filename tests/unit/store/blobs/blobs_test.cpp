@@ -22,7 +22,7 @@ std::size_t files_under(const std::filesystem::path& folder) {
   return n;
 }
 
-TEST(DiskBlobs, KeepsWhatWasPutAndReadsRanges) {
+TEST(DiskBlobs, StoresBlobsAndReadsRanges) {
   TempFolder dir;
   auto blobs = DiskBlobs::open(dir.path()).value();
   const Digest name = sha256("sunlight through steam");
@@ -51,7 +51,7 @@ TEST(DiskBlobs, RefusesBytesOfAnotherDigestAndLeavesNothing) {
   EXPECT_EQ(files_under(dir.path()), 0u);
 }
 
-TEST(DiskBlobs, AnAbandonedUploadLeavesNothingAndAnUnfinishedOneIsInvisible) {
+TEST(DiskBlobs, AbandonedUploadLeavesNothingAndUnfinishedUploadIsInvisible) {
   TempFolder dir;
   auto blobs = DiskBlobs::open(dir.path()).value();
   {
@@ -63,7 +63,7 @@ TEST(DiskBlobs, AnAbandonedUploadLeavesNothingAndAnUnfinishedOneIsInvisible) {
   EXPECT_EQ(files_under(dir.path()), 0u);
 }
 
-TEST(DiskBlobs, RemovesWhatAnEarlierProcessLeftHalfWritten) {
+TEST(DiskBlobs, RemovesHalfWrittenFilesOfAnEarlierProcess) {
   TempFolder dir;
   ASSERT_TRUE(DiskBlobs::open(dir.path()));
   std::ofstream(dir.path() / "tmp" / "left.over") << "half";
@@ -73,7 +73,7 @@ TEST(DiskBlobs, RemovesWhatAnEarlierProcessLeftHalfWritten) {
   EXPECT_EQ(files_under(dir.path()), 0u);
 }
 
-TEST(DiskBlobs, GoesOnWithAnUploadInPartsAfterARestart) {
+TEST(DiskBlobs, ContinuesAnUploadInPartsAfterARestart) {
   TempFolder dir;
   const Digest name = sha256("sunlight through steam");
   {
@@ -95,7 +95,7 @@ TEST(DiskBlobs, GoesOnWithAnUploadInPartsAfterARestart) {
   EXPECT_EQ(files_under(dir.path()), 1u);
 }
 
-TEST(DiskBlobs, KeepsNothingOfPartsThatMakeAnotherBlob) {
+TEST(DiskBlobs, DiscardsPartsWithAWrongDigest) {
   TempFolder dir;
   auto blobs = DiskBlobs::open(dir.path()).value();
   ASSERT_TRUE(blobs->resume_upload(sha256("abc"), 0).value()->append(bytes("ab")));
@@ -109,7 +109,7 @@ TEST(DiskBlobs, KeepsNothingOfPartsThatMakeAnotherBlob) {
   EXPECT_EQ(files_under(dir.path()), 0u);
 }
 
-TEST(DiskBlobs, RefusesMoreFromAConnectionThatAnotherOneHasReplaced) {
+TEST(DiskBlobs, RefusesBytesFromAConnectionThatAnotherHasReplaced) {
   TempFolder dir;
   auto blobs = DiskBlobs::open(dir.path()).value();
   auto half_open = blobs->resume_upload(sha256("abc"), 0).value();
@@ -124,7 +124,7 @@ TEST(DiskBlobs, RefusesMoreFromAConnectionThatAnotherOneHasReplaced) {
   EXPECT_TRUE(blobs->has(sha256("abc")));
 }
 
-TEST(DiskBlobs, OfTooManyUnfinishedUploadsTheOldestGivesWay) {
+TEST(DiskBlobs, OldestUnfinishedUploadIsDroppedIfThereAreTooMany) {
   const TempFolder dir;
   const auto blobs = DiskBlobs::open(dir.path()).value();
   const auto part = [&](std::size_t i) { return sha256("part " + std::to_string(i)); };
@@ -143,7 +143,7 @@ TEST(DiskBlobs, OfTooManyUnfinishedUploadsTheOldestGivesWay) {
 }
 
 // The folder of the blob is a symbolic link to itself, since root may read any folder.
-TEST(DiskBlobs, ADiskThatCannotBeLookedAtIsNoAnswer) {
+TEST(DiskBlobs, UnreadableDiskIsAnErrorNotAMissingBlob) {
   const TempFolder dir;
   const auto blobs = DiskBlobs::open(dir.path()).value();
   const Digest digest = sha256("a blob");
@@ -210,7 +210,7 @@ TEST(DataFolder, IsLockedForOneCoordinator) {
   EXPECT_TRUE(lock_folder(dir.path()));
 }
 
-TEST(WriteAtomically, SaysThatTheDiskIsFull) {
+TEST(WriteAtomically, ReportsAFullDisk) {
   // /dev/full refuses every write with ENOSPC.
   auto file = File::open("/dev/full", 1 /* O_WRONLY */).value();
   const auto written = write_all(file, bytes("x"), "/dev/full");

@@ -24,7 +24,7 @@ struct Collection : ::testing::Test {
   CollectedBlobs::Swept sweep(const std::set<Digest>& needed = {}) { return blobs.sweep(needed).value(); }
 };
 
-TEST_F(Collection, RemovesWhatNoJobNeedsAfterItsTimeAndKeepsWhatOneDoes) {
+TEST_F(Collection, RemovesUnneededBlobsAfterTheirTimeAndKeepsNeededOnes) {
   const Digest stray = put("stray"), used = put("used");
 
   EXPECT_EQ(sweep({used}).blobs, 0u);
@@ -37,7 +37,7 @@ TEST_F(Collection, RemovesWhatNoJobNeedsAfterItsTimeAndKeepsWhatOneDoes) {
   EXPECT_TRUE(disk->has(used));
 }
 
-TEST_F(Collection, BeginsItsTimeAnewWhenTheLastJobGoes) {
+TEST_F(Collection, RemovalOfTheLastJobRestartsTheTime) {
   const Digest file = put("grid");
   sweep({file});
   clock->advance(std::chrono::hours(100));
@@ -47,7 +47,7 @@ TEST_F(Collection, BeginsItsTimeAnewWhenTheLastJobGoes) {
   EXPECT_EQ(sweep().blobs, 1u);
 }
 
-TEST_F(Collection, BeginsItsTimeAnewWhenSomebodyAsksForTheBlob) {
+TEST_F(Collection, RequestForABlobRestartsItsTime) {
   const Digest file = put("grid");
   sweep();
   clock->advance(std::chrono::hours(23));
@@ -59,7 +59,7 @@ TEST_F(Collection, BeginsItsTimeAnewWhenSomebodyAsksForTheBlob) {
   EXPECT_TRUE(disk->has(file));
 }
 
-TEST_F(Collection, RemovesNothingWhileASubmissionIsUnderWay) {
+TEST_F(Collection, RemovesNothingDuringASubmission) {
   const Digest file = put("grid");
   sweep();
   clock->advance(std::chrono::hours(48));
@@ -71,7 +71,7 @@ TEST_F(Collection, RemovesNothingWhileASubmissionIsUnderWay) {
   EXPECT_EQ(sweep().blobs, 1u);
 }
 
-TEST_F(Collection, RemovesUnfinishedUploadsAfterADayAlsoWhereBlobsStayForGood) {
+TEST_F(Collection, RemovesUnfinishedUploadsAfterADayEvenWhereBlobsAreKeptForEver) {
   CollectedBlobs for_good{disk, clock, std::nullopt};
   const Digest stray = put("stray"), part = sha256("abc");
   ASSERT_TRUE(for_good.resume_upload(part, 0).value()->append(collected_bytes("a")));

@@ -38,7 +38,7 @@ struct DamagedBlobs : ::testing::Test {
   }
 };
 
-TEST_F(DamagedBlobs, AreNotReadAndTheErrorSaysWhichWhereAndWhatToDo) {
+TEST_F(DamagedBlobs, AreRefusedWithAnErrorThatSaysWhichAndWhatToDo) {
   damage();
 
   const auto read = blobs->read(kName, 0, 100);
@@ -49,13 +49,13 @@ TEST_F(DamagedBlobs, AreNotReadAndTheErrorSaysWhichWhereAndWhatToDo) {
                                           HasSubstr("damaged"), HasSubstr("upload the file again")));
 }
 
-TEST_F(DamagedBlobs, AreFoundBeforeTheFirstPieceOfThemIsRead) {
+TEST_F(DamagedBlobs, AreFoundBeforeTheirFirstPieceIsRead) {
   damage();
 
   EXPECT_EQ(blobs->read(kName, 10, 5).error().code, Errc::failed_precondition);
 }
 
-TEST_F(DamagedBlobs, AreFoundAlsoByAProcessThatReadThemWhenTheyWereRight) {
+TEST_F(DamagedBlobs, AreFoundEvenByAProcessThatReadThemBeforeTheDamage) {
   ASSERT_TRUE(blobs->read(kName, 0, 5));
   ASSERT_TRUE(blobs->prove(kName));
 
@@ -82,7 +82,7 @@ TEST_F(DamagedBlobs, CountAsMissingAndAreMovedAside) {
   EXPECT_TRUE(std::filesystem::exists(aside()));
 }
 
-TEST_F(DamagedBlobs, AreRepairedByTheRightBytesAlsoBeforeAnybodyHasFoundThem) {
+TEST_F(DamagedBlobs, UploadRepairsThemEvenBeforeTheDamageIsDetected) {
   damage();
 
   ASSERT_TRUE(blobs->put(kName, damaged_bytes(kText)));
@@ -103,7 +103,7 @@ TEST_F(DamagedBlobs, AreRepairedByAnUploadInParts) {
   EXPECT_FALSE(std::filesystem::exists(aside()));
 }
 
-TEST_F(DamagedBlobs, AreFoundWhereTheyWereCutShort) {
+TEST_F(DamagedBlobs, TruncatedBlobsAreFound) {
   std::filesystem::resize_file(blobs->path(kName), 5);
 
   EXPECT_EQ(blobs->read(kName, 0, 100).error().code, Errc::failed_precondition);

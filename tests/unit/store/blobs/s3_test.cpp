@@ -17,14 +17,14 @@ TEST(S3Address, IsReadFromAUrl) {
   EXPECT_EQ(address->shown(), "s3://farm-1/scenes/v2 at http://minio:9000");
 }
 
-TEST(S3Address, WithoutAnEndpointIsAmazonsOfTheRegion) {
+TEST(S3Address, DefaultsToAmazonsEndpointOfTheRegion) {
   const auto address = parse_s3_url("s3://farm?region=eu-central-1");
   ASSERT_TRUE(address);
   EXPECT_EQ(address->prefix, "");
   EXPECT_EQ(address->endpoint, "https://s3.eu-central-1.amazonaws.com");
 }
 
-TEST(S3Address, SaysHowLargePartsAreAndHowMuchStaysHere) {
+TEST(S3Address, ReadsPartSizeAndCacheSize) {
   const auto plain = parse_s3_url("s3://farm/scenes"),
              told = parse_s3_url("s3://farm?part-mib=5&copies-mib=2048");
   ASSERT_TRUE(plain && told);
@@ -34,7 +34,7 @@ TEST(S3Address, SaysHowLargePartsAreAndHowMuchStaysHere) {
   EXPECT_EQ(told->copies_bytes, std::uint64_t{2} << 30);
 }
 
-TEST(S3Address, WhatCannotBeOneIsRefusedByName) {
+TEST(S3Address, InvalidAddressIsRefusedByName) {
   for (const char* url :
        {"s3:/farm", "s3://", "s3://x", "s3://farm//a", "s3://farm/a b", "s3://farm/../other",
         "s3://farm/a%2F", "s3://farm?endpoint=ftp://x", "s3://farm?endpoint=http://x\r\nHost: y",
@@ -51,7 +51,7 @@ TEST(S3Address, WhatCannotBeOneIsRefusedByName) {
 using Digests = std::vector<Digest>;
 const Digest a = sha256("a"), b = sha256("b"), c = sha256("c");
 
-TEST(LocalCopies, TheOneNotUsedForTheLongestTimeGoesFirst) {
+TEST(LocalCopies, LeastRecentlyUsedCopyIsRemovedFirst) {
   LocalCopies copies(100);
   EXPECT_EQ(copies.used(a, 40), Digests{});
   EXPECT_EQ(copies.used(b, 60), Digests{});
@@ -62,7 +62,7 @@ TEST(LocalCopies, TheOneNotUsedForTheLongestTimeGoesFirst) {
   EXPECT_EQ(copies.bytes(), 90u);
 }
 
-TEST(LocalCopies, OneThatIsTooLargeByItselfStaysAlone) {
+TEST(LocalCopies, SingleOversizedCopyIsKept) {
   LocalCopies copies(100);
   copies.used(a, 40);
   copies.used(b, 40);
@@ -71,7 +71,7 @@ TEST(LocalCopies, OneThatIsTooLargeByItselfStaysAlone) {
   EXPECT_EQ(copies.used(a, 40), Digests{c});
 }
 
-TEST(LocalCopies, CountEachOnceAndNotWhatIsGone) {
+TEST(LocalCopies, CountEachCopyOnceAndNoRemovedOnes) {
   LocalCopies copies(100);
   for (int i = 0; i < 10; ++i) EXPECT_EQ(copies.used(a, 60), Digests{});
   copies.gone(a);
@@ -81,7 +81,7 @@ TEST(LocalCopies, CountEachOnceAndNotWhatIsGone) {
   EXPECT_EQ(copies.used(c, 100), Digests{});
 }
 
-TEST(LocalCopies, WithoutABoundAllStay) {
+TEST(LocalCopies, WithoutALimitAllAreKept) {
   LocalCopies copies(0);
   EXPECT_EQ(copies.used(a, 1ull << 60), Digests{});
   EXPECT_EQ(copies.used(b, 1ull << 60), Digests{});

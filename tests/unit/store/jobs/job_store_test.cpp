@@ -11,7 +11,7 @@
 namespace ls::coordinator {
 namespace {
 
-TEST(StoredJob, IsTheSameAfterJson) {
+TEST(StoredJob, RoundTripsThroughJson) {
   const StoredJob job = sample_job("j-1");
   EXPECT_EQ(parse_stored_job(to_json(job)).value(), job);
 }
@@ -21,7 +21,7 @@ TEST(StoredJob, RefusesDamagedJson) {
   EXPECT_FALSE(parse_stored_job("{}"));
 }
 
-TEST(StoredJob, RefusesCountsThatAreNone) {
+TEST(StoredJob, RefusesInvalidCounts) {
   const std::string text = to_json(sample_job("j-1"));
   for (const std::string field : {"\"peak_rss_bytes\":", "\"units\":", "\"bytes\":"})
     for (const std::string wrong : {"184467440737095516160", "-1", "1.5", "true"}) {
@@ -32,7 +32,7 @@ TEST(StoredJob, RefusesCountsThatAreNone) {
     }
 }
 
-TEST(StoredJob, WithASumThatIsInfiniteCanBeReadAgain) {
+TEST(StoredJob, InfiniteSumSurvivesARoundTrip) {
   StoredJob job = sample_job("j-1");
   job.totals.core_seconds = job.totals.time.load = std::numeric_limits<double>::infinity();
 
@@ -43,7 +43,7 @@ TEST(StoredJob, WithASumThatIsInfiniteCanBeReadAgain) {
   EXPECT_EQ(*read, job);
 }
 
-TEST(StoredJob, OfAVersionThatWroteSuchASumAsNullIsRead) {
+TEST(StoredJob, ReadsRecordsWhoseInfiniteSumIsNull) {
   std::string text = to_json(sample_job("j-1"));
   const std::size_t at = text.find("\"core_seconds\":") + 15;
   text.replace(at, text.find(',', at) - at, "null");
@@ -138,7 +138,7 @@ TEST_P(JobStores, CountsUpAndNeverGivesANumberTwice) {
   EXPECT_EQ(store->reserve("events", 1).value(), 105u);
 }
 
-TEST(SqliteJobStore, RemembersOverReopening) {
+TEST(SqliteJobStore, KeepsRecordsAfterReopening) {
   TempFolder dir;
   const auto file = dir.path() / "jobs.sqlite";
   {
@@ -153,7 +153,7 @@ TEST(SqliteJobStore, RemembersOverReopening) {
   EXPECT_EQ(store->reserve("events", 1).value(), 7u);
 }
 
-TEST(SqliteJobStore, SaysThatAFileIsNoDatabase) {
+TEST(SqliteJobStore, ReportsAFileThatIsNotADatabase) {
   TempFolder dir;
   const auto file = dir.path() / "jobs.sqlite";
   FILE* f = std::fopen(file.c_str(), "wb");

@@ -9,7 +9,7 @@ namespace {
 
 const std::vector<JobRestored::Audit> kSome{{7, 3, std::nullopt}, {8, 0, {{{"w-1f"}, sha256("pixels")}}}};
 
-TEST(AuditFile, GivesBackWhatWasWritten) {
+TEST(AuditFile, ReadsBackWhatItWrote) {
   TempFolder dir;
   EXPECT_TRUE(read_audits(dir.path()).empty());
 
@@ -20,7 +20,7 @@ TEST(AuditFile, GivesBackWhatWasWritten) {
   EXPECT_TRUE(read_audits(dir.path()).empty());
 }
 
-TEST(AuditFile, PassesOverLinesThatAreNone) {
+TEST(AuditFile, SkipsMalformedLines) {
   const std::string good = audits_text(kSome);
   for (const char* bad : {"", "7", "x 3", "7 3 w-1f", "7 3 w-1f 12", "-1 -1 -1", "7 3 w-1f zz more"})
     EXPECT_EQ(parse_audits(std::string(bad) + "\n" + good), kSome) << bad;

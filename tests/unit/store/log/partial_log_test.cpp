@@ -47,7 +47,7 @@ void fill(const std::filesystem::path& dir, std::uint32_t count) {
   ASSERT_TRUE(log->sync());
 }
 
-TEST(PartialLog, CostsNoFileBeforeTheFirstRecord) {
+TEST(PartialLog, MakesNoFileBeforeTheFirstRecord) {
   TempFolder dir;
   const auto folder = dir.path() / "job";
   const auto log = PartialLog::open(folder).value();
@@ -122,7 +122,7 @@ TEST(PartialLog, FindsEveryRecordAfterReopening) {
   }
 }
 
-TEST(PartialLog, CutsATornTailAtAnyByteAndGoesOn) {
+TEST(PartialLog, CutsATornTailAtAnyByteAndContinues) {
   for (std::uint64_t torn = 1; torn <= kRecordBytes; torn += 61) {
     TempFolder dir;
     fill(dir.path(), 3);
@@ -153,7 +153,7 @@ TEST(PartialLog, CutsARecordWhosePayloadOrHeaderIsDamaged) {
   }
 }
 
-TEST(PartialLog, LeavesRecordsThatTheDiskCannotReadNow) {
+TEST(PartialLog, KeepsRecordsThatTheDiskTemporarilyCannotRead) {
   TempFolder dir;
   fill(dir.path(), 3);
   {
@@ -185,7 +185,7 @@ TEST(PartialLog, VerifiesTheBytesOfASegmentWithoutAnIndex) {
   EXPECT_EQ(PartialLog::open(dir.path()).value()->found().size(), 3u);
 }
 
-TEST(PartialLog, NoticesDamageWhenAPartialIsRead) {
+TEST(PartialLog, DetectsDamageWhenAPartialIsRead) {
   TempFolder dir;
   auto log = PartialLog::open(dir.path()).value();
   const auto place = log->append(record(1), payload(1)).value();
@@ -213,7 +213,7 @@ TEST(PartialLog, LeavesASegmentThatCannotBeSynced) {
   EXPECT_EQ(log->read(*place).value(), payload(1));
 }
 
-TEST(PartialLog, BeginsANewSegmentWhenOneIsFull) {
+TEST(PartialLog, StartsANewSegmentWhenOneIsFull) {
   TempFolder dir;
   const std::size_t big = std::size_t{900} << 10;
   const auto count = static_cast<std::uint32_t>(limits::kMaxSegmentBytes / big + 3);
@@ -227,7 +227,7 @@ TEST(PartialLog, BeginsANewSegmentWhenOneIsFull) {
   EXPECT_EQ(log->read(log->found().back().place).value(), payload(count - 1, big));
 }
 
-TEST(PartialLog, AFullSegmentIsReadFromItsIndexAndWithoutOneFromItself) {
+TEST(PartialLog, FullSegmentIsReadByItsIndexOrElseDirectly) {
   TempFolder dir;
   const std::size_t big = std::size_t{900} << 10;
   const auto count = static_cast<std::uint32_t>(limits::kMaxSegmentBytes / big + 3);

@@ -105,7 +105,7 @@ class RedisStores : public testing::Test {
   test::RedisServer redis_;
 };
 
-TEST_F(RedisStores, GiveBackEverythingToAMachineThatLostItsDisk) {
+TEST_F(RedisStores, RestoreEverythingAfterALostDisk) {
   const StoredJob first = sample_job("j-1"), second = [] {
     StoredJob job = sample_job("a-later-one");
     job.submitted_unix += 1;
@@ -127,7 +127,7 @@ TEST_F(RedisStores, GiveBackEverythingToAMachineThatLostItsDisk) {
   EXPECT_GE(store->reserve("starts", 1).value(), 7u);
 }
 
-TEST_F(RedisStores, TellARedisThatLostItsMemory) {
+TEST_F(RedisStores, RefillAnEmptiedRedis) {
   {
     const auto store = open();
     ASSERT_TRUE(store->put_job(sample_job("j-1")));
@@ -141,7 +141,7 @@ TEST_F(RedisStores, TellARedisThatLostItsMemory) {
   EXPECT_EQ(parse_redis_job(ask({"HGETALL", redis_job_key({"j-1"})})).value().log.at(0).text, "submitted");
 }
 
-TEST_F(RedisStores, NoticeThatAnIdleRedisForgot) {
+TEST_F(RedisStores, DetectThatAnIdleRedisWasEmptied) {
   auto store = open();
   ASSERT_TRUE(store->put_job(sample_job("j-1")));
   ASSERT_TRUE(eventually([&] { return in_redis({"j-1"}).has_value(); }));
@@ -150,7 +150,7 @@ TEST_F(RedisStores, NoticeThatAnIdleRedisForgot) {
   EXPECT_TRUE(in_redis({"j-1"}));
 }
 
-TEST_F(RedisStores, TellAtTheEndThoughTheConnectionBrokeUnnoticed) {
+TEST_F(RedisStores, WriteAtTheEndDespiteABrokenConnection) {
   for (int i = 0; i < 20; ++i) {
     const JobId id{fmt::format("j-{}", i)};
     auto store = open();
@@ -163,7 +163,7 @@ TEST_F(RedisStores, TellAtTheEndThoughTheConnectionBrokeUnnoticed) {
   }
 }
 
-TEST_F(RedisStores, GoOnWithoutRedisAndTellItWhatItMissed) {
+TEST_F(RedisStores, ContinueWithoutRedisAndUpdateItLater) {
   const auto store = open();
   ASSERT_TRUE(store->put_job(sample_job("j-1")));
   redis_.kill();
@@ -175,7 +175,7 @@ TEST_F(RedisStores, GoOnWithoutRedisAndTellItWhatItMissed) {
   EXPECT_FALSE(in_redis({"j-1"}));
 }
 
-TEST_F(RedisStores, SayThatRedisIsAway) {
+TEST_F(RedisStores, ReportThatRedisIsAway) {
   const auto store = open();
   EXPECT_NE(store->status().mirror.find(std::to_string(redis_.port())), std::string::npos);
   redis_.kill();
@@ -186,7 +186,7 @@ TEST_F(RedisStores, SayThatRedisIsAway) {
   EXPECT_TRUE(eventually([&] { return store->status().trouble.empty() && store->status().behind == 0; }));
 }
 
-TEST_F(RedisStores, DoNotBringBackWhatWasRemovedWhileRedisWasAway) {
+TEST_F(RedisStores, DoNotRestoreJobsRemovedWhileRedisWasAway) {
   {
     const auto store = open();
     ASSERT_TRUE(store->put_job(sample_job("j-1")));
@@ -209,7 +209,7 @@ TEST_F(RedisStores, DoNotBringBackWhatWasRemovedWhileRedisWasAway) {
   EXPECT_FALSE(in_redis({"j-1"}));
 }
 
-TEST_F(RedisStores, LeaveALaterRevisionOfAnotherWriterAlone) {
+TEST_F(RedisStores, KeepALaterRevisionOfAnotherWriter) {
   auto store = open();
   ASSERT_TRUE(store->put_job(sample_job("j-1")));
   ASSERT_TRUE(eventually([&] { return in_redis({"j-1"}).has_value(); }));
@@ -225,7 +225,7 @@ TEST_F(RedisStores, LeaveALaterRevisionOfAnotherWriterAlone) {
   EXPECT_EQ(in_redis({"j-1"})->name, "theirs.xml");
 }
 
-TEST_F(RedisStores, TakeTheHigherRevisionAtTheStart) {
+TEST_F(RedisStores, UseTheHigherRevisionAtTheStart) {
   ASSERT_TRUE(open()->put_job(sample_job("j-1")));
   StoredJob later = sample_job("j-1");
   later.revision = 99;
@@ -234,7 +234,7 @@ TEST_F(RedisStores, TakeTheHigherRevisionAtTheStart) {
   EXPECT_EQ(open()->jobs().value().at(0), later);
 }
 
-TEST_F(RedisStores, StartWithoutRedisOnlyWhereTheDiskKnowsJobs) {
+TEST_F(RedisStores, StartWithoutRedisOnlyIfTheDiskHasJobs) {
   redis_.kill();
   const auto refused = try_open();
   ASSERT_FALSE(refused);
@@ -247,7 +247,7 @@ TEST_F(RedisStores, StartWithoutRedisOnlyWhereTheDiskKnowsJobs) {
   EXPECT_EQ(open()->jobs().value().size(), 1u);
 }
 
-TEST_F(RedisStores, LeaveADamagedRecordToPeopleAndTakeTheOthers) {
+TEST_F(RedisStores, KeepADamagedRecordForInspectionAndReadTheOthers) {
   ASSERT_TRUE(open()->put_job(sample_job("j-1")));
   ask({"SADD", kRedisJobs, "j-damaged", "j-of-another", "../../etc"});
   ask({"HSET", redis_job_key({"j-damaged"}), "revision", "3", "record", "{"});
@@ -261,7 +261,7 @@ TEST_F(RedisStores, LeaveADamagedRecordToPeopleAndTakeTheOthers) {
   EXPECT_EQ(ask({"HGET", redis_job_key({"j-damaged"}), "record"}).text, "{");
 }
 
-TEST_F(RedisStores, RememberQuarantinedWorkersThroughTheLossOfEither) {
+TEST_F(RedisStores, KeepQuarantinedWorkersIfEitherStoreIsLost) {
   ASSERT_TRUE(open()->quarantine({{"w-1"}, "evidence"}));
   redis_.kill();
   redis_.start();
@@ -271,7 +271,7 @@ TEST_F(RedisStores, RememberQuarantinedWorkersThroughTheLossOfEither) {
   EXPECT_EQ(open()->quarantined().value(), (std::vector<QuarantinedWorker>{{{"w-1"}, "evidence"}}));
 }
 
-TEST_F(RedisStores, OneThatIsRefusedKeepsNoOtherFromBeingTold) {
+TEST_F(RedisStores, RefusedRecordDoesNotBlockOthers) {
   ask({"SET", redis_job_key({"j-000"}), "of another type"});
   auto store = open();
   for (int i = 0; i < 200; ++i) ASSERT_TRUE(store->put_job(sample_job(fmt::format("j-{:03}", i))));
@@ -298,7 +298,7 @@ struct SharedStores : RedisStores {
   }
 };
 
-TEST_F(SharedStores, WhoIsQuarantinedByOneIsToldToTheOther) {
+TEST_F(SharedStores, QuarantineIsSharedWithOtherCoordinators) {
   const auto a = open_node("a"), b = open_node("b");
 
   ASSERT_TRUE(a->quarantine({{"w-1"}, "evidence"}));
@@ -310,7 +310,7 @@ TEST_F(SharedStores, WhoIsQuarantinedByOneIsToldToTheOther) {
   EXPECT_TRUE(a->moved().quarantined.empty());
 }
 
-TEST_F(SharedStores, AJobThatComesBackHasTheLogOfItsLastOwnerAlone) {
+TEST_F(SharedStores, ReturnedJobHasOnlyTheLogOfItsLastOwner) {
   const auto a = open_node("a");
   ASSERT_TRUE(a->put_job(sample_job("j-1")));
   ASSERT_TRUE(a->add_log({"j-1"}, {1, "by a"}));
@@ -335,7 +335,7 @@ TEST_F(SharedStores, AJobThatComesBackHasTheLogOfItsLastOwnerAlone) {
   EXPECT_EQ(a->log({"j-1"}).value()[0].text, "by b");
 }
 
-TEST_F(SharedStores, WhatWasSharedIsKnownToWhoTakesTheJobOver) {
+TEST_F(SharedStores, NewOwnerKnowsAllSharedRecords) {
   const auto a = open_node("a");
   ASSERT_TRUE(a->put_job(sample_job("j-1")));
   StoredJob cancelled = sample_job("j-1");
@@ -350,7 +350,7 @@ TEST_F(SharedStores, WhatWasSharedIsKnownToWhoTakesTheJobOver) {
   EXPECT_FALSE(in_redis({"j-1"}));
 }
 
-TEST_F(SharedStores, WhatCannotBeSharedIsSaid) {
+TEST_F(SharedStores, SharingFailuresAreReported) {
   const auto a = open_node("a");
   ASSERT_TRUE(a->put_job(sample_job("j-1")));
   ASSERT_TRUE(a->share(std::vector<JobId>{{"j-1"}}));
@@ -366,7 +366,7 @@ TEST_F(SharedStores, WhatCannotBeSharedIsSaid) {
   EXPECT_TRUE(a->share(std::vector<JobId>{{"j-1"}}));
 }
 
-TEST_F(SharedStores, AJobThatAnotherHasTakenOverIsNotChangedHere) {
+TEST_F(SharedStores, JobOfAnotherCoordinatorIsNotChangedHere) {
   const auto a = open_node("a");
   ASSERT_TRUE(a->put_job(sample_job("j-1")));
   ASSERT_TRUE(a->share(std::vector<JobId>{{"j-1"}}));
@@ -377,7 +377,7 @@ TEST_F(SharedStores, AJobThatAnotherHasTakenOverIsNotChangedHere) {
   EXPECT_EQ(a->share(std::vector<JobId>{{"j-1"}}).error().code, Errc::unavailable);
 }
 
-TEST(RedisLink, SaysWhatAPasswordIsWantedFor) {
+TEST(RedisLink, SaysWhichServerNeedsAPassword) {
   test::RedisServer redis("secret");
   RedisAddress address{"127.0.0.1", redis.port(), 0, "", ""};
   const auto none = RedisLink::connect(address, {});
@@ -390,7 +390,7 @@ TEST(RedisLink, SaysWhatAPasswordIsWantedFor) {
 
 // Random histories: changes, removals, a Redis that loses its data, a disk that is lost. The second loss
 // comes only after a start that has copied the data between the two. At the end both match the history.
-TEST_F(RedisStores, AgreeWithTheHistoryWhateverIsLost) {
+TEST_F(RedisStores, MatchTheHistoryAfterAnyLoss) {
   for (std::uint32_t seed = 0; seed < 4; ++seed) {
     std::mt19937 random(seed);
     ask({"FLUSHALL"});

@@ -10,7 +10,7 @@
 namespace ls::coordinator {
 namespace {
 
-TEST(FailureDetector, CountsLooksThatFollowEachOther) {
+TEST(FailureDetector, CountsConsecutiveChecks) {
   FailureDetector book(3);
   const std::map<std::string, bool> away{{"a", false}, {"b", true}}, back{{"a", true}, {"b", true}};
 
@@ -22,7 +22,7 @@ TEST(FailureDetector, CountsLooksThatFollowEachOther) {
   EXPECT_EQ(book.look(away), std::vector<std::string>{"a"});
 }
 
-TEST(FailureDetector, BeginsAgainWhenItWasTheLookerThatWasAway) {
+TEST(FailureDetector, RestartsAfterItsOwnAbsence) {
   FailureDetector book(2);
   const std::map<std::string, bool> away{{"a", false}};
   EXPECT_TRUE(book.look(away).empty());
@@ -45,7 +45,7 @@ struct OneMember {
 
 // The time from a coordinator's death until another one takes over its jobs: its last heartbeat expires after
 // a lease, then `looks` polls must find no heartbeat.
-TEST(MemberOptions, HaveJobsTakenWithinTenSeconds) {
+TEST(MemberOptions, DefaultTakeoverIsWithinTenSeconds) {
   const MemberOptions usual;
 
   EXPECT_LE(usual.lease + usual.looks * usual.beat, std::chrono::seconds(10));
@@ -102,7 +102,7 @@ class Members : public testing::Test {
   std::map<std::string, OneMember> all_;
 };
 
-TEST_F(Members, TheJobsOfADeadOneAreTakenAtTheLookAfterWhichItCountsAsGone) {
+TEST_F(Members, JobsOfADeadMemberAreTakenAsSoonAsItCountsAsGone) {
   add("a");
   auto& b = add("b");
   ASSERT_EQ(put("a", "j-1", 1), 1);
@@ -121,7 +121,7 @@ TEST_F(Members, TheJobsOfADeadOneAreTakenAtTheLookAfterWhichItCountsAsGone) {
   EXPECT_EQ(field("j-1", "owner"), "b");
 }
 
-TEST_F(Members, AJobIsToldAsTakenThoughTheAnswerToItsTakingWasLost) {
+TEST_F(Members, JobIsReportedAsTakenEvenIfTheReplyToTheTakeoverWasLost) {
   add("a");
   auto& b = add("b");
   ASSERT_EQ(put("a", "j-1", 1), 1);
@@ -142,7 +142,7 @@ TEST_F(Members, AJobIsToldAsTakenThoughTheAnswerToItsTakingWasLost) {
   EXPECT_EQ(b.taken[0].from, "a");
 }
 
-TEST_F(Members, AJobThatCouldNotBeKeptIsToldAgainUntilItIs) {
+TEST_F(Members, JobThatCouldNotBeStoredIsReportedUntilItIs) {
   add("a");
   auto& b = add("b");
   b.keeps = false;
@@ -161,7 +161,7 @@ TEST_F(Members, AJobThatCouldNotBeKeptIsToldAgainUntilItIs) {
   EXPECT_EQ(b.taken[2].from, "a");
 }
 
-TEST_F(Members, WhatCannotBeReadOrIsNoIdStaysWhereItIs) {
+TEST_F(Members, UnreadableEntriesAndBadIdsAreLeftAlone) {
   add("a");
   auto& b = add("b");
   ASSERT_EQ(put("a", "j-1", 1), 1);
@@ -179,7 +179,7 @@ TEST_F(Members, WhatCannotBeReadOrIsNoIdStaysWhereItIs) {
   EXPECT_EQ(ask({"LLEN", "lightshaft:lost:b"}).number, 0) << "dealt with";
 }
 
-TEST_F(Members, TellWhoIsQuarantinedWheneverThereAreMore) {
+TEST_F(Members, ShareEachNewQuarantine) {
   auto& a = add("a");
   ASSERT_TRUE(a.members->beat());
   EXPECT_TRUE(a.quarantined.empty());
@@ -194,7 +194,7 @@ TEST_F(Members, TellWhoIsQuarantinedWheneverThereAreMore) {
   EXPECT_EQ(a.quarantined[1].size(), 2u);
 }
 
-TEST_F(Members, WhoWakesAfterItsLeaseWritesNothingAndIsToldWhatItLost) {
+TEST_F(Members, MemberThatWakesAfterItsLeaseWritesNothingAndLearnsWhatItLost) {
   auto& a = add("a");
   auto& b = add("b");
   ASSERT_EQ(put("a", "j-1", 1), 1);
@@ -215,7 +215,7 @@ TEST_F(Members, WhoWakesAfterItsLeaseWritesNothingAndIsToldWhatItLost) {
   EXPECT_EQ(put("b", "j-1", 2, 1), 1) << "the new owner writes";
 }
 
-TEST_F(Members, OneThatComesBackBetweenTwoLooksKeepsItsJobs) {
+TEST_F(Members, MemberThatReturnsBetweenTwoChecksKeepsItsJobs) {
   auto& a = add("a");
   auto& b = add("b");
   ASSERT_EQ(put("a", "j-1", 1), 1);
@@ -229,7 +229,7 @@ TEST_F(Members, OneThatComesBackBetweenTwoLooksKeepsItsJobs) {
   EXPECT_TRUE(a.lost.empty());
 }
 
-TEST_F(Members, OfSeveralHeirsOneTakesEachJob) {
+TEST_F(Members, EachJobIsTakenByOneOfSeveralHeirs) {
   add("a");
   auto &b = add("b"), &c = add("c");
   for (int i = 0; i < 20; ++i) ASSERT_EQ(put("a", "j-" + std::to_string(i), 1), 1);
@@ -242,7 +242,7 @@ TEST_F(Members, OfSeveralHeirsOneTakesEachJob) {
   EXPECT_EQ(ask({"SCARD", "lightshaft:owned:a"}).number, 0);
 }
 
-TEST_F(Members, ALongTakeoverRenewsItsClaimAndSendsHeartbeats) {
+TEST_F(Members, LongTakeoverRenewsItsClaimAndSendsHeartbeats) {
   add("a");
   auto& b = add("b");
   for (int i = 1; i <= 300; ++i) ASSERT_EQ(put("a", frame_job({"j-film"}, i).value, 1), 1);
@@ -264,7 +264,7 @@ TEST_F(Members, ALongTakeoverRenewsItsClaimAndSendsHeartbeats) {
   EXPECT_EQ(ask({"EXISTS", "lightshaft:heir:a"}).number, 0) << "it is done";
 }
 
-TEST_F(Members, WhoHasLostItsClaimTakesNoMore) {
+TEST_F(Members, MemberWithoutItsClaimTakesNoMore) {
   add("a");
   auto &b = add("b"), &c = add("c");
   for (int i = 1; i <= 300; ++i) ASSERT_EQ(put("a", frame_job({"j-film"}, i).value, 1), 1);
@@ -283,7 +283,7 @@ TEST_F(Members, WhoHasLostItsClaimTakesNoMore) {
   EXPECT_EQ(c.taken.size(), 300 - before);
 }
 
-TEST_F(Members, AnHeirThatDiesIsInheritedFrom) {
+TEST_F(Members, DeadHeirsJobsAreTakenOver) {
   add("a");
   auto& b = add("b");
   ASSERT_EQ(put("a", "j-1", 1), 1);
@@ -299,7 +299,7 @@ TEST_F(Members, AnHeirThatDiesIsInheritedFrom) {
   EXPECT_EQ(put("b", "j-1", 2, 99), static_cast<int>(PutAnswer::lost));
 }
 
-TEST_F(Members, JobsThatHaveEndedStayAndASequenceGoesWhole) {
+TEST_F(Members, EndedJobsStayAndSequencesMoveAsAWhole) {
   add("a");
   auto& b = add("b");
   ASSERT_EQ(put("a", "j-done", 1, 1, "done"), 1);
@@ -319,7 +319,7 @@ TEST_F(Members, JobsThatHaveEndedStayAndASequenceGoesWhole) {
   EXPECT_FALSE(b.members->owner_of({"j-film"}).value()) << "removed with its frames";
 }
 
-TEST_F(Members, ARedisThatForgotMakesNobodyAnHeirAndTheHigherFenceWins) {
+TEST_F(Members, EmptiedRedisCausesNoTakeoverAndTheHigherFenceWins) {
   auto& a = add("a");
   auto& b = add("b");
   ASSERT_EQ(put("a", "j-1", 1), 1);
@@ -336,7 +336,7 @@ TEST_F(Members, ARedisThatForgotMakesNobodyAnHeirAndTheHigherFenceWins) {
   EXPECT_EQ(put("a", "j-1", 1, 51), static_cast<int>(PutAnswer::lost));
 }
 
-TEST_F(Members, AJobOfTheSameNameElsewhereIsNotOverwritten) {
+TEST_F(Members, EqualJobOfAnotherMemberIsNotOverwritten) {
   add("a");
   add("b");
   ASSERT_EQ(put("a", "j-1", 1), 1);
@@ -345,7 +345,7 @@ TEST_F(Members, AJobOfTheSameNameElsewhereIsNotOverwritten) {
   EXPECT_EQ(field("j-1", "owner"), "a");
 }
 
-TEST_F(Members, SayWhoHasAJobAndWhetherItLives) {
+TEST_F(Members, ReportTheOwnerOfAJobAndWhetherItIsAlive) {
   auto& a = add("a");
   auto& b = add("b");
   a.members->announce("http://here:1", "here:2");
@@ -362,7 +362,7 @@ TEST_F(Members, SayWhoHasAJobAndWhetherItLives) {
   EXPECT_FALSE(b.members->owner_of({"j-2"}).value());
 }
 
-TEST_F(Members, StartsAreNumbersThatNobodyElseHas) {
+TEST_F(Members, StartNumbersAreUnique) {
   auto &a = add("a"), &b = add("b");
 
   EXPECT_EQ(a.members->unique_start(7).value(), 8u);

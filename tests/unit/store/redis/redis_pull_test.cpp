@@ -94,7 +94,7 @@ class RedisPull : public testing::Test {
   int disks_ = 0;
 };
 
-TEST_F(RedisPull, TakesThePointsWithTheErrorsAgainstAReference) {
+TEST_F(RedisPull, RestoresCheckpointsWithReferenceErrors) {
   const auto local = empty_disk();
 
   ASSERT_TRUE(pull_owned(*link_, *local, "b"));
@@ -102,7 +102,7 @@ TEST_F(RedisPull, TakesThePointsWithTheErrorsAgainstAReference) {
   expect_whole(*local, "at once");
 }
 
-TEST_F(RedisPull, LosesNothingOfAJobIfTheProcessIsKilledBetweenTwoWrites) {
+TEST_F(RedisPull, KillBetweenTwoWritesLosesNothingOfAJob) {
   bool died = true;
   for (int writes = 0; died; ++writes) {
     const auto local = empty_disk();
@@ -116,7 +116,7 @@ TEST_F(RedisPull, LosesNothingOfAJobIfTheProcessIsKilledBetweenTwoWrites) {
   }
 }
 
-TEST_F(RedisPull, LosesNothingOfAnInheritedJobEither) {
+TEST_F(RedisPull, LosesNothingOfAnInheritedJob) {
   const auto job = parse_redis_job(link_->run({"HGETALL", redis_job_key(id_)}).value()).value();
   bool died = true;
   for (int writes = 0; died; ++writes) {

@@ -1,6 +1,6 @@
 // LDR-FLIP of two pictures as shown on a screen (Andersson et al. 2020, "FLIP: A Difference Evaluator for
 // Alternating Images", equations (1) to (14)). The coordinator's implementation is
-// common/image/reference/flip.cpp; tests compare both with values of the authors' program.
+// core/image/reference/flip.cpp; tests compare both with values of the authors' program.
 
 // For a monitor of 3,840 pixels and 0.7 m width, seen from 0.7 m
 export const kPixelsPerDegree = 67.0206432765823;

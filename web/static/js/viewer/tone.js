@@ -53,7 +53,7 @@ export function agx(r, g, b, scale, out, at) {
   out[at + 2] = code(mixed + rest * b);
 }
 
-// The colours of the coordinator's false-colour maps (common/image/exr/maps.h).
+// The colours of the coordinator's false-colour maps (core/image/exr/maps.h).
 const kStops = [[13, 8, 70], [45, 60, 142], [33, 120, 140], [70, 180, 105], [250, 230, 50]];
 const kRampSteps = 1024;
 let ramp = null;

@@ -9,7 +9,7 @@ const kLayers = [["picture", "Picture"], ["error", "Error"], ["samples", "Sample
 const kDenoised = [kLayers[0], ["denoised", "Denoised"], ...kLayers.slice(1)]; // layers of a job with denoising
 const isPicture = (layer) => layer === "picture" || layer === "denoised";
 const kNames = { picture: "as it is now", denoised: "denoised as it is now", error: "error of each pixel", samples: "samples of each pixel" };
-// The values at the ends of the maps' colour scale (common/image/exr/maps.h); the values between are spaced
+// The values at the ends of the maps' colour scale (core/image/exr/maps.h); the values between are spaced
 // by equal factors.
 const kLegends = { error: ["0.1 %", "100 % or more", "relative standard error of a pixel"], samples: ["2", "16,384 or more", "samples of a pixel"] };
 // Further legends for the viewer (js/viewer/tone.js).

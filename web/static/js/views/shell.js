@@ -31,7 +31,7 @@ const named = ({ role, user }) => (user ? `${user} (${role})` : role);
 /** Asks whether the link that was followed may sign in as somebody else. */
 const linkQuestion = (state, actions) => h("p", { key: "link", class: "toast", role: "alert" },
   `This link signs in as ${named(state.ui.link)}. You are signed in as ${named(state.me)}. `,
-  h("button", { type: "button", class: "small", onclick: actions.takeLink }, `Go on as ${named(state.ui.link)}`), " ",
+  h("button", { type: "button", class: "small", onclick: actions.takeLink }, `Continue as ${named(state.ui.link)}`), " ",
   h("button", { type: "button", class: "small quiet", onclick: actions.leaveLink }, `Stay ${named(state.me)}`));
 
 const skipLink = () => h("a", { key: "skip", class: "skip", href: "#main", onclick: toMain }, "Skip to the content");

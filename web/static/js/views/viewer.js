@@ -32,7 +32,7 @@ export function viewerView(state, actions) {
   // What comes and goes stands below the picture: it must not move while somebody drags in it.
   const picture = [
     stage(state, viewer, layer, second, job ?? { id: viewer.id }, actions),
-    viewer.problem ? h("p", { key: "problem", class: "toast", role: "alert" }, viewer.problem) : null,
+    viewer.problem || viewer.refused ? h("p", { key: "problem", class: "toast", role: "alert" }, viewer.problem || viewer.refused) : null,
     focusTools(state, viewer, job, actions), reading(viewer, layer, second), viewer.histogram ? histogram(viewer.survey, layer) : null];
   return h("article", { key: "viewer", class: "viewer" },
     h("div", { class: "viewer-head" },

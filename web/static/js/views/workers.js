@@ -65,7 +65,7 @@ function row(state, worker, actions) {
   return h("tr", { key: worker.id, class: `worker is-${safeClass(worker.state)}`, "data-worker": worker.id },
     h("td", { class: "name" },
       h("b", null, workerMark(colourOf(state, worker.name), worker.name)), worker.state === "connected" ? null : h("span", { key: "state", class: "pill" }, worker.state),
-      worker.fake === true ? h("span", { key: "fake", class: "pill", title: "It makes pixels up instead of rendering, for tests" }, "fake") : null,
+      worker.fake === true ? h("span", { key: "fake", class: "pill", title: "It invents pixels instead of rendering, for tests" }, "fake") : null,
       worker.tags?.length ? h("p", { class: "tags" }, worker.tags.map((tag) => h("span", { key: tag, class: "tag" }, tag))) : null),
     h("td", { class: "doing" }, alive(worker) ? worker.activity || "idle" : "not connected", worker.job ? [" · ", h("a", { key: "job", href: jobHref(worker.job) }, name)] : null),
     cell("Threads", count(worker.threads)),

@@ -1,0 +1,323 @@
+#include "core/image/exr/final_image.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "core/image/aov/identifiers.h"
+#include "core/image/exr/exr_file.h"
+
+namespace ls {
+
+namespace {
+
+// Adding 0 turns -0 into +0 and changes no other value (in the rounding mode to nearest).
+float pixel_value(double mean) { return static_cast<float>(mean) + 0.0f; }
+
+struct Gathered {
+  std::vector<float> rgb[3], standard_error[3];
+  std::vector<std::uint32_t> spp;
+};
+
+Gathered gather(const Film& film) {
+  const FrameSize frame = film.grid().frame;
+  const std::size_t pixels = frame.pixels();
+  Gathered out{{}, {}, std::vector<std::uint32_t>(pixels)};
+  for (int c = 0; c < 3; ++c) out.rgb[c].resize(pixels), out.standard_error[c].resize(pixels);
+  for (TileIndex t = 0; t < film.grid().count(); ++t) {
+    if (film.spp(t) == 0) continue;
+    const TilePixels tile = film.pixels(t);
+    // Values of a UINT layer are at most 2^32 - 1. A job has at most kMaxSpp = 2^24 samples per pixel, so
+    // nothing is lost.
+    const auto spp = static_cast<std::uint32_t>(
+        std::min<std::uint64_t>(tile.spp, std::numeric_limits<std::uint32_t>::max()));
+    each_pixel(tile.rect, frame, [&](std::size_t to, std::size_t from) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        out.rgb[c][to] = pixel_value(tile.mean[3 * from + c]);
+        out.standard_error[c][to] = static_cast<float>(tile.standard_error[3 * from + c]);
+      }
+      out.spp[to] = spp;
+    });
+  }
+  return out;
+}
+
+constexpr int kCryptomatteRanks = 6;  // identifiers stored per pixel: those with the largest coverage
+
+// Adds a layer of half floats or of floats. Returns the number of values that were clamped because their
+// magnitude exceeded the largest half.
+std::uint64_t add_layer(ExrPicture& picture, const std::string& name, std::vector<float> values,
+                        bool halves) {
+  if (!halves) {
+    picture.channels[name] = ExrFloat{std::move(values)};
+    return 0;
+  }
+  std::uint64_t clamped = 0;
+  for (float& v : values) {
+    if (std::abs(v) <= kLargestHalf) continue;
+    v = std::copysign(kLargestHalf, v);
+    ++clamped;
+  }
+  picture.channels[name] = ExrHalf{std::move(values)};
+  return clamped;
+}
+
+class Layers {
+ public:
+  explicit Layers(const Film& film)
+      : film_(film), frame_(film.grid().frame), planes_(planes_of(film.aovs())) {
+    sums_.assign(planes_.sums.size(), {});
+    // Two kinds of planes get no layer of their own. One is the plane that counts the samples that hit a
+    // surface. The others are the planes of half B of a guide (an AOV for the denoiser); they are added to
+    // the planes of half A.
+    for (std::size_t p = 0; p < sums_.size(); ++p)
+      if (p != planes_.hits && planes_.sums[p].half == 0) sums_[p].resize(frame_.pixels());
+    ids_.assign(planes_.ids.size() * 2 * kCryptomatteRanks, std::vector<float>(frame_.pixels()));
+  }
+
+  void gather() {
+    for (TileIndex t = 0; t < film_.grid().count(); ++t) {
+      if (film_.spp(t) == 0) continue;
+      const TileAovs tile = film_.aov_pixels(t);
+      gather_means(tile);
+      gather_ids(tile);
+    }
+  }
+
+  std::uint64_t move_to(ExrPicture& picture, const CryptomatteManifests& manifests, bool float_output) {
+    std::uint64_t clamped = 0;
+    for (std::size_t p = 0; p < sums_.size(); ++p) {
+      if (sums_[p].empty()) continue;
+      const AovRow& row = row_of(planes_.sums[p].aov);
+      const std::string name = fmt::format(
+          "{}.{}", layer_of(row.aov), row.components[static_cast<std::size_t>(planes_.sums[p].component)]);
+      clamped += add_layer(picture, name, std::move(sums_[p]), row.half && !float_output);
+    }
+    for (std::size_t i = 0; i < planes_.ids.size(); ++i) {
+      const std::string layer = layer_of(planes_.ids[i]);
+      for (std::size_t c = 0; c < 2 * kCryptomatteRanks; ++c)
+        picture.channels[fmt::format("{}{:02}.{}", layer, c / 4, "RGBA"[c % 4])] =
+            ExrFloat{std::move(ids_[i * 2 * kCryptomatteRanks + c])};
+      picture.strings.merge(cryptomatte_header(
+          layer, planes_.ids[i] == Aov::shape_id ? manifests.shapes : manifests.materials));
+    }
+    return clamped;
+  }
+
+ private:
+  void gather_means(const TileAovs& tile) {
+    const auto n = static_cast<std::size_t>(tile.rect.pixels());
+    const double* hits = planes_.hits == SIZE_MAX ? nullptr : &tile.sums[planes_.hits * n];
+    for (std::size_t p = 0; p < sums_.size(); ++p) {
+      if (sums_[p].empty()) continue;
+      const AovRow& row = row_of(planes_.sums[p].aov);
+      const bool by_hits = row.kind == AovKind::of_hits;
+      const double* other =
+          row.kind == AovKind::guide ? &tile.sums[(p + row.components.size()) * n] : nullptr;
+      each_pixel(tile.rect, frame_, [&](std::size_t to, std::size_t from) {
+        const double count = by_hits ? hits[from] : static_cast<double>(tile.spp);
+        const double sum = tile.sums[p * n + from] + (other ? other[from] : 0);
+        // Adding 0 turns -0 into +0 and changes no other value.
+        if (count > 0) sums_[p][to] = static_cast<float>(sum / count) + 0.f;
+      });
+    }
+  }
+  void gather_ids(const TileAovs& tile) {
+    const auto n = static_cast<std::size_t>(tile.rect.pixels());
+    for (std::size_t i = 0; i < planes_.ids.size(); ++i)
+      each_pixel(tile.rect, frame_, [&](std::size_t to, std::size_t from) {
+        const IdSlots slots = load_slots(&tile.ids[i * kIdPlanes * n + from], n);
+        for (std::size_t rank = 0; rank < kCryptomatteRanks; ++rank) {
+          std::vector<float>* channel = &ids_[(i * kCryptomatteRanks + rank) * 2];
+          channel[0][to] = slots.slots[rank].id;
+          channel[1][to] = static_cast<float>(double{slots.slots[rank].n} / static_cast<double>(tile.spp));
+        }
+      });
+  }
+
+  const Film& film_;
+  FrameSize frame_;
+  AovPlanes planes_;
+  std::vector<std::vector<float>> sums_, ids_;
+};
+
+std::string tile_digests(const Film& film) {
+  std::string out;
+  out.reserve(std::size_t{65} * film.grid().count());
+  for (TileIndex t = 0; t < film.grid().count(); ++t) {
+    if (t) out += ' ';
+    out += film.tile_digest(t).hex();
+  }
+  return out;
+}
+
+}  // namespace
+
+Digest pixels_sha256(const Film& film) {
+  static_assert(std::endian::native == std::endian::little);
+  const TileGrid& grid = film.grid();
+  const auto width = static_cast<std::size_t>(grid.frame.width);
+  Sha256 hash;
+  std::vector<float> band;
+  for (int row = 0; row < grid.rows(); ++row) {
+    const auto first = static_cast<TileIndex>(row) * static_cast<TileIndex>(grid.columns());
+    const PixelRect band_rect = grid.rect(first);
+    band.assign(width * static_cast<std::size_t>(band_rect.height()) * 3, 0.0f);
+    for (TileIndex t = first; t < first + static_cast<TileIndex>(grid.columns()); ++t) {
+      const TilePixels tile = film.pixels(t);
+      std::size_t from = 0;
+      for (int y = 0; y < tile.rect.height(); ++y) {
+        float* to = &band[(static_cast<std::size_t>(y) * width + static_cast<std::size_t>(tile.rect.x0)) * 3];
+        for (int i = 0; i < 3 * tile.rect.width(); ++i) *to++ = pixel_value(tile.mean[from++]);
+      }
+    }
+    hash.update(std::as_bytes(std::span(band)));
+  }
+  return hash.finish();
+}
+
+std::uint64_t values_above_half(const Film& film) {
+  std::uint64_t above = 0;
+  for (TileIndex t = 0; t < film.grid().count(); ++t) {
+    if (film.spp(t) == 0) continue;
+    for (const double mean : film.pixels(t).mean) above += !(std::abs(pixel_value(mean)) <= kLargestHalf);
+  }
+  return above;
+}
+
+std::string layer_of(Aov aov) {
+  if (aov == Aov::shape_id) return "crypto_object";
+  if (aov == Aov::material_id) return "crypto_material";
+  return std::string(row_of(aov).name);
+}
+
+std::uint64_t add_aov_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
+                             ExrPicture& picture) {
+  if (film.aovs().empty()) return 0;
+  Layers layers(film);
+  layers.gather();
+  return layers.move_to(picture, manifests, float_output);
+}
+
+ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
+                        std::uint64_t* clamped) {
+  Gathered planes = gather(film);
+  ExrPicture picture{film.grid().frame, {}, {}};
+  constexpr const char* kRgb[3] = {"R", "G", "B"};
+  std::uint64_t above = 0;
+  for (int c = 0; c < 3; ++c) {
+    const std::string layer = fmt::format("stderr.{}", kRgb[c]);
+    above += add_layer(picture, kRgb[c], std::move(planes.rgb[c]), !float_output);
+    picture.channels[layer] = ExrFloat{std::move(planes.standard_error[c])};
+  }
+  picture.channels["spp"] = ExrUint{std::move(planes.spp)};
+  above += add_aov_layers(film, manifests, float_output, picture);
+  if (clamped) *clamped += above;
+  return picture;
+}
+
+namespace {
+
+std::string pair_text(double lo, double hi) { return fmt::format("{:.9g} {:.9g}", lo, hi); }
+
+}  // namespace
+
+std::map<std::string, std::string> error_strings(const TileError& sums,
+                                                 std::uint64_t pixels_without_samples) {
+  std::map<std::string, std::string> strings;
+  if (pixels_without_samples > 0)
+    strings["lightshaft:pixels_without_samples"] = fmt::format("{}", pixels_without_samples);
+  if (sums.samples == 0) return strings;
+  const ImageError error = image_error(sums);
+  strings["lightshaft:relmse"] = fmt::format("{:.9g}", error.relmse);
+  strings["lightshaft:relmse_ci95"] = pair_text(error.relmse_lo, error.relmse_hi);
+  strings["lightshaft:rmse"] = fmt::format("{:.9g}", error.rmse);
+  if (error.rmse_hi > 0 || error.rmse == 0)
+    strings["lightshaft:rmse_ci95"] = pair_text(error.rmse_lo, error.rmse_hi);
+  strings["lightshaft:verdict"] = error.trusted ? "trusted" : error.verdict;
+  strings["lightshaft:few_hits"] = fmt::format("{}", error.few_hits);
+  return strings;
+}
+
+namespace {
+
+std::map<std::string, std::string> strings_of(const Film& film, const Provenance& from) {
+  std::map<std::string, std::string> strings = {{"lightshaft:scene", from.scene.hex()},
+                                                {"lightshaft:job", from.settings_json},
+                                                {"lightshaft:build", from.build},
+                                                {"lightshaft:class", from.numeric_class.hex()},
+                                                {"lightshaft:tiles", tile_digests(film)}};
+  strings.merge(error_strings(film.error(), film.pixels_without_samples()));
+  // The error over time (`convergence_status`) may show problems that the film alone does not show. Then its
+  // text replaces the verdict "trusted".
+  if (auto verdict = strings.find("lightshaft:verdict");
+      verdict != strings.end() && verdict->second == "trusted" && from.convergence_status &&
+      !from.convergence_status->trusted)
+    verdict->second = from.convergence_status->words;
+  if (from.seed) strings["lightshaft:seed"] = fmt::format("{}", *from.seed);
+  if (from.seconds) strings["lightshaft:seconds"] = fmt::format("{:.3f}", *from.seconds);
+  if (!from.health.empty()) strings["lightshaft:health"] = from.health;
+  if (from.core_seconds > 0) strings["lightshaft:core_seconds"] = fmt::format("{:.3f}", from.core_seconds);
+  if (!from.stopped.empty()) strings["lightshaft:stopped"] = from.stopped;
+  for (const auto& [name, value] : from.figures) strings["lightshaft:" + name] = fmt::format("{:.9g}", value);
+  for (const auto& [name, words] : from.notes) strings["lightshaft:" + name] = words;
+  return strings;
+}
+
+// Adds the layers of the denoised image in one row of tiles. Returns the number of clamped values.
+std::uint64_t add_denoised(std::span<const float> denoised, const TileGrid& grid, int row, bool float_output,
+                           ExrPicture& band) {
+  const auto width = static_cast<std::size_t>(grid.frame.width);
+  const auto first = static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.tile) * width;
+  const std::size_t pixels = static_cast<std::size_t>(band.size.height) * width;
+  std::uint64_t clamped = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::vector<float> plane(pixels);
+    for (std::size_t i = 0; i < pixels; ++i) plane[i] = pixel_value(double{denoised[3 * (first + i) + c]});
+    clamped += add_layer(band, fmt::format("denoised.{}", "RGB"[c]), std::move(plane), !float_output);
+  }
+  return clamped;
+}
+
+class MemorySink final : public ByteSink {
+ public:
+  Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) override {
+    if (at + bytes.size() > this->bytes.size())
+      this->bytes.resize(static_cast<std::size_t>(at) + bytes.size());
+    std::copy(bytes.begin(), bytes.end(), this->bytes.begin() + static_cast<std::ptrdiff_t>(at));
+    return {};
+  }
+  std::vector<std::byte> bytes;
+};
+
+}  // namespace
+
+Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& from, bool float_output,
+                                      ByteSink& sink, std::span<const float> denoised) {
+  std::uint64_t clamped = 0;
+  const ExrBands bands{film.grid().frame, strings_of(film, from), [&](int row) {
+                         // each band is requested in two passes, so the count of clamped values restarts at
+                         // the first band
+                         if (row == 0) clamped = 0;
+                         ExrPicture band =
+                             final_layers(film.row(row), from.manifests, float_output, &clamped);
+                         if (!denoised.empty())
+                           clamped += add_denoised(denoised, film.grid(), row, float_output, band);
+                         return band;
+                       }};
+  if (auto written = write_sealed_exr(bands, sink); !written) return tl::unexpected(written.error());
+  return clamped;
+}
+
+Result<FinalImage> final_exr(const Film& film, const Provenance& from, bool float_output,
+                             std::span<const float> denoised) {
+  MemorySink sink;
+  const auto clamped = write_final_exr(film, from, float_output, sink, denoised);
+  if (!clamped) return tl::unexpected(clamped.error());
+  return FinalImage{std::move(sink.bytes), *clamped};
+}
+
+}  // namespace ls

@@ -1,0 +1,136 @@
+// Shapes, camera and film of a scene; see scene.h.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <variant>
+
+#include "core/image/frame/frame.h"
+#include "core/scene/scene_values.h"
+
+namespace ls {
+
+struct RectangleShape {  // [-1,1]^2 in z = 0, normal +z, uv = (x+1)/2, (y+1)/2
+  bool operator==(const RectangleShape&) const = default;
+};
+struct CubeShape {  // [-1,1]^3, normals outwards; each face has its own uv from 0 to 1
+  bool operator==(const CubeShape&) const = default;
+};
+struct SphereShape {  // Shape::to_world transforms the sphere of this center and radius
+  Vec3 center{0, 0, 0};
+  double radius = 1;
+  bool operator==(const SphereShape&) const = default;
+};
+struct DiskShape {  // unit disk in z = 0, normal +z
+  bool operator==(const DiskShape&) const = default;
+};
+// A cylinder without caps about the line from p0 to p1. Its normals point outwards, even if to_world
+// mirrors it.
+struct CylinderShape {
+  Vec3 p0{0, 0, 0}, p1{0, 0, 1};
+  double radius = 1;
+  bool operator==(const CylinderShape&) const = default;
+};
+enum class MeshFormat { obj, ply, serialized };
+struct MeshShape {
+  AssetIndex file;
+  MeshFormat format = MeshFormat::obj;
+  bool face_normals = false;
+  // Only for files without vertex normals. true: faces are shaded flat; false: smooth normals are computed.
+  bool flat_without_normals = false;
+  bool flip_tex_coords = false;
+  int shape_index = 0;  // index of the mesh in a `serialized` file
+  bool operator==(const MeshShape&) const = default;
+};
+using Geometry = std::variant<RectangleShape, CubeShape, SphereShape, DiskShape, MeshShape, CylinderShape>;
+
+// Light from a shape's surface, emitted on the side of the normal or, if two_sided, on both sides. If
+// beam_width is set, the light is a beam: at an angle a from the normal, in degrees, it has the full radiance
+// for a within beam_width and zero beyond cutoff_angle; in between it is the full radiance times s^falloff
+// with s = (cos a - cos cutoff_angle) / (cos beam_width - cos cutoff_angle).
+struct AreaEmitter {
+  TextureIndex radiance;
+  double cutoff_angle = 90, beam_width = 90, falloff = 1;
+  bool two_sided = false;
+  bool operator==(const AreaEmitter&) const = default;
+};
+
+struct Shape {
+  Geometry geometry;
+  Transform to_world;
+  bool flip_normals = false;
+  BsdfIndex bsdf;
+  std::optional<AreaEmitter> emitter;
+  // The media on the two sides of the surface. Its normal points away from the interior, into the exterior.
+  std::optional<MediumIndex> interior, exterior;
+  bool is_medium_transition = false;  // true if the file gives an interior or exterior
+  // If set, the shape belongs to this group: it is visible only as part of the group's instances, and
+  // to_world places it within the group. It does not emit light. In the scene's list of shapes, the shapes of
+  // a group are contiguous, and those of a group of lower index come first.
+  std::optional<GroupIndex> group;
+  bool operator==(const Shape&) const = default;
+};
+struct ShapeGroup {  // a group of shapes, which refer to it by its index
+  bool operator==(const ShapeGroup&) const = default;
+};
+struct Instance {  // a copy of a group's shapes, placed in the world
+  GroupIndex group;
+  Transform to_world;
+  bool operator==(const Instance&) const = default;
+};
+
+enum class FovAxis { x, y, diagonal, smaller, larger };
+
+// How the camera projects. orthographic: parallel rays from the rectangle [-1, 1] x [-1/a, 1/a] in the
+// camera's x and y, where a is width / height of the image; to_world may scale this rectangle. spherical: all
+// directions by latitude and longitude, as in Mitsuba 0.x: the top row is +y; on the horizon the left edge is
+// -z, and a quarter of the width further is +x. A spherical camera ignores near_clip and far_clip.
+enum class Projection { perspective, orthographic, spherical };
+struct Sensor {  // looks along the +z axis of to_world, with +y up and +x to the LEFT, as in Mitsuba
+  Transform to_world;
+  double fov = 50;  // in degrees, along fov_axis
+  FovAxis fov_axis = FovAxis::x;
+  double near_clip = 1e-2, far_clip = 1e4;
+  std::array<double, 2> principal_point_offset{0, 0};
+  double aperture_radius = 0;  // 0: pinhole camera
+  double focus_distance = 1;
+  std::optional<MediumIndex> medium;  // the medium around the camera
+  Projection projection = Projection::perspective;
+  // An image that is stretched over the frame, with (u, v) = (0, 0) in the upper left corner. Its value at a
+  // pixel, from 0 to 1, is a factor on aperture_radius.
+  std::optional<TextureIndex> aperture_scale;
+  bool operator==(const Sensor&) const = default;
+};
+
+struct BoxFilter {
+  double radius = .5;
+  bool operator==(const BoxFilter&) const = default;
+};
+struct TentFilter {
+  double radius = 1;
+  bool operator==(const TentFilter&) const = default;
+};
+struct GaussianFilter {  // truncated at 4 stddev and lowered so that it is 0 there, as in Mitsuba
+  double stddev = .5;    // in pixels
+  bool operator==(const GaussianFilter&) const = default;
+};
+using ReconstructionFilter = std::variant<BoxFilter, TentFilter, GaussianFilter>;
+
+struct FilmSettings {
+  FrameSize size{768, 576};
+  ReconstructionFilter filter = GaussianFilter{};
+  // The rendered part of the frame, in pixels; if its width is 0, the whole frame is rendered.
+  std::array<int, 2> crop_offset{0, 0};
+  FrameSize crop_size{0, 0};
+  bool has_crop() const { return crop_size.width > 0; }
+  FrameSize image_size() const { return has_crop() ? crop_size : size; }  // size of the output image
+  bool operator==(const FilmSettings&) const = default;
+};
+
+// On a ray through a medium, the integrator `volpath_distant_mis` samples a point and connects it to a light.
+// DistanceSampling is the probability density along the ray from which this point is drawn; `mis` draws one
+// point from each of the other two densities, and weights the two points by the MisHeuristic.
+enum class DistanceSampling { exponential, equiangular, mis };
+enum class MisHeuristic { power, balance };
+
+}  // namespace ls

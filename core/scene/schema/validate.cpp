@@ -1,0 +1,195 @@
+#include "core/scene/schema/validate.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <map>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "core/scene/limits.h"
+#include "core/scene/schema/describe_fields.h"
+#include "core/scene/schema/traits.h"
+
+namespace ls::scene {
+namespace {
+
+class ValueChecker {
+ public:
+  explicit ValueChecker(const Scene& s) : s_(s) {}
+
+  std::string run() {
+    check_list("textures", s_.textures);
+    check_list("bsdfs", s_.bsdfs);
+    check_list("volumes", s_.volumes);
+    check_list("media", s_.media);
+    check_list("shapes", s_.shapes);
+    check_list("emitters", s_.emitters);
+    check_list("instances", s_.instances);
+    IndexWalker walker([&](const auto& i) { check("sensor", i); });
+    walker.walk(s_.sensor);
+    if (wrong_.empty()) check_bsdf_nesting();
+    if (wrong_.empty()) check_texture_nesting();
+    if (wrong_.empty()) check_groups();
+    if (wrong_.empty()) check_crop();
+    if (wrong_.empty()) check_labels();
+    if (wrong_.empty() && std::int64_t{s_.film.size.width} * s_.film.size.height > kMaxFramePixels)
+      wrong_ = fmt::format("scene.film has more than {} pixels", kMaxFramePixels);
+    return wrong_;
+  }
+
+ private:
+  template <class List>
+  void check_list(std::string_view name, const List& list) {
+    for (std::size_t i = 0; i < list.size() && wrong_.empty(); ++i) {
+      IndexWalker walker([&](const auto& index) { check(fmt::format("{}[{}]", name, i), index); });
+      walker.walk(list[i]);
+    }
+  }
+  template <class Tag>
+  void check(std::string_view where, const Index<Tag>& i) {
+    if (wrong_.empty() && i.value >= pool(s_, i).size())
+      wrong_ =
+          fmt::format("scene.{} refers to object {} of a list of {}", where, i.value, pool(s_, i).size());
+  }
+  void check_bsdf_nesting() {
+    const auto traits = bsdf_traits(s_);
+    if (!traits) {
+      wrong_ =
+          fmt::format("scene.bsdfs (twosided, mask, ...) contain each other in a circle or more than {} deep",
+                      kMaxBsdfNesting);
+      return;
+    }
+    for (const Bsdf& b : s_.bsdfs) {
+      const auto* two = std::get_if<TwoSidedBsdf>(&b);
+      if (!two) continue;
+      for (const BsdfIndex side : {two->front, two->back})
+        if ((*traits)[side.value].transmits || (*traits)[side.value].two_sided)
+          wrong_ = "scene.bsdfs: a twosided bsdf holds one that lets light through, or another twosided";
+    }
+  }
+  // Checks that the shapes of each group are contiguous in the scene's list of shapes and do not emit, that
+  // every group has a shape, and that in this list the groups follow each other in the order of their
+  // indices.
+  void check_groups() {
+    std::size_t seen = 0;
+    const std::optional<GroupIndex>* last = nullptr;
+    for (const Shape& s : s_.shapes) {
+      const bool same = last && s.group == *last;
+      last = &s.group;
+      if (!s.group) continue;
+      if (s.emitter) wrong_ = "scene.shapes: a shape in a group emits light";
+      if (!same && s.group->value != seen++) wrong_ = "scene.shapes: groups are mixed or out of their order";
+    }
+    if (wrong_.empty() && seen != s_.groups.size()) wrong_ = "scene.groups: a group has no shapes";
+  }
+  void check_labels() {
+    const auto fits = [](const auto& labels, const auto& things) {
+      return labels.empty() || labels.size() == things.size();
+    };
+    if (!fits(s_.shape_labels, s_.shapes)) wrong_ = "scene.shape_labels are not as many as the shapes";
+    if (!fits(s_.instance_labels, s_.instances))
+      wrong_ = "scene.instance_labels are not as many as the instances";
+  }
+  void check_crop() {
+    const FilmSettings& f = s_.film;
+    const auto outside = [](int offset, int width, int whole) {
+      return width < 1 || offset > whole || width > whole - offset;
+    };
+    const bool none = f.crop_size == FrameSize{0, 0} && f.crop_offset == std::array<int, 2>{0, 0};
+    if (!none && (outside(f.crop_offset[0], f.crop_size.width, f.size.width) ||
+                  outside(f.crop_offset[1], f.crop_size.height, f.size.height)))
+      wrong_ = "scene.film: the crop is not within the frame";
+  }
+  // Computes the nesting depths of the textures by passes over the list, until a pass changes nothing. In a
+  // scene that is allowed, this takes at most kMaxReferenceDepth + 1 passes.
+  void check_texture_nesting() {
+    std::vector<int> depth(s_.textures.size(), 0);
+    for (int round = 0; round <= kMaxReferenceDepth; ++round) {
+      bool changed = false;
+      for (std::size_t i = 0; i < s_.textures.size(); ++i) {
+        int d = 0;
+        if (const auto* c = std::get_if<CheckerboardTexture>(&s_.textures[i]))
+          d = 1 + std::max(depth[c->color0.value], depth[c->color1.value]);
+        else if (const auto* p = std::get_if<PeakTexture>(&s_.textures[i]))
+          d = 1 + depth[p->texture.value];
+        else if (const auto* product = std::get_if<ProductTexture>(&s_.textures[i]))
+          d = 1 + std::max(depth[product->first.value], depth[product->second.value]);
+        changed |= std::exchange(depth[i], d) != d;
+      }
+      if (!changed) return;
+    }
+    wrong_ =
+        fmt::format("scene.textures contain each other in a circle or more than {} deep", kMaxReferenceDepth);
+  }
+
+  const Scene& s_;
+  std::string wrong_;
+};
+
+class Compactor {
+ public:
+  explicit Compactor(const Scene& from) : from_(from) {}
+
+  Scene run() {
+    std::vector<bool> placed(from_.groups.size(), false);
+    for (const Instance& i : from_.instances) placed[i.group.value] = true;
+    for (std::size_t i = 0; i < from_.shapes.size(); ++i) {
+      const Shape& s = from_.shapes[i];
+      if (s.group && !placed[s.group->value]) continue;
+      to_.shapes.push_back(s);
+      if (!from_.shape_labels.empty()) to_.shape_labels.push_back(from_.shape_labels[i]);
+    }
+    to_.instance_labels = from_.instance_labels;
+    to_.aovs = from_.aovs;
+    to_.emitters = from_.emitters;
+    to_.sensor = from_.sensor;
+    to_.film = from_.film;
+    to_.integrator = from_.integrator;
+    to_.sample_count = from_.sample_count;
+    for (Shape& s : to_.shapes) move(s);
+    for (Emitter& e : to_.emitters) move(e);
+    to_.instances = from_.instances;
+    for (Instance& i : to_.instances) move(i);
+    move(to_.sensor);
+    return std::move(to_);
+  }
+
+ private:
+  // Replaces the indices in the object by those of the new scene. The recursion is at most kMaxReferenceDepth
+  // deep, since the nesting of the scene's objects has been checked before.
+  template <class T>
+  void move(T& object) {
+    IndexWalker walker([&](auto& i) { i = moved(i); });
+    walker.walk(object);
+  }
+  template <class I>
+  I moved(I old) {
+    auto& known = std::get<std::map<I, I>>(moved_);
+    if (const auto it = known.find(old); it != known.end()) return it->second;
+    auto object = pool(from_, old)[old.value];
+    move(object);  // adds the objects that this one refers to before this one
+    auto& list = pool(to_, old);
+    const I fresh{static_cast<std::uint32_t>(list.size())};
+    list.push_back(std::move(object));
+    known.emplace(old, fresh);
+    return fresh;
+  }
+
+  const Scene& from_;
+  Scene to_;
+  std::tuple<std::map<AssetIndex, AssetIndex>, std::map<TextureIndex, TextureIndex>,
+             std::map<BsdfIndex, BsdfIndex>, std::map<VolumeIndex, VolumeIndex>,
+             std::map<PhaseIndex, PhaseIndex>, std::map<MediumIndex, MediumIndex>,
+             std::map<GroupIndex, GroupIndex>>
+      moved_;
+};
+
+}  // namespace
+
+std::string find_inconsistency(const Scene& s) { return ValueChecker(s).run(); }
+
+Scene compacted(const Scene& s) { return Compactor(s).run(); }
+
+}  // namespace ls::scene
