@@ -118,9 +118,6 @@ json to_value(const JobView& v) {
                                                    {"seconds", number(*v.eta_with_more)},
                                                    {"ci95", interval(v.eta_with_more_ci95)}}
                                             : json()},
-          // The same values under their earlier names, for clients of earlier versions.
-          {"eta_with_8_more", number(v.eta_with_more)},
-          {"eta_with_8_more_ci95", interval(v.eta_with_more_ci95)},
           {"error", text_or_null(v.error)},
           {"after", to_value(v.after)},
           {"waits_for", text_or_null(v.waits_for)},

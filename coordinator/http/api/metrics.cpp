@@ -129,12 +129,10 @@ void write_workers(std::string& out, std::span<const coordinator::WorkerView> wo
 void write_leases(std::string& out, const coordinator::FarmFigures& f) {
   single(out, "lightshaft_leases", "Number of leases that workers hold now.", f.leases_now);
   single(out, "lightshaft_units_leased", "Number of units that are leased now.", f.units_leased_now);
-  single(out, "lightshaft_units_lent", "Older name of lightshaft_units_leased.", f.units_leased_now);
   single(out, "lightshaft_leases_granted_total", "Number of leases that workers have received.",
          f.leases_granted);
   single(out, "lightshaft_units_leased_total", "Number of units that have been leased to workers.",
          f.units_leased);
-  single(out, "lightshaft_units_lent_total", "Older name of lightshaft_units_leased_total.", f.units_leased);
   // Causes that freed no unit are listed, too, with the value 0: Prometheus computes the rate of a counter
   // only from values that it has seen, so a counter that first appeared with 1 would lose that event.
   LabelledValues freed;
@@ -171,7 +169,6 @@ void write_results(std::string& out, const coordinator::FarmFigures& f) {
          "Number of accepted results that wait for an earlier round of their tile.", f.waiting_now);
   single(out, "lightshaft_background_writes", "Number of writes that wait for the disk.",
          f.background_writes_now);
-  single(out, "lightshaft_chores", "Older name of lightshaft_background_writes.", f.background_writes_now);
   single(out, "lightshaft_result_bytes_total", "Bytes of results received from workers.", f.result_bytes);
   single(out, "lightshaft_blob_bytes_total", "Bytes of blobs sent to workers.", f.blob_bytes);
 }
@@ -183,8 +180,6 @@ void write_audits(std::string& out, const coordinator::AuditFigures& a) {
            "verdict", {{"asked", a.asked}, {"equal", a.equal}, {"differ", a.differ}, {"dropped", a.dropped}});
   single(out, "lightshaft_workers_quarantined_total",
          "Number of workers that were quarantined because they rendered wrong pixels.",
-         a.workers_quarantined);
-  single(out, "lightshaft_workers_barred_total", "Older name of lightshaft_workers_quarantined_total.",
          a.workers_quarantined);
   single(out, "lightshaft_tiles_discarded_total",
          "Number of tiles that were rendered again because a quarantined worker had rendered part of them.",
