@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "coordinator/views/describe_view.h"
 #include "core/base/parse_number.h"
 #include "core/job/advice.h"
 
@@ -14,74 +14,54 @@ namespace {
 
 using nlohmann::json;
 
-json number(double value) { return std::isfinite(value) ? json(value) : json(); }
-json number(const std::optional<double>& value) { return value ? number(*value) : json(); }
-json interval(double from, double to) { return {number(from), number(to)}; }
-json interval(const std::optional<std::pair<double, double>>& v) {
-  return v ? interval(v->first, v->second) : json();
-}
-json text_or_null(const std::string& text) { return text.empty() ? json() : json(text); }
-json rectangle(const PixelRect& r) { return {r.x0, r.y0, r.x1, r.y1}; }
-template <class T>
-json or_null(const std::optional<T>& value) {
-  return value ? json(*value) : json();
-}
 // Writes `j` as text. Names in it come from users, so invalid UTF-8 is replaced.
 std::string dump(const json& j) { return j.dump(-1, ' ', false, json::error_handler_t::replace); }
 
-json to_value(const FramesView& v) {
-  json j{{"range", to_string(v.range)}, {"total", v.total},   {"done", v.done},
-         {"running", v.running},        {"failed", v.failed}, {"cancelled", v.cancelled},
-         {"current", v.current}};
-  if (v.all.empty()) return j;
-  auto& list = j["list"] = json::array();
-  for (const FrameView& f : v.all)
-    list.push_back({{"frame", f.frame},
-                    {"id", f.job.value},
-                    {"state", to_string(f.state)},
-                    {"progress", number(f.progress)},
-                    {"spp_done", number(f.spp_done)},
-                    {"relmse", number(f.relmse)},
-                    {"error", text_or_null(f.error)}});
-  return j;
+template <class T>
+json to_value(const T& value);
+
+struct JsonWriter {
+  json object = json::object();
+  template <class T>
+  void field(const char* name, std::string_view, const T& value) {
+    object[name] = to_value(value);
+  }
+  template <class T>
+  void field_unless_empty(const char* name, std::string_view doc, const T& list) {
+    if (!list.empty()) field(name, doc, list);
+  }
+};
+
+// Writes a value of a field (describe_view.h).
+template <class T>
+json to_value(const T& value) {
+  if constexpr (std::is_same_v<T, double>) {
+    return std::isfinite(value) ? json(value) : json();
+  } else if constexpr (std::is_arithmetic_v<T> || std::is_convertible_v<T, std::string_view>) {
+    return value;
+  } else if constexpr (std::is_same_v<T, Word>) {
+    return value.value;
+  } else if constexpr (std::is_same_v<T, Interval>) {
+    return {to_value(value.first), to_value(value.second)};
+  } else if constexpr (requires { value.has_value(); }) {
+    return value ? to_value(*value) : json();
+  } else if constexpr (requires { value.begin(); }) {
+    json list = json::array();
+    for (const auto& one : value) list.push_back(to_value(one));
+    return list;
+  } else if constexpr (std::is_same_v<T, HealthView>) {
+    return json::parse(health_json(value.health, value.notes));
+  } else {
+    JsonWriter writer;
+    describe(writer, value);
+    return std::move(writer.object);
+  }
 }
 
-json to_value(const TimeSplit& t) {
-  json j;
-  for (const TimePart& part : kTimeParts) j[part.name] = number(t.*part.seconds);
-  return j;
-}
-
-json to_value(const DenoisedCheck& c) {
-  return {
-      {"spp", number(c.spp)}, {"relmse", number(std::max(0.0, c.relmse))}, {"at_most", number(c.at_most)}};
-}
-
-// In the result, "share" is null if no workers are connected.
-json to_value(const ClassShare& s) {
-  return {{"workers", s.workers},
-          {"of_workers", s.of_workers},
-          {"threads", s.threads},
-          {"of_threads", s.of_threads},
-          {"share", s.of_threads > 0 ? json(static_cast<double>(s.threads) / s.of_threads) : json()}};
-}
-
-json to_value(const ReferenceError& e) {
-  return {{"rmse", number(e.rmse)},
-          {"relmse", number(e.relmse)},
-          {"flip", number(e.flip)},
-          {"below_noise", e.relmse_below_noise()},
-          {"rmse_below_noise", e.rmse_below_noise()}};
-}
-
-json to_value(const std::vector<AfterView>& after) {
-  json all = json::array();
-  for (const AfterView& one : after)
-    all.push_back({{"id", one.id.value}, {"state", one.state ? json(to_string(*one.state)) : json()}});
-  return all;
-}
+}  // namespace
 
 std::string advice_of(const JobView& v) {
+  if (!v.convergence_status) return {};
   // In a sequence that is running, frames that wait do not hold up the others
   const bool goes_on = v.state == JobState::running ? v.after.empty() || v.frames
                                                     : v.state == JobState::queued && v.after.empty();
@@ -93,139 +73,23 @@ std::string advice_of(const JobView& v) {
                                            .can_extend = v.state == JobState::done});
 }
 
-json to_value(const JobView& v) {
-  const auto frame = frame_of(v.id);
-  const ErrorFigures* error = v.error_now ? &*v.error_now : nullptr;
-  return {{"id", v.id.value},
-          {"name", v.name},
-          {"owner", v.owner},
-          {"state", to_string(v.state)},
-          {"stopped", text_or_null(v.stopped)},
-          {"progress", number(v.progress)},
-          {"spp", v.spp},
-          {"spp_asked", v.spp_asked ? json(v.spp) : json()},
-          {"spp_done", number(v.spp_done)},
-          {"target_error", number(v.target_error)},
-          {"target_layer", v.target_error ? json(to_string(v.target_layer)) : json()},
-          {"denoised_check", v.denoised_check ? to_value(*v.denoised_check) : json()},
-          {"denoise", v.denoise},
-          {"denoised", v.denoised ? json{{"relmse", number(v.denoised->relmse)},
-                                         {"relmse_ci95", interval(v.denoised->relmse_ci95)}}
-                                  : json()},
-          {"eta_seconds", number(v.eta_seconds)},
-          {"eta_ci95", interval(v.eta_ci95)},
-          {"eta_with_more", v.eta_with_more ? json{{"workers", kMoreWorkers},
-                                                   {"seconds", number(*v.eta_with_more)},
-                                                   {"ci95", interval(v.eta_with_more_ci95)}}
-                                            : json()},
-          {"error", text_or_null(v.error)},
-          {"after", to_value(v.after)},
-          {"waits_for", text_or_null(v.waits_for)},
-          {"warnings", v.warnings},
-          {"fake", v.fake},
-          {"size", {v.size.width, v.size.height}},
-          {"tile", v.tile},
-          {"priority", v.priority},
-          {"focus", v.focus ? rectangle(*v.focus) : json()},
-          {"max_workers", or_null(v.max_workers)},
-          {"max_units", or_null(v.max_units)},
-          {"memory_bytes", v.memory_bytes},
-          {"units_done", v.units_done},
-          {"units_total", v.units_total},
-          {"elapsed_seconds", number(v.elapsed_seconds)},
-          {"core_seconds", number(v.core_seconds)},
-          {"queued_core_seconds", number(v.queued_core_seconds)},
-          {"time", to_value(v.time)},
-          {"submitted_unix", number(v.submitted_unix)},
-          {"health", json::parse(health_json(v.health, v.notes))},
-          {"numeric_class", v.numeric_class ? json(v.numeric_class->hex()) : json()},
-          {"platform", text_or_null(v.platform)},
-          {"class_share", v.class_share ? to_value(*v.class_share) : json()},
-          {"sequence", frame ? json(frame->sequence.value) : json()},
-          {"frame", frame ? json(frame->frame) : json()},
-          {"frames", v.frames ? to_value(*v.frames) : json()},
-          {"rmse", error ? number(error->rmse) : json()},
-          {"rmse_ci95", error && error->rmse_hi > 0 ? interval(error->rmse_lo, error->rmse_hi) : json()},
-          {"relmse", error ? number(error->relmse) : json()},
-          {"relmse_ci95", error ? interval(error->relmse_lo, error->relmse_hi) : json()},
-          {"reference", v.reference_error ? to_value(*v.reference_error) : json()},
-          {"reference_same_seed", v.reference_same_seed},
-          {"verdict", v.convergence_status ? json{{"kind", to_string(v.convergence_status->kind)},
-                                                  {"words", v.convergence_status->words},
-                                                  {"trusted", v.convergence_status->trusted},
-                                                  {"advice", text_or_null(advice_of(v))}}
-                                           : json()},
-          {"few_hits", or_null(v.few_hits)},
-          {"pixels_without_samples", or_null(v.pixels_without_samples)},
-          {"slope", v.trend ? number(-v.trend->slope) : json()},
-          {"slope_ci95", v.trend ? interval(-v.trend->slope_hi, -v.trend->slope_lo) : json()},
-          {"efficiency_per_core", number(v.efficiency)}};
-}
-
-json to_value(const WorkerView& v) {
-  return {{"id", v.id.value},
-          {"name", v.name},
-          {"build", v.build},
-          {"numeric_class", v.numeric_class.hex()},
-          {"platform", text_or_null(v.platform)},
-          {"fake", v.fake},
-          {"threads", v.threads},
-          {"tags", v.tags},
-          {"state", v.state},
-          {"activity", v.activity},
-          {"job", text_or_null(v.job)},
-          {"units_done", v.units_done},
-          {"cpu_seconds", number(v.cpu_seconds)},
-          {"rss_bytes", v.rss_bytes},
-          {"memory_bytes", v.memory_bytes},
-          {"last_seen_seconds", number(v.last_seen_seconds)}};
-}
-
-}  // namespace
-
 std::string time_json(const TimeSplit& time) { return dump(to_value(time)); }
 std::string job_json(const JobView& job) { return dump(to_value(job)); }
 std::string jobs_json(const JobsPage& page) {
-  json jobs = json::array(), states = json::object();
-  for (const JobView& job : page.jobs) jobs.push_back(to_value(job));
+  json states = json::object();
   for (std::size_t i = 0; i < page.states.size(); ++i)
     states[std::string(to_string(static_cast<JobState>(i)))] = page.states[i];
-  return dump(json{{"jobs", std::move(jobs)},
+  return dump(json{{"jobs", to_value(page.jobs)},
                    {"total", page.total},
                    {"states", std::move(states)},
                    {"owners", page.owners}});
 }
 std::string worker_json(const WorkerView& worker) { return dump(to_value(worker)); }
 std::string workers_json(const std::vector<WorkerView>& workers) {
-  json all = json::array();
-  for (const WorkerView& worker : workers) all.push_back(to_value(worker));
-  return dump(json{{"workers", std::move(all)}});
+  return dump(json{{"workers", to_value(workers)}});
 }
-
-std::string video_json(const VideoView& v) {
-  static constexpr const char* kStates[] = {"none", "waiting", "making", "ready", "failed"};
-  const bool asked = v.state != VideoState::none;
-  return dump(json{{"state", kStates[static_cast<int>(v.state)]},
-                   {"fps", asked ? number(v.asked.fps) : json()},
-                   {"exposure", asked ? number(v.asked.exposure) : json()},
-                   {"layer", asked ? json(v.asked.denoised ? "denoised" : "rgb") : json()},
-                   {"frames", v.frames},
-                   {"frames_done", v.frames_done},
-                   {"bytes", v.state == VideoState::ready ? json(v.bytes) : json()},
-                   {"error", text_or_null(v.error)}});
-}
-
-std::string tiles_json(const std::vector<TileView>& tiles) {
-  json all = json::array();
-  for (const auto& t : tiles)
-    all.push_back({{"tile", t.tile},
-                   {"rect", rectangle(t.rect)},
-                   {"rounds", t.rounds_folded},
-                   {"spp", t.spp},
-                   {"relmse", number(t.relmse)},
-                   {"workers", t.workers}});
-  return dump(json{{"tiles", std::move(all)}});
-}
+std::string video_json(const VideoView& video) { return dump(to_value(video)); }
+std::string tiles_json(const std::vector<TileView>& tiles) { return dump(json{{"tiles", to_value(tiles)}}); }
 
 std::string convergence_csv(const std::vector<ConvergencePoint>& points) {
   std::string csv =
@@ -245,7 +109,7 @@ std::string tile_event_json(const JobId& job, TileIndex tile, const PixelRect& r
                             std::uint64_t spp, std::string_view worker) {
   return dump(json{{"job", job.value},
                    {"tile", tile},
-                   {"rect", rectangle(rect)},
+                   {"rect", corners(rect)},
                    {"state", state},
                    {"spp", spp},
                    {"worker", worker}});

@@ -45,14 +45,19 @@ struct TimeSplit {
   bool operator==(const TimeSplit&) const = default;
 };
 
-// A part of TimeSplit and its name in JSON
+// A part of TimeSplit, its name in JSON and its description
 struct TimePart {
   const char* name;
   double TimeSplit::*seconds;
+  const char* doc;
 };
-inline constexpr TimePart kTimeParts[] = {{"load", &TimeSplit::load},     {"build", &TimeSplit::build},
-                                          {"render", &TimeSplit::render}, {"transfer", &TimeSplit::transfer},
-                                          {"merge", &TimeSplit::merge},   {"idle", &TimeSplit::idle}};
+inline constexpr TimePart kTimeParts[] = {
+    {"load", &TimeSplit::load, "Fetching the job's files."},
+    {"build", &TimeSplit::build, "Reading the files and building worlds from them."},
+    {"render", &TimeSplit::render, "Rendering: CPU time of units, the same as core_seconds."},
+    {"transfer", &TimeSplit::transfer, "Encoding results."},
+    {"merge", &TimeSplit::merge, "Checking results and adding them to the image, on the coordinator."},
+    {"idle", &TimeSplit::idle, "Idle time of render threads between two units of the job."}};
 
 inline void TimeSplit::add(const TimeSplit& o) {
   for (const TimePart& part : kTimeParts) this->*part.seconds += o.*part.seconds;

@@ -187,6 +187,7 @@ class Job(TypedDict):
     stopped: NotRequired[Union[str, None]]
     """Why the job ended: spp, error, time, or user (it was cancelled)."""
     progress: float
+    """From 0 to 1."""
     spp: int
     """Samples per pixel that the job asks for."""
     spp_asked: NotRequired[Union[int, None]]
@@ -233,10 +234,6 @@ class Job(TypedDict):
     """[low, high]: the 95 % interval of eta_seconds, for a job that ends at a target error."""
     eta_with_more: NotRequired[Union["JobEtaWithMore", None]]
     """Predicted time left with more workers like the present ones. null: more workers would not help."""
-    eta_with_8_more: NotRequired[Union[float, None]]
-    """seconds of eta_with_more. Deprecated; the next version removes it."""
-    eta_with_8_more_ci95: NotRequired[Union[list[float], None]]
-    """ci95 of eta_with_more. Deprecated; the next version removes it."""
     error: Union[str, None]
     """Why the job failed or does not progress."""
     after: NotRequired[list["JobAfter"]]
@@ -249,11 +246,13 @@ class Job(TypedDict):
     """Error of the denoised layers of a job that is done. null: the job has no denoised layers, or is a
     sequence."""
     warnings: NotRequired[list[str]]
+    """Warnings about the scene."""
     fake: NotRequired[bool]
     """True if fake workers (--fake) computed the pixels. The image does not show the scene."""
     size: NotRequired[list[int]]
     """[width, height] in pixels."""
     tile: NotRequired[int]
+    """Side of a tile in pixels."""
     priority: NotRequired[int]
     focus: NotRequired[Union[list[int], None]]
     """[x0, y0, x1, y1]: tiles in this rectangle get the next samples first. null: all tiles are treated
@@ -275,12 +274,14 @@ class Job(TypedDict):
     units_done: NotRequired[int]
     units_total: NotRequired[int]
     elapsed_seconds: NotRequired[float]
+    """Seconds since the job's first ray."""
     core_seconds: NotRequired[float]
     """CPU seconds that workers spent on the job's units."""
     queued_core_seconds: NotRequired[float]
     """Predicted CPU seconds of the units that no worker holds. 0 also if nothing was measured yet."""
     time: NotRequired["TimeSplit"]
     submitted_unix: NotRequired[float]
+    """Time of submission in seconds since 1970."""
     sequence: NotRequired[Union[str, None]]
     """For a frame: the id of its sequence."""
     frame: NotRequired[Union[int, None]]
@@ -307,6 +308,7 @@ class JobReference(TypedDict):
     rmse: NotRequired[float]
     relmse: NotRequired[float]
     flip: NotRequired[Union[float, None]]
+    """Mean HDR-FLIP, the visible difference from 0 to 1. null: not computed."""
     below_noise: NotRequired[bool]
     """True if relmse is less than three standard errors of the reference's own noise. The true error is
     then too small to measure, not 0."""
@@ -346,6 +348,7 @@ class JobDenoised(TypedDict):
     sequence."""
     relmse: NotRequired[float]
     relmse_ci95: NotRequired[Union[list[float], None]]
+    """[low, high]: the 95 % interval of relmse. null: unknown."""
 
 
 class JobClassShare(TypedDict):
@@ -442,10 +445,12 @@ class Tile(TypedDict):
     rect: NotRequired[list[int]]
     """[x0, y0, x1, y1] in pixels; x1 and y1 are exclusive."""
     rounds: NotRequired[int]
+    """Rounds that are part of the image."""
     spp: NotRequired[int]
     relmse: NotRequired[Union[float, None]]
     """Estimated error of the tile. null until it has samples."""
     workers: NotRequired[list[str]]
+    """Names of the workers that render the tile now."""
 
 
 class TileEvent(TypedDict):
@@ -471,13 +476,16 @@ class Worker(TypedDict):
     tags: NotRequired[list[str]]
     state: NotRequired[Literal["connected", "draining", "lost", "sick", "gone"]]
     activity: NotRequired[str]
+    """What the worker does now, or what is wrong with it."""
     job: NotRequired[Union[str, None]]
+    """Id of the job that it works on."""
     units_done: NotRequired[int]
     cpu_seconds: NotRequired[float]
     rss_bytes: NotRequired[int]
     memory_bytes: NotRequired[int]
     """Memory that the worker may use. 0: the worker did not send it."""
     last_seen_seconds: NotRequired[float]
+    """Seconds since the worker's last message."""
 
 
 class Report(TypedDict):

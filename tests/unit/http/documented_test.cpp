@@ -1,4 +1,4 @@
-// The API's answers have the members that openapi.json describes.
+// The report has the members that openapi.json describes.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -20,12 +20,6 @@ void expect_described(const json& answer, const json& properties) {
   for (const auto& [key, value] : answer.items()) EXPECT_TRUE(properties.contains(key)) << key;
   for (const auto& [key, value] : properties.items())
     EXPECT_TRUE(answer.contains(key) || key == "frames") << key << " is described and does not come";
-}
-
-TEST(Documented, OpenApiDocumentsAllMembersOfAJob) {
-  coordinator::JobView view;
-  view.id = JobId{"j-1"};
-  expect_described(json::parse(coordinator::job_json(view)), properties_of("Job"));
 }
 
 TEST(Documented, OpenApiDocumentsAllMembersOfAReport) {

@@ -1,4 +1,5 @@
-// The tables of a job's settings generate its parts of openapi.json and the reference page.
+// The tables of a job's settings and of what clients read generate parts of openapi.json and the reference
+// page.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -7,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "coordinator/views/describe_change.h"
+#include "coordinator/views/describe_view.h"
 #include "core/job/objects.h"
 
 namespace ls::http {
@@ -116,6 +118,76 @@ std::string query_parameters(const std::string& indent) {
   return lines;
 }
 
+// Returns the name of the schema of a view that openapi.json refers to; empty: its schema stands in place.
+template <class T>
+std::string schema_name() {
+  if (std::is_same_v<T, coordinator::TimeSplit>) return "TimeSplit";
+  if (std::is_same_v<T, coordinator::FramesView>) return "Frames";
+  return std::is_same_v<T, coordinator::HealthView> ? "Health" : "";
+}
+
+template <class T>
+Json view_schema(const T& value);
+
+struct SchemaWriter {
+  Json properties = Json::object();
+  template <class T>
+  void field(const char* name, std::string_view doc, const T& value) {
+    Json schema = view_schema(value);
+    if (!doc.empty()) schema["description"] = doc;
+    properties[name] = std::move(schema);
+  }
+  template <class T>
+  void field_unless_empty(const char* name, std::string_view doc, const T& list) {
+    field(name, doc, list);
+  }
+};
+
+template <class T>
+Json properties_of_view() {
+  const T view{};
+  SchemaWriter writer;
+  describe(writer, view);
+  return writer.properties;
+}
+
+// Returns the schema of a value of a field (coordinator/views/describe_view.h).
+template <class T>
+Json view_schema(const T& value) {
+  if constexpr (requires { value.has_value(); }) {
+    Json schema = view_schema(typename T::value_type{});
+    if (!schema.contains("type")) return {{"oneOf", {schema, {{"type", "null"}}}}};
+    schema["type"] = {schema["type"], "null"};
+    return schema;
+  } else if constexpr (std::is_same_v<T, bool>) {
+    return {{"type", "boolean"}};
+  } else if constexpr (std::is_arithmetic_v<T>) {
+    return {{"type", std::is_integral_v<T> ? "integer" : "number"}};
+  } else if constexpr (std::is_convertible_v<T, std::string_view>) {
+    return {{"type", "string"}};
+  } else if constexpr (std::is_same_v<T, coordinator::Word>) {
+    return {{"enum", value.all}};
+  } else if constexpr (std::is_same_v<T, coordinator::Interval>) {
+    return {{"type", "array"}, {"items", {{"type", "number"}}}};
+  } else if constexpr (requires { typename T::value_type; }) {
+    return {{"type", "array"}, {"items", view_schema(typename T::value_type{})}};
+  } else if (const std::string name = schema_name<T>(); !name.empty()) {
+    return {{"$ref", "#/components/schemas/" + name}};
+  } else if constexpr (!std::is_same_v<T, coordinator::HealthView>) {
+    return {{"type", "object"}, {"properties", properties_of_view<T>()}};
+  }
+  return {};
+}
+
+template <class T>
+std::string lines_of_view() {
+  std::string lines;
+  const Json properties = properties_of_view<T>();
+  for (const auto& [name, schema] : properties.items())
+    lines += fmt::format("{}          \"{}\": {}", lines.empty() ? "" : ",\n", name, in_a_line(schema));
+  return lines;
+}
+
 // Replaces the part of `text` from the end of the last of `begins`, which follow each other, to `end`.
 void replace_part(std::string& text, std::initializer_list<std::string> begins, const std::string& end,
                   const std::string& part) {
@@ -205,6 +277,17 @@ TEST(JobSettings, AreInTheOpenApiDocumentAsTheTablesSay) {
                properties_of<JobSpec>("          "));
   replace_part(text, {"\n      \"JobChange\": {\n", properties}, "\n        }\n      }",
                properties_of<JobChange>("          "));
+
+  const auto replace_view = [&]<class T>(const char* name, std::type_identity<T>) {
+    replace_part(text, {std::string("\n      \"") + name + "\": {\n", properties}, "\n        }\n      }",
+                 lines_of_view<T>());
+  };
+  replace_view("Job", std::type_identity<coordinator::JobView>());
+  replace_view("TimeSplit", std::type_identity<coordinator::TimeSplit>());
+  replace_view("Frames", std::type_identity<coordinator::FramesView>());
+  replace_view("Tile", std::type_identity<coordinator::TileView>());
+  replace_view("Worker", std::type_identity<coordinator::WorkerView>());
+  replace_view("Video", std::type_identity<coordinator::VideoView>());
 
   EXPECT_TRUE(Json::accept(text));
   expect_committed("coordinator/http/openapi.json", text);
