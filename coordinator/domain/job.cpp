@@ -133,19 +133,8 @@ void Job::plan_all() {
 }
 
 std::optional<TimePoint> Job::time_limit(TimePoint now) const {
-  if (!plan.time || !first_ray) return std::nullopt;
-  const Duration stood = still_since ? now - std::max(*still_since, *first_ray) : Duration{};
-  return *first_ray + stood + from_seconds(*plan.time);
-}
-
-void Job::stand_still(TimePoint now) {
-  if (!still_since) still_since = now;
-}
-
-void Job::go_on(TimePoint now) {
-  if (!still_since) return;
-  if (first_ray) *first_ray += now - std::max(*still_since, *first_ray);
-  still_since.reset();
+  const auto zero = clock.zero(now);
+  return plan.time && zero ? std::optional(*zero + from_seconds(*plan.time)) : std::nullopt;
 }
 
 }  // namespace ls::coordinator

@@ -21,6 +21,7 @@
 
 #include "coordinator/domain/adaptive_stop.h"
 #include "coordinator/domain/event.h"
+#include "coordinator/domain/job_clock.h"
 #include "coordinator/domain/limits.h"
 #include "coordinator/domain/unit_queue.h"
 #include "coordinator/domain/unit_table.h"
@@ -237,11 +238,7 @@ struct Job {
   std::map<Digest, PassedOver> passed_over = {};
   // How often the class was given up because it had brought no result for too long (kPinLimit)
   std::uint32_t pins_released = 0;
-  // When the first ray was traced, plus the total time in which the job's clock was stopped; nullopt: no ray
-  // was traced yet
-  std::optional<TimePoint> first_ray;
-  // When the job was paused or became done, which stops the clock of its time limit; nullopt: the clock runs
-  std::optional<TimePoint> still_since;
+  JobClock clock;  // of the time limit; it stands still while the job is paused or done
 
   UnitTable units;
   UnitQueue queue;
@@ -327,10 +324,6 @@ struct Job {
   // Returns the time at which the job's time budget is used up; nullopt: the job has no time budget, or no
   // ray was traced yet.
   std::optional<TimePoint> time_limit(TimePoint now) const;
-  // stand_still() stops the clock of the job's time limit at `now`, unless it is stopped already. go_on()
-  // starts it again, unless it is running already.
-  void stand_still(TimePoint now);
-  void go_on(TimePoint now);
 };
 
 }  // namespace ls::coordinator

@@ -156,9 +156,10 @@ void FarmDriver::on(const RecordUnit& e) {
   const auto entry = core_.jobs.find(e.unit.job);
   if (!entry) return;
   entry->leased.erase({e.unit.tile, e.unit.round});
-  if (entry->clock_zero) return;
+  if (entry->clock.started()) return;
   const auto figures = farm_.job(e.unit.job);
-  entry->clock_zero = figures && figures->first_ray ? *figures->first_ray : clock_.now();
+  const auto zero = figures ? figures->clock.zero(clock_.now()) : std::nullopt;
+  entry->clock.start(zero.value_or(clock_.now()));
   if (entry->stored.totals.began_unix == 0)
     entry->stored.totals.began_unix = system_unix_seconds() - entry->elapsed(clock_.now());
 }
@@ -310,11 +311,8 @@ void FarmDriver::on(const JobStateChanged& e) {
   }
   core_.records.log(e.job, fmt::format("{}", to_string(e.to)));
   if (e.to == JobState::running && !entry->pin_unsaved) entry->trouble.clear();
-  if (e.to == JobState::paused) entry->still_since = clock_.now();
-  if (e.from == JobState::paused) {
-    if (const auto since = std::exchange(entry->still_since, std::nullopt); since && entry->clock_zero)
-      *entry->clock_zero += clock_.now() - std::max(*since, *entry->clock_zero);
-  }
+  if (e.to == JobState::paused) entry->clock.stand_still(clock_.now());
+  if (e.from == JobState::paused) entry->clock.go_on(clock_.now());
   if (is_terminal(e.to)) {
     end_image(entry);
     entry->stored.totals.ended_unix = entry->ended_unix;
@@ -347,7 +345,7 @@ void FarmDriver::end_image(const EntryPtr& entry) {
   JobTotals& totals = entry->stored.totals;
   totals.render_seconds = entry->fold_seconds;
   entry->ended_unix = system_unix_seconds();
-  entry->clock_zero.reset();
+  entry->clock.reset();
   entry->leased.clear();
   if (!entry->assembly) return;
   totals.health = entry->assembly->health().total();

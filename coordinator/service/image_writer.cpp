@@ -75,14 +75,14 @@ void ImageWriter::keep_audits(Core&, const EntryPtr& entry, const std::vector<Jo
 }
 
 void ImageWriter::snapshot_if_due(Core&, const EntryPtr& entry) {
-  if (!files_.on_disk() || entry->snapshot_running || !entry->assembly) return;
+  if (!files_.on_disk() || entry->snapshots.running || !entry->assembly) return;
   const std::uint64_t folds = entry->assembly->folds_since_snapshot;
   if (folds < limits::kSnapshotUnits &&
-      seconds(clock_.now() - entry->last_snapshot) < limits::kSnapshotSeconds)
+      seconds(clock_.now() - entry->snapshots.last) < limits::kSnapshotSeconds)
     return;
-  entry->snapshot_running = true;
+  entry->snapshots.running = true;
   entry->assembly->folds_since_snapshot = 0;
-  entry->last_snapshot = clock_.now();
+  entry->snapshots.last = clock_.now();
   writes_.push([this, entry] { take_snapshot(entry); });
 }
 
@@ -94,18 +94,18 @@ void ImageWriter::take_snapshot(const EntryPtr& entry) {
   const auto done = [this, entry](const Result<void>& written) {
     if (!written) log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
     const auto core = core_.lock();
-    entry->snapshot_running = false;
+    entry->snapshots.running = false;
   };
   auto file = copy_folded(entry);
   if (!file) return done(tl::unexpected(file.error()));
-  writes_.push([this, entry, done, before = entry->snapshots,
+  writes_.push([this, entry, done, before = entry->snapshots.committed,
                 file = std::make_shared<SnapshotFile>(std::move(*file))] {
     auto core = core_.lock();
     // The snapshot is dropped if the job was removed or a later snapshot has been written meanwhile
-    const bool wanted = entry->assembly && !entry->removed && entry->snapshots == before;
+    const bool wanted = entry->assembly && !entry->removed && entry->snapshots.committed == before;
     core.unlock();
     if (!wanted) return done({});
-    ++entry->snapshots;
+    ++entry->snapshots.committed;
     const auto written = file->commit();
     failpoint("snapshot-written");
     done(written);
@@ -140,7 +140,7 @@ Result<void> ImageWriter::write_snapshot(const EntryPtr& entry, const Folded& fo
     if (auto added = file->add(snapshot_of(folded.film, folded.errors, folded.health, t)); !added)
       return added;
   if (auto sealed = file->finish(); !sealed) return sealed;
-  ++entry->snapshots;
+  ++entry->snapshots.committed;
   const auto written = file->commit();
   failpoint("snapshot-written");
   return written;

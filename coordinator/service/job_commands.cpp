@@ -132,7 +132,7 @@ Result<std::vector<EntryPtr>> may_extend(const Farm& farm, const Sequence& seque
 
 // True if a unit of the job is leased or done.
 bool has_begun(const JobEntry& entry) {
-  return entry.stored.state == JobState::running || entry.clock_zero || !entry.leased.empty() ||
+  return entry.stored.state == JobState::running || entry.clock.started() || !entry.leased.empty() ||
          entry.stored.totals.began_unix > 0;
 }
 
@@ -396,7 +396,7 @@ Result<void> JobCommands::go_on(Core& core, JobEntry& entry, const Result<JobPla
   entry.stored = std::move(next);
   core.jobs.count_state(entry);
   if (entry.finishing != 0 || state == JobState::done)
-    entry.clock_zero = clock_.now() - from_seconds(entry.stored.totals.render_seconds);
+    entry.clock.start(clock_.now() - from_seconds(entry.stored.totals.render_seconds));
   entry.finishing = 0;
   core.driver.run(change);
   core.records.log(entry.stored.id, std::move(log_line));

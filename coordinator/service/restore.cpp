@@ -123,11 +123,11 @@ Result<void> Restore::take_up(Core& core, JobEntry& entry,
   log_info(fmt::format("job={} state={} units={}", id.value, to_string(state), event.accepted.size()),
            "restored");
   if (event.elapsed_seconds > 0) {
-    entry.clock_zero = clock_.now() - from_seconds(event.elapsed_seconds);
+    entry.clock.start(clock_.now() - from_seconds(event.elapsed_seconds));
     if (entry.stored.totals.began_unix == 0)
       entry.stored.totals.began_unix = system_unix_seconds() - event.elapsed_seconds;
   }
-  if (state == JobState::paused) entry.still_since = clock_.now();
+  if (state == JobState::paused) entry.clock.stand_still(clock_.now());
   core.driver.replay(entry, std::move(event));
   return {};
 }

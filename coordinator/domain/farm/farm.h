@@ -24,6 +24,7 @@
 #include "coordinator/domain/effect.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/domain/farm_figures.h"
+#include "coordinator/domain/job_clock.h"
 #include "core/base/error.h"
 
 namespace ls::coordinator {
@@ -70,7 +71,7 @@ struct JobFigures {
   // cores times the number of its leases of this job, divided by the number of all its leases.
   double cores = 0;
   double core_seconds_queued = 0;  // predicted CPU seconds of the units that wait for a worker
-  std::optional<TimePoint> first_ray;
+  JobClock clock;
   std::optional<Digest> numeric_class;
   std::optional<ClassShare> class_share;  // nullopt: the job has no numeric class yet
 };

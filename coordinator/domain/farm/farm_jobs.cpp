@@ -28,7 +28,7 @@ void Farm::State::set_state(Job& job, JobState to) {
   if (job.state == to) return;
   effects.emplace_back(JobStateChanged{job.plan.brief.job, job.state, to});
   job.state = to;
-  to == JobState::paused || to == JobState::done ? job.stand_still(now) : job.go_on(now);
+  to == JobState::paused || to == JobState::done ? job.clock.stand_still(now) : job.clock.go_on(now);
 }
 
 void Farm::State::refresh(Job& job) {
@@ -54,8 +54,8 @@ void Farm::State::on(const JobRestored& event) {
   if (job.denoised) job.denoised.emplace(event.denoised_checks);
   job.state = event.state;
   job.numeric_class = event.numeric_class;
-  if (event.elapsed_seconds > 0) job.first_ray = now - from_seconds(event.elapsed_seconds);
-  if (job.state == JobState::paused || job.state == JobState::done) job.stand_still(now);
+  if (event.elapsed_seconds > 0) job.clock.start(now - from_seconds(event.elapsed_seconds));
+  if (job.state == JobState::paused || job.state == JobState::done) job.clock.stand_still(now);
   if (is_closed(job.state)) return;
 
   // If a done job has lost its film (the sums of its samples), it is unknown how many samples each tile had.

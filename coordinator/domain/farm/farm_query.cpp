@@ -141,7 +141,7 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
     f.cores += w.cores() * static_cast<double>(leases) /
                static_cast<double>(std::max<std::size_t>(leases, w.leases.size()));
   }
-  f.first_ray = job->first_ray;
+  f.clock = job->clock;
   f.numeric_class = job->numeric_class;
   if (job->numeric_class) {
     const auto own = state_->workers.of_class(*job->numeric_class), all = state_->workers.of_all_classes();

@@ -105,7 +105,7 @@ void Farm::State::accept(const UnitAccepted& event) {
   if (job.state == JobState::queued) set_state(job, JobState::running);
   const auto since = worker ? held_since(job, code, *worker) : std::nullopt;
   const double cpu_seconds = believable(job, code, worker, since, event.cpu_seconds, now);
-  if (!job.first_ray) job.first_ray = now - from_seconds(cpu_seconds);
+  if (!job.clock.started()) job.clock.start(now - from_seconds(cpu_seconds));
   effects.emplace_back(RecordUnit{event.unit, event.samples, event.digest, event.worker});
   settle_unit(job, code, worker);
   job.units.accept(code, {event.digest, workers.index_of(event.worker)});

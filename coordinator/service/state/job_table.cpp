@@ -35,7 +35,7 @@ JobEntry::JobEntry(StoredJob job, TimePoint now)
       settings_digest(digest_of(stored.settings)),
       grid{stored.settings.size, stored.settings.tile},
       film_bytes(film_bytes_of(stored)),
-      last_snapshot(now),
+      snapshots(now),
       fold_seconds(stored.totals.render_seconds) {}
 
 void JobEntry::begin_image() {
@@ -54,7 +54,7 @@ void JobEntry::free_image() {
 }
 
 double JobEntry::elapsed(TimePoint now) const {
-  return clock_zero ? std::max(0.0, seconds(still_since.value_or(now) - *clock_zero)) : fold_seconds;
+  return clock.started() ? clock.shows(now) : fold_seconds;
 }
 
 FrameRange Sequence::range() const {
@@ -83,7 +83,7 @@ ReportFacts facts_of(const JobEntry& entry, TimePoint now) {
   if (!entry.assembly) return facts;
   const Film& film = entry.assembly->film();
   facts.job.totals.health = entry.assembly->health().total();
-  if (entry.clock_zero) facts.job.totals.render_seconds = entry.elapsed(now);
+  if (entry.clock.started()) facts.job.totals.render_seconds = entry.elapsed(now);
   put_film(facts, film);
   return facts;
 }
@@ -243,8 +243,8 @@ void JobTable::add(const EntryPtr& entry) {
       frames.begin(), frames.end(), frame->frame,
       [](std::uint32_t number, const EntryPtr& e) { return number < frame_of(e->stored.id)->frame; });
   frames.insert(place, entry);
-  entry->counted = entry->stored.state;
-  ++found->second.in_state[static_cast<std::size_t>(entry->counted)];
+  entry->in_sequence.counted = entry->stored.state;
+  ++found->second.in_state[static_cast<std::size_t>(entry->in_sequence.counted)];
   auto& warnings = found->second.warnings;
   for (const std::string& warning : entry->stored.warnings)
     if (warnings.size() < limits::kMaxWarnings &&
@@ -254,11 +254,11 @@ void JobTable::add(const EntryPtr& entry) {
 
 void JobTable::count_state(JobEntry& entry) {
   const auto frame = frame_of(entry.stored.id);
-  Sequence* all = frame && entry.counted != entry.stored.state ? sequence(frame->sequence) : nullptr;
+  Sequence* all = frame && entry.in_sequence.counted != entry.stored.state ? sequence(frame->sequence) : nullptr;
   if (!all) return;
-  --all->in_state[static_cast<std::size_t>(entry.counted)];
-  entry.counted = entry.stored.state;
-  ++all->in_state[static_cast<std::size_t>(entry.counted)];
+  --all->in_state[static_cast<std::size_t>(entry.in_sequence.counted)];
+  entry.in_sequence.counted = entry.stored.state;
+  ++all->in_state[static_cast<std::size_t>(entry.in_sequence.counted)];
   // If the sequence goes on, its next end is news again
   if (const JobState state = all->for_others(); !is_terminal(state)) all->notified = state;
 }
@@ -277,7 +277,7 @@ std::optional<JobId> JobTable::remove(const EntryPtr& entry) {
     const auto found = sequences_.find(listed);
     if (found == sequences_.end()) return std::nullopt;
     if (std::erase(found->second.frames, entry) > 0)
-      --found->second.in_state[static_cast<std::size_t>(entry->counted)];
+      --found->second.in_state[static_cast<std::size_t>(entry->in_sequence.counted)];
     if (!found->second.frames.empty()) return std::nullopt;
   }
   unlist(listed);

@@ -15,6 +15,7 @@
 
 #include "coordinator/assemble/assembly.h"
 #include "coordinator/assemble/job_report.h"
+#include "coordinator/domain/job_clock.h"
 #include "coordinator/service/state/job_trace.h"
 #include "coordinator/store/jobs/job_store.h"
 #include "coordinator/store/log/partial_log.h"
@@ -22,6 +23,35 @@
 namespace ls::coordinator {
 
 struct Denoised;
+
+class ImageWriter;
+class JobTable;
+class Publisher;
+
+// Parts of a job in memory that one component alone reads and writes
+
+class Snapshots {
+ public:
+  explicit Snapshots(TimePoint now) : last(now) {}
+
+ private:
+  friend ImageWriter;
+  bool running = false;
+  std::uint64_t committed = 0;  // used by the writer thread only
+  TimePoint last;
+};
+
+class Published {
+  friend Publisher;
+  TimePoint at{};                     // of the last event about the job or sequence
+  bool due = false;                   // true: its progress is to be published soon
+  JobState state = JobState::queued;  // the state in that event
+};
+
+class InSequence {
+  friend JobTable;
+  JobState counted = JobState::queued;  // the state with which Sequence::in_state counts the frame
+};
 
 // A job in memory: its record (`stored`), its image, and what is known about it only while the coordinator
 // runs.
@@ -31,7 +61,7 @@ struct JobEntry {
   void begin_image();       // creates an image without samples
   void begin_comparison();  // if the job has a reference image: creates reference_tiles from the image so far
   void free_image();        // frees the image and closes the log; only the job's record and its files remain
-  // Seconds on the job's clock, which starts with the first ray and stands still during pauses
+  // Seconds that the job's clock shows or, once its rendering has ended, showed last
   double elapsed(TimePoint now) const;
 
   StoredJob stored;  // the job's record; its state stays `running` until the final image is written
@@ -67,17 +97,12 @@ struct JobEntry {
   std::string broken;  // why the job could not be restored; empty: it could
   // Number of the request for the final image that is being made (ImageWriter::finish); 0: none is being made
   std::uint64_t finishing = 0;
-  bool snapshot_running = false;
-  std::uint64_t snapshots = 0;  // how many snapshots were committed; used by the writer thread only
-  TimePoint last_snapshot{}, last_progress{};
-  bool progress_due = false;
-  JobState last_state = JobState::queued;  // the state in the last event about the job that was published
-  JobState counted = JobState::queued;     // the state with which Sequence::in_state counts it
-  // Time at which the job's clock stood at 0: the time of the first ray, plus the length of all pauses that
-  // have ended. nullopt: no result has arrived yet, or the job's rendering has ended.
-  std::optional<TimePoint> clock_zero;
-  // Time at which a pause stopped the job's clock; nullopt: the job is not paused
-  std::optional<TimePoint> still_since;
+  Snapshots snapshots;
+  Published published;
+  InSequence in_sequence;
+  // Starts with the first result, and stands still during pauses. It has not started again once the job's
+  // rendering has ended.
+  JobClock clock;
   // Time at which the job's rendering ended, in seconds since 1970. Copied into `stored` when the job's end
   // is stored; for a done job this is after the final image is written.
   double ended_unix = 0;
@@ -96,8 +121,7 @@ using EntryPtr = std::shared_ptr<JobEntry>;
 struct Sequence {
   std::vector<EntryPtr> frames;       // in ascending order of frame numbers; never empty
   std::vector<std::string> warnings;  // the warnings of all frames, each text once
-  TimePoint last_progress{};
-  bool progress_due = false;
+  Published published;
   // Number of frames in each state, kept by JobTable: a job that waits for a sequence may be one of
   // thousands, and looking at all frames for each of them would take long.
   std::array<std::size_t, static_cast<std::size_t>(JobState::cancelled) + 1> in_state{};

@@ -128,20 +128,20 @@ void EventHub::deliver(State& s, const std::stop_token& token) {
 }
 
 void Publisher::job(JobEntry& entry) {
-  entry.progress_due = false;
-  entry.last_progress = clock_.now();
+  entry.published.due = false;
+  entry.published.at = clock_.now();
   if (quiet_) return;
   const JobView view = views_.job(entry);
   hub_.publish("job", job_json(view), entry.stored.id.value, entry.stored.owner);
   if (const auto frame = frame_of(entry.stored.id)) {
-    const bool changed = std::exchange(entry.last_state, view.state) != view.state;
+    const bool changed = std::exchange(entry.published.state, view.state) != view.state;
     sequence(frame->sequence, changed && !records_.puts_together());
   }
 }
 
 void Publisher::progress(JobEntry& entry) {
-  entry.progress_due = seconds(clock_.now() - entry.last_progress) < limits::kProgressSeconds;
-  if (!entry.progress_due) job(entry);
+  entry.published.due = seconds(clock_.now() - entry.published.at) < limits::kProgressSeconds;
+  if (!entry.published.due) job(entry);
 }
 
 void Publisher::sequence(const JobId& id, bool at_once) {
@@ -152,18 +152,18 @@ void Publisher::sequence(const JobId& id, bool at_once) {
   at_once &= sequence->frames.size() <= limits::kFramesPerEvent;
   const double period = limits::kProgressSeconds * (1 + static_cast<double>(sequence->frames.size()) /
                                                             static_cast<double>(limits::kFramesPerEvent));
-  sequence->progress_due = !at_once && seconds(clock_.now() - sequence->last_progress) < period;
-  if (sequence->progress_due) return;
-  sequence->last_progress = clock_.now();
+  sequence->published.due = !at_once && seconds(clock_.now() - sequence->published.at) < period;
+  if (sequence->published.due) return;
+  sequence->published.at = clock_.now();
   hub_.publish("job", job_json(views_.sequence(id, *sequence, false)), id.value,
                sequence->frames.front()->stored.owner);
 }
 
 void Publisher::publish_due() {
   for (const auto& [id, entry] : jobs_.all())
-    if (entry->progress_due) progress(*entry);
+    if (entry->published.due) progress(*entry);
   for (const auto& [id, due] : jobs_.sequences())
-    if (due.progress_due) sequence(id, false);
+    if (due.published.due) sequence(id, false);
 }
 
 void Publisher::job_removed(const JobId& id, const std::string& owner) {

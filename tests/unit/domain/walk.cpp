@@ -320,7 +320,7 @@ void Walk::restart() {
     // restart the target may end the job with more rounds than the target needs.
     if (job.plan.time && job.plan.target_error && f.state != JobState::done) job.disturbed = true;
     JobRestored event{job.plan, f.state,    f.stopped, f.numeric_class,
-                      {},       job.folded, {},        f.first_ray ? 0.5 : 0.0};
+                      {},       job.folded, {},        f.clock.started() ? 0.5 : 0.0};
     for (const auto& [key, r] : job.accepted)
       event.accepted.push_back({key.first, key.second, r.samples, r.digest, r.worker});
     for (TileIndex t = 0; t < job.folded.size(); ++t) {
