@@ -11,14 +11,16 @@ namespace {
 // come between reading the revision and writing. ARGV: revision, id, fence, node, sequence or '', fields ...
 // The fence is a number that increases with every new owner of the job. A higher fence in Redis means that a
 // later owner has written the job. A lower one means that Redis has lost data or that an earlier owner wrote
-// the job; then the revision in Redis does not count.
+// the job; then the revision in Redis does not count, and the earlier owner is told that it has lost the job.
 constexpr const char* kPut = R"(
 local fence = tonumber(redis.call('HGET', KEYS[1], 'fence') or '0')
 local mine = tonumber(ARGV[3])
 if fence > mine then return -1 end
-if ARGV[4] ~= '' and fence == mine then
-  local owner = redis.call('HGET', KEYS[1], 'owner')
-  if owner and owner ~= ARGV[4] then return -1 end
+local owner = redis.call('HGET', KEYS[1], 'owner')
+if ARGV[4] ~= '' and owner and owner ~= ARGV[4] then
+  if fence == mine then return -1 end
+  redis.call('SREM', 'lightshaft:owned:' .. owner, ARGV[2])
+  redis.call('RPUSH', 'lightshaft:lost:' .. owner, ARGV[2] .. ' ' .. ARGV[3])
 end
 if fence == mine and tonumber(redis.call('HGET', KEYS[1], 'revision') or '0') > tonumber(ARGV[1]) then return 0 end
 redis.call('SADD', KEYS[2], ARGV[2])

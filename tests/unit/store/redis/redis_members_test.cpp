@@ -336,6 +336,22 @@ TEST_F(Members, EmptiedRedisCausesNoTakeoverAndTheHigherFenceWins) {
   EXPECT_EQ(put("a", "j-1", 1, 51), static_cast<int>(PutAnswer::lost));
 }
 
+// An owner that has nothing to write is never refused: it must learn from its heartbeat.
+TEST_F(Members, MemberWhoseJobAHigherFenceOverwritesLearnsThatItLostIt) {
+  auto& a = add("a");
+  add("b");
+  ASSERT_EQ(put("a", "j-1", 1), 1);
+
+  EXPECT_EQ(put("b", "j-1", 2), 1) << "Redis had lost the takeover";
+
+  ASSERT_TRUE(a.members->beat());
+  EXPECT_EQ(a.lost, (std::vector<LostJob>{{{"j-1"}, 2}}));
+  EXPECT_EQ(ask({"SISMEMBER", "lightshaft:owned:a", "j-1"}).number, 0);
+  EXPECT_EQ(put("b", "j-1", 2, 2), 1);
+  ASSERT_TRUE(a.members->beat());
+  EXPECT_EQ(a.lost.size(), 1u) << "told once";
+}
+
 TEST_F(Members, EqualJobOfAnotherMemberIsNotOverwritten) {
   add("a");
   add("b");
