@@ -107,7 +107,20 @@ std::string unknown_argument(const CLI::App& app, const CLI::ParseError& error) 
   return fmt::format("{} has no command '{}'{}", path, left.front(), hint(left.front(), commands));
 }
 
+void refuse_empty_values(CLI::App& app) {
+  const CLI::Validator not_empty(
+      [](const std::string& value) {
+        return value.empty() ? std::string("the value is empty; leave the option out for the default")
+                             : std::string();
+      },
+      "");
+  for (CLI::Option* option : app.get_options())
+    if (option->nonpositional() && option->get_items_expected_max() > 0) option->check(not_empty);
+  for (CLI::App* command : app.get_subcommands({})) refuse_empty_values(*command);
+}
+
 std::optional<int> parse_arguments(CLI::App& app, int argc, const char* const* argv) {
+  refuse_empty_values(app);
   try {
     app.parse(argc, argv);
     return std::nullopt;

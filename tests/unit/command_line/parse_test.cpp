@@ -26,14 +26,22 @@ class Usage : public ::testing::Test {
     token->require_subcommand(1);
     token->add_subcommand("revoke", "revokes");
   }
-  std::string message(std::vector<std::string> arguments) {
+  std::string message(const std::vector<std::string>& arguments) {
+    return parse(arguments, [&](const CLI::ParseError& error) { return unknown_argument(app_, error); });
+  }
+  std::string problem(const std::vector<std::string>& arguments) {
+    return parse(arguments, [](const CLI::ParseError& error) { return error.what(); });
+  }
+
+  template <class F>
+  std::string parse(std::vector<std::string> arguments, F message_of) {
     std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
     try {
       app_.parse(arguments);
     } catch (const CLI::ParseError& error) {
-      return unknown_argument(app_, error);
+      return message_of(error);
     }
-    return "no error";
+    return "";
   }
 
   CLI::App app_{"A program.", "program"};
@@ -68,6 +76,17 @@ TEST_F(Usage, NamesAnExtraArgument) {
 TEST_F(Usage, LeavesOtherErrorsToTheParser) {
   EXPECT_EQ(message({"render"}), "") << "the scene is missing";
   EXPECT_EQ(message({"render", "scene.xml", "--number", "10"}), "");
+}
+
+TEST_F(Usage, EmptyValueOfAnOptionIsAnError) {
+  const std::string help = app_.get_subcommand("render")->help();
+  refuse_empty_values(app_);
+
+  EXPECT_EQ(problem({"render", "scene.xml", "--spp", ""}),
+            "--spp: the value is empty; leave the option out for the default");
+  EXPECT_THAT(problem({"render", "scene.xml", "--spp="}), HasSubstr("--spp"));
+  EXPECT_EQ(problem({"render", "scene.xml", "--spp", "4"}), "");
+  EXPECT_EQ(app_.get_subcommand("render")->help(), help);
 }
 
 TEST_F(Usage, TheHelpShowsValuesInWords) {
