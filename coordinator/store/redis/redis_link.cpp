@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 #include <hiredis/hiredis.h>
+#include <sys/socket.h>
 #include <sys/time.h>
 
 #include <algorithm>
+#include <cerrno>
 
 #include "core/base/parse_number.h"
 #include "core/base/safe_text.h"
@@ -153,9 +155,15 @@ Result<std::unique_ptr<RedisLink>> RedisLink::connect(const RedisAddress& addres
   return link;
 }
 
+bool RedisLink::closed_by_server() const {
+  char next = 0;
+  const ssize_t got = recv(context_->fd, &next, 1, MSG_PEEK | MSG_DONTWAIT);
+  return got == 0 || (got < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR);
+}
+
 Result<bool> RedisLink::renew(std::unique_ptr<RedisLink>& link, const RedisAddress& address,
                               Timeouts timeouts) {
-  if (link && !link->broken_) return false;
+  if (link && !link->broken_ && !link->closed_by_server()) return false;
   link.reset();
   auto fresh = connect(address, timeouts);
   if (!fresh) return tl::unexpected(fresh.error());

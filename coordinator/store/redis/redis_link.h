@@ -46,7 +46,8 @@ class RedisLink {
   };
   // Connects, authenticates, selects the database.
   static Result<std::unique_ptr<RedisLink>> connect(const RedisAddress& address, Timeouts timeouts);
-  // Replaces `link` by a new connection if `link` is null or broken. Returns true if it was replaced.
+  // Replaces `link` by a new connection if `link` is null or broken, or the server has closed it, as when
+  // Redis was restarted. Returns true if it was replaced.
   static Result<bool> renew(std::unique_ptr<RedisLink>& link, const RedisAddress& address, Timeouts timeouts);
   ~RedisLink();
 
@@ -62,6 +63,7 @@ class RedisLink {
     void operator()(redisContext* context) const;
   };
   RedisLink(redisContext* context, std::string shown);
+  bool closed_by_server() const;
   Result<Result<RedisReply>> next_reply();
   Error connection_error();
 

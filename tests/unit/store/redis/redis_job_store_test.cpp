@@ -366,6 +366,21 @@ TEST_F(SharedStores, SharingFailuresAreReported) {
   EXPECT_TRUE(a->share(std::vector<JobId>{{"j-1"}}));
 }
 
+TEST_F(SharedStores, RestartOfRedisBetweenTwoChangesIsNotNoticed) {
+  const auto a = open_node("a");
+  ASSERT_TRUE(a->put_job(sample_job("j-1")));
+  ASSERT_TRUE(a->share(std::vector<JobId>{{"j-1"}}));
+  ASSERT_TRUE(a->locate_job({"j-1"}));
+  for (int i = 0; i < 10; ++i) {
+    redis_.kill();
+    redis_.start();
+
+    EXPECT_TRUE(a->locate_job({"j-1"})) << i;
+    ASSERT_TRUE(a->put_job(sample_job("j-1")));
+    EXPECT_TRUE(a->share(std::vector<JobId>{{"j-1"}})) << i;
+  }
+}
+
 TEST_F(SharedStores, JobOfAnotherCoordinatorIsNotChangedHere) {
   const auto a = open_node("a");
   ASSERT_TRUE(a->put_job(sample_job("j-1")));
@@ -375,6 +390,20 @@ TEST_F(SharedStores, JobOfAnotherCoordinatorIsNotChangedHere) {
 
   EXPECT_EQ(a->put_job(sample_job("j-1")).error().code, Errc::unavailable);
   EXPECT_EQ(a->share(std::vector<JobId>{{"j-1"}}).error().code, Errc::unavailable);
+}
+
+TEST(RedisLink, ReplacesAConnectionThatTheServerHasClosed) {
+  test::RedisServer redis;
+  const RedisAddress address{"127.0.0.1", redis.port(), 0, "", ""};
+  auto link = RedisLink::connect(address, {}).value();
+  EXPECT_EQ(RedisLink::renew(link, address, {}).value(), false);
+  ASSERT_TRUE(link->run({"PING"}));
+
+  redis.kill();
+  redis.start();
+
+  EXPECT_EQ(RedisLink::renew(link, address, {}).value(), true);
+  EXPECT_TRUE(link->run({"PING"}));
 }
 
 TEST(RedisLink, SaysWhichServerNeedsAPassword) {

@@ -131,9 +131,8 @@ TEST_F(Members, JobIsReportedAsTakenEvenIfTheReplyToTheTakeoverWasLost) {
   ask({"HSET", redis_job_key({"j-1"}), "owner", "b", "from", "a"});
   ask({"SMOVE", "lightshaft:owned:a", "lightshaft:owned:b", "j-1"});
   ask({"CLIENT", "KILL", "TYPE", "normal"});
-  EXPECT_FALSE(b.members->beat()) << "its connection has broken";
 
-  ASSERT_TRUE(b.members->beat());
+  ASSERT_TRUE(b.members->beat() || b.members->beat()) << "an attempt after the first has another connection";
   ASSERT_TRUE(b.members->beat());
 
   ASSERT_EQ(b.taken.size(), 1u) << "once";
@@ -329,8 +328,7 @@ TEST_F(Members, EmptiedRedisCausesNoTakeoverAndTheHigherFenceWins) {
   for (int look = 0; look < 10; ++look) ASSERT_TRUE(b.members->beat());
   EXPECT_TRUE(b.taken.empty());
 
-  EXPECT_FALSE(a.members->beat()) << "its connection has broken";
-  ASSERT_TRUE(a.members->beat());
+  ASSERT_TRUE(a.members->beat()) << "on a new connection";
   EXPECT_EQ(put("a", "j-1", 1, 50), 1) << "an earlier owner tells first what it knows";
   EXPECT_EQ(put("b", "j-1", 2, 3), 1) << "the owner since has the higher fence, if fewer changes";
   EXPECT_EQ(put("a", "j-1", 1, 51), static_cast<int>(PutAnswer::lost));
@@ -385,8 +383,7 @@ TEST_F(Members, StartNumbersAreUnique) {
   EXPECT_EQ(b.members->unique_start(0).value(), 9u);
   redis_.kill();
   redis_.start();
-  EXPECT_FALSE(b.members->beat()) << "its connection has broken";
-  ASSERT_TRUE(b.members->beat()) << "it tells the number it has";
+  ASSERT_TRUE(b.members->beat()) << "on a new connection it tells the number it has";
   auto& c = add("c");
   EXPECT_EQ(c.members->unique_start(0).value(), 10u);
 }
