@@ -74,8 +74,8 @@ ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests,
 // "crypto_material".
 std::string layer_of(Aov aov);
 
-// Adds the film's AOVs to `picture`: channels NAME.R, NAME.X, ... and, for identifiers, NAME00.R to NAME02.A
-// with their header strings. Pixels without a surface are 0 in the AOVs of surfaces (AovKind::of_hits, of_all
+// Adds the film's AOVs to `picture`: channels NAME.R, NAME.X, ...; for alpha A, and its standard error stderr.A
+// (FLOAT); for identifiers NAME00.R to NAME02.A with their header strings. Pixels without a surface are 0 in the AOVs of surfaces (AovKind::of_hits, of_all
 // and ids). Returns the number of values that were clamped because their magnitude exceeded 65504, the
 // largest half.
 std::uint64_t add_aov_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,

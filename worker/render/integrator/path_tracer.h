@@ -91,6 +91,8 @@ class PathTracer {
   // Returns the albedo and the normal of the first surface that is not an index-matched boundary, a mirror or
   // clear glass, seen through the surfaces before it.
   DenoisingGuide denoising_guide(const CameraRay& ray);
+  // Returns one sample of how much of what is behind the scene does not reach the camera along this ray.
+  Opacity opacity(const CameraRay& ray);
   // With F.connected: follows a ray of the sun, and calls keep(vertex) for each light vertex on its way.
   // Camera paths are connected to light vertices (light_vertices.h).
   template <class Keep>
@@ -497,6 +499,36 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
     ray_.leave(hit, w);
   }
   return guide;
+}
+
+// In grids the transmittance is an estimate, whose random numbers nothing else uses.
+template <Features F, template <Features> class Light>
+Opacity PathTracer<F, Light>::opacity(const CameraRay& ray) {
+  // Transmittances of the media, and of the surfaces that light passes straight through
+  C3 media(1), surfaces(1);
+  ray_ = {ray.o, ray.o, ray.d};
+  medium_ = start_medium(ray);
+  float reach = ray.t_max;
+  for (segment_ = 0; segment_ < kMaxSegments; ++segment_, reach = kInfinity) {
+    SurfaceHit hit;
+    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, reach);
+    const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
+    if (met && world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
+    if (medium_.any()) {
+      const float t = met ? ray_.length_to(hit) : reach;
+      RandomStream tracker = stream_.stream(segment_, Purpose::track_opacity);
+      media *= through_media(medium_, ray_.start, ray_.d, t, tracker);
+    }
+    if (!met || is_black(media)) break;
+    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if (!surface.null && !(surface.null_transmission && passes_null(hit))) {
+      surfaces = C3(0);
+      break;
+    }
+    surfaces = beta_;
+    pass_boundary(hit, surface);
+  }
+  return {C3(1) - media * surfaces, C3(1) - media};
 }
 
 // Adds the light that next-event estimation finds at a surface. wo is the direction back along the path, in
