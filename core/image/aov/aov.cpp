@@ -47,11 +47,16 @@ struct Alias {
   Aov aov;
 };
 constexpr Alias kAliases[] = {
-    {"crypto_material", Aov::material_id},  {"crypto_object", Aov::shape_id},
-    {"geometric_normal", Aov::geo_normal},  {"material", Aov::material_id},
-    {"multiple_scattering", Aov::multiple}, {"object_id", Aov::shape_id},
-    {"sh_normal", Aov::normal},             {"shading_normal", Aov::normal},
-    {"shape", Aov::shape_id},               {"single_scattering", Aov::single},
+    {"crypto_material", Aov::material_id},
+    {"crypto_object", Aov::shape_id},
+    {"geometric_normal", Aov::geo_normal},
+    {"material", Aov::material_id},
+    {"multiple_scattering", Aov::multiple},
+    {"object_id", Aov::shape_id},
+    {"sh_normal", Aov::normal},
+    {"shading_normal", Aov::normal},
+    {"shape", Aov::shape_id},
+    {"single_scattering", Aov::single},
 };
 // Names of the two layers that every image has, and other names for them.
 constexpr std::string_view kAlways[] = {"spp", "stderr", "sample_count", "standard_error"};

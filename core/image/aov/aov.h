@@ -52,8 +52,8 @@ enum class AovKind {
   of_hits,  // sums over the samples that hit a surface, divided by the number of these samples
   // sums over the samples that hit a surface, divided by the number of all samples: a miss counts as 0
   of_all,
-  light,  // components of the radiance, divided by the number of all samples
-  guide,  // for a denoiser: sums over all samples, separately for the two halves of the samples
+  light,    // components of the radiance, divided by the number of all samples
+  guide,    // for a denoiser: sums over all samples, separately for the two halves of the samples
   opacity,  // sums over all samples, separately for the two halves of the samples
   ids       // identifiers, each with the number of samples that hit it
 };

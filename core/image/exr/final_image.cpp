@@ -119,8 +119,7 @@ class Layers {
       if (sums_[p].empty()) continue;
       const AovRow& row = row_of(planes_.sums[p].aov);
       const bool by_hits = row.kind == AovKind::of_hits;
-      const double* other =
-          has_halves(row.kind) ? &tile.sums[(p + row.components.size()) * n] : nullptr;
+      const double* other = has_halves(row.kind) ? &tile.sums[(p + row.components.size()) * n] : nullptr;
       // Half the difference of the means of the two halves, as for the colour (Film::pixels())
       const bool with_error = row.aov == Aov::alpha;
       each_pixel(tile.rect, frame_, [&](std::size_t to, std::size_t from) {

@@ -28,8 +28,7 @@ constexpr AovSet kOfLight = AovSet{}
                                 .with(Aov::surface)
                                 .with(Aov::volume);
 constexpr AovSet kOfGuide = AovSet{}.with(Aov::denoising_albedo).with(Aov::denoising_normal);
-constexpr AovSet kOfOpacity =
-    AovSet{}.with(Aov::alpha).with(Aov::opacity).with(Aov::volume_opacity);
+constexpr AovSet kOfOpacity = AovSet{}.with(Aov::alpha).with(Aov::opacity).with(Aov::volume_opacity);
 static_assert((kOfSurface.bits() ^ kOfLight.bits() ^ kOfGuide.bits() ^ kOfOpacity.bits()) ==
               (1u << kAovs) - 1);
 

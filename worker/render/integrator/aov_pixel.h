@@ -40,8 +40,8 @@ class AovPixel {
   AovPlanes planes_;
   bool wants_surface_, wants_light_, wants_guide_, wants_opacity_;
   LightSplit split_;
-  // Sums over the samples. For AOVs with halves, [0] is the sum over the even samples and [1] that over the odd
-  // ones; for other AOVs, [0] is the sum over all samples.
+  // Sums over the samples. For AOVs with halves, [0] is the sum over the even samples and [1] that over the
+  // odd ones; for other AOVs, [0] is the sum over all samples.
   std::array<std::array<Sums, kAovs>, 2> sums_{};
   double hits_ = 0;
   std::vector<IdSlot> shapes_, materials_;

@@ -190,6 +190,12 @@ class PathTracer {
                                         const Group& g);
   void add_emission(const SurfaceHit& hit);
   void add_environment();
+  [[gnu::cold, gnu::noinline]] void add_environment_seen();
+  // True if a camera ray passes straight through a surface that is unseen or held out; false if it ends
+  // there.
+  bool sees_past(const SurfaceHit& hit, const SurfaceInfo& surface) {
+    return surface.unseen || surface.null || (surface.null_transmission && passes_null(hit));
+  }
   C3 unoccluded(const V3& start, const V3& p, const LightSample& light, const Within& medium,
                 RandomStream stream);
   [[gnu::always_inline]] inline C3 through_boundaries(C3 value, const V3& start, const V3& p, const V3& d,
@@ -400,6 +406,14 @@ void PathTracer<F, Light>::go_on(float t_max) {
       break;
     }
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if constexpr (F.visibility) {
+      if (depth_ == 0 && (surface.unseen || surface.holdout)) {
+        if (!sees_past(hit, surface)) break;
+        pass_boundary(hit, surface);
+        if (is_black(beta_)) break;
+        continue;
+      }
+    }
     if constexpr (F.overlaps) {
       if (world_.lights_on_others && surface.coincident_reach > 0) add_emission_of_others(hit);
     }
@@ -426,9 +440,9 @@ void PathTracer<F, Light>::go_on(float t_max) {
   outcome_.majorant_violations += counters_.majorant_violations;
 }
 
-// The path passes every index-matched surface, and each null-transmitting surface with that surface's
-// probability. As long as the ray hits the same surfaces as the path of the sample, the decisions use the
-// same random numbers as in trace().
+// The path passes every index-matched or unseen surface, and each null-transmitting surface with that
+// surface's probability. As long as the ray hits the same surfaces as the path of the sample, the decisions
+// use the same random numbers as in trace().
 template <Features F, template <Features> class Light>
 std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay& ray) {
   ray_ = {ray.o, ray.o, ray.d};
@@ -441,7 +455,7 @@ std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay&
     if (world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     beta_ = C3(1);
-    if (!surface.null && !(surface.null_transmission && passes_null(hit))) {
+    if (!sees_past(hit, surface)) {
       first.not_passed = beta_.x;
       return first;
     }
@@ -459,6 +473,7 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
   constexpr int kGuideSegments = 16;
   DenoisingGuide guide;
   double unscattered = 1;
+  bool direct = true;  // true before the first mirror or glass
   ray_ = {ray.o, ray.o, ray.d};
   medium_ = start_medium(ray);
   float reach = ray.t_max;
@@ -478,10 +493,12 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
     }
     if (!met || is_black(beta_)) break;
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    if (surface.null || (surface.null_transmission && passes_null(hit))) {
+    if ((surface.unseen && direct) || surface.null || (surface.null_transmission && passes_null(hit))) {
       pass_boundary(hit, surface);
       continue;
     }
+    if (surface.holdout && direct) break;
+    direct = false;
     const Group g = stream_.group(segment_, Purpose::guide);
     const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), hit.shading.to_local(-ray_.d), g.u(2),
                                        {g.u(0), g.u(1)});
@@ -521,8 +538,8 @@ Opacity PathTracer<F, Light>::opacity(const CameraRay& ray) {
     }
     if (!met || is_black(media)) break;
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    if (!surface.null && !(surface.null_transmission && passes_null(hit))) {
-      surfaces = C3(0);
+    if (!sees_past(hit, surface)) {
+      if (!surface.holdout) surfaces = C3(0);
       break;
     }
     surfaces = beta_;
@@ -743,7 +760,8 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
 
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_environment() {
-  if (!world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)) return;
+  if (!world_.lights.has_environment()) return;
+  if (depth_ == 0 && world_.hide_environment) return add_environment_seen();
   if constexpr (F.reuse) {
     if (is_leaving_second()) {
       const Lights::EnvironmentParts parts = world_.lights.environment_parts(last_.p, ray_.d, last_.place);
@@ -762,6 +780,13 @@ void PathTracer<F, Light>::add_environment() {
   }
   if (depth_ == 1 && looked_for_sky_) light -= world_.lights.constant_environment() * .5f;
   add(beta_ * light);
+}
+
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::add_environment_seen() {
+  if (world_.hide_emitters || world_.transparent) return;
+  const C3 light = world_.lights.environment_seen(ray_.d);
+  if (!is_black(light)) add(beta_ * light);
 }
 
 template <Features F, template <Features> class Light>
