@@ -62,11 +62,16 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class):
                 )
     if render.use_motion_blur:
         problems.unsupported("Render Properties: Motion Blur. Lightshaft renders an instant: switch it off")
-    if render.film_transparent:
-        problems.unsupported(
-            "Render Properties > Film: Transparent. images of Lightshaft have no alpha: switch it off"
-        )
-    film = element("film", "hdrfilm", None, element("rfilter", "gaussian"), width=width, height=height)
+    transparent = True if render.film_transparent else None
+    film = element(
+        "film",
+        "hdrfilm",
+        None,
+        element("rfilter", "gaussian"),
+        width=width,
+        height=height,
+        transparent=transparent,
+    )
     sampler = element("sampler", "independent", None, sample_count=int(scene.lightshaft.samples))
     inside = reference(medium, "medium") if medium else None
     document.add(element("sensor", plugin, None, film, sampler, inside, to_world=to_world, **values))

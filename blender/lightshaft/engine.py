@@ -136,7 +136,8 @@ class LightshaftEngine(bpy.types.RenderEngine):
         result = self.begin_result(0, 0, width, height)
         for render_pass in result.layers[0].passes:
             if render_pass.name == "Combined":
-                planes = [layers[c] for c in "RGB"] + [(layers["spp"] > 0).astype(np.float32)]
+                alpha = layers.get("A", (layers["spp"] > 0).astype(np.float32))
+                planes = [layers[c] for c in "RGB"] + [alpha]
             elif render_pass.name in self.passes:
                 planes = self.planes(render_pass.name, layers, scene)
             else:
@@ -154,7 +155,7 @@ class LightshaftEngine(bpy.types.RenderEngine):
         if name == "Depth":
             depth = planes[0]
             return [np.where(depth > 0, depth * along_axis(scene, depth.shape), FAR)]
-        return planes + [np.ones_like(planes[0])]
+        return planes + [layers.get("A", np.ones_like(planes[0]))]
 
 
 def along_axis(scene, shape):

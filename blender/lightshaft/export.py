@@ -1,14 +1,13 @@
 """Exports the evaluated scene of a dependency graph, and lists what Lightshaft cannot render."""
 
 import bpy
-from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Matrix
 from mathutils.bvhtree import BVHTree
 
 from . import meshes
 from .camera import add_camera
 from .document import Document, element, reference
-from .lights import add_light
+from .lights import add_light, only_if_hidden
 from .materials import Materials, Owner
 from .problems import Problems
 from .textures import Textures
@@ -23,8 +22,9 @@ SHEET = 1e-5  # the back of a sheet that gives off light stands this share of it
 class Shape:
     """A part of a mesh that can be placed in the scene."""
 
-    def __init__(self, filenames, bsdf, emission, medium):
+    def __init__(self, filenames, bsdf, emission, medium, flags):
         self.filenames, self.bsdf, self.emission, self.medium = filenames, bsdf, emission, medium
+        self.flags = flags  # parameters about what the camera sees
         self.tree = None
 
 
@@ -72,7 +72,6 @@ class Exporter:
         self.check_visibility(item)
         if item.type == "LIGHT":
             add_light(self.document, self.problems, item, matrix, Matrix)
-            self.check_lamp(item, matrix)
         elif item.type == "VOLUME":
             self.add_grid(item, matrix)
         elif item.type in MESHES:
@@ -96,6 +95,8 @@ class Exporter:
                 item.original.data.as_pointer(),
                 len(item.modifiers) and item.original.as_pointer(),
                 tuple(material_name(s) for s in item.material_slots),
+                item.visible_camera,
+                item.is_holdout,
             )
             if key not in self.known:
                 self.known[key] = self.shapes_of(item)
@@ -103,23 +104,6 @@ class Exporter:
         else:
             self.problems.unsupported(
                 f"object '{name}': Lightshaft renders no {item.type.replace('_', ' ').title()}. Convert it to a mesh (Object > Convert)"
-            )
-
-    def check_lamp(self, item, matrix):
-        """Warns about visible lights: Blender hides lamps from the camera, but Lightshaft shows everything that
-        emits light."""
-        data = item.data
-        radius = {"POINT": getattr(data, "shadow_soft_size", 0), "AREA": getattr(data, "size", 0)}.get(
-            data.type, 0
-        )
-        if radius == 0 or item.visible_camera:
-            return
-        x, y, depth = world_to_camera_view(self.scene, self.scene.camera, matrix.translation)
-        around = radius / max(depth, radius)
-        if depth > -radius and -around < x < 1 + around and -around < y < 1 + around:
-            self.problems.warning(
-                f"light '{item.name}' is visible in the image: Blender hides lamps from the camera, Lightshaft does not. "
-                "Move it out of the picture, or make it a point light of Radius 0"
             )
 
     def check_collections(self, layer):
@@ -139,13 +123,15 @@ class Exporter:
         kind = "light" if item.type == "LIGHT" else "object"
         where = "Object properties > Visibility"
         # Of a light the second says that it lights shadow catchers, of which there are none here.
-        if item.is_holdout or (item.is_shadow_catcher and kind == "object"):
+        # Meshes and lights can be hidden from the camera, and meshes can be held out.
+        mesh = item.type in MESHES
+        if (item.is_holdout and not mesh) or (item.is_shadow_catcher and kind == "object"):
             self.problems.unsupported(
                 f"{kind} '{item.name}': Holdout or Shadow Catcher. Switch it off in {where}"
             )
-        rays = ["camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow"]
-        if kind == "light":  # which has a check of its own for the camera, and no shadow
-            rays = rays[1:-1]
+        rays = ["diffuse", "glossy", "transmission", "volume_scatter"]
+        if kind == "object":
+            rays += ["shadow"] if mesh else ["camera", "shadow"]
         hidden = [ray for ray in rays if not getattr(item, f"visible_{ray}")]
         if hidden:
             self.problems.unsupported(
@@ -192,7 +178,8 @@ class Exporter:
         sides = [part.front()]
         if emission is not None and not part.closed:  # Blender's sheets give off light on both sides
             sides.append(part.back(SHEET * extent))
-        return Shape([self.document.write(side, ".ply") for side in sides], bsdf, emission, medium)
+        flags = {"visible_camera": only_if_hidden(item), "holdout": True if item.is_holdout else None}
+        return Shape([self.document.write(side, ".ply") for side in sides], bsdf, emission, medium, flags)
 
     def place_meshes(self):
         for key, places in self.places.items():
@@ -232,6 +219,7 @@ class Exporter:
             emitter,
             filename=filename,
             to_world=matrix,
+            **shape.flags,
         )
 
     def add_grid(self, item, matrix):

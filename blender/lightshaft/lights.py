@@ -43,7 +43,12 @@ def add_light(document, problems, item, matrix, matrix_class):
     if data.type == "SUN":
         direction = -rigid.col[2].xyz
         sun = element(
-            "emitter", "directional", None, irradiance=colour, angular_radius=math.degrees(data.angle / 2)
+            "emitter",
+            "directional",
+            None,
+            irradiance=colour,
+            angular_radius=math.degrees(data.angle / 2),
+            visible_camera=only_if_hidden(item),
         )
         sun.append(vector("direction", direction))
         document.add(sun)
@@ -52,7 +57,7 @@ def add_light(document, problems, item, matrix, matrix_class):
         if radius > 0:
             ball = matrix_class.Translation(matrix.translation) @ matrix_class.Scale(radius, 4)
             radiance = [c / (4 * math.pi**2 * radius**2) for c in colour]
-            document.add(lamp("sphere", ball, radiance))
+            document.add(lamp("sphere", ball, radiance, item))
         else:
             point = element("emitter", "point", None, intensity=[c / (4 * math.pi) for c in colour])
             point.append(vector("position", matrix.translation, "point"))
@@ -60,7 +65,7 @@ def add_light(document, problems, item, matrix, matrix_class):
     elif data.type == "SPOT":
         add_spot(document, problems, data, name, colour, rigid @ matrix_class(FLIP))
     else:
-        add_area(document, problems, data, name, colour, matrix @ matrix_class(FLIP), matrix_class)
+        add_area(document, problems, item, colour, matrix @ matrix_class(FLIP), matrix_class)
 
 
 def light_colour(data):
@@ -78,10 +83,23 @@ def vector(name, values, kind="vector"):
     )
 
 
-def lamp(shape, to_world, radiance):
+def only_if_hidden(item):
+    """Returns the value of `visible_camera` of an object, or None if it is true, as it is unless given."""
+    return None if item.visible_camera else False
+
+
+def lamp(shape, to_world, radiance, item):
     """Adds a shape that emits light and lets the light of others pass, like Blender's lamps."""
     emitter = element("emitter", "area", None, radiance=radiance)
-    return element("shape", shape, None, element("bsdf", "null"), emitter, to_world=to_world)
+    return element(
+        "shape",
+        shape,
+        None,
+        element("bsdf", "null"),
+        emitter,
+        to_world=to_world,
+        visible_camera=only_if_hidden(item),
+    )
 
 
 def add_spot(document, problems, data, name, colour, to_world):
@@ -128,7 +146,8 @@ def spot_profile(half, blend):
     return step * step * (3 - 2 * step)
 
 
-def add_area(document, problems, data, name, colour, to_world, matrix_class):
+def add_area(document, problems, item, colour, to_world, matrix_class):
+    data, name = item.data, item.name
     if data.spread < math.pi - 1e-4:
         problems.unsupported(
             f"light '{name}': Beam Shape > Spread. Lightshaft's area lights shine to all sides: set it to 180 degrees"
@@ -142,4 +161,5 @@ def add_area(document, problems, data, name, colour, to_world, matrix_class):
     if area <= 0:
         problems.error(f"light '{name}': its size is 0. Give it a size, or make it a point light")
         return
-    document.add(lamp("disk" if round_one else "rectangle", placed, [c / (math.pi * area) for c in colour]))
+    radiance = [c / (math.pi * area) for c in colour]
+    document.add(lamp("disk" if round_one else "rectangle", placed, radiance, item))

@@ -8,7 +8,7 @@ from .nodes import Place, constant, output_node
 # The middle of a world image is the direction +x in Blender and +z in the scene format; the point a quarter from its
 # left edge is +y in Blender and +x in the scene format.
 AXES = np.array([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]], float)
-RAYS = ("camera", "diffuse", "glossy", "transmission", "scatter")
+RAYS = ("diffuse", "glossy", "transmission", "scatter")
 
 
 def add_world(document, problems, textures, world):
@@ -23,6 +23,7 @@ def add_world(document, problems, textures, world):
         problems.unsupported(
             f"{owner}: hidden from rays ({', '.join(hidden)}). Switch all on in World properties > Settings > Ray Visibility"
         )
+    seen = None if world.cycles_visibility.camera else False
     output = Place(node)
     if output.source(output.input("Volume"))[0]:
         problems.error(
@@ -44,7 +45,7 @@ def add_world(document, problems, textures, world):
     if colour is not None:
         radiance = [strength * c for c in colour]
         if any(radiance):
-            document.add(element("emitter", "constant", None, radiance=radiance))
+            document.add(element("emitter", "constant", None, radiance=radiance, visible_camera=seen))
         return
     source, _ = background.source(background.input("Color"))
     where = f"{owner}, node '{source.title}'"
@@ -61,7 +62,13 @@ def add_world(document, problems, textures, world):
     if turn is not None and name is not None:
         document.add(
             element(
-                "emitter", "envmap", None, filename=name, scale=strength, to_world=np.linalg.inv(turn) @ AXES
+                "emitter",
+                "envmap",
+                None,
+                filename=name,
+                scale=strength,
+                to_world=np.linalg.inv(turn) @ AXES,
+                visible_camera=seen,
             )
         )
 

@@ -95,10 +95,12 @@ Result<void> choose_integrator(const Scene& scene, const JobSpec& spec, RenderSe
   return {};
 }
 
-// Sets the AOVs: those that the job requests and those that the scene requests.
+// Sets the AOVs: those that the job requests, those that the scene requests, and alpha for a transparent
+// film.
 Result<void> choose_aovs(const Scene& scene, const JobSpec& spec, RenderSettings& settings) {
   std::vector<std::string> names = spec.aov;
   if (spec.denoise) std::ranges::move(names_of(aovs_of(AovKind::guide)), std::back_inserter(names));
+  if (scene.film.transparent) names.emplace_back(row_of(Aov::alpha).name);
   for (std::string_view rest = scene.aovs; !rest.empty();) {
     const auto end = std::min(rest.find(','), rest.size());
     names.emplace_back(rest.substr(0, end));

@@ -295,8 +295,12 @@ struct HeterogeneousMedium {
 using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
 
 // Emitters without a shape.
+//
+// Camera rays that leave the scene before they are scattered do not see an emitter whose visible_camera is
+// false.
 struct ConstantEmitter {  // the same radiance from all directions
   Rgb radiance{1, 1, 1};
+  bool visible_camera = true;
   bool operator==(const ConstantEmitter&) const = default;
 };
 // Parallel light. `direction` is the direction in which the light travels, in world space. `irradiance` is
@@ -307,6 +311,7 @@ struct DirectionalEmitter {
   // In degrees. 0: the light is exactly parallel. Otherwise it comes from a disk of this angular radius in
   // the sky, whose radiance is uniform and gives the same irradiance.
   double angular_radius = 0;
+  bool visible_camera = true;
   bool operator==(const DirectionalEmitter&) const = default;
 };
 struct PointEmitter {
@@ -337,6 +342,7 @@ struct EnvmapEmitter {
   double scale = 1;
   Transform to_world;
   SkyMapping mapping = SkyMapping::latlong;
+  bool visible_camera = true;
   bool operator==(const EnvmapEmitter&) const = default;
 };
 

@@ -68,6 +68,12 @@ struct Shape {
   // to_world places it within the group. It does not emit light. In the scene's list of shapes, the shapes of
   // a group are contiguous, and those of a group of lower index come first.
   std::optional<GroupIndex> group;
+  // Camera rays, up to the first scattering, pass straight through a shape that is not visible_camera. All
+  // other rays meet it.
+  bool visible_camera = true;
+  // A camera ray that meets the shape and does not pass it ends there without light. The shape has no opacity
+  // in the AOVs of opacity, but hides what is behind.
+  bool holdout = false;
   bool operator==(const Shape&) const = default;
 };
 struct ShapeGroup {  // a group of shapes, which refer to it by its index
@@ -122,6 +128,9 @@ struct FilmSettings {
   // The rendered part of the frame, in pixels; if its width is 0, the whole frame is rendered.
   std::array<int, 2> crop_offset{0, 0};
   FrameSize crop_size{0, 0};
+  // True: the camera does not see the environment, so that the image can be laid over another one, and the
+  // image has the AOV `alpha`.
+  bool transparent = false;
   bool has_crop() const { return crop_size.width > 0; }
   FrameSize image_size() const { return has_crop() ? crop_size : size; }  // size of the output image
   bool operator==(const FilmSettings&) const = default;

@@ -288,13 +288,14 @@ bool is_our_parameter(std::string_view tag, std::string_view plugin, std::string
     std::vector<std::string_view> parameters;
   };
   static const std::vector<Ours> all = {
-      {"shape", "", {"flat_without_normals"}},
+      {"shape", "", {"flat_without_normals", "visible_camera", "holdout"}},
       {"shape", "obj", {"shape_index"}},
       {"shape", "ply", {"shape_index"}},
       {"bsdf", "", {"multiple_scattering"}},
       {"bsdf", "normalmap", {"follow_mirroring"}},
       {"texture", "bitmap", {"channel"}},
       {"emitter", "area", {"cutoff_angle", "beam_width", "falloff", "two_sided"}},
+      {"emitter", "", {"visible_camera"}},
       {"emitter", "directional", {"angular_radius"}},
       {"emitter", "envmap", {"mapping"}},
       {"emitter", "projector", {"as_intensity"}},
@@ -306,6 +307,7 @@ bool is_our_parameter(std::string_view tag, std::string_view plugin, std::string
       {"sensor", "", {"aperture_scale"}},
       {"sensor", "perspective", {"aperture_radius", "focus_distance"}},
       {"sensor", "thinlens", {"principal_point_offset_x", "principal_point_offset_y"}},
+      {"film", "hdrfilm", {"transparent"}},
       {"rfilter", "box", {"radius"}},
       {"integrator",
        "",

@@ -126,7 +126,7 @@ ROWS = [
     (104, "worker/render/integrator/segment_nee.h", "const auto light = path.world_.lights.sample(choice, p);\n    if («!light») return;", "true",
      "no next-event estimation in media by volpath_distant_mis", TABLE),
     (105, "worker/render/integrator/medium_crossing.h", "if («medium.emission_kind == EmissionKind::none || (depth_ == 0 && world_.hide_emitters)») return;", "true", "media give off no light", TABLE),
-    (106, "worker/render/integrator/path_tracer.h", "if («!world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)») return;", "true",
+    (106, "worker/render/integrator/path_tracer.h", "if («!world_.lights.has_environment()») return;", "true",
      "paths that leave the scene find no environment", TABLE),
     (107, "worker/render/integrator/path_tracer.h", "if («depth_ == 0 && world_.hide_emitters») return;\n  const C3 emitted", "true", "paths find no lights with an extent", TABLE),
     (108, "worker/render/integrator/path_tracer.h", "weight = balance_weight(last_.pdf, «p_l» * last_.in_medium", "p_l * p_l / last_.pdf",

@@ -10,8 +10,8 @@ from exr_layers import read
 from local_farm import SCENE, HttpError
 
 SPP = 12  # rounds of 2, 2, 4 and a cut one of 4
-ALL = ("albedo,coverage,depth,direct,emission,geo_normal,indirect,material_id,multiple,normal,position,shape_id,single,"
-       "surface,uv,volume")
+ALL = ("albedo,alpha,coverage,depth,direct,emission,geo_normal,indirect,material_id,multiple,normal,opacity,position,"
+       "shape_id,single,surface,uv,volume,volume_opacity")
 
 
 @pytest.fixture(scope="module")
@@ -79,8 +79,8 @@ def test_the_layers_are_typed_named_and_add_up(expected):
     rows, strings, types = read(expected[1])
     width, height = 72, 40
 
-    assert {types[c] for c in ("depth.Z", "position.X", "uv.U", "crypto_object00.R", "crypto_material02.A")} == {"f"}
-    assert {types[c] for c in ("R", "albedo.R", "normal.Z", "direct.G", "coverage.A")} == {"e"}
+    assert {types[c] for c in ("depth.Z", "position.X", "uv.U", "crypto_object00.R", "crypto_material02.A", "stderr.A")} == {"f"}
+    assert {types[c] for c in ("R", "A", "opacity.R", "albedo.R", "normal.Z", "direct.G", "coverage.A")} == {"e"}
     for y in range(height):
         for x in range(width):
             whole = rows["G"][y][x]
@@ -89,6 +89,9 @@ def test_the_layers_are_typed_named_and_add_up(expected):
             assert abs(rows["direct.G"][y][x] + rows["indirect.G"][y][x] - whole) <= close
             parts = rows["surface.G"][y][x] + rows["volume.G"][y][x] + rows["emission.G"][y][x]
             assert abs(parts - whole) <= close
+            # Halves of numbers up to 1
+            assert abs(sum(rows[f"opacity.{c}"][y][x] for c in "RGB") / 3 - rows["A"][y][x]) <= 2 ** -11
+            assert rows["volume_opacity.G"][y][x] - 2 ** -11 <= rows["opacity.G"][y][x]
             ranks = [rows[f"crypto_object{i // 4:02}.{'RGBA'[i % 4]}"][y][x] for i in range(12)]
             assert abs(sum(ranks[1::2]) - rows["coverage.A"][y][x]) <= 2 ** -11
             assert all(a >= b for a, b in zip(ranks[1::2], ranks[3::2]))
@@ -101,7 +104,28 @@ def test_the_layers_are_typed_named_and_add_up(expected):
     assert rows["crypto_object00.R"][height - 1][width // 2] == floor
     assert rows["crypto_object00.G"][height - 1][width // 2] == 1
     assert rows["normal.Y"][height - 1][width // 2] == 1 and rows["albedo.G"][height - 1][width // 2] == .5
-    assert rows["coverage.A"][0][0] == rows["depth.Z"][0][0] == 0
+    assert rows["coverage.A"][0][0] == rows["depth.Z"][0][0] == rows["A"][0][0] == 0
+    assert rows["A"][height - 1][width // 2] == 1 and rows["stderr.A"][height - 1][width // 2] == 0
+
+
+def test_a_transparent_film_has_alpha_in_every_form(fog, tmp_path):
+    scene = fog.parent / "transparent.xml"
+    scene.write_text(fog.read_text().replace('<film type="hdrfilm">',
+                                             '<film type="hdrfilm"><boolean name="transparent" value="true"/>'))
+    report = tmp_path / "report.json"
+    render(scene, tmp_path / "film.exr", "--report", report, "--partial-dir", tmp_path / "partials")
+    render(scene, tmp_path / "film.png")
+    render(fog, tmp_path / "whole.exr", "--aov", "alpha")
+    film, whole = layers(tmp_path / "film.exr"), layers(tmp_path / "whole.exr")
+
+    assert json.loads(read(tmp_path / "film.exr")[1]["lightshaft:job"])["aov"] == ["alpha"]
+    assert any("transparent film" in used for used in json.loads(report.read_text())["features_used"])
+    assert film["A"] == whole["A"], "the same rays"
+    assert film["A"][0][0] == 0 and film["R"][0][0] == 0 < whole["R"][0][0]
+    # The header of a PNG: 8 bits a channel, colour type 6, which is RGB and alpha.
+    assert (tmp_path / "film.png").read_bytes()[24:26] == bytes([8, 6])
+    lightshaft("merge", tmp_path / "partials", "-o", tmp_path / "merged.exr")
+    assert layers(tmp_path / "merged.exr") == film
 
 
 def test_mitsubas_wrapper_asks_for_layers(fog, expected, tmp_path):

@@ -58,6 +58,19 @@ def test_values_become_colours_by_exposure_and_curve(farm, viewer):
     assert page.wait(f"JSON.stringify({[64, 32, 255]}) === JSON.stringify((() => {{ const v = {VIEW}, c = v.querySelector('canvas'); const at = v.windowPoint([10.5, 10.5]).map(Math.round); return [...c.getContext('2d').getImageData(at[0], at[1], 1, 1).data].slice(0, 3); }})())")
 
 
+def test_an_image_with_alpha_lies_on_a_checkerboard(farm, viewer):
+    farm.layers["rgb"] = Layer(["R", "G", "B"], lambda x, y: (0.5, 0.25, 0) if x < 32 else (0, 0, 0))
+    farm.layers["alpha"] = Layer(["A"], lambda x, y: (1.0 if x < 32 else 0.0,))
+
+    page = viewer("curve=linear")
+
+    # The squares have the light 1/16 and 1/8; a code is 255 times the light.
+    assert [colour(page, x, 2) for x in (2, 34, 42)] == [[128, 64, 0], [16] * 3, [32] * 3]
+    page.evaluate("void (location.hash = '#/view/j-1?curve=linear&ev=-1')")
+    page.wait(f"{VIEW}.dataset.painted && document.getElementById('ev').value === '-1'")
+    assert [colour(page, x, 2) for x in (2, 34, 42)] == [[64, 32, 0], [16] * 3, [32] * 3]
+
+
 @pytest.mark.parametrize("curve", ["linear", "srgb", "filmic", "agx"])
 def test_every_curve_rises_from_black_to_white(modules_page, curve):
     codes = modules_page.evaluate(f"""(async () => {{

@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::array<AovRow, kAovs> kAovRows = {{
     {Aov::albedo, "albedo", AovKind::of_all, "RGB", true},
+    {Aov::alpha, "alpha", AovKind::opacity, "A", true},
     {Aov::coverage, "coverage", AovKind::of_all, "A", true},
     {Aov::denoising_albedo, "denoising_albedo", AovKind::guide, "RGB", true},
     {Aov::denoising_normal, "denoising_normal", AovKind::guide, "XYZ", true},
@@ -25,12 +26,14 @@ constexpr std::array<AovRow, kAovs> kAovRows = {{
     {Aov::material_id, "material_id", AovKind::ids, "", false},
     {Aov::multiple, "multiple", AovKind::light, "RGB", true},
     {Aov::normal, "normal", AovKind::of_all, "XYZ", true},
+    {Aov::opacity, "opacity", AovKind::opacity, "RGB", true},
     {Aov::position, "position", AovKind::of_hits, "XYZ", false},
     {Aov::shape_id, "shape_id", AovKind::ids, "", false},
     {Aov::single, "single", AovKind::light, "RGB", true},
     {Aov::surface, "surface", AovKind::light, "RGB", true},
     {Aov::uv, "uv", AovKind::of_hits, "UV", false},
     {Aov::volume, "volume", AovKind::light, "RGB", true},
+    {Aov::volume_opacity, "volume_opacity", AovKind::opacity, "RGB", true},
 }};
 static_assert([] {
   for (std::size_t i = 0; i < kAovs; ++i)
@@ -44,11 +47,15 @@ struct Alias {
   Aov aov;
 };
 constexpr Alias kAliases[] = {
-    {"alpha", Aov::coverage},           {"crypto_material", Aov::material_id},
-    {"crypto_object", Aov::shape_id},   {"geometric_normal", Aov::geo_normal},
-    {"material", Aov::material_id},     {"multiple_scattering", Aov::multiple},
-    {"object_id", Aov::shape_id},       {"sh_normal", Aov::normal},
-    {"shading_normal", Aov::normal},    {"shape", Aov::shape_id},
+    {"crypto_material", Aov::material_id},
+    {"crypto_object", Aov::shape_id},
+    {"geometric_normal", Aov::geo_normal},
+    {"material", Aov::material_id},
+    {"multiple_scattering", Aov::multiple},
+    {"object_id", Aov::shape_id},
+    {"sh_normal", Aov::normal},
+    {"shading_normal", Aov::normal},
+    {"shape", Aov::shape_id},
     {"single_scattering", Aov::single},
 };
 // Names of the two layers that every image has, and other names for them.
@@ -128,7 +135,7 @@ AovPlanes planes_of(AovSet set) {
     for (std::size_t c = 0; c < row.components.size(); ++c) {
       const char letter = row.components[c];
       const auto component = static_cast<int>(c);
-      if (row.kind != AovKind::guide)
+      if (!has_halves(row.kind))
         out.sums.push_back({fmt::format("aov.{}.{}", row.name, letter), row.aov, component});
       else
         for (const int half : {0, 1})

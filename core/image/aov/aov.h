@@ -24,6 +24,7 @@ inline constexpr int kPartialChannels = 6;
 
 enum class Aov : std::uint8_t {
   albedo,
+  alpha,
   coverage,
   denoising_albedo,
   denoising_normal,
@@ -35,24 +36,28 @@ enum class Aov : std::uint8_t {
   material_id,
   multiple,
   normal,
+  opacity,
   position,
   shape_id,
   single,
   surface,
   uv,
-  volume
+  volume,
+  volume_opacity
 };
-inline constexpr std::size_t kAovs = 18;
+inline constexpr std::size_t kAovs = 21;
 
 // The type of an AOV's values, and by what number of samples its sums are divided.
 enum class AovKind {
   of_hits,  // sums over the samples that hit a surface, divided by the number of these samples
   // sums over the samples that hit a surface, divided by the number of all samples: a miss counts as 0
   of_all,
-  light,  // components of the radiance, divided by the number of all samples
-  guide,  // for a denoiser: sums over all samples, separately for the two halves of the samples
-  ids     // identifiers, each with the number of samples that hit it
+  light,    // components of the radiance, divided by the number of all samples
+  guide,    // for a denoiser: sums over all samples, separately for the two halves of the samples
+  opacity,  // sums over all samples, separately for the two halves of the samples
+  ids       // identifiers, each with the number of samples that hit it
 };
+constexpr bool has_halves(AovKind kind) { return kind == AovKind::guide || kind == AovKind::opacity; }
 
 struct AovRow {
   Aov aov;
@@ -94,7 +99,8 @@ struct AovPlane {
   std::string name;
   Aov aov = Aov::depth;  // not used in the plane of hits
   int component = 0;     // index in AovRow::components
-  // half of the samples, for a guide: 0 is A, 1 is B; for other AOVs 0, and the plane is for all samples
+  // half of the samples, for AOVs with halves (has_halves()): 0 is A, 1 is B; for other AOVs 0, and the plane
+  // is for all samples
   int half = 0;
   bool hits = false;
 };

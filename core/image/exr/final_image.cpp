@@ -71,10 +71,11 @@ class Layers {
       : film_(film), frame_(film.grid().frame), planes_(planes_of(film.aovs())) {
     sums_.assign(planes_.sums.size(), {});
     // Two kinds of planes get no layer of their own. One is the plane that counts the samples that hit a
-    // surface. The others are the planes of half B of a guide (an AOV for the denoiser); they are added to
-    // the planes of half A.
+    // surface. The others are the planes of half B of an AOV with halves; they are added to the planes of
+    // half A.
     for (std::size_t p = 0; p < sums_.size(); ++p)
       if (p != planes_.hits && planes_.sums[p].half == 0) sums_[p].resize(frame_.pixels());
+    if (film.aovs().has(Aov::alpha)) alpha_error_.resize(frame_.pixels());
     ids_.assign(planes_.ids.size() * 2 * kCryptomatteRanks, std::vector<float>(frame_.pixels()));
   }
 
@@ -92,10 +93,13 @@ class Layers {
     for (std::size_t p = 0; p < sums_.size(); ++p) {
       if (sums_[p].empty()) continue;
       const AovRow& row = row_of(planes_.sums[p].aov);
-      const std::string name = fmt::format(
-          "{}.{}", layer_of(row.aov), row.components[static_cast<std::size_t>(planes_.sums[p].component)]);
+      const char component = row.components[static_cast<std::size_t>(planes_.sums[p].component)];
+      // Alpha belongs to R, G and B, which have no layer's name either.
+      const std::string name = row.aov == Aov::alpha ? std::string(1, component)
+                                                     : fmt::format("{}.{}", layer_of(row.aov), component);
       clamped += add_layer(picture, name, std::move(sums_[p]), row.half && !float_output);
     }
+    if (!alpha_error_.empty()) picture.channels["stderr.A"] = ExrFloat{std::move(alpha_error_)};
     for (std::size_t i = 0; i < planes_.ids.size(); ++i) {
       const std::string layer = layer_of(planes_.ids[i]);
       for (std::size_t c = 0; c < 2 * kCryptomatteRanks; ++c)
@@ -115,13 +119,16 @@ class Layers {
       if (sums_[p].empty()) continue;
       const AovRow& row = row_of(planes_.sums[p].aov);
       const bool by_hits = row.kind == AovKind::of_hits;
-      const double* other =
-          row.kind == AovKind::guide ? &tile.sums[(p + row.components.size()) * n] : nullptr;
+      const double* other = has_halves(row.kind) ? &tile.sums[(p + row.components.size()) * n] : nullptr;
+      // Half the difference of the means of the two halves, as for the colour (Film::pixels())
+      const bool with_error = row.aov == Aov::alpha;
       each_pixel(tile.rect, frame_, [&](std::size_t to, std::size_t from) {
         const double count = by_hits ? hits[from] : static_cast<double>(tile.spp);
         const double sum = tile.sums[p * n + from] + (other ? other[from] : 0);
         // Adding 0 turns -0 into +0 and changes no other value.
         if (count > 0) sums_[p][to] = static_cast<float>(sum / count) + 0.f;
+        if (with_error)
+          alpha_error_[to] = static_cast<float>(std::abs(tile.sums[p * n + from] - other[from]) / count);
       });
     }
   }
@@ -142,6 +149,7 @@ class Layers {
   FrameSize frame_;
   AovPlanes planes_;
   std::vector<std::vector<float>> sums_, ids_;
+  std::vector<float> alpha_error_;  // standard error of the AOV alpha; empty if the film does not have it
 };
 
 std::string tile_digests(const Film& film) {

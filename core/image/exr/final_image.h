@@ -74,10 +74,10 @@ ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests,
 // "crypto_material".
 std::string layer_of(Aov aov);
 
-// Adds the film's AOVs to `picture`: channels NAME.R, NAME.X, ... and, for identifiers, NAME00.R to NAME02.A
-// with their header strings. Pixels without a surface are 0 in the AOVs of surfaces (AovKind::of_hits, of_all
-// and ids). Returns the number of values that were clamped because their magnitude exceeded 65504, the
-// largest half.
+// Adds the film's AOVs to `picture`: channels NAME.R, NAME.X, ...; for alpha A, and its standard error
+// stderr.A (FLOAT); for identifiers NAME00.R to NAME02.A with their header strings. Pixels without a surface
+// are 0 in the AOVs of surfaces (AovKind::of_hits, of_all and ids). Returns the number of values that were
+// clamped because their magnitude exceeded 65504, the largest half.
 std::uint64_t add_aov_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
                              ExrPicture& picture);
 
@@ -119,12 +119,14 @@ float as_half(float value);  // returns the value rounded to half precision
 // a channel is magenta.
 std::array<std::uint8_t, 3> srgb8(const double* rgb, double scale);
 
-// Encodes an image as a PNG. `rgb` has 8 bits per channel, row by row.
-Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::uint8_t> rgb);
+// Encodes an image as a PNG. `pixels` has three channels of 8 bits (R, G, B), or four (R, G, B not multiplied
+// by alpha, and alpha), row by row.
+Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::uint8_t> pixels);
 
 // Returns the film as a PNG in 8-bit sRGB: its means, multiplied by 2^exposure_stops. Pixels with NaN are
-// magenta; tiles without samples show a dark checkerboard. If `denoised` is not empty (format as for
-// final_exr()), its pixels are shown instead of the film's.
+// magenta; tiles without samples show a dark checkerboard. If the film has the AOV alpha, so does the PNG;
+// light of pixels whose alpha is 0 is then lost. If `denoised` is not empty (format as for final_exr()), its
+// pixels are shown instead of the film's.
 Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops,
                                            std::span<const float> denoised = {});
 

@@ -55,9 +55,9 @@ std::vector<float> means(const TileAovs& tile, const AovPlanes& planes, const Ao
   for (std::size_t plane = 0; plane < planes.sums.size(); ++plane) {
     const AovPlane& p = planes.sums[plane];
     if (p.hits || p.aov != row.aov || p.half != 0) continue;
-    // A guide (an AOV for the denoiser) has its planes for half A of the samples, then those for half B, at
-    // an offset of `channels` planes. The sums of the two halves are added.
-    const double* other = row.kind == AovKind::guide ? &tile.sums[(plane + channels) * n] : nullptr;
+    // An AOV with halves has its planes for half A of the samples, then those for half B, at an offset of
+    // `channels` planes. The sums of the two halves are added.
+    const double* other = has_halves(row.kind) ? &tile.sums[(plane + channels) * n] : nullptr;
     for (std::size_t i = 0; i < n; ++i) {
       const double count = row.kind == AovKind::of_hits ? hits[i] : static_cast<double>(tile.spp);
       const double sum = tile.sums[plane * n + i] + (other ? other[i] : 0);

@@ -10,6 +10,7 @@
 
 #include "core/image/error/error_estimate.h"
 #include "core/image/error/relative_weights.h"
+#include "core/image/exr/pixel_layers.h"
 
 namespace ls {
 
@@ -44,19 +45,53 @@ std::array<std::uint8_t, 3> srgb8(const double* rgb, double scale) {
   return out;
 }
 
-Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::uint8_t> rgb) {
+Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::uint8_t> pixels) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   image.width = static_cast<png_uint_32>(size.width);
   image.height = static_cast<png_uint_32>(size.height);
-  image.format = PNG_FORMAT_RGB;
+  image.format = pixels.size() == 4 * size.pixels() ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
   image.flags = PNG_IMAGE_FLAG_FAST;
   png_alloc_size_t bytes = PNG_IMAGE_PNG_SIZE_MAX(image);
   std::vector<std::byte> png(bytes);
-  if (!png_image_write_to_memory(&image, png.data(), &bytes, 0, rgb.data(), 0, nullptr))
+  if (!png_image_write_to_memory(&image, png.data(), &bytes, 0, pixels.data(), 0, nullptr))
     return fail(Errc::internal, fmt::format("writing a PNG: {}", image.message));
   png.resize(bytes);
   return png;
+}
+
+Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops,
+                                           std::span<const float> denoised) {
+  if (!(std::abs(exposure_stops) <= kMaxStops))
+    return bad_argument(
+        fmt::format("exposure: {} stops; from -{} to {} are possible", exposure_stops, kMaxStops, kMaxStops));
+  const FrameSize frame = film.grid().frame;
+  const auto width = static_cast<std::size_t>(frame.width);
+  const double scale = std::exp2(exposure_stops);
+  const bool with_alpha = film.aovs().has(Aov::alpha);
+  const std::size_t channels = with_alpha ? 4 : 3;
+  std::vector<std::uint8_t> out(channels * frame.pixels(), 255);
+  for (TileIndex t = 0; t < film.grid().count(); ++t) {
+    const TilePixels tile = film.pixels(t);
+    std::vector<float> alpha;
+    if (with_alpha) alpha = TileLayers(film, t, true).values(pixel_layer(film.aovs(), "alpha").value());
+    each_pixel(tile.rect, frame, [&](std::size_t to, std::size_t from) {
+      Colour colour = kEmpty[(to % width / kChecker + to / width / kChecker) % 2];
+      if (tile.spp > 0) {
+        const double a = with_alpha ? std::clamp(double{alpha[from]}, 0., 1.) : 1;
+        std::array<double, 3> rgb;
+        if (denoised.empty())
+          std::copy_n(&tile.mean[3 * from], 3, rgb.begin());
+        else
+          std::copy_n(&denoised[3 * to], 3, rgb.begin());
+        // The colours of a PNG are not multiplied by alpha.
+        colour = a > 0 ? srgb8(rgb.data(), scale / a) : Colour{0, 0, 0};
+        if (with_alpha) out[channels * to + 3] = static_cast<std::uint8_t>(std::lround(255 * a));
+      }
+      std::copy_n(colour.begin(), 3, &out[channels * to]);
+    });
+  }
+  return write_png(frame, out);
 }
 
 namespace {
@@ -75,33 +110,6 @@ Result<std::vector<std::byte>> drawn(const Film& film, const DrawTile& draw) {
   }
   return write_png(frame, rgb);
 }
-
-}  // namespace
-
-Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops,
-                                           std::span<const float> denoised) {
-  if (!(std::abs(exposure_stops) <= kMaxStops))
-    return bad_argument(
-        fmt::format("exposure: {} stops; from -{} to {} are possible", exposure_stops, kMaxStops, kMaxStops));
-  const FrameSize frame = film.grid().frame;
-  const auto width = static_cast<std::size_t>(frame.width);
-  const double scale = std::exp2(exposure_stops);
-  return drawn(film, [&](TileIndex, const TilePixels& tile) {
-    std::vector<Colour> out(tile.mean.size() / 3);
-    each_pixel(tile.rect, frame, [&](std::size_t to, std::size_t from) {
-      std::array<double, 3> rgb;
-      if (denoised.empty())
-        std::copy_n(&tile.mean[3 * from], 3, rgb.begin());
-      else
-        std::copy_n(&denoised[3 * to], 3, rgb.begin());
-      out[from] = tile.spp == 0 ? kEmpty[(to % width / kChecker + to / width / kChecker) % 2]
-                                : srgb8(rgb.data(), scale);
-    });
-    return out;
-  });
-}
-
-namespace {
 
 // Draws a map of the film: `draw` draws the tiles that have samples, all other tiles are grey.
 Result<std::vector<std::byte>> map_png(const Film& film, const DrawTile& draw) {

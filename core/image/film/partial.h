@@ -37,8 +37,8 @@ struct Partial {
   UnitHeader header;
   // Six colour planes of tile.pixels() floats each, row by row (R, G, B of half A, then of half B), followed
   // by the planes of AOVs, which planes_of(aovs) lists. Values are sums, not means; each half has
-  // header.samples.count() / 2 samples per pixel. The sums of an AOV are over both halves, except for AOVs of
-  // the kind AovKind::guide, which have sums of each half. Every value is finite: non-finite samples are
+  // header.samples.count() / 2 samples per pixel. The sums of an AOV are over both halves, except for AOVs
+  // with halves (has_halves()), which have sums of each half. Every value is finite: non-finite samples are
   // counted in the health (health.h) and add zero here.
   std::vector<float> sums;
   AovSet aovs;  // the AOVs whose planes are in `sums`: those that the settings request

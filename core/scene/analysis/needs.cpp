@@ -38,6 +38,7 @@ class Analyst {
     n_.instances = static_cast<std::uint32_t>(s_.instances.size());
     n_.lens = s_.sensor.aperture_radius > 0;
     n_.crop = s_.film.has_crop();
+    n_.transparent_film = s_.film.transparent;
     files();
     return std::move(n_);
   }
@@ -68,6 +69,7 @@ void Analyst::shapes() {
     n_.boundaries = n_.boundaries || null;
     n_.null_transmission = n_.null_transmission || (!null && traits && (*traits)[s.bsdf.value].passes);
     n_.area_lights += s.emitter.has_value();
+    n_.flagged_shapes += !s.visible_camera || s.holdout;
   }
 }
 
@@ -170,6 +172,8 @@ class Words {
     lights();
     say("thin lens", n_.lens, "the aperture has a radius", "the camera is a pinhole");
     say("crop of the frame", n_.crop, "part of the frame", "the whole frame");
+    say("transparent film", n_.transparent_film, "the camera does not see the environment",
+        "the environment is in the picture");
     return std::move(out_);
   }
 
@@ -195,6 +199,7 @@ class Words {
     say("blends", count<BlendBsdf>(n_.materials), "materials");
     say("surfaces that let light pass straight on", n_.null_transmission,
         "masks or thin sheets: shadow rays collect", "no masks or thin sheets");
+    say("visibility by the camera", n_.flagged_shapes, "shapes hidden from the camera or held out");
     say("normal maps", count<NormalMapBsdf, BumpMapBsdf>(n_.materials), "normal and bump maps");
   }
   void media() {
@@ -246,26 +251,29 @@ class Words {
 }  // namespace
 
 std::string canonical_json(const Needs& n) {
-  const json j{{"media", n.media},
-               {"grids", n.grids},
-               {"chromatic", n.chromatic},
-               {"emission", n.emission},
-               {"anisotropic", n.anisotropic},
-               {"camera_in_medium", n.camera_in_medium},
-               {"boundaries", n.boundaries},
-               {"veils", n.null_transmission},
-               {"lens", n.lens},
-               {"crop", n.crop},
-               {"shapes", n.shapes},
-               {"materials", n.materials},
-               {"textures", n.textures},
-               {"lights", n.lights},
-               {"media_kinds", n.media_kinds},
-               {"area_lights", n.area_lights},
-               {"compensated", n.compensated},
-               {"density_files", n.density_files},
-               {"instances", n.instances},
-               {"only_delta_lights", n.only_delta_lights}};
+  json j{{"media", n.media},
+         {"grids", n.grids},
+         {"chromatic", n.chromatic},
+         {"emission", n.emission},
+         {"anisotropic", n.anisotropic},
+         {"camera_in_medium", n.camera_in_medium},
+         {"boundaries", n.boundaries},
+         {"veils", n.null_transmission},
+         {"lens", n.lens},
+         {"crop", n.crop},
+         {"shapes", n.shapes},
+         {"materials", n.materials},
+         {"textures", n.textures},
+         {"lights", n.lights},
+         {"media_kinds", n.media_kinds},
+         {"area_lights", n.area_lights},
+         {"compensated", n.compensated},
+         {"density_files", n.density_files},
+         {"instances", n.instances},
+         {"only_delta_lights", n.only_delta_lights}};
+  // Left out of scenes without them, so that the needs of stored jobs stay the same.
+  if (n.transparent_film) j["transparent_film"] = true;
+  if (n.flagged_shapes > 0) j["flagged_shapes"] = n.flagged_shapes;
   return j.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 

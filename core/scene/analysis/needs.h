@@ -34,6 +34,8 @@ struct Needs {
   // through which a part of the light passes without a change of direction.
   bool boundaries = false, null_transmission = false;
   bool lens = false, crop = false;
+  bool transparent_film = false;
+  std::uint32_t flagged_shapes = 0;  // number of shapes that the camera does not see, or that are held out
   // Number of objects of each type. The key is the name of the type (describe.h). Types without objects are
   // left out.
   std::map<std::string, std::uint32_t> shapes, materials, textures, lights, media_kinds;

@@ -46,7 +46,8 @@ class Search {
 
   bool unreachable(std::size_t i) {
     const Shape& s = s_.shapes[i];
-    if (!s.interior || s.group || !has_interior_behind(s)) return false;
+    // Camera rays pass a surface that they do not see.
+    if (!s.interior || s.group || !s.visible_camera || !has_interior_behind(s)) return false;
     const auto box = box_of(s);
     const bool clear = box ? camera_is_outside(s_.sensor, *box) : !s_.sensor.medium;
     return clear && (traits_[s.bsdf.value].black_behind || (box && sealed(s, i, *box)));

@@ -65,8 +65,8 @@ struct Field {
   bool number = false;  // true: the field is a texture that is read as a scalar, not as a colour
   // True for fields that Mitsuba does not have or that older scenes lack. If such a field has its default
   // value, it is written neither in files nor in JSON, so that the files and digests of scenes that do not
-  // use it stay the same. The default is `unwritten` for a colour whose `unwritten` is a number; for all
-  // others it is the type's initial value (false, 0, empty).
+  // use it stay the same. The default is `unwritten` for a colour or a boolean (0: false, 1: true) whose
+  // `unwritten` is a number; for all others it is the type's initial value (false, 0, empty).
   bool elided = false;
   // The names of the one or two integrators that have this parameter; both are empty if all integrators have
   // it.
@@ -81,6 +81,8 @@ struct Field {
     if (!elided) return false;
     if constexpr (std::is_same_v<T, Rgb>)
       if (!std::isnan(unwritten)) return value == Rgb{unwritten, unwritten, unwritten};
+    if constexpr (std::is_same_v<T, bool>)
+      if (!std::isnan(unwritten)) return value == (unwritten != 0);
     return value == T{};
   }
 };
@@ -88,6 +90,10 @@ struct Field {
 // Returns the field of a nested object. The arguments are members of Field.
 inline Field nested_field(std::string_view name, std::string_view doc, std::string_view given_as) {
   return {.name = name, .doc = doc, .derived = true, .given_as = given_as};
+}
+// Returns the field of a boolean that is true unless given, and that Mitsuba does not have.
+inline Field on_unless_given(std::string_view name, std::string_view doc) {
+  return {.name = name, .doc = doc, .unwritten = 1, .elided = true};
 }
 // Returns the field of a texture that is read as a scalar. `fallback` replaces a missing texture.
 inline Field number_field(std::string_view name, std::string_view doc, const Range& range, double fallback) {

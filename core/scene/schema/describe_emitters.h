@@ -36,6 +36,8 @@ LS_TYPE(ConstantEmitter, "emitter", "constant", "", "the same radiance from ever
 template <class V, Of<ConstantEmitter> T>
 void describe(V& v, T& e) {
   v.field({.name = "radiance", .doc = "radiance", .range = kNonNegative}, e.radiance);
+  v.field(on_unless_given("visible_camera", "whether the camera sees the light itself. Not in Mitsuba"),
+          e.visible_camera);
 }
 
 LS_TYPE(DirectionalEmitter, "emitter", "directional", "",
@@ -54,6 +56,8 @@ void describe(V& v, T& e) {
            .range = {0, 90},
            .unwritten = 0},
           e.angular_radius);
+  v.field(on_unless_given("visible_camera", "whether the camera sees the light itself. Not in Mitsuba"),
+          e.visible_camera);
 }
 
 LS_TYPE(PointEmitter, "emitter", "point", "",
@@ -95,6 +99,8 @@ void describe(V& v, T& e) {
                   "its right edge +x, of its lower edge +y. Not in Mitsuba",
            .elided = true},
           e.mapping);
+  v.field(on_unless_given("visible_camera", "whether the camera sees the light itself. Not in Mitsuba"),
+          e.visible_camera);
 }
 
 LS_TYPE(ProjectorEmitter, "emitter", "projector", "",

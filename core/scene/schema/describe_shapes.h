@@ -84,6 +84,17 @@ void describe(V& v, T& s) {
   v.field({.name = "is_medium_transition", .doc = "whether one of the two was given", .derived = true},
           s.is_medium_transition);
   v.field({.name = "group", .doc = "the group that it is in", .derived = true}, s.group);
+  v.field(
+      on_unless_given("visible_camera",
+                      "whether the camera sees it; if not, camera rays pass straight through it, while it "
+                      "still casts shadows, shines and shows in mirrors. Not in Mitsuba"),
+      s.visible_camera);
+  v.field(
+      {.name = "holdout",
+       .doc = "where the camera sees it, it cuts a hole into the image: black, with an alpha of 0 but for "
+              "media in front. Not in Mitsuba",
+       .elided = true},
+      s.holdout);
 }
 
 // Camera and film.
@@ -180,6 +191,13 @@ void describe(V& v, T& f) {
                    "pixels", {0, kMaxFrameSide}),
           f.crop_size.width);
   v.field(quantity("crop_height", "likewise", "pixels", {0, kMaxFrameSide}), f.crop_size.height);
+  v.field(
+      {.name = "transparent",
+       .doc = "the camera does not see the environment, which still lights the scene, and the image has a "
+              "channel A, by which R, G and B are already multiplied (docs/guide/compositing.md). Not in "
+              "Mitsuba",
+       .elided = true},
+      f.transparent);
 }
 
 }  // namespace ls::scene

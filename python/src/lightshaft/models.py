@@ -97,9 +97,9 @@ class JobSpec(TypedDict):
     path_reuse, shadow_roulette, sky_samples, path_splitting, sky_portals, local_lights. Without it, they
     are chosen for the scene. Every image is right with any of them; only its noise differs."""
     aov: NotRequired[list[str]]
-    """Further layers of the image (docs/reference/aovs.md). Possible are albedo, coverage,
+    """Further layers of the image (docs/reference/aovs.md). Possible are albedo, alpha, coverage,
     denoising_albedo, denoising_normal, depth, direct, emission, geo_normal, indirect, material_id,
-    multiple, normal, position, shape_id, single, surface, uv, volume."""
+    multiple, normal, opacity, position, shape_id, single, surface, uv, volume, volume_opacity."""
     defines: NotRequired[dict[str, str]]
     """Values of the scene's $NAME parameters."""
     priority: NotRequired[int]

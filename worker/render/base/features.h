@@ -17,6 +17,9 @@ struct Features {
   // The scene has surfaces that light passes straight through: index-matched boundaries, masks, thin
   // dielectrics.
   bool passing = false;
+  // Some surfaces are hidden from the camera or held out (SurfaceInfo::unseen, holdout). Only the variants
+  // with `split` have this.
+  bool visibility = false;
   // The radiance of each sample is split into the components of the light AOVs (path_records.h).
   bool split = false;
   // The integrator uses special sampling in media: it samples light at several points of each camera ray's
@@ -37,7 +40,7 @@ struct Features {
     return (media || !need.media) && (grids || !need.grids) && (chromatic || !need.chromatic) &&
            (emission || !need.emission) && (overlaps || !need.overlaps) && (passing || !need.passing) &&
            (aimed || !need.aimed) && (connected || !need.connected) && (whitted || !need.whitted) &&
-           (reuse || !need.reuse) && (split || !need.split);
+           (reuse || !need.reuse) && (split || !need.split) && (visibility || !need.visibility);
   }
   constexpr Features with(bool Features::*feature) const {
     Features more = *this;
@@ -47,6 +50,6 @@ struct Features {
 };
 inline constexpr Features kEveryScene{
     .media = true, .grids = true, .chromatic = true, .emission = true, .overlaps = true, .passing = true};
-inline constexpr Features kEverything = kEveryScene.with(&Features::split);
+inline constexpr Features kEverything = kEveryScene.with(&Features::split).with(&Features::visibility);
 
 }  // namespace ls::render

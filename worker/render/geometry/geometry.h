@@ -37,6 +37,9 @@ struct SurfaceInfo {
   // surfaces.
   bool sheet = false;
   bool null = false;  // index-matched: rays pass straight through
+  // Both are for camera rays, up to the first scattering. unseen: they pass straight through. holdout: if
+  // they do not pass, they end without light.
+  bool unseen = false, holdout = false;
   // True if part of the light passes straight through (BsdfTable::null_transmission)
   bool null_transmission = false;
   // For meshes: `normals` is true if the vertices have normals, `uvs` if they have uvs.

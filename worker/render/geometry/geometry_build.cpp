@@ -213,7 +213,9 @@ SurfaceInfo surface_info(const Scene& scene, const std::vector<scene::BsdfTraits
   info.null = std::holds_alternative<NullBsdf>(scene.bsdfs.at(s.bsdf.value));
   info.null_transmission = !info.null && traits.at(s.bsdf.value).passes;
   info.transition = s.is_medium_transition;
-  info.crossed = info.null || traits.at(s.bsdf.value).transmits;
+  info.unseen = !s.visible_camera;
+  info.holdout = s.holdout;
+  info.crossed = info.null || info.unseen || traits.at(s.bsdf.value).transmits;
   if (s.interior) info.interior = s.interior->value;
   if (s.exterior) info.exterior = s.exterior->value;
   info.orientation = orientation_of(s, vertex_normals);

@@ -28,7 +28,9 @@ constexpr AovSet kOfLight = AovSet{}
                                 .with(Aov::surface)
                                 .with(Aov::volume);
 constexpr AovSet kOfGuide = AovSet{}.with(Aov::denoising_albedo).with(Aov::denoising_normal);
-static_assert((kOfSurface.bits() ^ kOfLight.bits() ^ kOfGuide.bits()) == (1u << kAovs) - 1);
+constexpr AovSet kOfOpacity = AovSet{}.with(Aov::alpha).with(Aov::opacity).with(Aov::volume_opacity);
+static_assert((kOfSurface.bits() ^ kOfLight.bits() ^ kOfGuide.bits() ^ kOfOpacity.bits()) ==
+              (1u << kAovs) - 1);
 
 // Returns the uv of a hit. On spheres it is computed from the position, because SurfaceHit::uv is set there
 // only if the surface's material or light needs it.
@@ -59,7 +61,8 @@ AovPixel::AovPixel(const World& world)
       planes_(planes_of(world.aovs)),
       wants_surface_(world.aovs.any_of(kOfSurface)),
       wants_light_(world.aovs.any_of(kOfLight)),
-      wants_guide_(world.aovs.any_of(kOfGuide)) {}
+      wants_guide_(world.aovs.any_of(kOfGuide)),
+      wants_opacity_(world.aovs.any_of(kOfOpacity)) {}
 
 void AovPixel::begin_pixel() {
   sums_ = {};
@@ -75,13 +78,14 @@ void AovPixel::add(Aov aov, const V3d& v, std::size_t half) {
 
 void AovPixel::end_sample(int x, int y, std::uint64_t sample, bool usable) {
   if (wants_light_ && usable) add_light();
-  if (!wants_surface_ && !wants_guide_) return;
+  if (!wants_surface_ && !wants_guide_ && !wants_opacity_) return;
   x += world_.origin_x;
   y += world_.origin_y;
   const SampleStream stream(world_.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y),
                             sample);
   const CameraRay ray = camera_ray(world_, stream, x, y);
   if (wants_guide_) add_guide(ray, stream, sample & 1);
+  if (wants_opacity_) add_opacity(ray, stream, sample & 1);
   if (!wants_surface_) return;
   const auto first = PathTracer<Features{.passing = true}>(world_, stream).first_surface(ray);
   if (first) add_surface(*first, stream, ray);
@@ -132,6 +136,15 @@ void AovPixel::add_guide(const CameraRay& ray, const SampleStream& stream, std::
   if (is_finite(guide.albedo)) add(Aov::denoising_albedo, V3d(guide.albedo), half);
   const V3d& n = guide.normal;
   if (std::isfinite(n.x + n.y + n.z)) add(Aov::denoising_normal, n, half);
+}
+
+void AovPixel::add_opacity(const CameraRay& ray, const SampleStream& stream, std::size_t half) {
+  const Opacity opacity = PathTracer<kEveryScene>(world_, stream).opacity(ray);
+  if (!is_finite(opacity.all) || !is_finite(opacity.media)) return;
+  const V3d all(opacity.all);
+  add(Aov::alpha, {(all.x + all.y + all.z) / 3, 0, 0}, half);
+  add(Aov::opacity, all, half);
+  add(Aov::volume_opacity, V3d(opacity.media), half);
 }
 
 void AovPixel::add_id(std::vector<IdSlot>& seen, float id) {

@@ -33,13 +33,14 @@ class AovPixel {
   void add_light();
   void add_surface(const FirstSurface& first, const SampleStream& stream, const CameraRay& ray);
   void add_guide(const CameraRay& ray, const SampleStream& stream, std::size_t half);
+  void add_opacity(const CameraRay& ray, const SampleStream& stream, std::size_t half);
   void add_id(std::vector<IdSlot>& seen, float id);
 
   const World& world_;
   AovPlanes planes_;
-  bool wants_surface_, wants_light_, wants_guide_;
+  bool wants_surface_, wants_light_, wants_guide_, wants_opacity_;
   LightSplit split_;
-  // Sums over the samples. For denoising guides, [0] is the sum over the even samples and [1] that over the
+  // Sums over the samples. For AOVs with halves, [0] is the sum over the even samples and [1] that over the
   // odd ones; for other AOVs, [0] is the sum over all samples.
   std::array<std::array<Sums, kAovs>, 2> sums_{};
   double hits_ = 0;

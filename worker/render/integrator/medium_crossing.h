@@ -381,6 +381,9 @@ void PathTracer<F, Light>::add_emission_of_others(const SurfaceHit& hit) {
     if (!world_.geometry.complete(others.ids[static_cast<std::size_t>(i)], ray_.origin, ray_.d, other))
       continue;
     const SurfaceInfo& s = world_.geometry.surfaces[other.surface];
+    if constexpr (F.visibility) {
+      if (depth_ == 0 && (s.unseen || s.holdout)) continue;
+    }
     if (s.null && s.light != kNone) add_emission(other);
   }
 }

@@ -43,6 +43,12 @@ struct DenoisingGuide {
   V3d normal{0, 0, 0};
 };
 
+// One sample of the AOVs of opacity: 1 - transmittance of all media and surfaces on the camera ray (`all`),
+// and of the media up to the first surface that scatters (`media`).
+struct Opacity {
+  C3 all{0, 0, 0}, media{0, 0, 0};
+};
+
 // The components into which the radiance of a sample is split, by the scatterings on the light's path. The
 // light AOVs (auxiliary images) are sums of components.
 //

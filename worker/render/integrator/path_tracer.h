@@ -91,6 +91,8 @@ class PathTracer {
   // Returns the albedo and the normal of the first surface that is not an index-matched boundary, a mirror or
   // clear glass, seen through the surfaces before it.
   DenoisingGuide denoising_guide(const CameraRay& ray);
+  // Returns one sample of how much of what is behind the scene does not reach the camera along this ray.
+  Opacity opacity(const CameraRay& ray);
   // With F.connected: follows a ray of the sun, and calls keep(vertex) for each light vertex on its way.
   // Camera paths are connected to light vertices (light_vertices.h).
   template <class Keep>
@@ -188,6 +190,12 @@ class PathTracer {
                                         const Group& g);
   void add_emission(const SurfaceHit& hit);
   void add_environment();
+  [[gnu::cold, gnu::noinline]] void add_environment_seen();
+  // True if a camera ray passes straight through a surface that is unseen or held out; false if it ends
+  // there.
+  bool sees_past(const SurfaceHit& hit, const SurfaceInfo& surface) {
+    return surface.unseen || surface.null || (surface.null_transmission && passes_null(hit));
+  }
   C3 unoccluded(const V3& start, const V3& p, const LightSample& light, const Within& medium,
                 RandomStream stream);
   [[gnu::always_inline]] inline C3 through_boundaries(C3 value, const V3& start, const V3& p, const V3& d,
@@ -398,6 +406,14 @@ void PathTracer<F, Light>::go_on(float t_max) {
       break;
     }
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if constexpr (F.visibility) {
+      if (depth_ == 0 && (surface.unseen || surface.holdout)) {
+        if (!sees_past(hit, surface)) break;
+        pass_boundary(hit, surface);
+        if (is_black(beta_)) break;
+        continue;
+      }
+    }
     if constexpr (F.overlaps) {
       if (world_.lights_on_others && surface.coincident_reach > 0) add_emission_of_others(hit);
     }
@@ -422,81 +438,6 @@ void PathTracer<F, Light>::go_on(float t_max) {
   if constexpr (F.overlaps)
     if (medium_.overflowed()) outcome_.reject(HealthCause::nested_media);
   outcome_.majorant_violations += counters_.majorant_violations;
-}
-
-// The path passes every index-matched surface, and each null-transmitting surface with that surface's
-// probability. As long as the ray hits the same surfaces as the path of the sample, the decisions use the
-// same random numbers as in trace().
-template <Features F, template <Features> class Light>
-std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay& ray) {
-  ray_ = {ray.o, ray.o, ray.d};
-  float t_max = ray.t_max;
-  FirstSurface first;
-  SurfaceHit& hit = first.hit;
-  for (segment_ = 0; segment_ < kMaxSegments; ++segment_, t_max = kInfinity) {
-    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, t_max);
-    if (!primitive || !world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit)) return std::nullopt;
-    if (world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
-    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    beta_ = C3(1);
-    if (!surface.null && !(surface.null_transmission && passes_null(hit))) {
-      first.not_passed = beta_.x;
-      return first;
-    }
-    ray_.origin = offset_point(hit, ray_.d);
-  }
-  return std::nullopt;
-}
-
-// A medium on the way contributes in proportion to the light that it scatters or absorbs: its albedo replaces
-// that of the surface behind, and it has no normal. The proportion is 1 - transmittance, and the
-// transmittance is exact in homogeneous media. If flights were sampled instead, the guides would be noisy,
-// and a denoiser keeps the noise of its guides.
-template <Features F, template <Features> class Light>
-DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
-  constexpr int kGuideSegments = 16;
-  DenoisingGuide guide;
-  double unscattered = 1;
-  ray_ = {ray.o, ray.o, ray.d};
-  medium_ = start_medium(ray);
-  float reach = ray.t_max;
-  for (segment_ = 0; segment_ < kGuideSegments; ++segment_, reach = kInfinity) {
-    SurfaceHit hit;
-    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, reach);
-    const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
-    if (met && world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
-    if (medium_.any()) {
-      const float t = met ? ray_.length_to(hit) : reach;
-      RandomStream tracker = stream_.stream(segment_, Purpose::track_guide);
-      const C3 through = through_media(medium_, ray_.start, ray_.d, t, tracker);
-      const V3 middle = std::isfinite(t) ? ray_.start + ray_.d * (t / 2) : ray_.start;
-      guide.albedo += beta_ * (C3(1) - through) * world_.media[medium_.one()].albedo_at(middle);
-      beta_ *= through;
-      unscattered *= double{mean(through)};
-    }
-    if (!met || is_black(beta_)) break;
-    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    if (surface.null || (surface.null_transmission && passes_null(hit))) {
-      pass_boundary(hit, surface);
-      continue;
-    }
-    const Group g = stream_.group(segment_, Purpose::guide);
-    const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), hit.shading.to_local(-ray_.d), g.u(2),
-                                       {g.u(0), g.u(1)});
-    if (!s) break;
-    // A refracted sample's weight contains 1 / eta^2, by which refraction scales radiance. This factor is
-    // removed, since it is no property of the surface behind.
-    beta_ *= s->weight * (s->transmitted ? s->eta * s->eta : 1.f);
-    if (!s->delta) {
-      guide.albedo += beta_;
-      guide.normal = V3d(hit.shading.n) * (dot(hit.shading.n, ray_.d) > 0 ? -unscattered : unscattered);
-      break;
-    }
-    const V3 w = normalize(hit.shading.to_world(s->wi));
-    medium_ = beyond(hit, surface, w, ray_.d, medium_);
-    ray_.leave(hit, w);
-  }
-  return guide;
 }
 
 // Adds the light that next-event estimation finds at a surface. wo is the direction back along the path, in
@@ -711,7 +652,8 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
 
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_environment() {
-  if (!world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)) return;
+  if (!world_.lights.has_environment()) return;
+  if (depth_ == 0 && world_.hide_environment) return add_environment_seen();
   if constexpr (F.reuse) {
     if (is_leaving_second()) {
       const Lights::EnvironmentParts parts = world_.lights.environment_parts(last_.p, ray_.d, last_.place);
@@ -730,6 +672,13 @@ void PathTracer<F, Light>::add_environment() {
   }
   if (depth_ == 1 && looked_for_sky_) light -= world_.lights.constant_environment() * .5f;
   add(beta_ * light);
+}
+
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::add_environment_seen() {
+  if (world_.hide_emitters || world_.transparent) return;
+  const C3 light = world_.lights.environment_seen(ray_.d);
+  if (!is_black(light)) add(beta_ * light);
 }
 
 template <Features F, template <Features> class Light>
@@ -763,6 +712,7 @@ bool PathTracer<F, Light>::survives(float u) {
 
 }  // namespace ls::render
 
+#include "worker/render/integrator/aov_rays.h"
 #include "worker/render/integrator/medium_crossing.h"
 #include "worker/render/integrator/path_reuse.h"
 #include "worker/render/integrator/shadow_ray.h"

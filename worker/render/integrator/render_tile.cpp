@@ -223,7 +223,8 @@ TileResult render_tile_with(const World& w, const Variant& v, PixelRect tile, Sa
 }
 TileResult render_tile_with(const World& w, const Variant& v, PixelRect tile, SampleRange range,
                             const std::atomic<bool>* stop, Breadcrumb* crumb) {
-  if (w.aovs.empty()) return render_tile_with(w, v, tile, range, stop, crumb, NoAovs{});
+  // A variant that splits light into components needs somewhere to put them, even if no AOV asks for them.
+  if (w.aovs.empty() && !v.covers.split) return render_tile_with(w, v, tile, range, stop, crumb, NoAovs{});
   return render_tile_with(w, v, tile, range, stop, crumb, AovPixel(w));
 }
 
@@ -253,8 +254,7 @@ std::vector<std::string> covering_variants(const World& world) {
 TileResult render_tile_as(const World& world, const std::string& name, PixelRect tile, SampleRange samples) {
   for (const Variant& v : variants_for(world)) {
     if (name != v.name) continue;
-    if (!v.covers.split) return render_tile_with(world, v, tile, samples, nullptr, nullptr);
-    return render_tile_with(world, v, tile, samples, nullptr, nullptr, AovPixel(world));
+    return render_tile_with(world, v, tile, samples, nullptr, nullptr);
   }
   return {};
 }

@@ -10,7 +10,8 @@ std::span<const Variant> whitted_variants() {
   static constexpr Variant kVariants[] = {
       variant<Features{.passing = true, .whitted = true}>("surfaces, whitted"),
       variant<Features{.overlaps = true, .passing = true, .whitted = true}>("coincident surfaces, whitted"),
-      variant<Features{.overlaps = true, .passing = true, .split = true, .whitted = true}>(
+      variant<Features{
+          .overlaps = true, .passing = true, .visibility = true, .split = true, .whitted = true}>(
           "coincident surfaces, whitted, and light in parts"),
   };
   return kVariants;

@@ -29,6 +29,7 @@ struct SunLight : LightKind {
   C3 radiance;
   float cone = 0;     // 1 - cos of the sun's angular radius
   float density = 0;  // 1 / (the sun's solid angle) [1/sr]
+  bool seen = true;   // false: camera rays that were not scattered do not see the disk
 
   bool dark(const LightWorld&) const { return is_black(radiance); }
   double power(const LightWorld& world) const {  // irradiance times area, as for directional lights
@@ -134,6 +135,7 @@ inline std::variant<DirectionalLight, SunLight> make_light(const DirectionalEmit
   const double a = e.angular_radius * (kPiD / 180), half = std::sin(a / 2), sine = std::sin(a);
   SunLight l;
   l.travel = travel;
+  l.seen = e.visible_camera;
   l.radiance = color(e.irradiance) * static_cast<float>(1 / (kPiD * sine * sine));
   l.cone = static_cast<float>(2 * half * half);
   l.density = static_cast<float>(1 / (4 * kPiD * half * half));

@@ -69,9 +69,13 @@ Result<void> Lights::add_map(const Scene& scene, const EnvmapEmitter& emitter, c
 Result<void> Lights::add_emitter(const Scene& scene, const Emitter& emitter, const ImageLoader& images) {
   return std::visit(overloaded{[&](const ConstantEmitter& e) -> Result<void> {
                                  environment_ += color(e.radiance);
+                                 hides_sky_ = !e.visible_camera;
                                  return {};
                                },
-                               [&](const EnvmapEmitter& e) { return add_map(scene, e, images); },
+                               [&](const EnvmapEmitter& e) {
+                                 hides_sky_ = !e.visible_camera;
+                                 return add_map(scene, e, images);
+                               },
                                [&](const GoniometricEmitter& e) -> Result<void> {
                                  if (textures_->aspect(e.texture) != 1)
                                    return fail(Errc::invalid_argument,
@@ -211,6 +215,20 @@ Lights::EnvironmentParts Lights::environment_parts(const V3& x, const V3& direct
     parts.pdf = sun.density * probability_at(suns_.front(), place);
   }
   return parts;
+}
+
+bool Lights::hides_environment() const {
+  return hides_sky_ || std::ranges::any_of(suns_, [&](std::uint32_t i) {
+           return !std::get_if<SunLight>(&lights_[i].kind)->seen;
+         });
+}
+
+C3 Lights::environment_seen(const V3& direction) const {
+  C3 sum = hides_sky_ ? C3(0) : environment_ + sky_.radiance(direction);
+  for (const std::uint32_t i : suns_)
+    if (const SunLight& sun = *std::get_if<SunLight>(&lights_[i].kind); sun.seen)
+      sum += sun.found(direction, kInfinity, 1);
+  return sum;
 }
 
 C3 Lights::suns(const V3& direction, float pdf, const LightPlace& place) const {

@@ -104,6 +104,10 @@ class Lights {
     const float as_light = light.pdf * probability_at(sky_index_, place);
     return beside + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);
   }
+  // The radiance that a camera ray sees if it leaves the scene in this direction without a scattering: that
+  // of the lights whose visible_camera is true.
+  C3 environment_seen(const V3& direction) const;
+  bool hides_environment() const;  // true if visible_camera of one of these lights is false
   // The radiance of the constant environment; black while portals are set, since the constant environment is
   // then a part of the sky, which is sampled as a light.
   const C3& constant_environment() const { return environment_; }
@@ -236,6 +240,7 @@ class Lights {
   std::uint64_t tree_words_ = 0, table_words_ = 0;
   bool tree_in_media_ = false;
   bool any_with_place_ = false;
+  bool hides_sky_ = false;  // true if the camera does not see the environment map or the constant environment
   std::uint64_t left_out_ = 0, clamped_ = 0;
 };
 

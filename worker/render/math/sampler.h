@@ -140,6 +140,7 @@ enum class Purpose : std::uint32_t {
   track_guide,
   connect,
   track_connect,
+  track_opacity,
   end  // not a purpose, but the number of purposes
 };
 

@@ -58,11 +58,13 @@ void learn_sky_samples(const IntegratorSettings& settings, World& w) {
   // Paths of two segments are scattered at most once. Without the emitters that the camera sees directly,
   // which are hidden here, they find direct light only.
   const bool hide_emitters = std::exchange(w.hide_emitters, true);
+  const bool hide_environment = std::exchange(w.hide_environment, true);
   const auto all = pilot_radiance(w, 2);
   const C3 sky = w.lights.exchange_constant_environment(C3(0));
   const auto others = pilot_radiance(w, 2);
   (void)w.lights.exchange_constant_environment(sky);
   w.hide_emitters = hide_emitters;
+  w.hide_environment = hide_environment;
   w.sky_samples = all && *all - *others > kSkyThatPays * *all;
 }
 

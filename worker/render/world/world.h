@@ -98,7 +98,11 @@ class World {
   // With Features::reuse: the number of pixels in a group, whose paths share their tails, that is, the parts
   // from the second vertex on (path_reuse.h)
   int reuse = 0;
-  bool hide_emitters = false;
+  bool hide_emitters = false;  // true if camera rays see no light that was not scattered
+  bool transparent = false;    // true if camera rays see no environment (FilmSettings::transparent)
+  // True if camera rays do not see all of the environment, because of the two members above or
+  // Lights::hides_environment()
+  bool hide_environment = false;
   int max_depth = -1;  // maximum path length in segments; -1: unlimited
   // True if passing straight through a surface (null, or with null transmission) counts as a segment for
   // max_depth, as in Mitsuba's `path`; false if it does not, as in Mitsuba's `volpath`.

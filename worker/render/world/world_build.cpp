@@ -25,7 +25,8 @@ Features features_of(const scene::Needs& n) {
           .grids = n.grids,
           .chromatic = n.chromatic,
           .emission = n.emission,
-          .passing = n.boundaries || n.null_transmission};
+          .passing = n.boundaries || n.null_transmission,
+          .visibility = n.flagged_shapes > 0};
 }
 
 // Returns the features that the finished world requires. Except for `overlaps` and `chromatic`, features_of()
@@ -35,6 +36,8 @@ Features found_in(const World& w) {
   const auto& surfaces = w.geometry.surfaces;
   f.passing = std::any_of(surfaces.begin(), surfaces.end(),
                           [](const SurfaceInfo& s) { return s.null || s.null_transmission; });
+  f.visibility = std::any_of(surfaces.begin(), surfaces.end(),
+                             [](const SurfaceInfo& s) { return s.unseen || s.holdout; });
   if (!w.use_media) return f;
   const auto use = [&](std::uint32_t i) {
     if (i == kNone) return;
@@ -192,6 +195,7 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
     w.heuristic = scene.integrator.heuristic;
   }
   w.hide_emitters = scene.integrator.hide_emitters;
+  w.transparent = scene.film.transparent;
   auto geometry = Geometry::build(scene, loader);
   if (!geometry) return tl::unexpected(geometry.error());
   w.geometry = std::move(*geometry);
@@ -228,6 +232,7 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
   });
   if (!lights) return tl::unexpected(lights.error());
   w.lights = std::move(*lights);
+  w.hide_environment = w.hide_emitters || w.transparent || w.lights.hides_environment();
   w.inputs.add(HealthCause::negative_texel, w.lights.clamped_inputs());
   for (SurfaceInfo& s : w.geometry.surfaces) {
     s.transition = s.transition && w.use_media;

@@ -92,6 +92,7 @@ WorldReport describe(const World& w) {
   feature(w.overlaps, "media within or across each other");
   feature(w.coincident, "a search for surfaces that lie on null ones");
   feature(w.need.split, "AOVs of light");
+  feature(w.need.visibility, "surfaces hidden from the camera or held out");
   const TechniqueSet techniques = techniques_of(w);
   feature(techniques.has(Technique::equiangular), "equi-angular sampling about lights");
   feature(techniques.has(Technique::exponential), "points along segments, as light fades");

@@ -50,6 +50,7 @@ TEST(Aovs, HaveNamesAndAliases) {
 
   EXPECT_EQ(names_of(set({"uv", "depth", "depth"})), (std::vector<std::string>{"depth", "uv"}));
   EXPECT_EQ(set({"sh_normal", "Crypto-Object"}), set({"normal", "shape_id"}));
+  EXPECT_NE(set({"alpha"}), set({"coverage"}));
   EXPECT_TRUE(set({"spp", "stderr"}).empty());
   for (const AovRow& row : aov_rows()) EXPECT_EQ(names_of(set({std::string(row.name)}))[0], row.name);
 }
@@ -72,6 +73,10 @@ TEST(Aovs, EmptyListAddsNoLayers) {
 TEST(Aovs, PlanesAreInTheOrderOfTheFile) {
   EXPECT_THAT(planes_of(AovSet{}.with(Aov::depth).with(Aov::direct)).names,
               ElementsAre("aov.depth.Z", "aov.direct.B", "aov.direct.G", "aov.direct.R", "aov.hits"));
+  EXPECT_THAT(planes_of(AovSet{}.with(Aov::alpha).with(Aov::volume_opacity)).names,
+              ElementsAre("aov.alpha.A.A", "aov.alpha.B.A", "aov.volume_opacity.A.B",
+                          "aov.volume_opacity.A.G", "aov.volume_opacity.A.R", "aov.volume_opacity.B.B",
+                          "aov.volume_opacity.B.G", "aov.volume_opacity.B.R"));
   const auto all = planes_of(AovSet(~0u)).names;
   EXPECT_TRUE(std::is_sorted(all.begin(), all.end()));
   EXPECT_EQ(std::adjacent_find(all.begin(), all.end()), all.end());

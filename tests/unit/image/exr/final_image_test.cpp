@@ -171,22 +171,49 @@ TEST(FinalExr, IsUntrustedIfItsCurveIs) {
   EXPECT_FALSE(strings.contains("lightshaft:seconds"));
 }
 
+// A tile of two samples as flat() makes it, with the opacities that its two halves have.
+Partial with_alpha(Partial p, float a, float b) {
+  const auto n = static_cast<std::size_t>(p.header.tile.pixels());
+  p.aovs = AovSet{}.with(Aov::alpha);
+  p.sums.insert(p.sums.end(), n, a);
+  p.sums.insert(p.sums.end(), n, b);
+  return p;
+}
+
+TEST(FinalExr, HasAlphaWithItsStandardError) {
+  Film film(kFinalGrid, AovSet{}.with(Aov::alpha));
+  ASSERT_TRUE(film.fold(0, 0, with_alpha(flat(kFinalGrid, 0, {1, 1, 1}), .25f, .75f)));
+
+  const auto image = read_final_exr(final_exr(film, some_provenance(), false)->exr, "alpha").value();
+
+  EXPECT_EQ(std::get<ExrHalf>(image.channels.at("A")).values[0], .5f);
+  EXPECT_EQ(std::get<ExrFloat>(image.channels.at("stderr.A")).values[0], .25f);  // half of the difference
+  EXPECT_EQ(image.channels.count("alpha.A"), 0u);
+}
+
 struct Decoded {
   FrameSize size;
-  std::vector<png_byte> rgb;
+  std::size_t channels;
+  std::vector<png_byte> values;
   std::array<int, 3> at(int x, int y) const {
-    const png_byte* p = &rgb[static_cast<std::size_t>((y * size.width + x) * 3)];
+    const png_byte* p = pixel(x, y);
     return {p[0], p[1], p[2]};
+  }
+  int alpha(int x, int y) const { return pixel(x, y)[3]; }
+  const png_byte* pixel(int x, int y) const {
+    return &values[static_cast<std::size_t>(y * size.width + x) * channels];
   }
 };
 Decoded decode(const std::vector<std::byte>& png) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   EXPECT_TRUE(png_image_begin_read_from_memory(&image, png.data(), png.size())) << image.message;
-  image.format = PNG_FORMAT_RGB;
+  const bool alpha = image.format & PNG_FORMAT_FLAG_ALPHA;
+  image.format = alpha ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
   Decoded out{{static_cast<int>(image.width), static_cast<int>(image.height)},
+              alpha ? 4u : 3u,
               std::vector<png_byte>(PNG_IMAGE_SIZE(image))};
-  EXPECT_TRUE(png_image_finish_read(&image, nullptr, out.rgb.data(), 0, nullptr)) << image.message;
+  EXPECT_TRUE(png_image_finish_read(&image, nullptr, out.values.data(), 0, nullptr)) << image.message;
   return out;
 }
 
@@ -204,6 +231,20 @@ TEST(Preview, IsSrgbWithExposureInStops) {
   EXPECT_EQ(normal.at(9, 3), (std::array{0, 0, 255}));
   EXPECT_EQ(darker.at(3, 3), (std::array{137, 2, 255}));
   EXPECT_EQ(darker.at(9, 3), (std::array{0, 0, 188}));
+}
+
+TEST(Preview, HasAlphaAndColoursThatAreNotMultipliedByIt) {
+  Film film(kFinalGrid, AovSet{}.with(Aov::alpha));
+  ASSERT_TRUE(film.fold(0, 0, with_alpha(flat(kFinalGrid, 0, {.25f, .125f, 2}), .25f, .75f)));
+  ASSERT_TRUE(film.fold(1, 0, with_alpha(flat(kFinalGrid, 1, {1, 1, 1}), 0, 0)));
+
+  const Decoded image = decode(preview_png(film, 0).value());
+
+  ASSERT_EQ(image.channels, 4u);
+  EXPECT_EQ(image.at(3, 3), (std::array{188, 137, 255}));  // 0.5, 0.25 and 4
+  EXPECT_EQ(image.alpha(3, 3), 128);
+  EXPECT_EQ(image.alpha(9, 3), 0);
+  EXPECT_EQ(decode(preview_png(Film(kFinalGrid), 0).value()).channels, 3u);
 }
 
 TEST(Preview, ShowsNaNInMagentaAndInfinitiesAtTheEnds) {

@@ -10,7 +10,7 @@
 
 #include "core/image/aov/identifiers.h"
 #include "core/image/film/partial.h"
-#include "tests/support/render_check.h"
+#include "tests/unit/render/integrator/aov_picture.h"
 
 namespace ls::render {
 namespace {
@@ -19,63 +19,6 @@ using test::SceneBuilder;
 using test::translate;
 using test::operator*;
 
-constexpr std::uint64_t kSamples = 16;
-// The test compares positions in a world of unit size, uv and unit vectors. They are float32 after a few
-// operations each. 2^-20 of the largest of them is 16 units in the last place.
-constexpr double kClose = 0x1p-20;
-
-// A picture with AOVs. Its functions return, by the plane's name, sums over the samples of a pixel, and means
-// over all its samples or over those that hit a surface.
-class Picture {
- public:
-  Picture(const SceneBuilder& builder, std::vector<std::string> names, std::uint64_t samples = kSamples)
-      : samples_(samples) {
-    RenderSettings settings = test::settings_of(builder.scene);
-    settings.aov = names_of(parse_aovs(names).value());
-    aovs_ = planes_of(aovs_of(settings));
-    size_ = settings.size;
-    auto world = build_world(builder.scene, settings, builder.files, 1);
-    if (!world) throw std::runtime_error(world.error().message);
-    sums_ = render_tile(**world, {0, 0, size_.width, size_.height}, {0, samples}, nullptr, nullptr).sums;
-  }
-  std::size_t pixels() const { return static_cast<std::size_t>(size_.width * size_.height); }
-  std::vector<float> beauty() const {
-    return {sums_.begin(), sums_.begin() + static_cast<std::ptrdiff_t>(6 * pixels())};
-  }
-  double sum(const std::string& plane, std::size_t pixel) const {
-    const auto at = std::find(aovs_.names.begin(), aovs_.names.end(), plane);
-    if (at == aovs_.names.end()) throw std::runtime_error("no plane " + plane);
-    return sums_[(6 + static_cast<std::size_t>(at - aovs_.names.begin())) * pixels() + pixel];
-  }
-  double of_all(const std::string& plane, std::size_t pixel = 0) const {
-    return sum(plane, pixel) / static_cast<double>(samples_);
-  }
-  double of_hits(const std::string& plane, std::size_t pixel = 0) const {
-    return sum(plane, pixel) / sum("aov.hits", pixel);
-  }
-  double whole(std::size_t channel, std::size_t pixel) const {
-    return double{sums_[channel * pixels() + pixel]} + sums_[(3 + channel) * pixels() + pixel];
-  }
-  IdSlots ids(std::size_t which, std::size_t pixel = 0) const {
-    return load_slots(&sums_[(6 + aovs_.sums.size() + which * kIdPlanes) * pixels() + pixel], pixels());
-  }
-
- private:
-  std::uint64_t samples_;
-  AovPlanes aovs_;
-  FrameSize size_;
-  std::vector<float> sums_;
-};
-
-// A wall of side 4 in the plane z = 0, moved by `at`. The camera looks straight at its point (x, y) from a
-// distance of 5.
-SceneBuilder wall(double x = .4, double y = .6, const Vec3& at = {0, 0, 0}) {
-  SceneBuilder builder({2, 2});
-  builder.shape(RectangleShape{}, translate(at) * test::scale(2), builder.diffuse(.3));
-  builder.environment();
-  builder.look({at[0] + x, at[1] + y, at[2] + 5}, {at[0] + x, at[1] + y, at[2]}, 1e-3, {0, 1, 0});
-  return builder;
-}
 const std::vector<std::string> kOfSurface = {"albedo", "coverage", "depth",    "normal",     "geo_normal",
                                              "uv",     "position", "shape_id", "material_id"};
 
@@ -256,26 +199,6 @@ TEST(Aovs, InstancesAreSeparateObjectsInCryptomattes) {
 }
 
 // ---- light AOVs
-SceneBuilder hall(bool media, bool grids) {
-  SceneBuilder builder({8, 6});
-  const BsdfIndex white = builder.diffuse(.7);
-  builder.shape(RectangleShape{}, translate({0, 0, -1}) * test::scale(3), white);
-  builder.shape(SphereShape{}, translate({.6, .8, -.5}) * test::scale(.4), builder.glass(1.5));
-  builder.shape(RectangleShape{}, translate({0, 0, 2}) * test::rotate_x(180) * test::scale(.5), white)
-      .emitter = AreaEmitter{builder.texture({3, 2, 1})};
-  builder.scene.emitters.push_back(PointEmitter{{1, -1, 1}, {1, 1, 1}});
-  builder.environment(.1);
-  if (media) {
-    const Transform box = translate({-1, -1, -1}) * test::scale(2);
-    const MediumIndex m =
-        grids ? builder.heterogeneous(builder.grid({2, 2, 2}, {1, 2, 3, 1, .5f, 1, 2, 0}, box), {.9, .6, .3},
-                                      1, .4)
-              : builder.homogeneous({.8, .9, 1}, {.9, .5, .2}, .3);
-    builder.container(CubeShape{}, test::scale(.9), builder.null(), m);
-  }
-  builder.look({0, -5, 1}, {0, 0, 0}, 40);
-  return builder;
-}
 const std::vector<std::string> kOfLight = {"direct", "indirect", "surface", "volume",
                                            "single", "multiple", "emission"};
 

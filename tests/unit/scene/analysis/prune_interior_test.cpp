@@ -51,6 +51,12 @@ std::string bsdf(std::string_view type, std::string_view inside = "") {
 
 std::size_t media(std::string_view objects) { return pruned(objects).scene.media.size(); }
 
+TEST(PruneInteriors, InteriorThatTheCameraLooksIntoStays) {
+  const std::string hidden = R"(<boolean name="visible_camera" value="false"/>)";
+  EXPECT_EQ(media(cube(kWhole + kFog) + R"(<emitter type="point"/>)"), 0u);
+  EXPECT_EQ(media(cube(kWhole + kFog + hidden) + R"(<emitter type="point"/>)"), 1u);
+}
+
 TEST(PruneInteriors, InteriorOfAnOpaqueBodyIsRemovedWithItsGrid) {
   const Pruned p = pruned(cube(kWhole + kGrid) + R"(<emitter type="point"/>)");
   EXPECT_TRUE(p.scene.media.empty());

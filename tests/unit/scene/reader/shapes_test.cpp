@@ -58,6 +58,33 @@ TEST(ReadCylinder, MayBeStretchedAlongItsAxisOnly) {
   EXPECT_THAT(with("", "0 0 0"), HasSubstr("the same point"));
 }
 
+TEST(ReadVisibility, IsKeptAndLeavesOtherScenesAsTheyAre) {
+  const auto flag = [](std::string_view name, std::string_view value) {
+    return fmt::format("<boolean name=\"{}\" value=\"{}\"/>", name, value);
+  };
+  const Scene plain = must_read(with_sensor(R"(<shape type="sphere"/><emitter type="constant"/>)"));
+  EXPECT_TRUE(plain.shapes[0].visible_camera);
+  for (const char* name : {"visible_camera", "holdout", "transparent"})
+    EXPECT_EQ(serialize(plain).find(name), std::string::npos) << name;
+
+  const Scene s = must_read(with_sensor(
+      "<shape type=\"sphere\">" + flag("visible_camera", "false") + "</shape><shape type=\"cube\">" +
+      flag("holdout", "true") + flag("visible_camera", "true") + "</shape><emitter type=\"constant\">" +
+      flag("visible_camera", "false") + "</emitter><emitter type=\"directional\">" +
+      flag("visible_camera", "false") + "</emitter>"));
+  EXPECT_FALSE(s.shapes[0].visible_camera);
+  EXPECT_TRUE(s.shapes[1].visible_camera && s.shapes[1].holdout);
+  EXPECT_FALSE(std::get<ConstantEmitter>(s.emitters[0]).visible_camera);
+  EXPECT_FALSE(std::get<DirectionalEmitter>(s.emitters[1]).visible_camera);
+  expect_kept(s);
+
+  const Scene film = must_read(sensor("perspective", "", flag("transparent", "true")));
+  EXPECT_TRUE(film.film.transparent);
+  expect_kept(film);
+  EXPECT_FALSE(must_read(sensor("perspective", "", "<string name=\"pixel_format\" value=\"rgba\"/>"))
+                   .film.transparent);
+}
+
 constexpr std::string_view kGroup =
     R"(<shape type="shapegroup" id="trees"><shape type="sphere"/><shape type="cylinder"><bsdf type="null"/></shape></shape>)";
 

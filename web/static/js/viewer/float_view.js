@@ -2,12 +2,13 @@
 // (zoom and pan), `pointed` (the pixel under the pointer), `picked`, `framed` (a region), `split` (position
 // of the wipe), `flipped` (the mean of a FLIP map), `command` (a key). Its property `model` determines what
 // it draws: {a, b, layer, look, view, by, split, overlay, region, focus, tool, changed}.
-import { paint, paintCompared } from "./paint.js";
+import { overChecks, paint, paintCompared } from "./paint.js";
 import { blockRect, bounded, imagePoint, levelOf, moved, seenBlocks, windowPoint, zoomed, zoomOf } from "./place.js";
 import { flipCanvas } from "./flip_canvas.js";
 import { drawValues, kValuesFrom } from "./values.js";
 
 const kCoarser = 4; // up to this many levels coarser than wanted are drawn until the wanted level arrives
+const kOverChecks = ["rgb", "denoised"]; // layers that are shown over a checkerboard if the image has alpha
 const kMostPainted = 384; // most painted blocks that are kept
 const kOverlayOpacity = 0.6;
 const kWheelStep = 1.0015; // zoom factor per unit of a wheel's movement
@@ -90,7 +91,7 @@ class FloatView extends HTMLElement {
     this.#frame += 1;
     const { a, b, by, layer } = this.#model;
     const level = levelOf(zoomOf(this.#view, this.#size, this.#window), ratio, a.maxLevel);
-    const names = this.#model.overlay ? [layer, this.#model.overlay] : [layer];
+    const names = [layer, ...(this.#model.overlay ? [this.#model.overlay] : []), ...(kOverChecks.includes(layer) ? ["alpha"] : [])];
     const blocks = seenBlocks(this.#view, this.#size, this.#window, level);
     const wanted = (source) => blocks.flatMap(([bx, by_]) => names.filter((name) => source.layer(name).name === name).map((name) => [name, level, bx, by_]));
     a.want(b && by === "b" ? [] : wanted(a));
@@ -173,7 +174,12 @@ class FloatView extends HTMLElement {
 
   #block(which, source, layer, level, bx, by) {
     const block = source.block(layer.name, level, bx, by);
-    return block && this.#kept(`${which} ${layer.name} ${level} ${bx} ${by}`, `${this.#look} ${block.version}`, block.rect, () => paint(block.buffer, layer, this.#model.look));
+    const hasAlpha = kOverChecks.includes(layer.name) && source.layer("alpha").name === "alpha";
+    const alpha = hasAlpha ? source.block("alpha", level, bx, by) : null;
+    if (!block || (hasAlpha && !alpha)) return undefined;
+    const { look } = this.#model;
+    const buffer = () => (alpha ? overChecks(block.buffer, alpha.buffer, block.rect, look.exposure) : block.buffer);
+    return this.#kept(`${which} ${layer.name} ${level} ${bx} ${by}`, `${this.#look} ${block.version} ${alpha?.version}`, block.rect, () => paint(buffer(), layer, look));
   }
 
   #compared(level, bx, by) {

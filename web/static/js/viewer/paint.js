@@ -3,6 +3,9 @@ import { floatsOf, halfBits, halfValues } from "./half.js";
 import { agx, codes, falseColour, kErrorScale, kFalseStops, kRelMseScale, kSamplesScale, onLogScale } from "./tone.js";
 
 const kNoSample = [24, 24, 27]; // colour of pixels without samples, as in the coordinator's previews
+// Light of the two kinds of squares behind an image with alpha, at exposure 0, and the side of a square in pixels
+const kChecks = [1 / 16, 1 / 8];
+const kCheckSide = 8;
 const kDimmed = 0.15; // brightness of objects that are not picked
 export const kRelMseDenominator = 0.01; // the same as in relative_weights.h
 
@@ -49,6 +52,24 @@ export function paint(buffer, layer, look) {
     return each(halves, layer.channels.length, (v, out, at) => agx(v(picked[0]), v(picked[1]), picked[2] < 0 ? 0 : v(picked[2]), scale, out, at));
   }
   return coded(halves, layer.channels.length, picked, codesOf(look.curve, look.exposure));
+}
+
+/**
+ * The colours of a block, multiplied by alpha, over a checkerboard that looks the same at every exposure. rect: of the
+ * block in its level. Returns half floats, as `colours` has them.
+ */
+export function overChecks(colours, alphas, [x0, y0, x1], exposure) {
+  const values = halfValues();
+  const [over, alpha] = [new Uint16Array(colours.slice(0)), new Uint16Array(alphas)];
+  const width = x1 - x0;
+  for (let i = 0; i < alpha.length; i += 1) {
+    const passes = 1 - values[alpha[i]];
+    if (!(passes > 0)) continue; // or no samples yet
+    const [x, y] = [x0 + (i % width), y0 + Math.floor(i / width)];
+    const light = (passes * kChecks[(Math.floor(x / kCheckSide) + Math.floor(y / kCheckSide)) % 2]) / 2 ** exposure;
+    for (let c = 3 * i; c < 3 * i + 3; c += 1) over[c] = halfBits(values[over[c]] + light);
+  }
+  return over.buffer;
 }
 
 /** Where a value lies between the ends of a range, from 0 to 1. */

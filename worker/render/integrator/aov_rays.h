@@ -1,0 +1,120 @@
+// Part of path_tracer.h, which includes it: what AOVs find along the sample's own camera ray. They use no
+// random number of the path, but for the decisions at surfaces that light passes straight through.
+#pragma once
+
+#include <cmath>
+#include <optional>
+
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+// The path passes every index-matched or unseen surface, and each null-transmitting surface with that
+// surface's probability. As long as the ray hits the same surfaces as the path of the sample, the decisions
+// use the same random numbers as in trace().
+template <Features F, template <Features> class Light>
+std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay& ray) {
+  ray_ = {ray.o, ray.o, ray.d};
+  float t_max = ray.t_max;
+  FirstSurface first;
+  SurfaceHit& hit = first.hit;
+  for (segment_ = 0; segment_ < kMaxSegments; ++segment_, t_max = kInfinity) {
+    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, t_max);
+    if (!primitive || !world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit)) return std::nullopt;
+    if (world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
+    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    beta_ = C3(1);
+    if (!sees_past(hit, surface)) {
+      first.not_passed = beta_.x;
+      return first;
+    }
+    ray_.origin = offset_point(hit, ray_.d);
+  }
+  return std::nullopt;
+}
+
+// A medium on the way contributes in proportion to the light that it scatters or absorbs: its albedo replaces
+// that of the surface behind, and it has no normal. The proportion is 1 - transmittance, and the
+// transmittance is exact in homogeneous media. If flights were sampled instead, the guides would be noisy,
+// and a denoiser keeps the noise of its guides.
+template <Features F, template <Features> class Light>
+DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
+  constexpr int kGuideSegments = 16;
+  DenoisingGuide guide;
+  double unscattered = 1;
+  bool direct = true;  // true before the first mirror or glass
+  ray_ = {ray.o, ray.o, ray.d};
+  medium_ = start_medium(ray);
+  float reach = ray.t_max;
+  for (segment_ = 0; segment_ < kGuideSegments; ++segment_, reach = kInfinity) {
+    SurfaceHit hit;
+    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, reach);
+    const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
+    if (met && world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
+    if (medium_.any()) {
+      const float t = met ? ray_.length_to(hit) : reach;
+      RandomStream tracker = stream_.stream(segment_, Purpose::track_guide);
+      const C3 through = through_media(medium_, ray_.start, ray_.d, t, tracker);
+      const V3 middle = std::isfinite(t) ? ray_.start + ray_.d * (t / 2) : ray_.start;
+      guide.albedo += beta_ * (C3(1) - through) * world_.media[medium_.one()].albedo_at(middle);
+      beta_ *= through;
+      unscattered *= double{mean(through)};
+    }
+    if (!met || is_black(beta_)) break;
+    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if ((surface.unseen && direct) || surface.null || (surface.null_transmission && passes_null(hit))) {
+      pass_boundary(hit, surface);
+      continue;
+    }
+    if (surface.holdout && direct) break;
+    direct = false;
+    const Group g = stream_.group(segment_, Purpose::guide);
+    const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), hit.shading.to_local(-ray_.d), g.u(2),
+                                       {g.u(0), g.u(1)});
+    if (!s) break;
+    // A refracted sample's weight contains 1 / eta^2, by which refraction scales radiance. This factor is
+    // removed, since it is no property of the surface behind.
+    beta_ *= s->weight * (s->transmitted ? s->eta * s->eta : 1.f);
+    if (!s->delta) {
+      guide.albedo += beta_;
+      guide.normal = V3d(hit.shading.n) * (dot(hit.shading.n, ray_.d) > 0 ? -unscattered : unscattered);
+      break;
+    }
+    const V3 w = normalize(hit.shading.to_world(s->wi));
+    medium_ = beyond(hit, surface, w, ray_.d, medium_);
+    ray_.leave(hit, w);
+  }
+  return guide;
+}
+
+// In grids the transmittance is an estimate, whose random numbers nothing else uses.
+template <Features F, template <Features> class Light>
+Opacity PathTracer<F, Light>::opacity(const CameraRay& ray) {
+  // Transmittances of the media, and of the surfaces that light passes straight through
+  C3 media(1), surfaces(1);
+  ray_ = {ray.o, ray.o, ray.d};
+  medium_ = start_medium(ray);
+  float reach = ray.t_max;
+  for (segment_ = 0; segment_ < kMaxSegments; ++segment_, reach = kInfinity) {
+    SurfaceHit hit;
+    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, reach);
+    const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
+    if (met && world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
+    if (medium_.any()) {
+      const float t = met ? ray_.length_to(hit) : reach;
+      RandomStream tracker = stream_.stream(segment_, Purpose::track_opacity);
+      media *= through_media(medium_, ray_.start, ray_.d, t, tracker);
+    }
+    if (!met || is_black(media)) break;
+    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if (!sees_past(hit, surface)) {
+      if (!surface.holdout) surfaces = C3(0);
+      break;
+    }
+    surfaces = beta_;
+    pass_boundary(hit, surface);
+  }
+  return {C3(1) - media * surfaces, C3(1) - media};
+}
+
+}  // namespace ls::render
