@@ -81,6 +81,24 @@ json to_value(const std::vector<AfterView>& after) {
   return all;
 }
 
+json to_value(const JobFailure& f) {
+  json attempts = json::array();
+  for (const JobFailure::Attempt& a : f.attempts)
+    attempts.push_back({{"worker", a.worker},
+                        {"reason", text_or_null(a.reason)},
+                        {"signal", or_null(a.signal)},
+                        {"pixel", a.pixel ? json{a.pixel->first, a.pixel->second} : json()},
+                        {"sample", or_null(a.sample)}});
+  return {{"kind", to_string(f.kind)},
+          {"tile", f.tile},
+          {"rect", rectangle(f.rect)},
+          {"round", f.round},
+          {"samples", {f.samples.s0, f.samples.s1}},
+          {"frame", or_null(f.frame)},
+          {"attempts", std::move(attempts)},
+          {"replay", text_or_null(f.replay)}};
+}
+
 std::string advice_of(const JobView& v) {
   // In a sequence that is running, frames that wait do not hold up the others
   const bool goes_on = v.state == JobState::running ? v.after.empty() || v.frames
@@ -122,6 +140,7 @@ json to_value(const JobView& v) {
           {"eta_with_8_more", number(v.eta_with_more)},
           {"eta_with_8_more_ci95", interval(v.eta_with_more_ci95)},
           {"error", text_or_null(v.error)},
+          {"failure", v.failure ? to_value(*v.failure) : json()},
           {"after", to_value(v.after)},
           {"waits_for", text_or_null(v.waits_for)},
           {"warnings", v.warnings},

@@ -3,7 +3,7 @@ import json
 
 import pytest
 
-from stub_farm import job
+from stub_farm import attempt, failure, job
 
 NAMES = "[...document.querySelectorAll('[data-job]')].map(row => row.dataset.job)"
 
@@ -189,7 +189,7 @@ def test_priority_of_several_jobs_is_set_at_once(farm, dashboard):
 
 def test_a_row_says_why_its_job_does_not_go_on(farm, dashboard):
     why = "no connected worker may take it: lab-01 lacks a tag that the job asks for"
-    farm.jobs = {"j-0": job("j-0", state="queued", error=why), "j-1": job("j-1", state="failed", error="tile 0 (pixels 0,0 to 8,8), round 0 (samples 0 to 4) failed in 1 attempt; on a: the disk is full"),
+    farm.jobs = {"j-0": job("j-0", state="queued", error=why), "j-1": job("j-1", state="failed", error="in words", failure=failure(attempt("a", "the disk is full"))),
                  "j-2": job("j-2", state="done", error=""), "j-3": job("j-3", state="paused", error="the disk is full: make room in /srv/farm")}
     page = dashboard()
     assert page.text("[data-job=j-0] .reason") == why
