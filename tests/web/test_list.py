@@ -251,8 +251,17 @@ def test_the_same_scene_is_rendered_again_with_more_samples(farm, dashboard):
     assert farm.submitted == [("j-1", {"spp": 128, "seed": 5})]
 
 
-@pytest.mark.parametrize("width", [1280, 375])
-def test_the_list_fits_the_screen(many, dashboard, width):
+@pytest.mark.parametrize("width", [1280, 1000, 375])
+def test_the_list_fits_its_place(many, dashboard, width):
+    many.change("j-3210", relmse=5.55e-5, spp=4096, spp_done=2012)  # long figures
     page = dashboard(width=width, height=800, phone=width < 500)
     page.wait("document.querySelectorAll('[data-job]').length === 50")
     assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate("document.querySelector('.list').getBoundingClientRect().right - document.getElementById('main').getBoundingClientRect().right") < 1
+
+
+def test_what_is_not_known_takes_no_room_on_a_phone(farm, dashboard):
+    farm.jobs = {"j-0": job("j-0", state="done"), "j-1": job("j-1", state="done")}
+    page = dashboard(width=375, height=800, phone=True)
+    page.wait("document.querySelectorAll('.list td.absent').length === 2")
+    assert page.evaluate("[...document.querySelectorAll('.list td.absent')].every(cell => cell.offsetParent === null)")
