@@ -43,7 +43,7 @@ stop_farm() {
 
 if [ "$setting" = stop ]; then
   stop_farm
-  echo "the farm has ended"
+  echo "the farm has stopped"
   exit 0
 fi
 
@@ -53,12 +53,12 @@ options=() layer=""
 if [ "$denoise" != no ]; then
   if deploy/install-denoiser.sh; then options=(--denoise) layer="&layer=denoised"
   elif [ "$denoise" = needed ]; then exit 1
-  else echo "Open Image Denoise could not be fetched, so the picture is shown as it is rendered, with its grain"
+  else echo "Open Image Denoise could not be downloaded: the picture is not denoised, and noise is visible in it"
   fi
 fi
 # Denoised, so few samples look finished.
 [ "$setting" = full ] || options+=(--size 640x480 --spp 16)
-echo "building, which takes minutes (log: build/demo/build.log)"
+echo "building; this takes some minutes (log: build/demo/build.log)"
 mkdir -p "$home"
 if ! { cmake --preset release -DLIGHTSHAFT_TESTS=OFF && cmake --build --preset release --target lightshaft lightshaft-coordinator lightshaft-worker; } >"$home/build.log" 2>&1; then
   tail -n 40 "$home/build.log" >&2
@@ -109,11 +109,11 @@ image:      build/demo/bath.exr   (picture: build/demo/bath.png)
 dashboard:  $url/#token=$token
 EOF
 if [ "$detach" = 1 ]; then
-  echo "the farm goes on; end it with: deploy/demo.sh --stop"
+  echo "the farm keeps running; stop it with: deploy/demo.sh --stop"
 elif [ ! -t 1 ]; then
-  echo "without a terminal the farm ends now; deploy/demo.sh --detach leaves it running, with its dashboard"
+  echo "without a terminal the farm stops now; deploy/demo.sh --detach keeps it running, with its dashboard"
 else
-  echo "the farm runs until Ctrl-C"
+  echo "the farm runs until you press Ctrl-C"
   trap 'exit 0' INT TERM
   while kill -0 "$coordinator" 2>/dev/null; do sleep 1; done
 fi

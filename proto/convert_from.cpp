@@ -294,7 +294,7 @@ Result<FromWorker> from_wire(const pb::FromWorker& in) {
     case pb::FromWorker::kReturned:
       return returned_from(in.returned());
     case pb::FromWorker::kDraining:
-      return WorkerDraining{};
+      return WorkerDraining{in.draining().withdrawn()};
     case pb::FromWorker::MESSAGE_NOT_SET:
       break;
   }
@@ -329,7 +329,7 @@ Result<ToWorker> from_wire(const pb::ToWorker& in) {
       return RecallLease{LeaseId{lease}};
     }
     case pb::ToWorker::kDrain:
-      return DrainNow{};
+      return DrainNow{in.drain().withdrawn()};
     case pb::ToWorker::MESSAGE_NOT_SET:
       break;
   }

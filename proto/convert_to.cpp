@@ -144,7 +144,7 @@ void put(const LeaseReturned& returned, pb::FromWorker& out) {
   out.mutable_returned()->set_unknown_job(returned.unknown_job);
 }
 
-void put(const WorkerDraining&, pb::FromWorker& out) { out.mutable_draining(); }
+void put(const WorkerDraining& d, pb::FromWorker& out) { out.mutable_draining()->set_withdrawn(d.withdrawn); }
 void put(const Welcome& welcome, pb::ToWorker& out) {
   out.mutable_welcome()->set_worker(welcome.worker.value);
   out.mutable_welcome()->set_epoch(welcome.epoch);
@@ -189,7 +189,7 @@ void put(const RecallLease& recall, pb::ToWorker& out) {
   out.mutable_recall_lease()->set_lease(recall.lease.value);
 }
 
-void put(const DrainNow&, pb::ToWorker& out) { out.mutable_drain(); }
+void put(const DrainNow& d, pb::ToWorker& out) { out.mutable_drain()->set_withdrawn(d.withdrawn); }
 
 }  // namespace
 

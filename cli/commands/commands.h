@@ -45,13 +45,17 @@ void add_compare(CLI::App& app, Action& action);
 // Adds the commands race-lane and race-tool, which `compare` starts.
 void add_race(CLI::App& app, Action& action);
 void add_doctor(CLI::App& app, Action& action);
-// Adds the commands up and join, of which Python knows the options.
+// Adds the commands up and join.
 void add_python_commands(CLI::App& app, Action& action);
 // Becomes another program with these arguments. Returns an exit code if that fails, of which a message was
 // printed.
 int become(const std::filesystem::path& program, std::vector<std::string> arguments);
 // Becomes the Python that runs this command with these arguments; returns as become() does.
 int run_in_python(const char* command, const std::vector<std::string>& arguments);
+// Adds an option of which only the Python of the command reads the value, see given_options().
+CLI::Option* pass_option(CLI::App& app, const char* name, const char* type, const char* help);
+// The same for an option that may be given several times.
+CLI::Option* pass_options(CLI::App& app, const char* name, const char* type, const char* help);
 // Returns the options of a command that the user gave, each as "--name=value", and its other arguments.
 std::vector<std::string> given_options(const CLI::App& app);
 

@@ -30,7 +30,7 @@ using nlohmann::json;
 struct FarmFlags {
   FarmOptions farm;
   std::string id, frame, spp, target_error, out, report, html, region, fps, exposure, role, user;
-  std::string state, search, owner, sort, limit, offset, priority;
+  std::string state, search, owner, sort, limit, offset, priority, name;
   std::vector<std::string> after;
   JobOptions job;
   bool quiet = false, none = false, denoised = false;
@@ -93,6 +93,7 @@ int extend(FarmApi& api, const FarmFlags& flags) {
   return flags.spp.empty() ? change(api, flags, "target_error", flags.target_error)
                            : change(api, flags, "spp", flags.spp);
 }
+int rename(FarmApi& api, const FarmFlags& flags) { return change(api, flags, "name", flags.name); }
 int priority(FarmApi& api, const FarmFlags& flags) { return change(api, flags, "priority", flags.priority); }
 
 int after(FarmApi& api, const FarmFlags& flags) { return change(api, flags, {{"after", flags.after}}); }
@@ -278,6 +279,8 @@ void add_farm_commands(CLI::App& app, Action& action) {
   add_option(*extend_command, "--spp", extending->spp, "TOTAL", "the new total of samples per pixel");
   add_option(*extend_command, "--target-error", extending->target_error, "E",
              "for a job with a target error: continue until the image's relMSE is below this");
+  const auto [rename_command, naming] = add(app, action, "rename", "change the name of a job", rename, true);
+  add_option(*rename_command, "name", naming->name, "NAME", "the job's name in lists")->required();
   const auto [priority_command, ranking] =
       add(app, action, "priority", "change the priority of a job", priority, true);
   add_option(*priority_command, "priority", ranking->priority, "N",

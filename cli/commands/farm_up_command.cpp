@@ -9,10 +9,10 @@ namespace {
 void describe(CLI::App& app, FarmOptions& farm) {
   farm.add_to(app);
   const auto option = [&](const char* name, const char* type, const char* help) {
-    return app.add_option(name)->description(help)->type_name(type);
+    pass_option(app, name, type, help);
   };
   const auto repeated = [&](const char* name, const char* type, const char* help) {
-    option(name, type, help)->expected(1, CLI::detail::expected_max_vector_size)->allow_extra_args(false);
+    pass_options(app, name, type, help);
   };
   app.add_option("--on")
       ->description("what runs the workers: slurm, docker, kubernetes, or ssh for a list of machines")

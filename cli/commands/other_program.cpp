@@ -20,6 +20,16 @@ int become(const std::filesystem::path& program, std::vector<std::string> argume
   return kFailed;
 }
 
+CLI::Option* pass_option(CLI::App& app, const char* name, const char* type, const char* help) {
+  return app.add_option(name)->description(help)->type_name(type);
+}
+
+CLI::Option* pass_options(CLI::App& app, const char* name, const char* type, const char* help) {
+  return pass_option(app, name, type, help)
+      ->expected(1, CLI::detail::expected_max_vector_size)
+      ->allow_extra_args(false);
+}
+
 std::vector<std::string> given_options(const CLI::App& app) {
   std::vector<std::string> words, others;
   for (const CLI::Option* option : app.get_options())

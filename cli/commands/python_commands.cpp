@@ -15,13 +15,15 @@ namespace {
 
 Error missing(std::string text) { return {Errc::failed_precondition, std::move(text)}; }
 
-void add(CLI::App& app, Action& action, const char* name, const char* help) {
+// Adds a command with the options that both up and join have.
+CLI::App& add(CLI::App& app, Action& action, const char* name, const char* help) {
   CLI::App* command = app.add_subcommand(name, help);
-  command->set_help_flag();  // Python knows the options
-  command->prefix_command();
-  command->callback([=, &action] {
-    action = [name, arguments = command->remaining()] { return run_in_python(name, arguments); };
-  });
+  pass_option(*command, "--data", "DIR",
+              "folder for everything that is stored; default: lightshaft in $XDG_DATA_HOME, or "
+              "~/.local/share/lightshaft");
+  pass_option(*command, "--threads", "N", "number of units to render at once; default: one for each core");
+  command->callback([=, &action] { action = [=] { return run_in_python(name, given_options(*command)); }; });
+  return *command;
 }
 
 }  // namespace
@@ -55,9 +57,18 @@ int run_in_python(const char* command, const std::vector<std::string>& arguments
 }
 
 void add_python_commands(CLI::App& app, Action& action) {
-  add(app, action, "up", "run a farm on this machine, with its dashboard, until Ctrl-C");
-  add(app, action, "join",
-      "render for a farm that another machine runs with `lightshaft up --lan`, until Ctrl-C");
+  CLI::App& up = add(app, action, "up", "run a farm on this machine, with its dashboard, until Ctrl-C");
+  up.add_flag("--lan")->description("let other machines join over TLS; prints the command for that");
+  pass_options(up, "--name", "HOST",
+               "with --lan: another name or address by which others reach this machine; may be repeated");
+  pass_option(up, "--port", "N",
+              "port of the dashboard and of HTTP; default: 8080, or another one if that is taken");
+  up.add_flag("--no-browser")->description("do not open the dashboard");
+  pass_option(up, "--first-scene", "FILE",
+              "scene of the first picture; default: the one that comes with Lightshaft");
+  CLI::App& join = add(app, action, "join", "render for the farm of another machine, until Ctrl-C");
+  pass_option(join, "host", "HOST", "the machine on which `lightshaft up --lan` runs")->required();
+  pass_option(join, "--code", "CODE", "the code that it printed; if it is missing, `join` asks for it");
 }
 
 }  // namespace ls::cli

@@ -130,10 +130,10 @@ Finding of_reachability(const FarmFacts& facts) {
         "farm", facts.trouble,
         tls ? "name the file of the farm's authority with --ca or LIGHTSHAFT_CA (ca.pem, in the "
               "coordinator's DATA/tls), and check that the address is one that its certificate names"
-            : "check the address, that the coordinator runs, and that no firewall is between");
+            : "check the address, that the coordinator runs, and that no firewall blocks its port");
   }
   if (!facts.is_coordinator)
-    return problem("farm", "something else than a coordinator answers there" + through(facts.proxy),
+    return problem("farm", "something other than a coordinator answers there" + through(facts.proxy),
                    facts.proxy.empty()
                        ? "check the address and port: it is the coordinator's --http"
                        : "name the farm's host in no_proxy, or check the address and port: it is the "
@@ -147,7 +147,7 @@ Finding of_reachability(const FarmFacts& facts) {
 Finding of_tls(const FarmFacts& facts) {
   if (facts.url.starts_with("https:")) return ok("tls", "encrypted, and its certificate is trusted");
   if (on_this_machine(facts.url)) return ok("tls", "not encrypted, but on this machine");
-  return warning("tls", "not encrypted: others on the way can read the token",
+  return warning("tls", "not encrypted: anyone on the network between can read the token",
                  "start the coordinator with --tls, and use its https address");
 }
 
@@ -171,7 +171,7 @@ Finding of_clock(const FarmFacts& facts) {
 
 Finding of_token(const FarmFacts& facts) {
   if (!facts.has_token)
-    return problem("token", "none is given, so that the farm answers no questions",
+    return problem("token", "none is given, so the farm answers no requests",
                    "give --token-file FILE or LIGHTSHAFT_TOKEN; `lightshaft token add` makes one");
   if (!facts.role.empty())
     return ok("token", facts.user.empty() ? fmt::format("valid, role {}", facts.role)
@@ -217,7 +217,7 @@ void add_workers(std::vector<Finding>& all, const FarmFacts& facts, const std::s
   for (const WorkerFacts& worker : *facts.workers)
     if (worker.state != "lost" && worker.state != "gone") present.push_back(worker);
   if (present.empty()) {
-    all.push_back(warning("workers", "none is connected, so that no job continues",
+    all.push_back(warning("workers", "none is connected, so no job makes progress",
                           "start lightshaft-worker with this coordinator's address for workers (--grpc)"));
     return;
   }
@@ -253,11 +253,11 @@ void add_workers(std::vector<Finding>& all, const FarmFacts& facts, const std::s
 }
 
 Finding of_jobs(const std::vector<StuckJob>& stuck) {
-  if (stuck.empty()) return ok("jobs", "none of those that have not ended stands still");
+  if (stuck.empty()) return ok("jobs", "all that have not ended make progress");
   const StuckJob& first = stuck.front();
   return warning("jobs",
-                 fmt::format("{} of those that have not ended {} still; {}: {}", stuck.size(),
-                             stuck.size() == 1 ? "stands" : "stand", first.id, first.why),
+                 fmt::format("{} of those that have not ended {} no progress; {}: {}", stuck.size(),
+                             stuck.size() == 1 ? "makes" : "make", first.id, first.why),
                  fmt::format("lightshaft show {}", shell_word(first.id)));
 }
 

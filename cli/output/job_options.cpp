@@ -39,6 +39,13 @@ std::string help_of(const Setting& s) {
   return s.choices ? fmt::format("{}: {}", help, s.choices()) : help;
 }
 
+// Returns the value that a new job has without the option; empty: none, or the one of an earlier job.
+template <class T>
+std::string default_of(JobOptions::Command command, const Setting& s, const T& value) {
+  if constexpr (job::kIsWhole<T>) return fmt::to_string(value);
+  return command == JobOptions::Command::again ? "" : std::string(s.absent);
+}
+
 }  // namespace
 
 Result<std::uint64_t> parse_whole(const std::string& what, const std::string& text, std::uint64_t least,
@@ -101,7 +108,7 @@ Result<void> use_techniques(const std::string& techniques, Scene& scene) {
 
 void JobOptions::add_to(CLI::App& app, Command command) {
   const JobSpec any;
-  job::for_each_setting(any, [&]<class T>(const Setting& s, const T&) {
+  job::for_each_setting(any, [&]<class T>(const Setting& s, const T& value) {
     if (!has(command, s)) return;
     Given& given = given_[s.name];
     const std::string option(s.option), placeholder(s.placeholder), help = help_of(s);
@@ -112,7 +119,7 @@ void JobOptions::add_to(CLI::App& app, Command command) {
     else if constexpr (std::is_same_v<T, job::Defines>)
       add_option(app, option, given.list, placeholder, help)->allow_extra_args(false);
     else
-      add_option(app, option, given.text, placeholder, help);
+      add_option(app, option, given.text, placeholder, help)->default_str(default_of(command, s, value));
   });
   if (command != Command::again) app.add_flag("--strict", strict, "warnings of the scene are errors");
 }

@@ -95,21 +95,26 @@ Result<void> choose_integrator(const Scene& scene, const JobSpec& spec, RenderSe
   return {};
 }
 
+// Sets the AOVs: those of these names, and those that the denoiser needs.
+Result<void> set_aovs(std::vector<std::string> names, bool denoise, RenderSettings& settings) {
+  if (denoise) std::ranges::move(names_of(aovs_of(AovKind::guide)), std::back_inserter(names));
+  const auto aovs = parse_aovs(names);
+  if (!aovs) return tl::unexpected(aovs.error());
+  settings.aov = names_of(*aovs);
+  return {};
+}
+
 // Sets the AOVs: those that the job requests, those that the scene requests, and alpha for a transparent
 // film.
 Result<void> choose_aovs(const Scene& scene, const JobSpec& spec, RenderSettings& settings) {
   std::vector<std::string> names = spec.aov;
-  if (spec.denoise) std::ranges::move(names_of(aovs_of(AovKind::guide)), std::back_inserter(names));
   if (scene.film.transparent) names.emplace_back(row_of(Aov::alpha).name);
   for (std::string_view rest = scene.aovs; !rest.empty();) {
     const auto end = std::min(rest.find(','), rest.size());
     names.emplace_back(rest.substr(0, end));
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }
-  const auto aovs = parse_aovs(names);
-  if (!aovs) return tl::unexpected(aovs.error());
-  settings.aov = names_of(*aovs);
-  return {};
+  return set_aovs(std::move(names), spec.denoise, settings);
 }
 
 Result<RenderSettings> settings_of(const Scene& scene, const JobSpec& spec, std::uint32_t frame,
@@ -309,7 +314,8 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
   return admission;
 }
 
-Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, const BlobStore& blobs) {
+Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, const BlobStore& blobs,
+                              std::optional<std::uint32_t> frame) {
   StoredJob job{.name = before.name,
                 .scene = before.scene,
                 .settings = before.settings,
@@ -321,7 +327,7 @@ Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, c
                 .features_left_out = before.features_left_out,
                 .needs = before.needs,
                 .analysis = before.analysis};
-  job.spec.frames = {};  // the new job is a single image, even if the old one was a frame of a sequence
+  if (!frame) job.spec.frames = {};  // a single image, even if the old job was a frame of a sequence
   if (changes.spp || changes.target_error || changes.time) {
     job.spp = job.spec.spp = changes.spp;
     job.spec.target_error = changes.target_error;
@@ -331,7 +337,11 @@ Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, c
   if (changes.memory) job.spec.memory = changes.memory;
   job.spec.priority = changes.priority;
   job.spec.after = changes.after;
-  if (changes.seed) job.settings.seed = *(job.spec.seed = changes.seed);
+  if (changes.seed) job.settings.seed = *(job.spec.seed = changes.seed) + frame.value_or(0);
+  if (changes.denoise && !job.spec.denoise) {
+    job.spec.denoise = true;
+    if (auto ok = set_aovs(job.settings.aov, true, job.settings); !ok) return tl::unexpected(ok.error());
+  }
   for (const BlobRef& asset : job.assets)
     if (!blobs.has(asset.digest))
       return fail(Errc::failed_precondition,

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "coordinator/domain/farm_figures.h"
+#include "coordinator/domain/job_failure.h"
 #include "coordinator/domain/job_state.h"
 #include "core/base/digest.h"
 #include "core/base/id.h"
@@ -128,6 +129,7 @@ struct JobFinished {
 struct JobFailed {
   JobId job;
   std::string error;
+  std::optional<JobFailure> failure = {};  // the same as data, if a unit could not be rendered
 };
 
 struct WorkerStateChanged {

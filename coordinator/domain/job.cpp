@@ -38,27 +38,41 @@ const std::vector<FailedAttempt>& UnitFailures::attempts(UnitCode code) const {
   return it == units_.end() ? kNone : it->second;
 }
 
-std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
-                             const std::vector<FailedAttempt>& attempts, const std::string& replay) {
-  std::string text;
-  if (attempts.empty()) return text;
+JobFailure failure_after(const std::vector<FailedAttempt>& attempts, const PixelRect& rect,
+                         const SampleRange& samples, const std::string& replay) {
   const UnitFailure& last = attempts.back().failure;
-  text = fmt::format("tile {} (pixels {},{} to {},{}), round {} (samples {} to {}) failed in {} attempt{}",
-                     last.unit.tile, rect.x0, rect.y0, rect.x1, rect.y1, last.unit.round, samples.s0,
-                     samples.s1, attempts.size(), attempts.size() == 1 ? "" : "s");
-  for (const FailedAttempt& a : attempts) {
-    text += fmt::format("; on {}: {}", a.worker_name,
-                        a.failure.reason.empty() ? "no reason given" : a.failure.reason);
-    if (a.failure.signal) text += fmt::format(" (signal {})", *a.failure.signal);
-    if (a.failure.pixel)
-      text += fmt::format(" at pixel {},{}", a.failure.pixel->first, a.failure.pixel->second);
-    if (a.failure.sample) text += fmt::format(" sample {}", *a.failure.sample);
+  JobFailure failure{.kind = last.scene_at_fault ? FailureKind::scene : FailureKind::unit,
+                     .tile = last.unit.tile,
+                     .rect = rect,
+                     .round = last.unit.round,
+                     .samples = samples};
+  for (const FailedAttempt& a : attempts)
+    failure.attempts.push_back(
+        {a.worker_name, a.failure.reason, a.failure.signal, a.failure.pixel, a.failure.sample});
+  if (last.pixel)
+    failure.replay =
+        replay_command(replay, last.pixel->first, last.pixel->second, last.sample.value_or(samples.s0));
+  return failure;
+}
+
+std::string describe(const JobFailure& f) {
+  std::string text = f.kind == FailureKind::scene ? "the scene cannot be rendered: "
+                     : f.kind == FailureKind::no_worker
+                         ? fmt::format(
+                               "no worker is left that may try: each has failed {} units of this "
+                               "job; the last: ",
+                               kWorkerFailuresPerJob)
+                         : "";
+  text += fmt::format("tile {} (pixels {},{} to {},{}), round {} (samples {} to {}) failed in {} attempt{}",
+                      f.tile, f.rect.x0, f.rect.y0, f.rect.x1, f.rect.y1, f.round, f.samples.s0, f.samples.s1,
+                      f.attempts.size(), f.attempts.size() == 1 ? "" : "s");
+  for (const JobFailure::Attempt& a : f.attempts) {
+    text += fmt::format("; on {}: {}", a.worker, a.reason.empty() ? "no reason given" : a.reason);
+    if (a.signal) text += fmt::format(" (signal {})", *a.signal);
+    if (a.pixel) text += fmt::format(" at pixel {},{}", a.pixel->first, a.pixel->second);
+    if (a.sample) text += fmt::format(" sample {}", *a.sample);
   }
-  if (last.pixel) {
-    text += ". Replay it with: " +
-            replay_command(replay, last.pixel->first, last.pixel->second, last.sample.value_or(samples.s0));
-  }
-  return text;
+  return f.replay.empty() ? text : text + ". Replay it with: " + f.replay;
 }
 
 Job::Job(JobSeq number, JobPlan asked)

@@ -22,6 +22,7 @@
 #include "coordinator/domain/adaptive_stop.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/domain/job_clock.h"
+#include "coordinator/domain/job_failure.h"
 #include "coordinator/domain/limits.h"
 #include "coordinator/domain/unit_queue.h"
 #include "coordinator/domain/unit_table.h"
@@ -119,11 +120,10 @@ struct WorkerFailures {
   bool blocked_at(TimePoint now) const { return blocked && !forgiven_at(now); }
 };
 
-// Returns the error message of a failed job for the job's user. It names the unit, what each worker reported
-// (the reason, and the signal, pixel and sample if known), and the command that renders the failed pixel
-// again.
-std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
-                             const std::vector<FailedAttempt>& attempts, const std::string& replay);
+// Returns why a job fails after these attempts on one unit, of which there is at least one. `replay`:
+// JobPlan::replay.
+JobFailure failure_after(const std::vector<FailedAttempt>& attempts, const PixelRect& rect,
+                         const SampleRange& samples, const std::string& replay);
 
 // The workers that held a lease on a unit but did not deliver its accepted result. If results of a unit
 // differ, only these workers may vote on it (farm_trust.cpp). The table is bounded: beyond kMaxVoters the

@@ -334,7 +334,9 @@ std::vector<WorkerView> Coordinator::workers() const {
   return all;
 }
 
-Result<void> Coordinator::drain_worker(const WorkerId& id) { return parts_->sessions.drain(id); }
+Result<void> Coordinator::drain_worker(const WorkerId& id, bool withdrawn) {
+  return parts_->sessions.drain(id, withdrawn);
+}
 
 Result<std::unique_ptr<WorkerSession>> Coordinator::connect(const WorkerHello& hello,
                                                             std::shared_ptr<WorkerSink> sink,

@@ -126,7 +126,7 @@ class Coordinator {
   // Workers
 
   std::vector<WorkerView> workers() const;
-  Result<void> drain_worker(const WorkerId& id);  // WorkerSessions::drain
+  Result<void> drain_worker(const WorkerId& id, bool withdrawn = false);  // WorkerSessions::drain
   // `principal`: who answers for the worker (WorkerJoined::principal)
   Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink,
                                                  const std::string& principal = {});

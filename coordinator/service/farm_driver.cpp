@@ -358,6 +358,7 @@ void FarmDriver::on(const JobFailed& e) {
   const auto entry = core_.jobs.find(e.job);
   if (!entry) return;
   entry->stored.error = e.error;
+  entry->stored.failure = e.failure;
   log_error(fmt::format("job={}", e.job.value), e.error);
   core_.records.log(e.job, "failed: " + e.error);
   core_.records.put(entry);

@@ -240,10 +240,11 @@ Result<void> JobCommands::change_job(Core& core, const EntryPtr& entry, const Jo
     if (auto done = extend(core, *entry, *change.spp); !done) return done;
   if (change.target_error)
     if (auto done = set_target(core, *entry, *change.target_error); !done) return done;
-  if (change.priority) {
+  if (change.name)
+    if (auto done = rename(core, {entry}, *change.name); !done) return done;
+  if (change.priority)
     if (auto done = set_priority(core, {entry}, *change.priority); !done) return done;
-    core.publisher.job(*entry);
-  }
+  if (change.name || change.priority) core.publisher.job(*entry);
   if (change.focus)
     if (auto done = set_focus(core, {entry}, *change.focus); !done) return done;
   if (change.after)
@@ -311,6 +312,10 @@ Result<void> JobCommands::edit_all(Core& core, const Entries& jobs, Edit edit) c
     core.jobs.count_state(*job);
   }
   return {};
+}
+
+Result<void> JobCommands::rename(Core& core, const Entries& jobs, const std::string& name) const {
+  return edit_all(core, jobs, [&](StoredJob& job) { job.name = name; });
 }
 
 Result<void> JobCommands::set_priority(Core& core, const Entries& jobs, int priority) const {
@@ -480,6 +485,8 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
   for (const EntryPtr& frame : retargeted)
     if (auto done = set_target(core, *frame, *change.target_error); !done)
       return tl::unexpected(in_frame(frame->stored.id, done.error()));
+  if (change.name)
+    if (auto done = rename(core, sound, *change.name); !done) return done;
   if (change.priority)
     if (auto done = set_priority(core, sound, *change.priority); !done) return done;
   if (change.focus)

@@ -50,6 +50,7 @@ class JobCommands {
   Result<void> change_job(Core& core, const EntryPtr& entry, const JobChange& change) const;
   template <class Edit>
   Result<void> edit_all(Core& core, const Entries& jobs, Edit edit) const;
+  Result<void> rename(Core& core, const Entries& jobs, const std::string& name) const;
   Result<void> set_priority(Core& core, const Entries& jobs, int priority) const;
   Result<void> set_after(Core& core, const std::vector<JobWait>& waits) const;
   Result<void> set_focus(Core& core, const Entries& jobs, const std::optional<PixelRect>& focus) const;

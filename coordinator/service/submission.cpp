@@ -61,24 +61,32 @@ Result<JobId> Submission::submit_again(const JobId& before, const JobSpec& chang
                                        const std::string& traceparent) {
   const double at = system_unix_seconds();
   const TimePoint began = clock_.now();
-  StoredJob model;
+  std::vector<StoredJob> jobs;  // first the earlier ones, then the new ones
+  std::optional<FrameRange> range;
   {
     const auto core = core_.lock();
-    const auto entry = core->jobs.usable(before);
-    if (!entry) return tl::unexpected(entry.error());
-    model = (*entry)->stored;
+    const auto entries = core->jobs.job_or_frames(before);
+    if (!entries) return tl::unexpected(entries.error());
+    for (const EntryPtr& entry : *entries) {
+      if (const auto usable = core->jobs.usable(entry->stored.id); !usable)
+        return tl::unexpected(usable.error());
+      jobs.push_back(entry->stored);
+    }
+    if (const Sequence* sequence = core->jobs.sequence(before)) range = sequence->range();
   }
-  if (model.spec.denoise)
+  if (jobs.front().spec.denoise || changes.denoise)
     if (const auto possible = denoising_.available(); !possible) return tl::unexpected(possible.error());
   const auto in_use = blobs_.in_use();
-  auto job = admit_again(model, changes, blobs_);
-  if (!job) return tl::unexpected(job.error());
-  job->owner = owner;
-  job->submitted_unix = at;
-  job->traceparent = clean_traceparent(traceparent);
-  std::vector<StoredJob> jobs;
-  jobs.push_back(std::move(*job));
-  return take(std::move(jobs), std::nullopt, began);
+  for (StoredJob& job : jobs) {
+    const auto frame = range ? std::optional(frame_of(job.id)->frame) : std::nullopt;
+    auto again = admit_again(job, changes, blobs_, frame);
+    if (!again) return tl::unexpected(again.error());
+    job = std::move(*again);
+    job.owner = owner;
+    job.submitted_unix = at;
+    job.traceparent = clean_traceparent(traceparent);
+  }
+  return take(std::move(jobs), range, began);
 }
 
 // Stores the jobs, either all or none, and adds them to the farm.

@@ -187,7 +187,9 @@ void WorkerSessions::handle(Core& core, Connection& from, FromWorker message) {
                  [&](const LeaseReturned& m) {
                    core.driver.run(LeaseCameBack{from.worker, m});
                  },
-                 [&](const WorkerDraining&) { core.driver.run(WorkerDrains{from.worker}); }},
+                 [&](const WorkerDraining& m) {
+                   core.driver.run(WorkerDrains{from.worker, m.withdrawn});
+                 }},
       message);
 }
 
@@ -209,7 +211,7 @@ void WorkerSessions::note_progress(Core& core, Connection& from, WorkerEntry& wo
   core.publisher.worker(from.worker, false);
 }
 
-Result<void> WorkerSessions::drain(const WorkerId& id) {
+Result<void> WorkerSessions::drain(const WorkerId& id, bool withdrawn) {
   const auto core = core_.lock();
   const auto found = core->workers.find(id);
   if (found == core->workers.end())
@@ -218,7 +220,11 @@ Result<void> WorkerSessions::drain(const WorkerId& id) {
   if (!connection || !connection->open)
     return fail(Errc::failed_precondition,
                 fmt::format("worker {} is not connected: it can't be asked to end", id.value));
-  connection->sink->send(DrainNow{});
+  const auto figures = core->driver.farm().worker(id);
+  if (withdrawn && !(figures && figures->state == WorkerState::draining))
+    return fail(Errc::failed_precondition,
+                fmt::format("worker {} is not draining: it takes units as before", id.value));
+  connection->sink->send(DrainNow{withdrawn});
   return {};
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <span>
 
+#include "coordinator/base/limits.h"
 #include "coordinator/domain/job_state.h"
 #include "coordinator/views/views.h"
 #include "core/job/describe.h"
@@ -25,6 +26,7 @@ constexpr job::Setting reworded(job::Setting row, std::string_view doc, std::str
 
 template <class V, job::Of<JobChange> T>
 void describe(V& v, T& c) {
+  v.setting({.name = "name", .doc = "The job's name in lists.", .range = {1, limits::kMaxShownName}}, c.name);
   v.setting({.name = "state", .doc = "The job pauses, is rendered further, or ends for good."}, c.state);
   v.setting(job::kPriority, c.priority);
   v.setting(reworded(job::kSpp, "The new total of samples per pixel.",

@@ -121,6 +121,33 @@ void describe(V& v, T& a) {
           a.state ? std::optional(std::string(to_string(*a.state))) : std::nullopt);
 }
 
+template <class V, job::Of<JobFailure::Attempt> T>
+void describe(V& v, T& a) {
+  v.field("worker", "Name of the worker.", a.worker);
+  v.field("reason", "", unless_empty(a.reason));
+  v.field("signal", "Signal that ended the render process.", a.signal);
+  v.field("pixel", "[x, y] of the pixel that was being rendered.",
+          a.pixel ? std::optional(std::array{a.pixel->first, a.pixel->second}) : std::nullopt);
+  v.field("sample", "", a.sample);
+}
+
+template <class V, job::Of<JobFailure> T>
+void describe(V& v, T& f) {
+  static constexpr std::array<std::string_view, 3> kKinds{"unit", "scene", "no_worker"};
+  v.field("kind",
+          "unit: a unit failed on several workers. scene: the last worker said that the scene is at fault. "
+          "no_worker: every worker has failed too many units of the job.",
+          Word{to_string(f.kind), kKinds});
+  v.field("tile", "", f.tile);
+  v.field("rect", "[x0, y0, x1, y1] of the tile, in pixels, without x1 and y1.", corners(f.rect));
+  v.field("round", "", f.round);
+  v.field("samples", "[first, last) sample of the round.", std::array{f.samples.s0, f.samples.s1});
+  v.field("frame", "The frame that failed, of a sequence.", f.frame);
+  v.field("attempts", "What the workers reported, the latest attempt last.", f.attempts);
+  v.field("replay", "Command that renders the failed pixel again. null: the pixel is not known.",
+          unless_empty(f.replay));
+}
+
 template <class V, job::Of<ClassShare> T>
 void describe(V& v, T& s) {
   v.field("workers", "", s.workers);
@@ -213,6 +240,10 @@ void describe(V& v, T& j) {
           j.eta_with_more ? std::optional(MoreWorkersView{*j.eta_with_more, j.eta_with_more_ci95})
                           : std::nullopt);
   v.field("error", "Why the job failed or does not progress.", unless_empty(j.error));
+  v.field("failure",
+          "Why the job failed, as data. null: it has not failed, or not because of a unit that could not be "
+          "rendered; then `error` says why.",
+          j.failure);
   v.field("after",
           "The jobs that this job waits for and that are not done yet. Until they are done it is `queued` and "
           "gets no worker. For a sequence: those of its first waiting frame.",

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "coordinator/domain/farm_figures.h"
+#include "coordinator/domain/job_failure.h"
 #include "coordinator/domain/job_state.h"
 #include "core/base/digest.h"
 #include "core/base/error.h"
@@ -180,6 +181,7 @@ struct JobView {
   // 95 % interval of eta_with_more; nullopt unless the target error is predicted to end the job
   std::optional<std::pair<double, double>> eta_with_more_ci95;
   std::string error;                  // why the job failed or waits; empty: it does neither
+  std::optional<JobFailure> failure;  // `error` as data, if the job failed because of a unit
   std::vector<std::string> warnings;  // warnings about the scene
   std::vector<AfterView> after;       // jobs that must be done before this one begins, and are not yet
   std::string waits_for;              // says so in words; empty: it waits for no other job
@@ -225,6 +227,7 @@ struct JobChange {
   // no tiles are preferred any more.
   std::optional<std::optional<PixelRect>> focus = {};
   std::optional<std::vector<std::string>> after = {};  // replaces the jobs that it waits for
+  std::optional<std::string> name = {};
 };
 
 // How a list of jobs is sorted. `order`: in order of submission. `active`: running jobs first, then paused,

@@ -84,6 +84,7 @@ void describe(V& v, T& s) {
              .more = "Without it, the seed is 0.",
              .range = {0, UINT64_MAX},
              .option = "--seed",
+             .absent = "0",
              .render = true,
              .again = true,
              .pixels = true},
@@ -155,7 +156,8 @@ void describe(V& v, T& s) {
              .more = "Needs Open Image Denoise (deploy/install-denoiser.sh); 409 if the coordinator does not "
                      "have it.",
              .option = "--denoise",
-             .render = true},
+             .render = true,
+             .again = true},
             s.denoise);
   v.setting({.name = "tags",
              .doc = "Only workers that have all of these tags render the job.",

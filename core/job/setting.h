@@ -14,7 +14,8 @@ namespace ls::job {
 enum class Form { json, query, option };
 
 // The range of a number. A whole number is from `least` to `most`; any other number is above 0 and at most
-// `most`.
+// `most`. Of a text, the range of its length in bytes; a text without a range is a name (is_name in
+// values.h).
 struct Range {
   std::int64_t least = 0;
   std::uint64_t most = 0;
@@ -25,10 +26,11 @@ struct Setting {
   std::string_view doc;        // what it does, in one sentence
   std::string_view more = {};  // further sentences, for openapi.json and the reference page
   std::string_view unit = {};
-  Range range = {};                    // of a number
+  Range range = {};                    // of a number or a text
   std::string_view query = {};         // name of the query parameter, if it is not `name`
   std::string_view option = {};        // option of the command line; empty: it is not given as an option
   std::string_view placeholder = "N";  // stands for the value of the option in the help
+  std::string_view absent = {};        // the value of a new job for which an optional setting is not given
   std::string_view who = {};           // who may set it; empty: everyone who may submit or change the job
   std::string (*choices)() = nullptr;  // returns the values that are possible, as a list for the help
   // Commands that have the option: `submit` always, `render` and `again` as these members say. A request to

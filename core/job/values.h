@@ -135,7 +135,9 @@ bool fits(const Setting& s, const T& value) {
   else if constexpr (kIs<T, double>)
     return value > 0 && value <= static_cast<double>(s.range.most);  // false for NaN, too
   else if constexpr (kIs<T, std::string>)
-    return is_name(value);
+    return s.range.most == 0
+               ? is_name(value)
+               : std::cmp_greater_equal(value.size(), s.range.least) && value.size() <= s.range.most;
   else if constexpr (kIs<T, Names>)
     return value.size() <= kMaxNames && std::ranges::all_of(value, is_name);
   else if constexpr (kIs<T, FrameSize>)
@@ -166,7 +168,8 @@ std::string allowed(const Setting& s, Form form) {
       names.push_back(fmt::format("{0}{1}{0}", json ? "\"" : "", to_string(one)));
     return fmt::format("{}", fmt::join(names, " or "));
   } else if constexpr (kIs<T, std::string>) {
-    return std::string(kName);
+    return s.range.most == 0 ? std::string(kName)
+                             : fmt::format("a text of {} to {} bytes", s.range.least, s.range.most);
   } else if constexpr (kIs<T, Names>) {
     return fmt::format("a list of at most {} texts{}, each {}", kMaxNames, json ? "" : " separated by commas",
                        kName);

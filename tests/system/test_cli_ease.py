@@ -141,6 +141,9 @@ def test_priority_log_again_and_remove(idle, tmp_path):
     call(idle, "priority", job, "-7")
     assert json.loads(call(idle, "show", job, "--json").stdout)["priority"] == -7
     assert "submitted" in call(idle, "log", job).stdout
+    call(idle, "rename", job, "Chapel, take 2")
+    assert idle.job(job)["name"] == "Chapel, take 2"
+    assert "a text of 1 to 256 bytes" in call(idle, "rename", job, "x" * 257, code=2).stderr
     other = call(idle, "again", job, "--spp", 16, "--seed", 3).stdout.strip()
     assert json.loads(call(idle, "show", other, "--json").stdout)["spp"] == 16
     assert f"lightshaft cancel {job}" in call(idle, "remove", job, code=1).stderr

@@ -72,6 +72,9 @@ def test_bash_completes_commands_options_values_and_files(tmp_path):
     assert complete(tmp_path, "token", "add", "--role", "=", "r") == ["read"]
     assert complete(tmp_path, "token", "add", "--role", "=") == ["submit", "read", "join", "admin"]
     assert complete(tmp_path, "completion", "z") == ["zsh"]
+    assert complete(tmp_path, "up", "--l") == ["--lan"] and complete(tmp_path, "join", "--c") == ["--code"]
+    assert complete(tmp_path, "farm", "up", "--on", "s") == ["slurm", "ssh"] and complete(tmp_path, "farm", "up", "--bud") == ["--budget"]
+    assert complete(tmp_path, "compare", "--clock", "c") == ["cpu"] and complete(tmp_path, "compare", "my") == ["my scene.xml"]
     assert complete(tmp_path, "render", "my") == ["my scene.xml"]
     assert complete(tmp_path, "jobs", "--token-file", "to") == ["token"]
     assert complete(tmp_path, "jobs", "to") == [""], "this command takes no file"

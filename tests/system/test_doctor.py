@@ -159,7 +159,7 @@ def test_a_proxy_that_the_environment_names_is_said(stub):
 def test_what_is_no_coordinator_is_said(stub):
     stub.answers[("GET", "/healthz")] = [(200, b"<html>")]
 
-    assert "something else" in doctor("--farm", stub.url, code=1, LIGHTSHAFT_TOKEN=SECRET)["farm"][0]["what"]
+    assert "something other than a coordinator" in doctor("--farm", stub.url, code=1, LIGHTSHAFT_TOKEN=SECRET)["farm"][0]["what"]
 
 
 def test_a_farm_that_is_not_ready_is_a_problem(stub):

@@ -271,7 +271,7 @@ def test_a_second_interrupt_ends_what_does_not_end(tmp_path, leaves_nothing):
     os.kill(up.child("lightshaft-worker"), signal.SIGSTOP)
 
     up.interrupt()
-    up.said("ending")
+    up.said("stopping")
     up.interrupt()
 
     up.ends()

@@ -26,6 +26,16 @@ def job(id="j-1", name="steam.xml", state="running", **more):
             "health": {"clean": True, "nonfinite": 0, "negative": 0, "majorant_violations": 0, "causes": []}, **more}
 
 
+def attempt(worker, reason, **more):
+    """In failure()."""
+    return {"worker": worker, "reason": reason, "signal": None, "pixel": None, "sample": None, **more}
+
+
+def failure(*attempts, **more):
+    """Why a job failed, as the coordinator tells it."""
+    return {"kind": "unit", "tile": 3, "rect": [0, 0, 8, 8], "round": 1, "samples": [4, 8], "frame": None, "replay": None, "attempts": attempts, **more}
+
+
 def worker(id="w-1", name="lab-01", **more):
     return {"id": id, "name": name, "build": "test", "numeric_class": "9c41f0aa", "threads": 2, "tags": [], "state": "connected",
             "activity": "rendering", "job": "j-1", "units_done": 5, "cpu_seconds": 12, "rss_bytes": 1 << 20, "last_seen_seconds": 0.1, **more}

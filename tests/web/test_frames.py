@@ -42,6 +42,17 @@ def shown(page):
     return page.evaluate("document.querySelector('.frame[aria-current]')?.dataset.frame")
 
 
+def test_a_sequence_is_rendered_again_as_a_whole(farm, dashboard):
+    sequence(farm, {1: "done", 2: "done"}, 2)
+    page = dashboard(f"#/jobs/{SEQUENCE}")
+    page.wait("[...document.querySelectorAll('button')].some(b => b.innerText === 'Render again …')")
+    page.evaluate("[...document.querySelectorAll('button')].find(b => b.innerText === 'Render again …').click()")
+    assert "with all its frames" in page.text(".again .help")
+    page.click(".again button[type=submit]")
+    page.wait("location.hash === '#/jobs/j-again'")
+    assert farm.submitted[0][0] == SEQUENCE
+
+
 def test_a_sequence_is_one_job_in_the_list(farm, dashboard):
     sequence(farm, {1: "done", 2: "running", 3: "queued", 4: "queued"}, current=2)
     for frame in range(1, 5):

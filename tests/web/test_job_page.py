@@ -4,7 +4,7 @@ import json
 import pytest
 
 from local_farm import wait_until
-from stub_farm import job, png
+from stub_farm import attempt, failure, job, png
 
 HEAVY = {"kind": "heavy_tail", "words": "don't trust yet: few pixels carry the error", "trusted": False}
 PIXEL = "(() => { const c = document.querySelector('.stage live-image canvas'); return [...c.getContext('2d').getImageData(3, 3, 1, 1).data.slice(0, 3)]; })()"
@@ -89,12 +89,10 @@ def test_who_may_only_look_is_not_offered_to_render_on(farm, dashboard):
     assert page.count(".go-on button") == 0 and page.count("#priority") == 0
 
 
-FAILED = ("tile 0 (pixels 0,0 to 32,32), round 0 (samples 0 to 4) failed in 2 attempts; on demo-2: shape 12: 'leaf.ply': the file is cut short"
-          "; on demo-1: shape 12: 'leaf.ply': the file is cut short")
-
-
 def test_the_cause_of_a_failure_comes_first_and_once(farm, dashboard):
-    farm.jobs["j-1"] = job(state="failed", units_done=0, spp_done=0, relmse=None, error=FAILED)
+    cut = "shape 12: 'leaf.ply': the file is cut short"
+    farm.jobs["j-1"] = job(state="failed", units_done=0, spp_done=0, relmse=None, error="in words",
+                           failure=failure(attempt("demo-2", cut), attempt("demo-1", cut), tile=0, rect=[0, 0, 32, 32], round=0, samples=[0, 4]))
     page = dashboard("#/jobs/j-1")
 
     assert page.text(".notice.bad pre") == "shape 12: 'leaf.ply': the file is cut short"
@@ -103,15 +101,38 @@ def test_the_cause_of_a_failure_comes_first_and_once(farm, dashboard):
     assert page.count(".figures") == 0 and page.count(".plot") == 0, "there are no figures of a job that failed at once"
 
 
-@pytest.mark.parametrize("text, cause, where", [
-    ("the disk is full", "the disk is full", ""),
-    ("the scene cannot be rendered: tile 3 (pixels 0,0 to 8,8), round 1 (samples 4 to 8) failed in 1 attempt; on a: crash at pixel 1,2. Replay it with: lightshaft render x.xml", "crash at pixel 1,2",
+@pytest.mark.parametrize("told, cause, where", [
+    (None, "in words", ""),
+    (failure(attempt("a", "crash", signal=11, pixel=[1, 2], sample=5), kind="scene", replay="lightshaft render x.xml"), "crash (signal 11) at pixel 1,2 sample 5",
      "the scene cannot be rendered: tile 3 (pixels 0,0 to 8,8), round 1 (samples 4 to 8) failed in 1 attempt on a.\nSee it again: lightshaft render x.xml"),
-    ("tile 3 (pixels 0,0 to 8,8), round 1 (samples 4 to 8) failed in 2 attempts; on a: this; on b: that", "this (on a)\nthat (on b)",
-     "tile 3 (pixels 0,0 to 8,8), round 1 (samples 4 to 8) failed in 2 attempts on a, b.")])
-def test_the_causes_of_a_failure_are_told_apart(open_page, farm, text, cause, where):
+    (failure(attempt("a", "this"), attempt("b", None), kind="no_worker", frame=7), "this (on a)\nno reason given (on b)",
+     "frame 7: no worker is left that may try: tile 3 (pixels 0,0 to 8,8), round 1 (samples 4 to 8) failed in 2 attempts on a, b.")])
+def test_the_causes_of_a_failure_are_told_apart(open_page, farm, told, cause, where):
     page = open_page(f"{farm.url}/demo.html")
-    assert page.evaluate(f"import('/js/failure.js').then(({{ causeFirst }}) => causeFirst({json.dumps(text)}))") == {"cause": cause, "where": where}
+    said = json.dumps({"error": "in words", "failure": told})
+    assert page.evaluate(f"import('/js/failure.js').then(({{ causeFirst }}) => causeFirst({said}))") == {"cause": cause, "where": where}
+
+
+def test_a_job_gets_another_name(farm, dashboard):
+    farm.jobs["j-1"] = job(name="steam.xml")
+    page = dashboard("#/jobs/j-1")
+    page.click("[aria-label='Rename: steam.xml']")
+    page.wait("document.activeElement.id === 'new-name'")
+    page.type("Steam, take 2")
+    page.click(".rename button[type=submit]")
+    page.wait("document.querySelector('h1').innerText === 'Steam, take 2' && !document.querySelector('.rename')")
+    assert farm.changes == [("j-1", {"name": "Steam, take 2"})]
+
+
+def test_a_finished_job_is_denoised_as_a_new_job_with_its_samples(farm, dashboard):
+    farm.jobs["j-1"] = job(state="done", stopped="spp", progress=1, spp_done=64, spp_asked=64)
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('.go-on button')")
+    page.evaluate("[...document.querySelectorAll('.go-on button')].find(b => b.innerText === 'Denoise …').click()")
+    page.wait("document.getElementById('again-denoise').checked")
+    page.click(".again button[type=submit]")
+    page.wait("location.hash === '#/jobs/j-again'")
+    assert farm.submitted == [("j-1", {"denoise": True})]
 
 
 @pytest.mark.parametrize("state, words", [("paused", "Paused before the first tile"), ("cancelled", "No sample was taken."), ("running", "The first tiles are being rendered")])

@@ -3,7 +3,7 @@ import json
 
 import pytest
 
-from stub_farm import job
+from stub_farm import attempt, failure, job
 
 NAMES = "[...document.querySelectorAll('[data-job]')].map(row => row.dataset.job)"
 
@@ -189,7 +189,7 @@ def test_priority_of_several_jobs_is_set_at_once(farm, dashboard):
 
 def test_a_row_says_why_its_job_does_not_go_on(farm, dashboard):
     why = "no connected worker may take it: lab-01 lacks a tag that the job asks for"
-    farm.jobs = {"j-0": job("j-0", state="queued", error=why), "j-1": job("j-1", state="failed", error="tile 0 (pixels 0,0 to 8,8), round 0 (samples 0 to 4) failed in 1 attempt; on a: the disk is full"),
+    farm.jobs = {"j-0": job("j-0", state="queued", error=why), "j-1": job("j-1", state="failed", error="in words", failure=failure(attempt("a", "the disk is full"))),
                  "j-2": job("j-2", state="done", error=""), "j-3": job("j-3", state="paused", error="the disk is full: make room in /srv/farm")}
     page = dashboard()
     assert page.text("[data-job=j-0] .reason") == why
@@ -251,8 +251,17 @@ def test_the_same_scene_is_rendered_again_with_more_samples(farm, dashboard):
     assert farm.submitted == [("j-1", {"spp": 128, "seed": 5})]
 
 
-@pytest.mark.parametrize("width", [1280, 375])
-def test_the_list_fits_the_screen(many, dashboard, width):
+@pytest.mark.parametrize("width", [1280, 1000, 375])
+def test_the_list_fits_its_place(many, dashboard, width):
+    many.change("j-3210", relmse=5.55e-5, spp=4096, spp_done=2012)  # long figures
     page = dashboard(width=width, height=800, phone=width < 500)
     page.wait("document.querySelectorAll('[data-job]').length === 50")
     assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate("document.querySelector('.list').getBoundingClientRect().right - document.getElementById('main').getBoundingClientRect().right") < 1
+
+
+def test_what_is_not_known_takes_no_room_on_a_phone(farm, dashboard):
+    farm.jobs = {"j-0": job("j-0", state="done"), "j-1": job("j-1", state="done")}
+    page = dashboard(width=375, height=800, phone=True)
+    page.wait("document.querySelectorAll('.list td.absent').length === 2")
+    assert page.evaluate("[...document.querySelectorAll('.list td.absent')].every(cell => cell.offsetParent === null)")

@@ -1,9 +1,12 @@
 """The list of workers: order, search, how to add one, and sending one away."""
 import json
+import os
+import pathlib
+import signal
 
 import pytest
 
-from local_farm import LocalFarm, bin_dir, wait_until
+from local_farm import SCENE, LocalFarm, bin_dir, wait_until
 from stub_farm import worker
 
 NAMES = "[...document.querySelectorAll('.worker-list .worker-name')].map(e => e.innerText)"
@@ -43,13 +46,26 @@ def test_workers_are_searched_by_all_words(some, dashboard):
     page.wait("document.querySelector('main').innerText.includes('No worker is like this.')")
 
 
+def test_workers_are_chosen_by_a_tag(some, dashboard):
+    some.workers["w-1"]["tags"] = ["gpu-room"]
+    page = dashboard("#/workers")
+    page.wait("document.getElementById('worker-tag')")
+    assert page.evaluate("[...document.getElementById('worker-tag').options].map(o => o.text)") == ["any", "gpu", "gpu-room"]
+    page.evaluate("(e => { e.value = 'gpu'; e.dispatchEvent(new Event('change')); })(document.getElementById('worker-tag'))")
+    shows(page, ["lab-3", "lab-6", "lab-9", "lab-12"])
+
+
 def test_a_worker_is_sent_away_after_one_more_question(some, dashboard):
     page = dashboard("#/workers")
     page.click("[data-worker=w-3] .acts button")
     page.click("[data-worker=w-3] .acts .danger")
     page.wait("document.querySelector('[data-worker=w-3] .pill')?.innerText === 'draining'")
     assert some.changes == [("w-3", {"state": "draining"})]
-    assert page.count("[data-worker=w-3] .acts button") == 0
+
+    assert page.text("[data-worker=w-3] .acts button") == "Keep after all"
+    page.click("[data-worker=w-3] .acts button")
+    page.wait("!document.querySelector('[data-worker=w-3] .pill')")
+    assert some.changes[1:] == [("w-3", {"state": "connected"})]
 
 
 @pytest.mark.parametrize("role", ["submit", "read"])
@@ -113,3 +129,32 @@ def test_a_real_worker_ends_when_it_is_sent_away_and_the_command_is_right(tmp_pa
         wait_until(lambda: one.popen.poll() is not None, "the worker ends")
         assert one.popen.returncode == 0
         page.wait("!document.querySelector('[data-worker].is-connected')")
+
+
+def test_a_real_worker_that_drains_is_kept_and_renders_on(tmp_path, open_page):
+    try:
+        bin = bin_dir()
+    except FileNotFoundError as missing:
+        pytest.skip(str(missing))
+    with LocalFarm(tmp_path, bin) as farm:
+        worker = farm.add_worker(fake=False)
+        job = farm.submit(SCENE, spp=4096)
+        wait_until(lambda: farm.job(job)["units_done"] > 0, "it renders")
+        renderers = [int(pid) for pid in pathlib.Path(f"/proc/{worker.popen.pid}/task/{worker.popen.pid}/children").read_text().split()]
+        for pid in renderers:
+            os.kill(pid, signal.SIGSTOP)  # so that its units, and the drain, take longer than the test
+        page = open_page(f"{farm.url()}/#token={farm.token}")
+        page.wait("document.querySelector('.link.live')")
+        page.evaluate("void (location.hash = '#/workers')")
+
+        page.click("[data-worker].is-connected .acts button")
+        page.click("[data-worker] .acts .danger")
+        page.wait("document.querySelector('[data-worker].is-draining .acts button')?.innerText === 'Keep after all'")
+        page.click("[data-worker].is-draining .acts button")
+        page.wait("document.querySelector('[data-worker].is-connected')")
+        for pid in renderers:
+            os.kill(pid, signal.SIGCONT)
+
+        before = farm.job(job)["units_done"]
+        wait_until(lambda: farm.job(job)["units_done"] > before + 4, "it gets further units")
+        assert worker.alive()

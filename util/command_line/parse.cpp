@@ -42,6 +42,12 @@ class PlainHelp : public CLI::Formatter {
   std::string make_option_name(const CLI::Option* option, bool positional) const override {
     return positional ? described(*option, app_).value : CLI::Formatter::make_option_name(option, false);
   }
+  std::string make_option_usage(const CLI::Option* option) const override {
+    std::string usage = CLI::Formatter::make_option_usage(option);
+    // CLI11 adds dots to the name of a value that may be repeated, and the name may have them already.
+    if (const std::size_t dots = usage.find("......"); dots != usage.npos) usage.erase(dots, 3);
+    return usage;
+  }
   std::string make_option_desc(const CLI::Option* option) const override {
     return sentence_of(described(*option, app_));
   }

@@ -156,8 +156,9 @@ struct WorkerProgress {
   bool operator==(const WorkerProgress&) const = default;
 };
 // The worker wants no more leases. It still sends the results of finished units, and returns all other units
-// with a LeaseReturned message.
+// with a LeaseReturned message. `withdrawn`: it wants leases again, after a DrainNow that was withdrawn.
 struct WorkerDraining {
+  bool withdrawn = false;
   bool operator==(const WorkerDraining&) const = default;
 };
 // The worker returns units of a lease that it has not rendered and will not render, because it takes no more
@@ -218,7 +219,10 @@ struct RecallLease {
   LeaseId lease;
   bool operator==(const RecallLease&) const = default;
 };
+// The worker finishes the units that are being rendered, returns the others, and ends. `withdrawn`: an
+// earlier DrainNow no longer applies; the worker takes leases again unless it has another reason to end.
 struct DrainNow {
+  bool withdrawn = false;
   bool operator==(const DrainNow&) const = default;
 };
 using ToWorker =

@@ -50,7 +50,7 @@ Result<void> Agent::Impl::run() {
     if (stop_requested) break;
     look_at_backend();
     look_at_idleness();
-    if (drain_requested) begin_drain();
+    look_at_drain();
     if (connection == Connection::opening && clock.now() >= connection_timer) {
       link.close();
       connection_ended({Errc::unavailable, "the coordinator did not answer the hello"});
@@ -129,7 +129,7 @@ void Agent::Impl::handle_message(ToWorker& message) {
                      outgoing.push_back(std::move(returned));
                    stop_dropped_work();
                  },
-                 [this](DrainNow&) { drain_requested = true; },
+                 [this](DrainNow& d) { coordinator_drains = !d.withdrawn; },
              },
              message);
   work.notify_all();
@@ -246,15 +246,19 @@ void Agent::Impl::look_at_idleness() {
   drain_requested = true;
 }
 
-void Agent::Impl::begin_drain() {
+void Agent::Impl::look_at_drain() {
   const std::lock_guard lock(mutex);
-  if (draining) return;
-  draining = true;
+  const bool wanted = drain_requested || coordinator_drains;
+  if (draining == wanted) return;
+  draining = wanted;
   drain_deadline = clock.now() + options.drain_limit;
-  outgoing.push_back(WorkerDraining{});
-  for (LeaseReturned& returned : table.return_waiting()) outgoing.push_back(std::move(returned));
+  outgoing.push_back(WorkerDraining{.withdrawn = !wanted});
+  if (draining)
+    for (LeaseReturned& returned : table.return_waiting()) outgoing.push_back(std::move(returned));
   work.notify_all();
-  log_info(fmt::format("worker={}", id.value), "draining: finishing the units in hand");
+  log_info(fmt::format("worker={}", id.value),
+           draining ? "draining: finishing the units in hand"
+                    : "the coordinator has withdrawn the drain: taking units again");
 }
 
 std::vector<FromWorker> Agent::Impl::due_messages() {

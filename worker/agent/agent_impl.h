@@ -149,7 +149,7 @@ struct Agent::Impl {
   // Sets the stop flag of each running unit that is no longer in `table`, and that of the loader if it loads
   // a job of which `table` has no unit.
   void stop_dropped_work();
-  void begin_drain();
+  void look_at_drain();    // begins a drain, or ends one that the coordinator has withdrawn
   void look_at_backend();  // drains if the backend is broken, so that run() ends with the backend's error
   // If the worker was without work for options.idle_limit: drains, or ends run() if it has never joined.
   void look_at_idleness();
@@ -241,7 +241,8 @@ struct Agent::Impl {
   TimePoint last_busy{};  // when this worker was last found to hold units or results
   std::optional<Result<void>> ended;
   WorkerId id;
-  std::string secret;  // proves to the coordinator that this worker has the id
+  std::string secret;               // proves to the coordinator that this worker has the id
+  bool coordinator_drains = false;  // the latest DrainNow was not withdrawn
 
   std::atomic<bool> drain_requested{false}, stop_requested{false};
   std::atomic<bool> stop_loading{false};  // tells the backend to abandon the world that it builds

@@ -59,7 +59,7 @@ Result<void> LinkRing::connect(const WorkerHello& hello, std::shared_ptr<LinkObs
 bool LinkRing::idle_for_long(const FromWorker& message) {
   const std::lock_guard lock(mutex_);
   const std::lock_guard state_lock(state_->mutex);
-  if (std::holds_alternative<WorkerDraining>(message)) draining_ = true;
+  if (const auto* drain = std::get_if<WorkerDraining>(&message)) draining_ = !drain->withdrawn;
   if (std::holds_alternative<UnitResult>(message) || std::holds_alternative<UnitFailure>(message))
     ++state_->unacknowledged;
   const auto* report = std::get_if<WorkerProgress>(&message);

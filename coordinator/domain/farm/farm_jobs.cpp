@@ -245,9 +245,9 @@ void Farm::State::finish_if_complete(Job& job) {
   refresh(job);
 }
 
-void Farm::State::fail(Job& job, std::string error) {
+void Farm::State::fail(Job& job, std::string error, std::optional<JobFailure> failure) {
   set_state(job, JobState::failed);
-  effects.emplace_back(JobFailed{job.plan.brief.job, std::move(error)});
+  effects.emplace_back(JobFailed{job.plan.brief.job, std::move(error), std::move(failure)});
   // The job is to blame for its failure, not the workers: their failures in it are erased.
   for (const auto& [index, worker] : workers.all()) worker->failures.erase(job.seq);
   end(job);

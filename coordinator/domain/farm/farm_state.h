@@ -99,7 +99,7 @@ struct Farm::State {
   void freeze(Job& job, StopReason reason);
   void watch_time(Job& job);  // freezes the job if its time limit has passed
   void finish_if_complete(Job& job);
-  void fail(Job& job, std::string error);
+  void fail(Job& job, std::string error, std::optional<JobFailure> failure = {});
   void end(Job& job);  // takes back all leases of a job that has failed or was cancelled
 
   // Defined in farm_workers.cpp

@@ -233,21 +233,19 @@ void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const U
       proven_ones.insert(other->principal);
     if (!blocked) ++willing;
   }
-  const auto report = [&](const std::string& head) {
-    const PixelRect rect = job.plan.grid.rect(tile_of(code));
-    fail(job, head + describe_failure(rect, job.range(code), job.failures.attempts(code), job.plan.replay));
+  const auto report = [&](bool no_worker) {
+    JobFailure why = failure_after(job.failures.attempts(code), job.plan.grid.rect(tile_of(code)),
+                                   job.range(code), job.plan.replay);
+    if (no_worker && why.kind == FailureKind::unit) why.kind = FailureKind::no_worker;
+    std::string text = describe(why);
+    fail(job, std::move(text), std::move(why));
   };
   // A single report that the scene is at fault does not fail the job: the worker may have bad memory or lie.
   // It counts like any other failure.
-  const std::string at_fault = failure.scene_at_fault ? "the scene cannot be rendered: " : "";
   const bool only_proven = !proven_ones.empty();
   if (job.failures.exhausted(code, (only_proven ? proven_ones : known).size(), only_proven))
-    return report(at_fault);
-  if (!known.empty() && willing == 0) {
-    return report(fmt::format(
-        "{}no worker is left that may try: each has failed {} units of this job; the last: ", at_fault,
-        kWorkerFailuresPerJob));
-  }
+    return report(false);
+  if (!known.empty() && willing == 0) return report(true);
   if (was_blocked || !record.blocked_at(now)) return;
   effects.emplace_back(
       WorkerBlocked{worker.id, job.plan.brief.job,

@@ -101,10 +101,11 @@ void Farm::State::lose(Worker& worker, FreedCause why) {
 
 void Farm::State::on(const WorkerDrains& event) {
   Worker* worker = workers.find(event.worker);
-  if (worker == nullptr || !worker->connected || worker->draining) return;
-  worker->draining = true;
-  workers.settle(*worker);
-  effects.emplace_back(WorkerStateChanged{worker->id, worker->state(), "drains"});
+  if (worker == nullptr || !worker->connected || worker->draining == !event.withdrawn) return;
+  worker->draining = !event.withdrawn;
+  touch(*worker);
+  effects.emplace_back(
+      WorkerStateChanged{worker->id, worker->state(), event.withdrawn ? "takes units again" : "drains"});
   work_appeared = true;
 }
 

@@ -22,8 +22,9 @@ std::string_view text_of(const StaticFile& file) {
   return {reinterpret_cast<const char*>(file.bytes.data()), file.bytes.size()};
 }
 
-std::string digest_of(const std::string& text) {
-  return sha256(std::as_bytes(std::span(text))).hex().substr(0, 16);
+JoinedFile joined_file(std::string_view ending, std::string text) {
+  const std::string digest = sha256(std::as_bytes(std::span(text))).hex().substr(0, 16);
+  return {fmt::format("dashboard.{}.{}", digest, ending), std::move(text)};
 }
 
 template <typename Line>  // Line(std::string_view)
@@ -35,8 +36,17 @@ void each_line(std::string_view text, const Line& line) {
   }
 }
 
+// True if the line belongs to a comment, which has its lines for itself. `open`: a comment that began before
+// goes on; set for the next line.
+bool is_comment(std::string_view line, bool& open) {
+  line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
+  const bool block = open || line.starts_with("/*");
+  if (block) open = line.find("*/") == std::string_view::npos;
+  return block || line.starts_with("//");
+}
+
 // Each module becomes a function that is called once and returns what it exports. What a module imports
-// stands before it.
+// stands before it, or in an earlier script.
 class Joined {
  public:
   explicit Joined(const Sources& sources) : sources_(sources) {}
@@ -49,9 +59,9 @@ class Joined {
     done_[name] = false;  // until it is there: modules that import each other in a circle can't be joined
     std::string body;
     std::vector<std::string> exported;
-    bool known = true;
+    bool known = true, comment = false;
     each_line(source->second, [&](std::string_view line) {
-      known = known && add_line(name, std::string(line), body, exported);
+      known = known && (is_comment(line, comment) || add_line(name, std::string(line), body, exported));
     });
     if (!known) return false;
     text_ += fmt::format("modules[\"{}\"] = (() => {{\n{}\nreturn {{ {} }};\n}})();\n", name, body,
@@ -59,7 +69,14 @@ class Joined {
     return done_[name] = true;
   }
 
-  std::string text() const { return "const modules = {};\n" + text_; }
+  // Returns the script of the modules that were added since the last call.
+  JoinedFile take() {
+    const std::string head = first_.empty() ? "export const modules = {};\n"
+                                            : fmt::format("import {{ modules }} from \"./{}\";\n", first_);
+    JoinedFile script = joined_file("js", head + std::exchange(text_, {}));
+    if (first_.empty()) first_ = script.name;
+    return script;
+  }
 
  private:
   bool add_line(const std::string& name, std::string line, std::string& body,
@@ -91,8 +108,9 @@ class Joined {
   }
 
   const Sources& sources_;
-  std::map<std::string, bool, std::less<>> done_;  // true: its text stands in text_
+  std::map<std::string, bool, std::less<>> done_;  // true: its text stands in text_ or in a script before
   std::string text_;
+  std::string first_;  // name of the first script
 };
 
 }  // namespace
@@ -103,34 +121,32 @@ std::optional<PageBundle> bundle_page(std::span<const StaticFile> files) {
   const auto page = sources.find("index.html");
   if (page == sources.end()) return std::nullopt;
   static const std::regex kStyle(R"re(\s*<link rel="stylesheet" href="([^"]+)">\s*)re");
-  static const std::regex kScript(R"re(\s*<script type="module" src="([^"]+)"></script>\s*)re");
+  static const std::regex kScript(R"re(\s*<script type="module"( async)? src="([^"]+)"></script>\s*)re");
   PageBundle bundle;
+  std::string style;
   Joined joined(sources);
-  bool known = true, styled = false, scripted = false;
+  bool known = true, styled = false;
   each_line(page->second, [&](std::string_view view) {
     const std::string line(view);
     std::smatch parts;
     if (std::regex_match(line, parts, kStyle)) {
-      const auto style = sources.find(parts[1].str());
-      known = known && style != sources.end();
-      if (known) bundle.style += style->second;
+      const auto sheet = sources.find(parts[1].str());
+      known = known && sheet != sources.end();
+      if (known) style += sheet->second;
       if (!std::exchange(styled, true)) bundle.page += "  <link rel=\"stylesheet\" href=\"{style}\">\n";
     } else if (std::regex_match(line, parts, kScript)) {
-      known = known && !std::exchange(scripted, true) && joined.add(parts[1]);
-      bundle.page += "  <script type=\"module\" src=\"{script}\"></script>\n";
+      known = known && joined.add(parts[2]);
+      bundle.scripts.push_back(joined.take());
+      bundle.page += fmt::format("  <script type=\"module\"{} src=\"{}\"></script>\n", parts[1].str(),
+                                 bundle.scripts.back().name);
     } else {
       bundle.page += line;
     }
   });
-  if (!known || !styled || !scripted) return std::nullopt;
-  bundle.script = joined.text();
-  bundle.style_name = fmt::format("dashboard.{}.css", digest_of(bundle.style));
-  bundle.script_name = fmt::format("dashboard.{}.js", digest_of(bundle.script));
-  const auto put = [&](std::string_view mark, const std::string& name) {
-    bundle.page.replace(bundle.page.find(mark), mark.size(), name);
-  };
-  put("{style}", bundle.style_name);
-  put("{script}", bundle.script_name);
+  if (!known || !styled || bundle.scripts.empty()) return std::nullopt;
+  bundle.style = joined_file("css", std::move(style));
+  constexpr std::string_view kMark = "{style}";
+  bundle.page.replace(bundle.page.find(kMark), kMark.size(), bundle.style.name);
   return bundle;
 }
 

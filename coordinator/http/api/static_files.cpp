@@ -41,8 +41,8 @@ StaticFiles::StaticFiles(std::span<const StaticFile> files) {
   for (const auto& file : files) add(std::string(file.name), file.bytes, false);
   auto bundle = bundle_page(files);
   if (!bundle) return;
-  add(bundle->script_name, keep(std::move(bundle->script)), true);
-  add(bundle->style_name, keep(std::move(bundle->style)), true);
+  bundle->scripts.push_back(std::move(bundle->style));
+  for (JoinedFile& file : bundle->scripts) add(std::move(file.name), keep(std::move(file.text)), true);
   add("index.html", keep(std::move(bundle->page)), false);
 }
 

@@ -99,16 +99,19 @@ Response get_workers(Api& api, const Request& request, const Params&) {
   return json_response(200, answer.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
-// A worker takes no other wish than to end after its units: it comes back when somebody starts it again.
+// A worker can be asked to end after its units, and, until it has ended, to stay.
 Response patch_worker(Api& api, const Request& request, const Params& params) {
   const auto body = read_object(request.body, {"state"});
   if (!body) return problem(body.error());
   const auto state = body->find("state");
-  if (state == body->end() || *state != "draining")
-    return problem(400, "a worker can be given the state \"draining\" alone: {\"state\": \"draining\"}");
+  const bool stays = state != body->end() && *state == "connected";
+  if (!stays && (state == body->end() || *state != "draining"))
+    return problem(400,
+                   "'state' must be \"draining\" (the worker finishes its units and ends) or \"connected\" "
+                   "(it stays)");
   const WorkerId id{params.empty() ? std::string() : params[0]};
   if (!plausible_id(id.value)) return problem(404, "there is no such worker");
-  if (const auto done = api.coordinator().drain_worker(id); !done) return problem(done.error());
+  if (const auto done = api.coordinator().drain_worker(id, stays); !done) return problem(done.error());
   return {.status = 202};
 }
 

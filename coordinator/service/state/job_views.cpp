@@ -150,6 +150,7 @@ JobView JobViews::job(const JobEntry& entry) const {
   v.denoise = job.spec.denoise;
   if (job.state == JobState::done) v.denoised = job.denoised;
   v.error = job.error.empty() ? entry.trouble : job.error;
+  v.failure = job.failure;
   v.warnings = job.warnings;
   v.fake = job.fake;
   v.numeric_class = job.numeric_class;

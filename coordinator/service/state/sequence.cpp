@@ -63,9 +63,9 @@ FramesView count(std::span<const JobView> frames, const FrameRange& range) {
   return v;
 }
 
-// Returns the error of the first failed frame. If no frame failed, returns the error of the first
-// frame that has not ended and has one; empty if none has.
-std::string trouble_of(std::span<const JobView> frames) {
+// Sets the error to that of the first failed frame. If no frame failed, to that of the first frame that has
+// not ended and has one; leaves it empty if none has.
+void put_trouble(JobView& v, std::span<const JobView> frames) {
   const JobView* found = nullptr;
   for (const JobView& f : frames)
     if (!found && f.state == JobState::failed && !f.error.empty()) found = &f;
@@ -74,9 +74,11 @@ std::string trouble_of(std::span<const JobView> frames) {
     const auto first = std::find_if(frames.begin(), frames.end(), in_trouble);
     if (first != frames.end()) found = &*first;
   }
-  if (!found) return "";
+  if (!found) return;
   const auto id = frame_of(found->id);
-  return id ? fmt::format("frame {}: {}", id->frame, found->error) : found->error;
+  v.error = id ? fmt::format("frame {}: {}", id->frame, found->error) : found->error;
+  v.failure = found->failure;
+  if (v.failure && id) v.failure->frame = id->frame;
 }
 
 struct WorkLeft {
@@ -201,7 +203,7 @@ JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frame
   put_worst(v, frames);
   for (const JobView& f : frames)
     if (f.few_hits) v.few_hits = v.few_hits.value_or(0) + *f.few_hits;
-  v.error = trouble_of(frames);
+  put_trouble(v, frames);
   if (const auto waits = std::ranges::find_if(frames, [](const JobView& f) { return !f.after.empty(); });
       waits != frames.end()) {
     v.after = waits->after;

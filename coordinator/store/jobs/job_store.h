@@ -88,6 +88,7 @@ struct StoredJob {
   JobState state = JobState::queued;
   std::optional<StopReason> stopped;
   std::string error;
+  std::optional<JobFailure> failure;  // `error` as data, if a unit could not be rendered
   std::optional<Digest> numeric_class;
   // `build` and `platform` describe the numeric class to which the job is pinned: the build of one of its
   // workers, and that worker's machine and build in words. Both are from its WorkerHello.

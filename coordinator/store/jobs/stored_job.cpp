@@ -96,6 +96,40 @@ Enum enum_from(const json& j, std::initializer_list<Enum> all) {
   throw std::invalid_argument("unknown word '" + word + "'");
 }
 
+json to_value(const JobFailure& f) {
+  json j{{"kind", to_string(f.kind)},
+         {"tile", f.tile},
+         {"rect", {f.rect.x0, f.rect.y0, f.rect.x1, f.rect.y1}},
+         {"round", f.round},
+         {"samples", {f.samples.s0, f.samples.s1}},
+         {"attempts", json::array()},
+         {"replay", f.replay}};
+  for (const JobFailure::Attempt& a : f.attempts)
+    j["attempts"].push_back({a.worker, a.reason, a.signal ? json(*a.signal) : json(),
+                             a.pixel ? json{a.pixel->first, a.pixel->second} : json(),
+                             a.sample ? json(*a.sample) : json()});
+  return j;
+}
+
+JobFailure failure_from(const json& j) {
+  JobFailure f;
+  f.kind = enum_from(j.at("kind"), {FailureKind::unit, FailureKind::scene, FailureKind::no_worker});
+  f.tile = j.at("tile");
+  const json& rect = j.at("rect");
+  f.rect = {rect.at(0), rect.at(1), rect.at(2), rect.at(3)};
+  f.round = j.at("round");
+  f.samples = {count_of(j.at("samples").at(0)), count_of(j.at("samples").at(1))};
+  for (const json& a : j.at("attempts")) {
+    JobFailure::Attempt& attempt = f.attempts.emplace_back();
+    attempt.worker = a.at(0), attempt.reason = a.at(1);
+    if (!a.at(2).is_null()) attempt.signal = a.at(2).get<int>();
+    if (const json& pixel = a.at(3); !pixel.is_null()) attempt.pixel = {pixel.at(0), pixel.at(1)};
+    if (!a.at(4).is_null()) attempt.sample = count_of(a.at(4));
+  }
+  f.replay = j.at("replay");
+  return f;
+}
+
 StoredJob stored_from(const json& j) {
   StoredJob job;
   job.id.value = j.at("id");
@@ -121,6 +155,7 @@ StoredJob stored_from(const json& j) {
     job.stopped =
         enum_from(j.at("stopped"), {StopReason::spp, StopReason::error, StopReason::time, StopReason::user});
   job.error = j.at("error");
+  if (const auto failure = j.find("failure"); failure != j.end()) job.failure = failure_from(*failure);
   if (!j.at("numeric_class").is_null()) job.numeric_class = digest_from(j.at("numeric_class"));
   job.build = j.at("build");
   job.platform = j.value("platform", std::string());
@@ -199,6 +234,7 @@ std::string to_json(const StoredJob& job) {
          {"build", job.build},
          {"totals", to_value(job.totals)}};
   for (const Digest& digest : job.missing_blobs) j["awaited"].push_back(digest.hex());
+  if (job.failure) j["failure"] = to_value(*job.failure);
   if (job.techniques != TechniqueSet{}) j["techniques"] = job.techniques.bits();
   for (const DenoisedCheck& c : job.denoised_checks)
     j["denoised_checks"].push_back({{"spp", finite(c.spp)},

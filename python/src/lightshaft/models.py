@@ -153,6 +153,8 @@ class Video(TypedDict):
 
 
 class JobChange(TypedDict):
+    name: NotRequired[str]
+    """The job's name in lists."""
     state: NotRequired[Literal["paused", "running", "cancelled"]]
     """The job pauses, is rendered further, or ends for good."""
     priority: NotRequired[int]
@@ -236,6 +238,9 @@ class Job(TypedDict):
     """Predicted time left with more workers like the present ones. null: more workers would not help."""
     error: Union[str, None]
     """Why the job failed or does not progress."""
+    failure: NotRequired[Union["JobFailure", None]]
+    """Why the job failed, as data. null: it has not failed, or not because of a unit that could not be
+    rendered; then `error` says why."""
     after: NotRequired[list["JobAfter"]]
     """The jobs that this job waits for and that are not done yet. Until they are done it is `queued` and
     gets no worker. For a sequence: those of its first waiting frame."""
@@ -335,6 +340,37 @@ class JobEtaWithMore(TypedDict):
     seconds: NotRequired[float]
     ci95: NotRequired[Union[list[float], None]]
     """[low, high]: the 95 % interval of seconds."""
+
+
+class JobFailure(TypedDict):
+    """Why the job failed, as data. null: it has not failed, or not because of a unit that could not be
+    rendered; then `error` says why."""
+    kind: NotRequired[Literal["unit", "scene", "no_worker"]]
+    """unit: a unit failed on several workers. scene: the last worker said that the scene is at fault.
+    no_worker: every worker has failed too many units of the job."""
+    tile: NotRequired[int]
+    rect: NotRequired[list[int]]
+    """[x0, y0, x1, y1] of the tile, in pixels, without x1 and y1."""
+    round: NotRequired[int]
+    samples: NotRequired[list[int]]
+    """[first, last) sample of the round."""
+    frame: NotRequired[Union[int, None]]
+    """The frame that failed, of a sequence."""
+    attempts: NotRequired[list["JobFailureAttempts"]]
+    """What the workers reported, the latest attempt last."""
+    replay: NotRequired[Union[str, None]]
+    """Command that renders the failed pixel again. null: the pixel is not known."""
+
+
+class JobFailureAttempts(TypedDict):
+    worker: NotRequired[str]
+    """Name of the worker."""
+    reason: NotRequired[Union[str, None]]
+    signal: NotRequired[Union[int, None]]
+    """Signal that ended the render process."""
+    pixel: NotRequired[Union[list[int], None]]
+    """[x, y] of the pixel that was being rendered."""
+    sample: NotRequired[Union[int, None]]
 
 
 class JobAfter(TypedDict):

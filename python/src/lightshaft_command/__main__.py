@@ -21,9 +21,9 @@ signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDS)
 if not __package__:
     sys.path[0] = str(pathlib.Path(__file__).resolve().parent.parent)
 
-from lightshaft_command.command import DESCRIBED, run
+from lightshaft_command.command import run
 
-if sys.argv[1:2] not in [[name] for name in DESCRIBED]:
+if sys.argv[1:2] in (["up"], ["join"]):  # others handle signals themselves from their beginning on
     for number, handler in before.items():
         signal.signal(number, handler)
 

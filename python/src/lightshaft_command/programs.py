@@ -60,13 +60,9 @@ def _become(program: str) -> NoReturn:
         sys.exit(f"error: cannot start {path}: {error.strerror}; this wheel is for Linux on x86-64 processors")
 
 
-def lightshaft() -> int:
+def lightshaft() -> NoReturn:
     """The command `lightshaft` of a wheel."""
-    from lightshaft_command.command import COMMANDS, run
-
     find_denoiser()
-    if len(sys.argv) > 1 and sys.argv[1] in COMMANDS:
-        return run(sys.argv[1:])
     os.environ["LIGHTSHAFT_PYTHON"] = sys.executable  # for the commands that the program leaves to Python
     _become("lightshaft")
 

@@ -7,12 +7,24 @@ import pathlib
 from collections.abc import Iterator
 from typing import IO
 
+from lightshaft_command.console import Given
+from lightshaft_command.farm_up.numbers import whole_option
 from lightshaft_command.programs import Problem
+
+MOST_THREADS = 256  # as the worker has it
 
 
 def usual() -> pathlib.Path:
     named = os.environ.get("XDG_DATA_HOME")
     return (pathlib.Path(named) if named else pathlib.Path.home() / ".local" / "share") / "lightshaft"
+
+
+def data_of(given: Given) -> pathlib.Path:
+    return (pathlib.Path(given.text("--data")).expanduser() if given.flag("--data") else usual()).absolute()
+
+
+def threads_of(given: Given) -> int | None:
+    return whole_option("--threads", given.text("--threads"), 1, MOST_THREADS) if given.flag("--threads") else None
 
 
 class Claim:

@@ -1,6 +1,6 @@
-"""`lightshaft up`: runs a coordinator and a worker on this machine, until Ctrl-C."""
+"""`lightshaft up`: runs a coordinator and a worker on this machine, until Ctrl-C. The program `lightshaft` describes the options
+(cli/commands/python_commands.cpp)."""
 
-import argparse
 import contextlib
 import http.client
 import os
@@ -9,17 +9,46 @@ import shlex
 import socket
 import ssl
 import time
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from lightshaft_command import browser, enrolment
 from lightshaft_command.children import Child, Children, has_ended, say
 from lightshaft_command.connections import listens
+from lightshaft_command.console import Given
+from lightshaft_command.farm_up.numbers import whole_option
 from lightshaft_command.first_picture import FirstPicture
-from lightshaft_command.programs import Problem, find
-from lightshaft_command.state import claim
+from lightshaft_command.programs import Problem, Usage, find
+from lightshaft_command.state import claim, data_of, threads_of
 
 HTTP, WORKERS, JOINING = 8080, 50051, 50052  # ports, if they are free
 PROXIES = ("http_proxy", "https_proxy", "all_proxy")
 PATIENCE = 60.0  # seconds, after which it is said that the coordinator is still starting
+
+
+@dataclass(frozen=True)
+class Options:
+    data: pathlib.Path
+    threads: int | None
+    lan: bool
+    names: list[str]
+    port: int | None
+    first_scene: pathlib.Path | None
+    browser: bool
+
+
+def read_options(given: Given) -> Options:
+    if given.flag("--name") and not given.flag("--lan"):
+        raise Usage("--name needs --lan: otherwise only this machine can reach the farm")
+    return Options(
+        data=data_of(given),
+        threads=threads_of(given),
+        lan=given.flag("--lan"),
+        names=given.all("--name"),
+        port=whole_option("--port", given.text("--port"), 0, 65535) if given.flag("--port") else None,
+        first_scene=pathlib.Path(given.text("--first-scene")) if given.flag("--first-scene") else None,
+        browser=not given.flag("--no-browser"),
+    )
 
 
 def free_port(host: str, wanted: int, given: int | None) -> int:
@@ -37,18 +66,18 @@ def free_port(host: str, wanted: int, given: int | None) -> int:
     return found
 
 
-def start_coordinator(children: Children, args: argparse.Namespace, data: pathlib.Path, names: list[str]) -> dict[str, int]:
+def start_coordinator(children: Children, asked: Options, data: pathlib.Path, names: list[str]) -> dict[str, int]:
     """Starts the coordinator. Returns its ports `http` and `grpc`."""
-    host = "0.0.0.0" if args.lan else "127.0.0.1"
+    host = "0.0.0.0" if asked.lan else "127.0.0.1"
     home = data / "coordinator"
-    tls = ["--tls", "--tls-names", ",".join(names)] if args.lan else []
+    tls = ["--tls", "--tls-names", ",".join(names)] if asked.lan else []
 
     def words(web: int, workers: int) -> list[str]:
         return [find("lightshaft-coordinator"), "--http", f"{host}:{web}", "--grpc", f"{host}:{workers}", "--data", str(home), *tls]
 
     # Another program may take a port that was free just now.
     for wanted_http, wanted_workers in ((HTTP, WORKERS), (0, 0)):
-        ports = {"http": free_port(host, wanted_http, args.port), "grpc": free_port(host, wanted_workers, None)}
+        ports = {"http": free_port(host, wanted_http, asked.port), "grpc": free_port(host, wanted_workers, None)}
         with contextlib.suppress(OSError):  # of a coordinator that was killed
             (home / "ports.json").unlink()
         # When it is started again, workers and browsers find it where it was.
@@ -89,10 +118,10 @@ def has_started(children: Children, child: Child, file: pathlib.Path, port: int,
     return True
 
 
-def farm_variables(args: argparse.Namespace, home: pathlib.Path, ports: dict[str, int]) -> dict[str, str]:
+def farm_variables(asked: Options, home: pathlib.Path, ports: dict[str, int]) -> dict[str, str]:
     """Returns the environment variables by which `lightshaft` on this machine finds the farm."""
-    found = {"LIGHTSHAFT_URL": f"{'https' if args.lan else 'http'}://127.0.0.1:{ports['http']}", "LIGHTSHAFT_TOKEN": (home / "token").read_text().strip()}
-    if args.lan:
+    found = {"LIGHTSHAFT_URL": f"{'https' if asked.lan else 'http'}://127.0.0.1:{ports['http']}", "LIGHTSHAFT_TOKEN": (home / "token").read_text().strip()}
+    if asked.lan:
         found["LIGHTSHAFT_CA"] = str(home / "tls" / "ca.pem")
     # The token is not for a proxy, which could not reach this machine's own address either.
     if any(os.environ.get(name) for proxy in PROXIES for name in (proxy, proxy.upper())):
@@ -103,16 +132,16 @@ def farm_variables(args: argparse.Namespace, home: pathlib.Path, ports: dict[str
     return found
 
 
-def start_worker(children: Children, args: argparse.Namespace, data: pathlib.Path, coordinator: str, token: str, tls: pathlib.Path | None, leaves: str) -> None:
+def start_worker(children: Children, threads: int | None, data: pathlib.Path, coordinator: str, token: str, tls: pathlib.Path | None, leaves: str) -> None:
     words = [find("lightshaft-worker"), "--coordinator", coordinator, "--cache", str(data / "cache")]
-    if args.threads:
-        words += ["--threads", str(args.threads)]
+    if threads:
+        words += ["--threads", str(threads)]
     if tls:
         words += ["--tls-ca", str(tls / "ca.pem"), "--tls-cert", str(tls / "worker.pem"), "--tls-key", str(tls / "worker.key")]
     children.kept.append(Child("worker", words, data / "worker.log", {**os.environ, "LIGHTSHAFT_JOIN_TOKEN": token}, leaves))
 
 
-def show(args: argparse.Namespace, data: pathlib.Path, farm: dict[str, str]) -> str:
+def show(data: pathlib.Path, farm: dict[str, str]) -> str:
     """Prints the addresses of the farm, including the one that signs in automatically."""
     home = data / "coordinator"
     address = f"{farm['LIGHTSHAFT_URL']}/#token={farm['LIGHTSHAFT_TOKEN']}"
@@ -134,29 +163,31 @@ def invite(data: pathlib.Path, names: list[str], ports: dict[str, int]) -> None:
     say(f"                  your browser will warn about the farm's own certificate, whose SHA-256 is: {fingerprint}")
 
 
-def run(args: argparse.Namespace) -> int:
-    data = args.data
+def run(words: Sequence[str]) -> int:
+    asked = read_options(Given(words))
+    os.umask(0o077)
+    data = asked.data
     children = Children()
-    names = [*args.name, *enrolment.own_addresses()] or ["127.0.0.1"]
+    names = [*asked.names, *enrolment.own_addresses()] or ["127.0.0.1"]
     try:
         with claim(data) as claimed:
-            ports = start_coordinator(children, args, data, names)
+            ports = start_coordinator(children, asked, data, names)
             home = data / "coordinator"
-            farm = farm_variables(args, home, ports)
-            start_worker(children, args, data, f"127.0.0.1:{ports['grpc']}", (home / "join-token").read_text().strip(), home / "tls" if args.lan else None,
+            farm = farm_variables(asked, home, ports)
+            start_worker(children, asked.threads, data, f"127.0.0.1:{ports['grpc']}", (home / "join-token").read_text().strip(), home / "tls" if asked.lan else None,
                          "was drained and has ended; the farm continues, and the next `lightshaft up` starts a new worker")  # fmt: skip
-            address = show(args, data, farm)
+            address = show(data, farm)
             claimed.tell(address)
-            if args.lan:
+            if asked.lan:
                 invite(data, names, ports)
-            say(f"Ctrl-C ends the farm. What it has rendered stays in {data}, and the next `lightshaft up` continues with it.")
-            if not args.no_browser and (why := browser.open_address(address)):
+            say(f"press Ctrl-C to stop the farm; what it has rendered stays in {data}, and the next `lightshaft up` continues with it")
+            if asked.browser and (why := browser.open_address(address)):
                 say(f"open the dashboard's address in a browser yourself: {why}")
-            picture = FirstPicture(children, data / "first", args.first_scene, farm)
+            picture = FirstPicture(children, data / "first", asked.first_scene, farm)
             children.run(picture.go_on)
-            say("ending: the worker sends its results (Ctrl-C again ends everything at once)")
+            say("stopping: the worker sends its results first (press Ctrl-C again to stop everything at once)")
             children.end()
-            say(f"the farm has ended; its state is in {data}")
+            say(f"the farm has stopped; its data stay in {data}")
     finally:
         children.end()
     return 0

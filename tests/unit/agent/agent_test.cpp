@@ -90,6 +90,39 @@ TEST_F(AgentTest, DrainsOnTheCoordinatorsRequest) {
   EXPECT_TRUE(join());
 }
 
+TEST_F(AgentTest, TakesLeasesAgainWhenTheCoordinatorWithdrawsItsDrain) {
+  coordinator_.acknowledge_results(false);  // so that it has not drained before
+  start();
+  coordinator_.tell(assign("l-1", "j-1", {0}));
+  coordinator_.wait_for([](auto& c) { return c.results.size() == 1; });
+  coordinator_.tell(DrainNow{});
+  coordinator_.wait_for([](auto& c) { return c.draining == 1; });
+
+  coordinator_.tell(DrainNow{.withdrawn = true});
+  coordinator_.wait_for([](auto& c) { return c.undrained == 1; });
+  coordinator_.tell(assign("l-2", "j-1", {1}));
+  coordinator_.wait_for([](auto& c) { return c.results.size() == 2; });
+
+  EXPECT_TRUE(coordinator_.returned.empty());
+}
+
+TEST_F(AgentTest, EndsForItsOwnReasonsThoughTheCoordinatorWithdrawsADrain) {
+  coordinator_.acknowledge_results(false);
+  start({.drain_limit = std::chrono::seconds(5)});
+  coordinator_.tell(assign("l-1", "j-1", {0}));
+  coordinator_.wait_for([](auto& c) { return c.results.size() == 1; });
+  agent_->drain();
+  coordinator_.wait_for([](auto& c) { return c.draining == 1; });
+
+  coordinator_.tell(DrainNow{.withdrawn = true});
+  wait_while_time_passes(
+      [](auto& c) { return c.progress.size() > 1 && c.progress.back().activity == "draining"; });
+  pass(std::chrono::seconds(6));
+
+  EXPECT_FALSE(join());
+  EXPECT_EQ(coordinator_.undrained, 0);
+}
+
 TEST_F(AgentTest, EndsWhenItHasHadNoWorkForItsIdleLimit) {
   start({.idle_limit = std::chrono::seconds(60)});
   pass(std::chrono::seconds(59));

@@ -73,7 +73,7 @@ class ScriptedCoordinator final : public CoordinatorLink {
   std::vector<UnitFailure> failures;
   std::vector<LeaseReturned> returned;
   std::vector<WorkerProgress> progress;
-  int draining = 0;
+  int draining = 0, undrained = 0;
   int fetches = 0;
 
   // CoordinatorLink.
@@ -105,7 +105,7 @@ class ScriptedCoordinator final : public CoordinatorLink {
       }
       if (auto* m = std::get_if<LeaseReturned>(&message)) returned.push_back(*m);
       if (auto* m = std::get_if<WorkerProgress>(&message)) progress.push_back(*m);
-      if (std::holds_alternative<WorkerDraining>(message)) ++draining;
+      if (auto* m = std::get_if<WorkerDraining>(&message)) ++(m->withdrawn ? undrained : draining);
     }
     changed_.notify_all();
     if (acknowledge) tell(ResultAck{*acknowledge, {}});

@@ -49,6 +49,15 @@ class Usage : public ::testing::Test {
   unsigned number_ = 7;
 };
 
+TEST_F(Usage, ShowsTheDotsOfARepeatedValueOnce) {
+  std::vector<std::string> files, names;
+  CLI::App* merge = app_.add_subcommand("merge", "merges");
+  merge->add_option("files", files, "files")->type_name("FILE...")->required();
+  merge->add_option("names", names, "names")->type_name("NAME");
+
+  EXPECT_THAT(merge->help(), HasSubstr("FILE... [NAME...]\n"));
+}
+
 TEST_F(Usage, SuggestsTheMeantCommand) {
   EXPECT_EQ(message({"rendr", "scene.xml"}), "program has no command 'rendr'; did you mean 'render'?");
 }

@@ -29,6 +29,13 @@ TEST(Failure, UnitThatFailsOnThreeWorkersFailsTheJobWithPlaceAndReplayCommand) {
   EXPECT_THAT(of<JobFailed>(effects)[0].error,
               testing::AllOf(testing::HasSubstr("tile 0"), testing::HasSubstr("signal 11"),
                              testing::HasSubstr("lightshaft render SCENE --pixel 3,4 --sample 5")));
+  const std::optional<JobFailure> failure = of<JobFailed>(effects)[0].failure;
+  ASSERT_TRUE(failure);
+  EXPECT_EQ(failure->kind, FailureKind::unit);
+  EXPECT_EQ(failure->attempts.size(), 3u);
+  EXPECT_EQ(failure->attempts[2].signal, 11);
+  EXPECT_EQ(failure->replay, "lightshaft render SCENE --pixel 3,4 --sample 5");
+  EXPECT_EQ(describe(*failure), of<JobFailed>(effects)[0].error);
 }
 
 TEST(Failure, LoneWorkerGetsASecondAttempt) {

@@ -197,6 +197,18 @@ TEST(Lease, DrainingWorkerGetsNoMoreUnitsAndOthersGetItsRest) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
+TEST(Lease, WorkerGetsUnitsAgainWhenItsDrainIsWithdrawn) {
+  Rig rig(plan_of("j", 3, 2), {{"a", 1}});
+  rig.send(WorkerDrains{{"a"}});
+  rig.render("a");
+
+  rig.send(WorkerDrains{{"a"}, true});
+  EXPECT_EQ(rig.worker("a").state, WorkerState::connected);
+  rig.render_all();
+
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
 TEST(Lease, WorkerThatReturnsALeaseGetsNoneBeforeTheNextTick) {
   Rig rig(plan_of("j", 1, 2), {{"a", 1}});
   const Rig::Held unit = rig.take("a");

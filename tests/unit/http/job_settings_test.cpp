@@ -50,6 +50,8 @@ Json schema_of(const Setting& s, const T& value) {
             {"maxItems", 4}};
   } else {
     Json schema{{"type", "string"}};
+    if constexpr (std::is_same_v<T, std::string>)
+      if (s.range.most > 0) schema["minLength"] = s.range.least, schema["maxLength"] = s.range.most;
     if constexpr (std::is_same_v<T, FrameRange>) schema["pattern"] = "^[0-9]+(-[0-9]+(x[0-9]+)?)?$";
     if constexpr (std::is_same_v<T, Digest>) schema["pattern"] = "^[0-9a-f]{64}$";
     return schema;
@@ -221,9 +223,9 @@ std::string commands_with(const Setting& s) {
 }
 
 template <class M>
-std::string default_of() {
+std::string default_of(const Setting& s) {
   if constexpr (requires(M m) { m.has_value(); })
-    return "none";
+    return s.absent.empty() ? "none" : fmt::format("`{}`", s.absent);
   else
     return "`" + job::write(M{}).dump() + "`";
 }
@@ -250,13 +252,14 @@ std::string page() {
       "| setting | value in JSON | default | option | meaning |\n|---|---|---|---|---|\n";
   const JobSpec spec;
   job::for_each_setting(spec, [&]<class M>(const Setting& s, const M&) {
-    text += fmt::format("| `{}` | {} | {} | {} | {} |\n", s.name, values_of<M>(s), default_of<M>(),
+    text += fmt::format("| `{}` | {} | {} | {} | {} |\n", s.name, values_of<M>(s), default_of<M>(s),
                         commands_with(s), sentences(s));
   });
   text +=
       "\n## For a job that the coordinator has accepted\n\n"
       "The body of `PATCH /api/v1/jobs/ID` has at least one of these; either all changes are made or none. "
-      "The commands `pause`, `resume`, `cancel`, `priority`, `extend`, `after` and `focus` send them.\n\n"
+      "The commands `pause`, `resume`, `cancel`, `rename`, `priority`, `extend`, `after` and `focus` send "
+      "them.\n\n"
       "| setting | value in JSON | meaning |\n|---|---|---|\n";
   const JobChange change;
   job::for_each_setting(change, [&]<class M>(const Setting& s, const M&) {

@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <tuple>
 
 #include "coordinator/http/api/content_coding.h"
 #include "tests/unit/http/fixture.h"
@@ -47,17 +48,51 @@ TEST(PageBundle, JoinsModulesInTheOrderInWhichTheyNeedEachOther) {
       "export const x = 1;\nconst here = new URL(\"./w.js\", import.meta.url);\n");
   ASSERT_TRUE(bundle);
 
+  ASSERT_EQ(bundle->scripts.size(), 1U);
   EXPECT_EQ(
-      bundle->script,
-      "const modules = {};\n"
+      bundle->scripts[0].text,
+      "export const modules = {};\n"
       "modules[\"js/deep/other.js\"] = (() => {\nconst x = 1;\nconst here = new URL(\"./w.js\", new "
       "URL(\"js/deep/other.js\", document.baseURI));\n\nreturn { x };\n})();\n"
       "modules[\"js/main.js\"] = (() => {\nconst { x: y } = modules[\"js/deep/other.js\"];\nfunction f() { "
       "return y; }\n\nreturn { f };\n})();\n");
-  EXPECT_EQ(bundle->style, "a {}\nb {}\n");
-  EXPECT_EQ(bundle->page, "<head>\n  <link rel=\"stylesheet\" href=\"" + bundle->style_name +
-                              "\">\n  <script type=\"module\" src=\"" + bundle->script_name +
+  EXPECT_EQ(bundle->style.text, "a {}\nb {}\n");
+  EXPECT_EQ(bundle->page, "<head>\n  <link rel=\"stylesheet\" href=\"" + bundle->style.name +
+                              "\">\n  <script type=\"module\" src=\"" + bundle->scripts[0].name +
                               "\"></script>\n</head>\n");
+}
+
+TEST(PageBundle, HasEachModuleOnceInTheFirstScriptThatNeedsIt) {
+  constexpr std::string_view kPage =
+      "  <script type=\"module\" async src=\"js/early.js\"></script>\n"
+      "  <link rel=\"stylesheet\" href=\"css/a.css\">\n"
+      "  <script type=\"module\" src=\"js/main.js\"></script>\n";
+  const StaticFile files[] = {
+      {"index.html", bytes_of(kPage)},
+      {"css/a.css", bytes_of("a {}\n")},
+      {"js/shared.js", bytes_of("export const x = 1;\n")},
+      {"js/early.js", bytes_of("import { x } from \"./shared.js\";\n")},
+      {"js/main.js", bytes_of("import { x } from \"./shared.js\";\nimport \"./early.js\";\n")}};
+  const auto bundle = bundle_page(files);
+  ASSERT_TRUE(bundle && bundle->scripts.size() == 2);
+  const auto& [early, main] = std::tie(bundle->scripts[0], bundle->scripts[1]);
+
+  EXPECT_NE(early.text.find("modules[\"js/shared.js\"] = "), std::string::npos);
+  EXPECT_NE(early.text.find("modules[\"js/early.js\"] = "), std::string::npos);
+  EXPECT_EQ(main.text, "import { modules } from \"./" + early.name +
+                           "\";\nmodules[\"js/main.js\"] = (() => {\nconst { x } = "
+                           "modules[\"js/shared.js\"];\n\nreturn {  };\n})();\n");
+  EXPECT_NE(bundle->page.find("<script type=\"module\" async src=\"" + early.name), std::string::npos);
+}
+
+TEST(PageBundle, LeavesCommentsOut) {
+  const auto bundle = bundled(
+      "// one line\nconst a = \"http://x\"; // behind code\n/**\n * const b = 1;\n */\n  /** c */\nf(a);\n");
+  ASSERT_TRUE(bundle);
+
+  EXPECT_NE(bundle->scripts[0].text.find("{\nconst a = \"http://x\"; // behind code\nf(a);\n\n"),
+            std::string::npos)
+      << bundle->scripts[0].text;
 }
 
 TEST(PageBundle, NamesFilesByTheirContent) {
@@ -66,9 +101,9 @@ TEST(PageBundle, NamesFilesByTheirContent) {
   const auto other = bundled("import \"./deep/other.js\";\n", "export const x = 2;\n");
   ASSERT_TRUE(one && same && other);
 
-  EXPECT_EQ(one->script_name, same->script_name);
-  EXPECT_NE(one->script_name, other->script_name);
-  EXPECT_EQ(one->style_name, other->style_name);
+  EXPECT_EQ(one->scripts[0].name, same->scripts[0].name);
+  EXPECT_NE(one->scripts[0].name, other->scripts[0].name);
+  EXPECT_EQ(one->style.name, other->style.name);
 }
 
 TEST(PageBundle, LeavesUnknownContentUnchanged) {
@@ -85,9 +120,13 @@ TEST(PageBundle, ContainsAllDashboardModulesExceptTheWorkers) {
   for (const StaticFile& file : embedded_files()) {
     const bool module = file.name.starts_with("js/") && file.name.ends_with(".js");
     const bool of_worker = file.name == "js/viewer/flip_worker.js" || file.name == "js/viewer/flip.js";
-    if (module && !of_worker)
-      EXPECT_NE(bundle->script.find("modules[\"" + std::string(file.name) + "\"] = "), std::string::npos)
-          << file.name;
+    if (!module || of_worker) continue;
+    const std::string begin = "modules[\"" + std::string(file.name) + "\"] = ";
+    EXPECT_EQ(std::ranges::count_if(
+                  bundle->scripts,
+                  [&](const JoinedFile& script) { return script.text.find(begin) != script.text.npos; }),
+              1)
+        << file.name;
   }
 }
 
@@ -96,16 +135,16 @@ TEST(StaticFiles, AreCompressedForClientsThatAcceptItAndCachedByTheirDigest) {
   const auto bundle = bundle_page(embedded_files());
   ASSERT_TRUE(bundle);
 
-  const auto plain = files.find(request(Method::get, "/" + bundle->script_name));
+  const auto plain = files.find(request(Method::get, "/" + bundle->scripts.back().name));
   const auto gzip =
-      files.find(request(Method::get, "/" + bundle->script_name, {{"accept-encoding", "br, gzip"}}));
+      files.find(request(Method::get, "/" + bundle->scripts.back().name, {{"accept-encoding", "br, gzip"}}));
   ASSERT_TRUE(plain && gzip);
   const auto text = [](const Response& r) {
     return std::string(reinterpret_cast<const char*>(r.bytes().data()), r.bytes().size());
   };
 
-  EXPECT_EQ(text(*plain), bundle->script);
-  EXPECT_EQ(unpacked(text(*gzip)), bundle->script);
+  EXPECT_EQ(text(*plain), bundle->scripts.back().text);
+  EXPECT_EQ(unpacked(text(*gzip)), bundle->scripts.back().text);
   EXPECT_LT(3 * gzip->length(), plain->length());
   const auto field = [](const Response& r, std::string_view name) {
     const auto found = std::ranges::find(r.headers, name, &Fields::value_type::first);

@@ -74,6 +74,7 @@ const std::vector<FromWorker> kFromWorker = {
     LeaseReturned{LeaseId{"l"}, {{JobId{"j"}, 5, 6}}, "its disk is full"},
     LeaseReturned{LeaseId{"l"}, {{JobId{"j"}, 5, 6}}, "", true},
     WorkerDraining{},
+    WorkerDraining{.withdrawn = true},
 };
 
 const std::vector<ToWorker> kToWorker = {
@@ -86,6 +87,7 @@ const std::vector<ToWorker> kToWorker = {
     CancelLease{LeaseId{"l"}},
     RecallLease{LeaseId{"l"}},
     DrainNow{},
+    DrainNow{.withdrawn = true},
 };
 
 template <class Message, class Wire>

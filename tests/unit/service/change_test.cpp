@@ -176,6 +176,24 @@ TEST(Change, IsRefusedWithoutEffectIfItCannotBeStored) {
     }
 }
 
+TEST(Change, JobsAndSequencesGetAnotherNameWhichSurvivesARestart) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  JobSpec two;
+  two.frames = FrameRange{1, 2, 1};
+  const JobId job = submit(*coordinator), sequence = submit(*coordinator, two);
+
+  for (const JobId& id : {job, sequence})
+    ASSERT_TRUE(coordinator->change(id, {.name = "Chapel, take 2"})) << id.value;
+
+  coordinator.reset();
+  coordinator = open_at(dir.path());
+  for (const JobId& id : {job, sequence, frame_job(sequence, 2)})
+    EXPECT_EQ(coordinator->job(id)->name, "Chapel, take 2") << id.value;
+  EXPECT_FALSE(coordinator->change(job, {.name = ""}));
+  EXPECT_FALSE(coordinator->change(job, {.name = std::string(257, 'x')}));
+}
+
 TEST(Change, FarmsOwnChangesAreStoredOnceTheDiskWorksAgain) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());

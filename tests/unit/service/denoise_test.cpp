@@ -144,6 +144,23 @@ TEST(ServiceDenoise, LosingTheDenoiserCostsOnlyTheDenoisedLayers) {
               AllOf(HasSubstr("oidn.so"), HasSubstr("LIGHTSHAFT_OIDN")));
 }
 
+TEST(ServiceDenoise, FinishedJobIsDenoisedAsANewJobWithItsSamples) {
+  auto coordinator = open_with({}, fake("blurs"));
+  JobSpec plain;
+  plain.spp = 16;
+  const JobId before = submit(*coordinator, plain);
+  ASSERT_TRUE(finish(*coordinator, before));
+  JobSpec changes;
+  changes.denoise = true;
+
+  const JobId job = coordinator->submit_again(before, changes, "").value();
+  ASSERT_TRUE(finish(*coordinator, job));
+
+  EXPECT_EQ(coordinator->job(job)->spp, 16u);
+  EXPECT_TRUE(image_of(*coordinator, job).channels.contains("denoised.R"));
+  EXPECT_FALSE(coordinator->job(before)->denoise);
+}
+
 TEST(ServiceDenoise, ExtendedJobIsDenoisedAgain) {
   TempFolder dir;
   auto coordinator = open_with(dir.path(), fake("blurs"));

@@ -105,6 +105,23 @@ TEST(Sequence, FramesHaveThePixelsOfSeparateJobs) {
   EXPECT_NE(coordinator->job_log(id)->find("frame 3: submitted with 3 frames"), std::string::npos);
 }
 
+TEST(Sequence, IsSubmittedAgainWithAllItsFrames) {
+  auto coordinator = open_at({});
+  const JobId id = submit(*coordinator, frames(3, 4));
+  JobSpec changes;
+  changes.seed = 7;
+
+  const JobId again = coordinator->submit_again(id, changes, "anna").value();
+  ASSERT_TRUE(finish(*coordinator, again));
+
+  const JobView view = coordinator->job(again).value();
+  ASSERT_TRUE(view.frames);
+  EXPECT_EQ(view.owner, "anna");
+  EXPECT_EQ(view.frames->range, (FrameRange{3, 4, 1}));
+  EXPECT_EQ(pixels(*coordinator, frame_job(again, 3)), pixels_with_seed(10));
+  EXPECT_EQ(pixels(*coordinator, frame_job(again, 4)), pixels_with_seed(11));
+}
+
 TEST(Sequence, FramesAreLeasedInTheirOrder) {
   auto coordinator = open_at({});
   const JobId id = submit(*coordinator, frames(8, 11));

@@ -27,6 +27,14 @@ inline StoredJob sample_job(std::string id) {
   job.features_used = {"volume grids"};
   job.state = JobState::running;
   job.stopped = StopReason::error;
+  job.failure =
+      JobFailure{.kind = FailureKind::no_worker,
+                 .tile = 1,
+                 .rect = {32, 0, 64, 32},
+                 .round = 2,
+                 .samples = {4, 8},
+                 .attempts = {{"a", "out of memory", 9, std::pair(33, 1), 5}, {"b", "", {}, {}, {}}},
+                 .replay = "lightshaft render scene.xml"};
   job.numeric_class = sha256("class");
   job.platform = "armv8-a:gcc-14.2.0";
   job.fake = true;

@@ -1,12 +1,14 @@
 // Actions of the form that submits a job's scene once more, with other samples.
 import { withUi } from "./state.js";
 
-export const kAgain = { spp: "", target_error: "", time: "", seed: "" };
+export const kAgain = { spp: "", target_error: "", time: "", seed: "", denoise: false };
 
 /** What the form says as the coordinator wants it, or what is wrong with it. */
 export function changesOf(form) {
   const changes = {};
-  for (const [name, text] of Object.entries(form)) {
+  if (form.denoise) changes.denoise = true;
+  for (const name of ["spp", "target_error", "time", "seed"]) {
+    const text = form[name];
     if (text.trim() === "") continue;
     const value = Number(text);
     const whole = name === "spp" || name === "seed";
@@ -18,9 +20,11 @@ export function changesOf(form) {
 
 export function makeAgainActions({ get, set, attempt, api }) {
   return {
+    /** To denoise it: with the samples that it has. */
+    openDenoise: (job) => set(withUi(get(), { again: { id: job.id, form: { ...kAgain, denoise: true }, problem: null } })),
     openAgain: (job) => set(withUi(get(), { again: { id: job.id, form: { ...kAgain, spp: job.spp_asked === null ? "" : String(2 * job.spp), target_error: job.spp_asked === null && job.target_error ? String(job.target_error / 2) : "" }, problem: null } })),
     closeAgain: () => set(withUi(get(), { again: null })),
-    typeAgain: (name, text) => set(withUi(get(), { again: { ...get().ui.again, form: { ...get().ui.again.form, [name]: text }, problem: null } })),
+    typeAgain: (name, value) => set(withUi(get(), { again: { ...get().ui.again, form: { ...get().ui.again.form, [name]: value }, problem: null } })),
     submitAgain: async (event) => {
       event.preventDefault();
       const { id, form } = get().ui.again;

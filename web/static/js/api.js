@@ -53,7 +53,8 @@ export const api = {
   report: async (id) => (await call("GET", `${jobPath(id)}/report`)).json(),
   /** {workers, join}: join says how further ones come in. */
   workers: async () => (await call("GET", "/workers")).json(),
-  drainWorker: (id) => call("PATCH", `/workers/${encodeURIComponent(id)}`, json({ state: "draining" })),
+  /** state: "draining", or "connected" for one that drains and is to stay. */
+  setWorkerState: (id, state) => call("PATCH", `/workers/${encodeURIComponent(id)}`, json({ state })),
   remove: (id) => call("DELETE", jobPath(id)),
   again: async (id, changes) => (await call("POST", `${jobPath(id)}/again`, json(changes))).json(),
   thumbnail: async (id, signal) => createImageBitmap(await (await call("GET", `${jobPath(id)}/thumbnail.png`, { signal })).blob()),

@@ -1,24 +1,25 @@
-// Why a job failed, with the cause first. The coordinator (describe_failure in coordinator/domain/job.cpp) writes
-// "HEAD: tile 0 (...) failed in 2 attempts; on lab-01: CAUSE; on lab-02: CAUSE. Replay it with: COMMAND".
+// Why a job failed, the cause first, from what the coordinator says of it (openapi.json: Job.failure).
 
-const kAttempts = /^(.*)\b(tile \d+ \(pixels [^)]*\), round \d+ \(samples [^)]*\) failed in \d+ attempts?); on /s;
+const kHeads = { scene: "the scene cannot be rendered: ", no_worker: "no worker is left that may try: " };
 
-/** {cause, where}: each different cause once; where: what was tried, and how to see it again. Other texts are a cause as they are. */
-export function causeFirst(text) {
-  const found = kAttempts.exec(text);
-  if (!found) return { cause: text, where: "" };
-  const [whole, head, tile] = found;
-  const [attempts, replay] = text.slice(whole.length).split(/\.\s+Replay it with: /);
+/** {cause, where}: each different cause once; where: what was tried, and how to see it again. An `error` that is not about a unit is a cause as it is. */
+export function causeFirst({ error, failure }) {
+  if (!failure) return { cause: error, where: "" };
   const workers = new Map(); // cause -> names of workers
-  for (const attempt of attempts.split("; on ")) {
-    const [, name, cause] = /^(.*?): (.*)$/s.exec(attempt) ?? [null, "", attempt];
-    workers.set(cause, new Set([...(workers.get(cause) ?? []), name]));
+  for (const attempt of failure.attempts) {
+    const cause = causeOf(attempt);
+    workers.set(cause, new Set([...(workers.get(cause) ?? []), attempt.worker]));
   }
   const causes = [...workers].map(([cause, names]) => (workers.size > 1 ? `${cause} (on ${[...names].join(", ")})` : cause));
-  const said = head.replace(/[:\s]+$/, "");
-  const names = [...new Set([...workers.values()].flatMap((some) => [...some]))].filter(Boolean);
-  return {
-    cause: causes.join("\n"),
-    where: [`${said ? `${said}: ` : ""}${tile}${names.length ? ` on ${names.join(", ")}` : ""}.`, replay ? `See it again: ${replay}` : ""].filter(Boolean).join("\n"),
-  };
+  return { cause: causes.join("\n"), where: [unitOf(failure), failure.replay ? `See it again: ${failure.replay}` : null].filter(Boolean).join("\n") };
+}
+
+function causeOf({ reason, signal, pixel, sample }) {
+  const place = pixel ? ` at pixel ${pixel.join(",")}${sample === null ? "" : ` sample ${sample}`}` : "";
+  return `${reason ?? "no reason given"}${signal === null ? "" : ` (signal ${signal})`}${place}`;
+}
+
+function unitOf({ kind, frame, tile, rect: [x0, y0, x1, y1], round, samples, attempts }) {
+  const names = [...new Set(attempts.map(({ worker }) => worker))];
+  return `${frame === null ? "" : `frame ${frame}: `}${kHeads[kind] ?? ""}tile ${tile} (pixels ${x0},${y0} to ${x1},${y1}), round ${round} (samples ${samples.join(" to ")}) failed in ${attempts.length} ${attempts.length === 1 ? "attempt" : "attempts"} on ${names.join(", ")}.`;
 }

@@ -90,6 +90,15 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
     },
     renderOn: alter,
     setPriority: (id, priority) => alter(id, { priority }),
+    /** null: of none. */
+    openRename: (id) => {
+      set(withUi(get(), { renaming: id }));
+      if (id) requestAnimationFrame(() => document.getElementById("new-name")?.select());
+    },
+    rename: async (id, name) => {
+      await alter(id, { name });
+      if (!get().ui.notice) set(withUi(get(), { renaming: null }));
+    },
     remove,
     cancel: (id) => change(id, "cancelled"),
     confirm: (id) => set(withUi(get(), { confirming: id })),

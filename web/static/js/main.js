@@ -8,12 +8,13 @@ import { openEvents } from "./events.js";
 import { routeOf, takeToken } from "./route.js";
 import { makeAgainActions } from "./again_actions.js";
 import { makeJobActions } from "./job_actions.js";
-import { listOf, parametersOf } from "./job_list.js";
+import { listOf } from "./job_list.js";
 import { makeListActions } from "./list_actions.js";
 import { makeSubmitActions } from "./submit_actions.js";
 import { makeWorkerActions } from "./worker_actions.js";
 import { makeViewerActions } from "./viewer_actions.js";
 import { jobName } from "./format.js";
+import { askFirst, opened, tryLink } from "./session.js";
 import { initialState, openJob, shownOf, withEvent, withJob, withList, withListed, withOpen, withTiles, withUi, withWorkers, withoutJob } from "./state.js";
 import { page } from "./views/shell.js";
 
@@ -55,36 +56,34 @@ async function attempt(request) {
 // ---- session ----
 
 async function start() {
-  const token = takeToken(window.location, window.history);
+  const { token, link, first } = opened;
   set({ ...state, route: routeOf(window.location.hash) });
-  if (token) await followLink(token);
-  else await enter();
+  if (token) await followLink(token, link, first);
+  else await enter(first);
 }
 
 /**
  * A link with a token signs in at once where nobody is signed in. Where somebody is, another user's link only
  * asks: anybody can write such a link, and who follows it would go on as somebody else without noticing.
  */
-async function followLink(token) {
-  let now;
-  try {
-    now = await api.me();
-  } catch (error) {
-    if (error.status === 401) await signIn(token);
-    else await enter();
+async function followLink(token, link = tryLink(token), first = undefined) {
+  const { me: now, signing } = await link;
+  if (!now) {
+    await (signing ? signIn(signing, first) : enter(first));
     return;
   }
   const then = await api.whoIs(token).catch(() => null);
-  await enter();
+  await enter(first);
   if (!then) set(withUi(state, { notice: "The token of this link is not known here. You are still signed in as before." }));
   else if (then.role !== now.role || then.user !== now.user) set(withUi(state, { link: { token, ...then } }));
 }
 
-async function signIn(token) {
+/** `signing`: what the coordinator answers to a token. `first`: askFirst() after it. */
+async function signIn(signing, first) {
   set(withUi(state, { signingIn: true, signInError: null }));
   try {
-    await api.signIn(token);
-    const problem = await enter();
+    await signing;
+    const problem = await enter(first);
     if (problem) {
       signedOut(problem.status === 401
         ? "The token is right, but the browser keeps no session: allow cookies for this page."
@@ -96,13 +95,13 @@ async function signIn(token) {
   set(withUi(state, { signingIn: false }));
 }
 
-/** Shows the farm. Returns the error if that is not possible. */
-async function enter() {
+/** Shows the farm. Returns the error if that is not possible. `first`: askFirst(), if that was asked before. */
+async function enter(first) {
   let page;
   let me;
   const asked = state.route.view === "jobs" ? listOf(state.route.query) : state.list.asked;
   try {
-    [page, me] = await Promise.all([api.list(parametersOf(asked, Date.now() / 1000)), api.me()]);
+    [page, me] = await (first ?? askFirst(asked));
   } catch (error) {
     if (error.status === 401) signedOut();
     else if (state.session === "unknown") {
@@ -242,7 +241,7 @@ function showRoute() {
   const turned = !moved && route.frame !== state.route.frame;
   const open = route.view !== "job" ? null : state.open?.id === route.id ? state.open : openJob(route.id);
   const fresh = open && open !== state.open;
-  set(withUi({ ...state, route, open }, moved ? { confirming: null, notice: null, again: null } : {}));
+  set(withUi({ ...state, route, open }, moved ? { confirming: null, notice: null, again: null, renaming: null } : {}));
   if (moved) window.scrollTo(0, 0);
   if (route.view === "jobs" && state.session === "in") actions.openList(route.query);
   if (route.view !== "view") actions.closeViewer();
@@ -280,13 +279,13 @@ document.addEventListener("drop", (event) => {
 
 const seam = { get: () => state, set, attempt, api, snapshot, showRoute, compareFile: (file) => actions.compareFile(file) };
 const actions = {
-  signIn,
+  signIn: (token) => signIn(api.signIn(token)),
   takeLink: () => {
     const { token } = state.ui.link;
     closeEvents?.(); // it shows what the session before may see
     closeEvents = null;
     set({ ...initialState(), narrow: state.narrow, route: state.route });
-    return signIn(token);
+    return signIn(api.signIn(token));
   },
   leaveLink: () => set(withUi(state, { link: null })),
   signOut: async () => {

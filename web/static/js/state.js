@@ -16,13 +16,13 @@ export function initialState() {
     jobs: null, // Map id -> job JSON; of frames only the one that is shown; null: not known yet
     workers: null, // Map id -> worker JSON
     join: null, // how further workers join: {address, tls, token_file}
-    workerList: { search: "", sort: "Worker", descending: false },
+    workerList: { search: "", tag: "", sort: "Worker", descending: false },
     colours: new Map(), // worker name -> index into the palette, in order of appearance
     open: null, // the state of the job that is open, see openJob()
     viewer: null, // the state of the viewer, see viewer_actions.js
     submit: emptySubmission(),
     narrow: false, // true if the page is as narrow as a phone
-    ui: { confirming: null, busy: null, notice: null, again: null, signInError: null, signingIn: false, link: null },
+    ui: { confirming: null, busy: null, notice: null, again: null, renaming: null, signInError: null, signingIn: false, link: null },
   };
 }
 

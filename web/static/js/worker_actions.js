@@ -5,11 +5,12 @@ export function makeWorkerActions({ get, set, attempt, api }) {
   const list = (more) => set({ ...get(), workerList: { ...get().workerList, ...more } });
   return {
     searchWorkers: (search) => list({ search }),
+    chooseTag: (tag) => list({ tag }),
     sortWorkers: (sort, descending) => list({ sort, descending }),
     /** The event stream tells when the worker has heard of it. */
-    drainWorker: async (id) => {
+    setWorkerState: async (id, state) => {
       set(withUi(get(), { busy: `worker ${id}`, confirming: null }));
-      await attempt(() => api.drainWorker(id));
+      await attempt(() => api.setWorkerState(id, state));
       set(withUi(get(), { busy: null }));
     },
   };

@@ -1,6 +1,6 @@
 // The page of one job: its image, the image's error, and the workers that render it.
 import { h } from "../dom.js";
-import { healthComplaints, isOver, layerOf, ownerOf, seesOthers } from "../state.js";
+import { healthComplaints, isOver, layerOf, mayChange, ownerOf, seesOthers } from "../state.js";
 import { duration, jobName, moment, percent, plural } from "../format.js";
 import { downloads } from "../api.js";
 import { againButton, againForm } from "./again.js";
@@ -26,7 +26,7 @@ export function jobView(state, actions) {
   return h("article", { key: job.id, class: "job" },
     heading(state, job, actions),
     againForm(state, job, actions),
-    job.error && job.state === "failed" ? h("div", { key: "error" }, notice("bad", phrases.failed, failure(job.error))) : null,
+    job.error && job.state === "failed" ? h("div", { key: "error" }, notice("bad", phrases.failed, failure(job))) : null,
     alerts(job),
     framesStrip(state, job, actions),
     shownJob(state, state.jobs.get(state.open.shown), actions));
@@ -37,7 +37,7 @@ function shownJob(state, job, actions) {
   if (!job || job.frames) return h("p", { class: "waiting", key: "frame" }, "Fetching the frame …");
   const started = job.state !== "failed" || job.units_done > 0; // of a job that failed at once there are no figures
   return [
-    job.sequence && job.error ? h("div", { key: "frame-error" }, notice("bad", `Frame ${job.frame}`, failure(job.error))) : null,
+    job.sequence && job.error ? h("div", { key: "frame-error" }, notice("bad", `Frame ${job.frame}`, failure(job))) : null,
     h("div", { key: "columns", class: "columns" },
       h("div", { class: "picture" }, imagePanel(state, job, actions), started ? errorPlot(job, state.open, actions, state.narrow) : null, downloadLinks(job, state.open), logOf(job, state.open, actions)),
       h("div", { class: "facts" }, started ? figures(job, job.denoised ?? state.open.report?.denoised) : null, started ? timeSplit(job) : null, jobFacts(state, job, actions), inFlight(state, job))),
@@ -47,11 +47,28 @@ function shownJob(state, job, actions) {
 function heading(state, job, actions) {
   return h("div", { class: "job-head" },
     h("p", { class: "crumb" }, h("a", { href: "#/jobs" }, "Jobs"), " / ", h("code", null, job.id), seesOthers(state) ? h("span", { key: "owner", class: "owner" }, ` of ${ownerOf(job)}`) : null),
-    h("div", { class: "heading" }, h("h1", null, jobName(job)), statePill(job), againButton(state, job, actions), jobActions(state, job, actions, true)),
+    h("div", { class: "heading" }, title(state, job, actions), statePill(job), againButton(state, job, actions), jobActions(state, job, actions, true)),
     progressBar(job.progress, `Progress of ${jobName(job)}`, `wide in-${job.state}`),
     // Screen readers announce it when it changes, unlike the numbers
     h("p", { class: "unseen", role: "status" }, stateWord(job)),
     goOn(state, job, actions, sentence(job)));
+}
+
+/** The name, and the means to change it. */
+function title(state, job, actions) {
+  if (state.ui.renaming !== job.id) {
+    return [h("h1", { key: "name" }, jobName(job)),
+      mayChange(state) ? h("button", { key: "rename", type: "button", class: "small quiet", "aria-label": `Rename: ${jobName(job)}`, onclick: () => actions.openRename(job.id) }, "Rename") : null];
+  }
+  const rename = (event) => {
+    event.preventDefault();
+    actions.rename(job.id, new FormData(event.currentTarget).get("name"));
+  };
+  return [h("h1", { key: "unseen", class: "unseen" }, jobName(job)),
+    h("form", { key: "renaming", class: "rename", onsubmit: rename },
+      h("input", { id: "new-name", name: "name", "aria-label": "New name", required: true, maxlength: 256, autocomplete: "off", value: job.name }),
+      h("button", { type: "submit", class: "small", disabled: state.ui.busy === job.id }, "Rename"),
+      h("button", { type: "button", class: "small quiet", onclick: () => actions.openRename(null) }, "Keep"))];
 }
 
 function sentence(job) {
@@ -65,7 +82,7 @@ function alerts(job) {
   const complaints = healthComplaints(job);
   const warnings = job.warnings ?? [];
   return [
-    job.error && job.state !== "failed" ? h("div", { key: "unwell" }, notice("bad", phrases.unwell, failure(job.error))) : null,
+    job.error && job.state !== "failed" ? h("div", { key: "unwell" }, notice("bad", phrases.unwell, failure(job))) : null,
     job.fake === true ? h("p", { key: "fake", class: "notice warn" }, "Fake workers (--fake) make up the pixels of this job: it is no picture of the scene.") : null,
     job.few_hits > 0 ? h("p", { key: "few", class: "notice mild" }, `${plural(job.few_hits, "pixel")} ${job.few_hits === 1 ? "has" : "have"} too few samples that found light for the error to be known there: pink in the map of the error.`) : null,
     job.reference_same_seed === true ? h("p", { key: "seed", class: "notice mild" }, phrases.sameSeed) : null,
@@ -79,8 +96,8 @@ const complaint = ({ key, text, place, replay }) => h("li", { key },
   replay ? h("p", { key: "replay", class: "replay" }, "See it again: ", h("code", null, replay)) : null);
 
 /** The cause, and below it where it happened. */
-function failure(text) {
-  const { cause, where } = causeFirst(text);
+function failure(job) {
+  const { cause, where } = causeFirst(job);
   return [h("pre", { key: "cause" }, cause), where ? h("p", { key: "where", class: "failure-where" }, where) : null];
 }
 

@@ -122,7 +122,7 @@ function row(state, job, actions) {
 function reason(job) {
   const text = job.error || job.waits_for;
   if (typeof text !== "string" || !text || job.state === "done") return null;
-  return h("small", { key: "reason", class: job.state === "failed" ? "reason bad" : "reason", title: text }, causeFirst(text).cause.split("\n")[0]);
+  return h("small", { key: "reason", class: job.state === "failed" ? "reason bad" : "reason", title: text }, causeFirst({ error: text, failure: job.failure }).cause.split("\n")[0]);
 }
 
 /** What ends a job whose samples nobody asked for. */

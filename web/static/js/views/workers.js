@@ -21,8 +21,7 @@ export function workersView(state, actions) {
   return h("section", { key: "workers", class: "workers" },
     h("div", { class: "heading" }, h("h1", null, "Workers"), h("p", { class: "sub" }, `${plural(workers.length, "worker")} · ${plural(threads, "thread")} connected`)),
     classesApart(workers),
-    workers.length < kSearchFrom && !state.workerList.search ? null : h("search", { key: "search", class: "list-tools" },
-      h("input", { id: "worker-search", type: "search", placeholder: "Search: all words in name, tags, doing", "aria-label": "Search workers; all words must be there", ".value": state.workerList.search, oninput: (event) => actions.searchWorkers(event.currentTarget.value) })),
+    narrowing(state, workers, actions),
     shown.length === 0 ? h("p", { key: "nothing", class: "waiting" }, "No worker is like this.") : h("table", { key: "list", class: "list worker-list" },
       h("thead", null, h("tr", null, kColumns.map((column) => head(column, state.workerList, actions)), mayDrain(state) ? h("th", { key: "actions", scope: "col" }, h("span", { class: "unseen" }, "Actions")) : null)),
       h("tbody", null, shown.map((worker) => row(state, worker, actions)))),
@@ -33,7 +32,18 @@ const alive = (worker) => worker.state === "connected" || worker.state === "drai
 /** Workers serve everybody: only an admin sends them away. */
 const mayDrain = (state) => state.me.role === "admin";
 
+/** The fields by which fewer workers are shown: of many workers, or of workers with tags. */
+function narrowing({ workerList: { search, tag } }, workers, actions) {
+  const tags = [...new Set(workers.flatMap((worker) => worker.tags ?? []).concat(tag || []))].sort();
+  if (workers.length < kSearchFrom && !search && tags.length === 0) return null;
+  return h("search", { key: "search", class: "list-tools" },
+    h("input", { id: "worker-search", type: "search", placeholder: "Search: all words in name, tags, doing", "aria-label": "Search workers; all words must be there", ".value": search, oninput: (event) => actions.searchWorkers(event.currentTarget.value) }),
+    tags.length === 0 ? null : h("span", { key: "tag", class: "list-tool" }, h("label", { for: "worker-tag" }, "Tag"),
+      h("select", { id: "worker-tag", onchange: (event) => actions.chooseTag(event.currentTarget.value) }, ["", ...tags].map((one) => h("option", { key: one, value: one, selected: one === tag, ".selected": one === tag }, one || "any")))));
+}
+
 function matches({ workerList }, worker) {
+  if (workerList.tag && !worker.tags?.includes(workerList.tag)) return false;
   const text = [worker.name, worker.id, worker.state, worker.activity, worker.numeric_class, worker.platform, ...(worker.tags ?? [])].join("\n").toLowerCase();
   return workerList.search.toLowerCase().split(/\s+/).every((word) => text.includes(word));
 }
@@ -77,14 +87,15 @@ function row(state, worker, actions) {
     mayDrain(state) ? h("td", { key: "acts", class: "acts" }, drain(state, worker, actions)) : null);
 }
 
-/** It can't be taken back, so it asks once more. */
+/** Once it has ended it can't be taken back, so it asks once more. */
 function drain(state, worker, actions) {
-  if (worker.state !== "connected") return null;
+  if (!alive(worker)) return null;
   const busy = state.ui.busy === `worker ${worker.id}`;
   const button = (key, label, onclick, className) => h("button", { key, type: "button", class: `small ${className}`, disabled: busy, "aria-label": `${label}: ${worker.name}`, onclick }, label);
+  if (worker.state === "draining") return button("stay", "Keep after all", () => actions.setWorkerState(worker.id, "connected"), "quiet");
   if (state.ui.confirming !== `worker ${worker.id}`) return button("drain", "Drain", () => actions.confirm(`worker ${worker.id}`), "quiet");
   return h("span", { key: "sure", class: "actions" },
-    button("yes", "Really finish and end", () => actions.drainWorker(worker.id), "danger"), button("no", "Keep", () => actions.confirm(null), "quiet"));
+    button("yes", "Really finish and end", () => actions.setWorkerState(worker.id, "draining"), "danger"), button("no", "Keep", () => actions.confirm(null), "quiet"));
 }
 
 const kEverywhere = new Set(["0.0.0.0", "[::]", "*"]);
