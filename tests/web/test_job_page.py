@@ -58,9 +58,9 @@ def test_a_noisy_job_says_so_plainly_and_renders_on(farm, dashboard, fields, lab
 
 
 def test_the_coordinators_own_advice_comes_before_the_pages(farm, dashboard):
-    farm.jobs["j-1"] = job(state="done", verdict={**HEAVY, "advice": "Render it with four times the samples."})
+    farm.jobs["j-1"] = job(state="done", verdict={**HEAVY, "advice": "render it with four times the samples."})
     page = dashboard("#/jobs/j-1")
-    page.wait("document.querySelector('.noisy')?.innerText.includes('four times the samples')")
+    page.wait("document.querySelector('.noisy')?.innerText.includes('. Render it with four times the samples')")
 
 
 def test_a_job_that_waits_for_others_says_for_which(farm, dashboard):

@@ -46,6 +46,12 @@ def test_workers_are_searched_by_all_words(some, dashboard):
     page.wait("document.querySelector('main').innerText.includes('No worker is like this.')")
 
 
+def test_the_search_has_a_line_for_itself_on_a_phone(some, dashboard):
+    page = dashboard("#/workers", width=375, height=800, phone=True)
+    page.wait("document.getElementById('worker-search')")
+    assert page.evaluate("document.getElementById('worker-search').offsetWidth >= document.querySelector('.list-tools').clientWidth")
+
+
 def test_workers_are_chosen_by_a_tag(some, dashboard):
     some.workers["w-1"]["tags"] = ["gpu-room"]
     page = dashboard("#/workers")

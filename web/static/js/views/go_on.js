@@ -30,7 +30,7 @@ export function goOn(state, job, actions, sentence) {
 
 /** The coordinator's own advice if it gives some. */
 function advice({ state, verdict, denoise }) {
-  if (typeof verdict.advice === "string" && verdict.advice) return verdict.advice;
+  if (typeof verdict.advice === "string" && verdict.advice) return verdict.advice[0].toUpperCase() + verdict.advice.slice(1);
   if (state !== "done") return "It gets better with every sample.";
   return `Rendering on keeps every sample there is.${denoise ? " The denoised picture has an error of its own." : ""}`;
 }
