@@ -203,11 +203,13 @@ void describe(V& v, T& j) {
           "and spp is only an upper limit for each pixel.",
           only_if(j.spp_asked, j.spp));
   v.field("target_error", "Target error, as relMSE.", j.target_error);
-  v.field("target_layer", "The layer that must reach target_error: raw or denoised. null: the job has no target.",
+  v.field("target_layer",
+          "The layer that must reach target_error: raw or denoised. null: the job has no target.",
           only_if(j.target_error.has_value(), std::string(to_string(j.target_layer))));
   v.field("denoised_check", "The last comparison of the denoised layers' error with the target.",
           j.denoised_check);
-  v.field("denoise", "True if the image also gets the layers denoised.R, denoised.G and denoised.B.", j.denoise);
+  v.field("denoise", "True if the image also gets the layers denoised.R, denoised.G and denoised.B.",
+          j.denoise);
   v.field("spp_done", "Samples per pixel so far, averaged over the pixels.", j.spp_done);
   v.field("rmse", "Estimated from the image itself.", only_if(known, error.rmse));
   v.field("rmse_ci95", "[low, high]: the 95 % interval of the error of this image. null: unknown.",
@@ -221,20 +223,22 @@ void describe(V& v, T& j) {
           "True if the reference was rendered from this scene with this seed. It then has the same noise as "
           "the image, so its error figures mean nothing. No verdict is drawn from them.",
           j.reference_same_seed);
-  v.field("verdict", "How far the error figures can be trusted, in words. null: there are none yet.",
-          j.convergence_status ? std::optional(VerdictView{*j.convergence_status, advice_of(j)}) : std::nullopt);
+  v.field(
+      "verdict", "How far the error figures can be trusted, in words. null: there are none yet.",
+      j.convergence_status ? std::optional(VerdictView{*j.convergence_status, advice_of(j)}) : std::nullopt);
   v.field("few_hits", "Number of pixels where too few samples found light.", j.few_hits);
   v.field("pixels_without_samples", "Number of pixels in tiles without results. null: unknown.",
           j.pixels_without_samples);
-  v.field("slope",
-          "Slope of log relMSE over log core seconds, normally about -1. null: there are too few checkpoints.",
-          only_if(j.trend.has_value(), -trend.slope));
+  v.field(
+      "slope",
+      "Slope of log relMSE over log core seconds, normally about -1. null: there are too few checkpoints.",
+      only_if(j.trend.has_value(), -trend.slope));
   v.field("slope_ci95", "[low, high]: the 95 % interval of slope.",
           only_if(j.trend.has_value(), Interval(-trend.slope_hi, -trend.slope_lo)));
   v.field("efficiency_per_core", "1 / (relmse x core seconds) at the last checkpoint.", j.efficiency);
   v.field("eta_seconds", "Predicted seconds until the job ends.", j.eta_seconds);
-  v.field("eta_ci95",
-          "[low, high]: the 95 % interval of eta_seconds, for a job that ends at a target error.", j.eta_ci95);
+  v.field("eta_ci95", "[low, high]: the 95 % interval of eta_seconds, for a job that ends at a target error.",
+          j.eta_ci95);
   v.field("eta_with_more",
           "Predicted time left with more workers like the present ones. null: more workers would not help.",
           j.eta_with_more ? std::optional(MoreWorkersView{*j.eta_with_more, j.eta_with_more_ci95})
@@ -244,14 +248,16 @@ void describe(V& v, T& j) {
           "Why the job failed, as data. null: it has not failed, or not because of a unit that could not be "
           "rendered; then `error` says why.",
           j.failure);
-  v.field("after",
-          "The jobs that this job waits for and that are not done yet. Until they are done it is `queued` and "
-          "gets no worker. For a sequence: those of its first waiting frame.",
-          j.after);
-  v.field("waits_for",
-          "The same as `after`, in a sentence. If one of those jobs failed, was cancelled or was removed, the "
-          "sentence says what to do, and is also in `error`.",
-          unless_empty(j.waits_for));
+  v.field(
+      "after",
+      "The jobs that this job waits for and that are not done yet. Until they are done it is `queued` and "
+      "gets no worker. For a sequence: those of its first waiting frame.",
+      j.after);
+  v.field(
+      "waits_for",
+      "The same as `after`, in a sentence. If one of those jobs failed, was cancelled or was removed, the "
+      "sentence says what to do, and is also in `error`.",
+      unless_empty(j.waits_for));
   v.field("denoised",
           "Error of the denoised layers of a job that is done. null: the job has no denoised layers, or is a "
           "sequence.",

@@ -23,8 +23,8 @@ std::string unknown_argument(const CLI::App& app, const CLI::ParseError& error);
 // has one if the variable is not set, and must not render with the default.
 void refuse_empty_values(CLI::App& app);
 
-// Parses the arguments, which have no empty values of options. If the program is to end now, returns its exit code: 0 after --help or --version, 2
-// after wrong usage, of which a message was printed.
+// Parses the arguments, which have no empty values of options. If the program is to end now, returns its exit
+// code: 0 after --help or --version, 2 after wrong usage, of which a message was printed.
 std::optional<int> parse_arguments(CLI::App& app, int argc, const char* const* argv);
 
 }  // namespace ls

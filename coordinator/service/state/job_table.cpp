@@ -53,9 +53,7 @@ void JobEntry::free_image() {
   log.reset();
 }
 
-double JobEntry::elapsed(TimePoint now) const {
-  return clock.started() ? clock.shows(now) : fold_seconds;
-}
+double JobEntry::elapsed(TimePoint now) const { return clock.started() ? clock.shows(now) : fold_seconds; }
 
 FrameRange Sequence::range() const {
   const StoredJob &first = frames.front()->stored, &last = frames.back()->stored;
@@ -254,7 +252,8 @@ void JobTable::add(const EntryPtr& entry) {
 
 void JobTable::count_state(JobEntry& entry) {
   const auto frame = frame_of(entry.stored.id);
-  Sequence* all = frame && entry.in_sequence.counted != entry.stored.state ? sequence(frame->sequence) : nullptr;
+  Sequence* all =
+      frame && entry.in_sequence.counted != entry.stored.state ? sequence(frame->sequence) : nullptr;
   if (!all) return;
   --all->in_state[static_cast<std::size_t>(entry.in_sequence.counted)];
   entry.in_sequence.counted = entry.stored.state;
