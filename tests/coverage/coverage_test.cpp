@@ -101,7 +101,7 @@ TEST(ShortCoverage, HoldsForImagesOfFewSamplesWithPathReuse) {
     fmt::print("{}\n", rendered_line({.scene = file, .size = {32, 32}}, cell));
     ASSERT_GT(cell.trusted, 300) << cell.spp << " samples";
     const double bound = kCovered - share_slack(cell.trusted, level) + kMayBeOff;
-    EXPECT_GE(cell.relmse, cell.trusted * bound) << cell.spp << " samples";
+    EXPECT_GE(cell.relmse.share, bound) << cell.spp << " samples";
     EXPECT_GT(bound, .89) << "what covers 88 % would pass too often";
   }
 }
