@@ -19,9 +19,11 @@ T checked(Result<T> result) {
 ImageError error_of(const json& report) {
   ImageError e;
   e.rmse = report.at("rmse");
-  e.rmse_lo = report.at("rmse_ci95").at(0), e.rmse_hi = report.at("rmse_ci95").at(1);
   e.relmse = report.at("relmse");
-  e.relmse_lo = report.at("relmse_ci95").at(0), e.relmse_hi = report.at("relmse_ci95").at(1);
+  if (const json& ends = report.at("rmse_ci95"); !ends.is_null())
+    e.rmse_lo = ends.at(0), e.rmse_hi = ends.at(1);
+  if (const json& ends = report.at("relmse_ci95"); !ends.is_null())
+    e.relmse_lo = ends.at(0), e.relmse_hi = ends.at(1);
   e.spp = report.at("spp");
   e.trusted = report.at("trusted");
   return e;

@@ -105,7 +105,11 @@ bool holds(double lo, double value, double hi, double real, double width) {
 
 void count(Shares& shares, const ImageError& e, const Realised& real, double width) {
   const double part = 1.0 / shares.jobs;
-  shares.rmse += holds(e.rmse_lo, e.rmse, e.rmse_hi, std::sqrt(std::max(0.0, real.mse)), width) ? part : 0;
+  // the mean so far, over the jobs that state an interval of RMSE
+  if (e.rmse_hi > 0) {
+    const bool held = holds(e.rmse_lo, e.rmse, e.rmse_hi, std::sqrt(std::max(0.0, real.mse)), width);
+    shares.rmse += ((held ? 1 : 0) - shares.rmse) / ++shares.rmse_stated;
+  }
   shares.relmse += holds(e.relmse_lo, e.relmse, e.relmse_hi, real.relmse, width) ? part : 0;
 }
 
@@ -197,19 +201,21 @@ Coverage measure_coverage(const CoverageScene& scene, int count, int threads, st
   }));
   Coverage out;
   out.jobs = count;
+  Shares rendered{.jobs = count};
   Quotient mse, relmse;
   for (const CoverageJob& job : jobs) {
     const Realised real = realised(job, truth, jobs.size(), !stops);
     const ImageError& e = job.error;
-    const double rmse = std::sqrt(std::max(0.0, real.mse)), share = 1.0 / count;
-    out.rmse += e.rmse_lo <= rmse && rmse <= e.rmse_hi ? share : 0;
-    out.relmse += e.relmse_lo <= real.relmse && real.relmse <= e.relmse_hi ? share : 0;
+    const double share = 1.0 / count;
+    ls::test::count(rendered, e, real, 1);
     out.heavy_tail += job.heavy_tail ? share : 0;
     out.true_relmse += real.relmse * share;
     out.spp += e.spp * share;
     mse.add(e.rmse * e.rmse, real.mse);
     relmse.add(e.relmse, real.relmse);
   }
+  out.rmse = rendered.rmse;
+  out.relmse = rendered.relmse;
   out.mse_ratio = mse.ratio();
   out.relmse_ratio = relmse.ratio();
   if (stops) return out;

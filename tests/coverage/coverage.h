@@ -41,13 +41,15 @@ class Quotient {
 // Of n jobs.
 struct Shares {
   int jobs = 0;
-  double rmse = 0, relmse = 0;  // share whose interval holds the true figure
+  int rmse_stated = 0;          // those that state an interval of RMSE (ImageError)
+  double rmse = 0, relmse = 0;  // share whose interval holds the true figure; of RMSE among rmse_stated
 };
 
 struct Coverage {
   int jobs = 0;
-  double spp = 0;                 // mean over pixels and jobs
-  double rmse = 0, relmse = 0;    // share of jobs whose interval holds the true figure
+  double spp = 0;  // mean over pixels and jobs
+  // share of jobs whose interval holds the true figure, of RMSE among those that state one
+  double rmse = 0, relmse = 0;
   Ratio mse_ratio, relmse_ratio;  // mean estimated / mean true
   double true_relmse = 0;         // mean
   double heavy_tail = 0;          // share of jobs that say "don't trust yet"

@@ -5,13 +5,19 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <exception>
 #include <filesystem>
 #include <fstream>
+#include <memory>
+#include <mutex>
+#include <span>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "cli/local/local_scene.h"
 #include "core/image/error/convergence.h"
+#include "core/image/error/relative_weights.h"
 #include "core/image/film/film.h"
 #include "worker/render/render.h"
 #include "worker/render/world/world.h"
@@ -19,15 +25,8 @@
 namespace ls::test {
 namespace {
 
-constexpr double kOfDenominator = 0.01;  // relMSE's
-
-// One image after each of its rounds.
-struct Stage {
-  std::vector<float> image;  // tile by tile
-  ImageError error;
-  AreaError areas;
-  bool trusted = false;
-};
+// Both halves of one image after each of its rounds: tile by tile, each as three planes (HalfMeans).
+using Stage = std::array<std::vector<double>, 2>;
 using Stages = std::vector<Stage>;
 
 template <class T, class E>
@@ -47,115 +46,342 @@ class Renders {
       if (!file.is_text) files_.emplace(file.digest, file.path);
   }
 
-  Stages render(std::uint64_t seed, std::vector<double>* halves) const {
+  Stages render(std::uint64_t seed) const {
+    const auto world = world_of(seed);
+    const TileGrid grid{jobs_.size, RenderSettings{}.tile};
+    Film film(grid);
+    Stages stages;
+    for (RoundIndex k = 0; k < round_count(jobs_.spp); ++k) {
+      const SampleRange range = cut_range(k, jobs_.spp);
+      Stage& stage = stages.emplace_back();
+      for (TileIndex t = 0; t < grid.count(); ++t) {
+        Partial partial{{{}, {}, {}, grid.rect(t), range}, {}};
+        partial.sums = render::render_tile(*world, grid.rect(t), range, nullptr, nullptr).sums;
+        (void)rendered(film.fold(t, k, partial));
+        const auto halves = film.half_means(t);
+        for (std::size_t h = 0; h < 2; ++h)
+          stage[h].insert(stage[h].end(), halves[h].begin(), halves[h].end());
+      }
+    }
+    return stages;
+  }
+  // Whether all pixels of an image have errors in common (area_error.h).
+  bool common() const { return world_of(jobs_.first_seed)->need.connected; }
+
+ private:
+  std::shared_ptr<const render::World> world_of(std::uint64_t seed) const {
     RenderSettings settings;
     settings.size = jobs_.size;
     settings.seed = seed;
     settings.integrator = scene_.scene.integrator.name;
     settings.max_depth = scene_.scene.integrator.max_depth;
     settings.rr_depth = scene_.scene.integrator.rr_depth;
-    const auto world = rendered(render::build_world(scene_.scene, settings, files_, 1));
-    const TileGrid grid{settings.size, settings.tile};
-    Film film(grid);
-    Stages stages;
-    std::vector<ErrorPoint> points;
-    for (RoundIndex k = 0; k < round_count(jobs_.spp); ++k) {
-      const SampleRange range = cut_range(k, jobs_.spp);
-      for (TileIndex t = 0; t < grid.count(); ++t) {
-        Partial partial{{{}, {}, {}, grid.rect(t), range}, {}};
-        partial.sums = render::render_tile(*world, grid.rect(t), range, nullptr, nullptr).sums;
-        (void)rendered(film.fold(t, k, partial));
-      }
-      const ImageError e = image_error(film.error());
-      points.push_back({e.spp, e.spp, e.relmse, e.relmse_lo, e.relmse_hi});
-      Stage stage{
-          {}, e, area_error(film.error().areas, world->need.connected), judge(points, e.verdict).trusted};
-      for (TileIndex t = 0; t < grid.count(); ++t) {
-        const auto mean = film.pixels(t).mean;
-        stage.image.insert(stage.image.end(), mean.begin(), mean.end());
-        if (halves)
-          for (const auto& half : film.half_means(t)) halves->insert(halves->end(), half.begin(), half.end());
-      }
-      stages.push_back(std::move(stage));
-    }
-    return stages;
+    return rendered(render::build_world(scene_.scene, settings, files_, 1));
   }
 
- private:
   const RenderedJobs& jobs_;
   const cli::LocalScene scene_;
   render::AssetFiles files_;
 };
 
-std::vector<Stages> render_all(const RenderedJobs& jobs) {
-  const Renders renders(jobs);
-  std::vector<Stages> out(static_cast<std::size_t>(jobs.images));
-  std::vector<std::vector<double>> halves(jobs.dump.empty() ? 0 : out.size());
+// Calls work(0), ..., work(count - 1) on several threads, and throws what one of them threw.
+template <class Work>
+void on_threads(int threads, std::size_t count, const Work& work) {
   std::atomic<std::size_t> next{0};
+  std::mutex mutex;
+  std::exception_ptr thrown;
   std::vector<std::jthread> pool;
-  for (int i = 0; i < jobs.threads; ++i)
+  for (int i = 0; i < threads; ++i)
     pool.emplace_back([&] {
-      for (std::size_t n; (n = next++) < out.size();)
-        out[n] = renders.render(jobs.first_seed + n, halves.empty() ? nullptr : &halves[n]);
+      try {
+        for (std::size_t n; (n = next++) < count;) work(n);
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        thrown = std::current_exception();
+        next = count;
+      }
     });
   pool.clear();
-  if (!jobs.dump.empty()) {
-    std::ofstream file(jobs.dump, std::ios::binary);
-    for (const auto& h : halves)
-      file.write(reinterpret_cast<const char*>(h.data()),
-                 static_cast<std::streamsize>(h.size() * sizeof(double)));
-  }
+  if (thrown) std::rethrow_exception(thrown);
+}
+
+// The halves of an image as float64, one round after the other.
+void keep(const Stages& stages, const std::filesystem::path& path) {
+  const std::filesystem::path unfinished = path.string() + ".part";
+  std::ofstream file(unfinished, std::ios::binary);
+  for (const Stage& stage : stages)
+    for (const auto& half : stage)
+      file.write(reinterpret_cast<const char*>(half.data()),
+                 static_cast<std::streamsize>(half.size() * sizeof(double)));
+  file.close();
+  if (!file) throw std::runtime_error(fmt::format("{}: cannot be written", unfinished.string()));
+  std::filesystem::rename(unfinished, path);
+}
+
+Stages read_kept(const RenderedJobs& jobs, const std::filesystem::path& path) {
+  Stages stages(round_count(jobs.spp));
+  const auto values = static_cast<std::size_t>(3 * jobs.size.width * jobs.size.height);
+  const std::size_t bytes = 2 * stages.size() * values * sizeof(double);
+  if (std::filesystem::file_size(path) != bytes)
+    throw std::runtime_error(
+        fmt::format("{}: is an image of another size or number of samples", path.string()));
+  std::ifstream file(path, std::ios::binary);
+  for (Stage& stage : stages)
+    for (auto& half : stage) {
+      half.resize(values);
+      file.read(reinterpret_cast<char*>(half.data()), static_cast<std::streamsize>(values * sizeof(double)));
+    }
+  if (!file) throw std::runtime_error(fmt::format("{}: cannot be read", path.string()));
+  return stages;
+}
+
+std::vector<Stages> render_all(const RenderedJobs& jobs, const Renders& renders) {
+  if (!jobs.kept.empty()) std::filesystem::create_directories(jobs.kept);
+  std::vector<Stages> out(static_cast<std::size_t>(jobs.images));
+  on_threads(jobs.threads, out.size(), [&](std::size_t n) {
+    const std::uint64_t seed = jobs.first_seed + n;
+    const auto path = jobs.kept / fmt::format("{}.f64", seed);
+    if (!jobs.kept.empty() && std::filesystem::exists(path)) {
+      out[n] = read_kept(jobs, path);
+      return;
+    }
+    out[n] = renders.render(seed);
+    if (!jobs.kept.empty()) keep(out[n], path);
+  });
   return out;
 }
 
-}  // namespace
+constexpr std::size_t kTile = 32, kTilePixels = kTile * kTile;
 
-namespace {
-
-// The means of an image over squares of 16 x 16 pixels. The image is stored tile by tile, each as three
-// planes of 32 x 32 pixels.
-std::vector<double> square_means(const std::vector<float>& image) {
-  constexpr std::size_t kTile = 32, kSquare = 16, kAcross = kTile / kSquare;
-  std::vector<double> out(image.size() / (kSquare * kSquare));
+// The means of an image over squares of 16 x 16 pixels.
+std::vector<double> square_means(const std::vector<double>& image) {
+  constexpr std::size_t kAcross = kTile / kCorrelatedSide;
+  std::vector<double> out(image.size() / (kCorrelatedSide * kCorrelatedSide));
   for (std::size_t i = 0; i < image.size(); ++i) {
-    const std::size_t plane = i / (kTile * kTile), y = i / kTile % kTile, x = i % kTile;
-    out[(plane * kAcross + y / kSquare) * kAcross + x / kSquare] += double{image[i]} / (kSquare * kSquare);
+    const std::size_t plane = i / kTilePixels, y = i / kTile % kTile, x = i % kTile;
+    out[(plane * kAcross + y / kCorrelatedSide) * kAcross + x / kCorrelatedSide] +=
+        image[i] / static_cast<double>(kCorrelatedSide * kCorrelatedSide);
   }
   return out;
 }
 
-// Counts how often intervals of errors of areas hold, in the trusted images at one stage.
-void measure_areas(const std::vector<Stages>& all, std::size_t k, RenderedCell& cell) {
-  const auto n = static_cast<double>(all.size());
-  std::vector<std::vector<double>> last;
-  for (const Stages& s : all) last.push_back(square_means(s.back().image));
-  const std::size_t squares = last.front().size();
-  std::vector<double> sum(squares), variance(squares);
-  double green = 0;
-  for (const auto& means : last)
-    for (std::size_t i = 0; i < squares; ++i) sum[i] += means[i];
-  for (const auto& means : last)
-    for (std::size_t i = 0; i < squares; ++i) {
-      const double d = means[i] - sum[i] / n;
-      variance[i] += d * d / (n - 1);
-    }
-  for (const Stages& s : all) green += s.back().areas.mean[1];
-  for (std::size_t j = 0; j < all.size(); ++j) {
-    const Stage& stage = all[j][k];
-    if (!stage.trusted || !stage.error.settled) continue;
-    const double right = (green - all[j].back().areas.mean[1]) / (n - 1);
-    ++cell.mean_known;
-    cell.mean += std::abs(stage.areas.mean[1] - right) <= stage.areas.half_width[1];
-    const std::vector<double> means = square_means(stage.image);
-    double relmse = 0;
-    for (std::size_t i = 0; i < squares; ++i) {
-      const double m = (sum[i] - last[j][i]) / (n - 1), d = means[i] - m;
-      relmse += (d * d - variance[i] / (n - 1)) / (m * m + kOfDenominator) / static_cast<double>(squares);
-    }
-    cell.squares_known += stage.areas.relmse_hi > 0;
-    cell.squares +=
-        stage.areas.relmse_hi > 0 && stage.areas.relmse_lo <= relmse && relmse <= stage.areas.relmse_hi;
+double mean_of_green(const std::vector<double>& image) {
+  double sum = 0;
+  for (std::size_t i = 0; i < image.size(); ++i) sum += i / kTilePixels % 3 == 1 ? image[i] : 0;
+  return 3 * sum / static_cast<double>(image.size());
+}
+
+// Knows the right answer for any pair of images: the mean of the halves of all others.
+class RightAnswer {
+ public:
+  // `halves`: the halves of all images, both halves of an image beside each other
+  explicit RightAnswer(std::vector<std::vector<double>> halves)
+      : halves_(std::move(halves)), sum_(halves_.front().size()), variance_(sum_.size()) {
+    const auto n = static_cast<double>(halves_.size());
+    for (const auto& half : halves_)
+      for (std::size_t i = 0; i < sum_.size(); ++i) sum_[i] += half[i];
+    for (const auto& half : halves_)
+      for (std::size_t i = 0; i < sum_.size(); ++i) {
+        const double d = half[i] - sum_[i] / n;
+        variance_[i] += d * d / (n - 1);
+      }
   }
+
+  // The right answer for value n of an image whose halves are of the images i and j.
+  double right(std::size_t n, std::size_t i, std::size_t j) const {
+    const double of_i = halves_[2 * i][n] + halves_[2 * i + 1][n],
+                 of_j = i == j ? 0 : halves_[2 * j][n] + halves_[2 * j + 1][n];
+    return (sum_[n] - of_i - of_j) / others(i, j);
+  }
+  struct Errors {
+    double mse = 0, relmse = 0;
+  };
+  Errors errors(const std::vector<double>& values, std::size_t i, std::size_t j) const {
+    const auto count = static_cast<double>(values.size());
+    Errors out;
+    for (std::size_t n = 0; n < values.size(); ++n) {
+      const double m = right(n, i, j), off = values[n] - m,
+                   square = (off * off - variance_[n] / others(i, j)) / count;
+      out.mse += square;
+      out.relmse += square / (m * m + kRelMseDenominator);
+    }
+    return out;
+  }
+
+ private:
+  double others(std::size_t i, std::size_t j) const {
+    return static_cast<double>(halves_.size()) - (i == j ? 2 : 4);
+  }
+
+  std::vector<std::vector<double>> halves_;
+  std::vector<double> sum_, variance_;
+};
+
+template <class Value>
+RightAnswer right_answer_of(const std::vector<Stages>& all, const Value& value) {
+  std::vector<std::vector<double>> halves;
+  for (const Stages& s : all)
+    for (const auto& half : s.back()) halves.push_back(value(half));
+  return RightAnswer(std::move(halves));
+}
+
+// Where a true figure lies beside the stated interval.
+enum class Place { unstated, below, held, above };
+Place place(double lo, double real, double hi) {
+  return real < lo ? Place::below : real > hi ? Place::above : Place::held;
+}
+
+// One pair of images after one round.
+struct Look {
+  std::size_t first = 0, second = 0;
+  bool trusted = false;
+  Place relmse{}, rmse{}, mean{}, squares{};
+  double estimated_mse = 0, estimated_relmse = 0;
+  RightAnswer::Errors real;
+};
+
+class Looks {
+ public:
+  Looks(const RenderedJobs& jobs, const std::vector<Stages>& all, bool common)
+      : jobs_(jobs),
+        all_(all),
+        common_(common),
+        pixels_(right_answer_of(all, [](const auto& half) { return half; })),
+        squares_(right_answer_of(all, square_means)),
+        green_(right_answer_of(all, [](const auto& half) { return std::vector{mean_of_green(half)}; })) {}
+
+  // Looks at a pair after each round but the first.
+  std::vector<Look> look(std::size_t first, std::size_t second) const {
+    std::vector<Look> out;
+    std::vector<ErrorPoint> points;
+    for (std::size_t k = 0; k < all_[first].size(); ++k) {
+      const TileError sums = sums_of(first, second, k);
+      const ImageError e = image_error(sums);
+      points.push_back({e.spp, e.spp, e.relmse, e.relmse_lo, e.relmse_hi});
+      if (k == 0) continue;
+      Look look{first, second, judge(points, e.verdict).trusted};
+      look.estimated_mse = e.rmse * e.rmse;
+      look.estimated_relmse = e.relmse;
+      std::vector<double> image = all_[first][k][0];
+      const std::vector<double>& other = all_[second][k][1];
+      for (std::size_t i = 0; i < image.size(); ++i) image[i] = (image[i] + other[i]) / 2;
+      look.real = pixels_.errors(image, first, second);
+      if (look.trusted) {
+        look.relmse = place(e.relmse_lo, look.real.relmse, e.relmse_hi);
+        if (e.rmse_hi > 0) look.rmse = place(e.rmse_lo, std::sqrt(std::max(0.0, look.real.mse)), e.rmse_hi);
+        if (e.settled) look_at_areas(area_error(sums.areas, common_), image, look);
+      }
+      out.push_back(look);
+    }
+    return out;
+  }
+
+ private:
+  // The figures of the image that has half A of one image and half B of another.
+  TileError sums_of(std::size_t first, std::size_t second, std::size_t k) const {
+    const auto part = [&](std::size_t round, std::size_t tile) {
+      constexpr std::size_t kValues = 3 * kTilePixels;
+      const auto of = [&](std::size_t image, std::size_t half) {
+        return std::span(all_[image][round][half]).subspan(tile * kValues, kValues);
+      };
+      return HalfMeans{kTile, kTile, of(first, 0), of(second, 1)};
+    };
+    const auto spp = [&](std::size_t round) {
+      return cut_range(static_cast<RoundIndex>(round), jobs_.spp).s1;
+    };
+    TileError sums;
+    for (std::size_t t = 0; t < all_[first][k][0].size() / (3 * kTilePixels); ++t) {
+      if (k == 0) {
+        sums.add(estimate_error(part(k, t), spp(k)));
+        continue;
+      }
+      const EarlierMeans earlier{part(k - 1, t), spp(k - 1)};
+      sums.add(estimate_error(part(k, t), spp(k), &earlier));
+    }
+    return sums;
+  }
+
+  void look_at_areas(const AreaError& areas, const std::vector<double>& image, Look& look) const {
+    const double mean = areas.mean[1], half = areas.half_width[1];
+    look.mean = place(mean - half, green_.right(0, look.first, look.second), mean + half);
+    if (areas.relmse_hi > 0)
+      look.squares =
+          place(areas.relmse_lo, squares_.errors(square_means(image), look.first, look.second).relmse,
+                areas.relmse_hi);
+  }
+
+  const RenderedJobs& jobs_;
+  const std::vector<Stages>& all_;
+  const bool common_;
+  const RightAnswer pixels_, squares_, green_;
+};
+
+// Returns statistic(looks), and its standard error from leaving out each image with all of its pairs.
+template <class Statistic>
+Ratio jackknifed(const std::vector<Look>& looks, int images, const Statistic& statistic) {
+  const double all = statistic(looks), n = images;
+  double squares = 0;
+  for (std::size_t image = 0; image < static_cast<std::size_t>(images); ++image) {
+    std::vector<Look> others;
+    for (const Look& l : looks)
+      if (l.first != image && l.second != image) others.push_back(l);
+    const double d = statistic(others) - all;
+    squares += d * d;
+  }
+  return {all, std::sqrt(squares * (n - 1) / n)};
+}
+
+Held held_of(const std::vector<Look>& looks, int images, Place Look::*interval) {
+  Held out;
+  int above = 0;
+  for (const Look& l : looks) {
+    out.stated += l.*interval != Place::unstated;
+    above += l.*interval == Place::above;
+  }
+  if (out.stated == 0) return out;
+  out.above = static_cast<double>(above) / out.stated;
+  const Ratio share = jackknifed(looks, images, [&](const std::vector<Look>& some) {
+    double stated = 0, held = 0;
+    for (const Look& l : some) {
+      stated += l.*interval != Place::unstated;
+      held += l.*interval == Place::held;
+    }
+    return stated > 0 ? held / stated : 1;
+  });
+  out.share = share.value;
+  out.sigma = share.sigma;
+  return out;
+}
+
+Ratio ratio_of(const std::vector<Look>& looks, int images, double Look::*estimated,
+               double RightAnswer::Errors::*real) {
+  return jackknifed(looks, images, [&](const std::vector<Look>& some) {
+    double above = 0, below = 0;
+    for (const Look& l : some) above += l.*estimated, below += l.real.*real;
+    return above / below;
+  });
+}
+
+RenderedCell cell_of(const std::vector<Look>& looks, int images, std::uint64_t spp) {
+  RenderedCell cell;
+  cell.spp = spp;
+  cell.images = static_cast<int>(looks.size());
+  for (const Look& l : looks) {
+    cell.trusted += l.trusted;
+    cell.true_relmse += l.real.relmse / static_cast<double>(looks.size());
+  }
+  cell.relmse = held_of(looks, images, &Look::relmse);
+  cell.rmse = held_of(looks, images, &Look::rmse);
+  cell.mean = held_of(looks, images, &Look::mean);
+  cell.squares = held_of(looks, images, &Look::squares);
+  cell.mse_ratio = ratio_of(looks, images, &Look::estimated_mse, &RightAnswer::Errors::mse);
+  cell.relmse_ratio = ratio_of(looks, images, &Look::estimated_relmse, &RightAnswer::Errors::relmse);
+  return cell;
+}
+
+std::string share(const Held& h) {
+  return h.stated == 0 ? "-"
+                       : fmt::format("{:.1f} +- {:.1f} % of {}", 100 * h.share, 100 * h.sigma, h.stated);
 }
 
 }  // namespace
@@ -163,63 +389,41 @@ void measure_areas(const std::vector<Stages>& all, std::size_t k, RenderedCell& 
 std::vector<RenderedCell> measure_rendered(const RenderedJobs& jobs) {
   if (jobs.size.width % 32 != 0 || jobs.size.height % 32 != 0)
     throw std::runtime_error("the sides of the images must be multiples of 32 pixels");
-  const std::vector<Stages> all = render_all(jobs);
-  const std::size_t values = all.front().front().image.size();
-  const auto n = static_cast<double>(all.size());
-  std::vector<double> sum(values), variance(values);
-  for (const Stages& s : all)
-    for (std::size_t i = 0; i < values; ++i) sum[i] += s.back().image[i];
-  for (const Stages& s : all)
-    for (std::size_t i = 0; i < values; ++i) {
-      const double d = s.back().image[i] - sum[i] / n;
-      variance[i] += d * d / (n - 1);
-    }
+  if (jobs.images < 3 || jobs.pairs < 1 || jobs.pairs > jobs.images)
+    throw std::runtime_error("there must be at least 3 images, and at most as many pairs of each");
+  const Renders renders(jobs);
+  const std::vector<Stages> all = render_all(jobs, renders);
+  const Looks looks(jobs, all, renders.common());
+  const std::size_t pairs = all.size() * static_cast<std::size_t>(jobs.pairs);
+  std::vector<std::vector<Look>> looked(pairs);
+  on_threads(jobs.threads, pairs, [&](std::size_t n) {
+    const std::size_t first = n % all.size();
+    looked[n] = looks.look(first, (first + n / all.size()) % all.size());
+  });
   std::vector<RenderedCell> cells;
-  for (std::size_t k = 1; k < all.front().size(); ++k) {
-    RenderedCell cell;
-    cell.images = jobs.images;
-    cell.spp = static_cast<std::uint64_t>(all.front()[k].error.spp);
-    Quotient mse, relmse;
-    for (const Stages& s : all) {
-      const ImageError& e = s[k].error;
-      double true_mse = 0, true_relmse = 0;
-      for (std::size_t i = 0; i < values; ++i) {
-        const double right = (sum[i] - s.back().image[i]) / (n - 1), d = s[k].image[i] - right;
-        const double square = (d * d - variance[i] / (n - 1)) / static_cast<double>(values);
-        true_mse += square;
-        true_relmse += square / (right * right + kOfDenominator);
-      }
-      const double rmse = std::sqrt(std::max(0.0, true_mse));
-      cell.true_relmse += true_relmse / n;
-      mse.add(e.rmse * e.rmse, true_mse);
-      relmse.add(e.relmse, true_relmse);
-      if (!s[k].trusted) continue;
-      ++cell.trusted;
-      cell.rmse_known += e.rmse_hi > 0;
-      cell.rmse += e.rmse_hi > 0 && e.rmse_lo <= rmse && rmse <= e.rmse_hi;
-      cell.relmse += e.relmse_lo <= true_relmse && true_relmse <= e.relmse_hi;
-    }
-    measure_areas(all, k, cell);
-    cell.mse_ratio = mse.ratio();
-    cell.relmse_ratio = relmse.ratio();
-    cells.push_back(cell);
+  for (std::size_t k = 0; k < looked.front().size(); ++k) {
+    std::vector<Look> of_round;
+    for (const auto& pair : looked) of_round.push_back(pair[k]);
+    cells.push_back(cell_of(of_round, jobs.images, cut_range(static_cast<RoundIndex>(k + 1), jobs.spp).s1));
   }
   return cells;
 }
 
+std::string rendered_head() {
+  return "| scene | pixels | spp | true relMSE | trusted | relMSE covered | above | RMSE covered | mean "
+         "covered | "
+         "16 x 16 covered | estimated / true MSE | relMSE "
+         "|\n|---|---|---|---|---|---|---|---|---|---|---|---|";
+}
+
 std::string rendered_line(const RenderedJobs& jobs, const RenderedCell& c) {
-  const auto share = [](int held, int of) {
-    return of == 0 ? std::string("-") : fmt::format("{:.0f} %", 100.0 * held / of);
-  };
   return fmt::format(
-      "| {} | {} x {} | {} | {:.2g} | {} of {} | {} of {} | {} | {} of {} | {} of {} | {:.3f} +- {:.3f} | "
-      "{:.3f} "
-      "+- {:.3f} |",
+      "| {} | {} x {} | {} | {:.2g} | {} of {} | {} | {} | {} | {} | {} | {:.3f} +- {:.3f} | {:.3f} +- "
+      "{:.3f} |",
       std::filesystem::path(jobs.scene).stem().string(), jobs.size.width, jobs.size.height, c.spp,
-      c.true_relmse, c.trusted, c.images, share(c.rmse, c.rmse_known), c.rmse_known,
-      share(c.relmse, c.trusted), share(c.mean, c.mean_known), c.mean_known,
-      share(c.squares, c.squares_known), c.squares_known, c.mse_ratio.value, c.mse_ratio.sigma,
-      c.relmse_ratio.value, c.relmse_ratio.sigma);
+      c.true_relmse, c.trusted, c.images, share(c.relmse),
+      c.relmse.stated > 0 ? fmt::format("{:.1f} %", 100 * c.relmse.above) : "-", share(c.rmse), share(c.mean),
+      share(c.squares), c.mse_ratio.value, c.mse_ratio.sigma, c.relmse_ratio.value, c.relmse_ratio.sigma);
 }
 
 }  // namespace ls::test

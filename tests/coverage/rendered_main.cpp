@@ -1,6 +1,6 @@
-// rendered_coverage SCENE [SIDE] [SPP] [IMAGES] [SEED] [DUMP]: how often the intervals of images of a scene
-// file hold the true error, with default settings; a row of docs/measurements/error.md for each number of
-// samples.
+// rendered_coverage SCENE [SIDE] [SPP] [IMAGES] [SEED] [PAIRS] [THREADS] [FOLDER]: how often the intervals of
+// images of a scene file hold the true error, with default settings; a row of docs/measurements/error.md for
+// each number of samples. FOLDER keeps the renders (rendered.h).
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -12,7 +12,8 @@
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    fmt::print(stderr, "usage: rendered_coverage SCENE [SIDE] [SPP] [IMAGES] [SEED] [DUMP]\n");
+    fmt::print(stderr,
+               "usage: rendered_coverage SCENE [SIDE] [SPP] [IMAGES] [SEED] [PAIRS] [THREADS] [FOLDER]\n");
     return 2;
   }
   ls::test::RenderedJobs jobs;
@@ -23,11 +24,14 @@ int main(int argc, char** argv) {
   jobs.spp = static_cast<std::uint64_t>(number(3, 64));
   jobs.images = static_cast<int>(number(4, 100));
   jobs.first_seed = static_cast<std::uint64_t>(number(5, 1));
-  if (argc > 6) jobs.dump = argv[6];
+  jobs.pairs = static_cast<int>(number(6, 1));
+  jobs.threads = static_cast<int>(number(7, 2));
+  if (argc > 8) jobs.kept = argv[8];
   ls::log_level(ls::LogLevel::off);
   try {
-    for (const auto& cell : ls::test::measure_rendered(jobs))
-      fmt::print("{}\n", ls::test::rendered_line(jobs, cell));
+    const auto cells = ls::test::measure_rendered(jobs);
+    fmt::print("{}\n", ls::test::rendered_head());
+    for (const auto& cell : cells) fmt::print("{}\n", ls::test::rendered_line(jobs, cell));
   } catch (const std::exception& e) {
     fmt::print(stderr, "{}\n", e.what());
     return 1;

@@ -40,6 +40,7 @@ void AreaSums::add(const AreaSums& o) {
     values[c] += o.values[c];
     noise[c] += o.noise[c];
     last[c] += o.last[c];
+    powers[c] += o.powers[c];
     squares[c] += o.squares[c];
     fourths[c] += o.fourths[c];
   }
@@ -82,6 +83,7 @@ AreaSums area_sums(const HalfMeans& h, std::uint64_t spp, const EarlierMeans* ea
       const double mean = values[i] / pixels;
       out.values[c] += values[i];
       out.noise[c] += noise[i];
+      out.powers[c] += powers[i];
       out.squares[c] += noise[i] * noise[i];
       out.fourths[c] += fourth(noise[i]);
       const double weight = 1 / (mean * mean + kRelMseDenominator);
@@ -117,9 +119,10 @@ AreaError area_error(const AreaSums& s, bool common) {
     const double before = s.noise[c] - s.last[c],
                  alike = two_parts ? s.last[c] * s.last[c] + before * before : s.noise[c] * s.noise[c];
     if (!(s.squares[c] > 0)) continue;
-    const double freedom = 3 * s.squares[c] * s.squares[c] / s.fourths[c] - 2;
+    const double freedom = 3 * s.squares[c] * s.squares[c] / s.fourths[c] - 2,
+                 variance = std::max(s.squares[c], std::sqrt(s.powers[c] * s.squares[c]));
     out.half_width[c] =
-        (common ? student(degrees) * std::sqrt(alike) : student(freedom) * std::sqrt(s.squares[c])) / pixels;
+        (common ? student(degrees) * std::sqrt(alike) : student(freedom) * std::sqrt(variance)) / pixels;
     if (count > 1)
       correlation = std::max(correlation, std::clamp((alike / s.squares[c] - 1) / (count - 1), 0.0, 1.0));
   }

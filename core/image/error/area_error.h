@@ -8,8 +8,11 @@
 // this value of a pixel.
 //
 // The mean of the image: if squares are independent, its variance is, per channel,
-//   sum over squares of (sum of D)^2 / pixels^2,
-// with 3 (sum of x)^2 / (sum of x^2) - 2 degrees of freedom, x = (sum of D)^2 of a square: the number of
+//   Q / pixels^2,   Q = sum over squares of (sum of D)^2.
+// If pixels are independent, too, it is P / pixels^2 with P = sum over pixels of D^2, which is known better.
+// Errors that pixels have in common raise Q alone, and with few squares Q is too low in many images: so the
+// variance is from Q or, if that is smaller, from the geometric mean of both. The degrees of freedom are
+//   3 (sum of x)^2 / (sum of x^2) - 2,   x = (sum of D)^2 of a square: the number of
 // squares if all are alike and Gaussian. If all pixels have errors in common, only the mean of D over the
 // image tells them. This mean is the sum of a part from the last round and a part from the samples before it.
 // If these use different sets of light vertices, the parts are independent, and the sum of their squares has
@@ -56,6 +59,7 @@ struct AreaSums {
   // The smallest and largest number of samples per pixel that a tile had before its last round. Neither can
   // be computed from the tile's present samples alone.
   std::uint64_t fewest_before = 0, most_before = 0;
+  ChannelSums powers{};              // sum over pixels of D^2
   ChannelSums squares{}, fourths{};  // sums over squares of the 2nd and 4th power of (sum of D)
   double relative = 0;               // sum over squares of pixels * E^2 / (S^2 + 0.01), all channels
   // Sums over squares of u and u^2, where u is the sum over pixels and channels of D^2 / (S^2 + 0.01)
@@ -66,6 +70,10 @@ struct AreaSums {
 };
 // `earlier` is null in the first round.
 AreaSums area_sums(const HalfMeans& halves, std::uint64_t spp, const EarlierMeans* earlier);
+
+// Number of squares at which what correlated errors add to a variance gets the weight 1/2. The sum over this
+// many squares is known to a third. The weight approaches 1 in images of many squares.
+inline constexpr double kHalfWeightSquares = 16;
 
 struct AreaError {
   ChannelSums mean{};        // mean of the image in each channel

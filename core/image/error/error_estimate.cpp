@@ -21,6 +21,11 @@ constexpr int kReach = 2;  // radius of the 5 x 5 window
 // deviation of sqrt(4/3/100) = 12 %. In a small image 1 / kPartOfSmall of its pixels suffices, because object
 // edges alone sometimes carry the error of a 32 x 32 image.
 constexpr double kFewPixels = 100, kPartOfSmall = 48;
+// The interval of RMSE, which is not weighed, is unknown if fewer than so many pixels carry the error: the
+// light of the brightest ones may not have been found at all, and then the error is larger by far. Pixels of
+// equal Gaussian noise count as a third of their number; to a sixteenth it falls where the noise of single
+// pixels is several times as large as that of most.
+constexpr double kFewUnweighed = 256, kPartUnweighed = 16;
 // In images with many pixels the figures are not trusted if one pixel has a larger share of the error than
 // this.
 constexpr double kLargeShare = 0.1;
@@ -44,9 +49,6 @@ constexpr std::uint64_t kTellingSamples = 16;
 // The interval of relMSE contains both sums of squared relative errors, which differ in their weights, and
 // reaches beyond by this part of the distance between their logarithms.
 constexpr double kBeyond = 0.5;
-// Number of squares at which the contribution of correlated errors to the variance gets the weight 1/2. The
-// sum over this many squares is known to a third. The weight approaches 1 in images of many squares.
-constexpr double kHalfWeightSquares = 16;
 
 // Returns the expected amount by which skewed noise lowers the sum of squared relative errors, as a negative
 // number. error_estimate.h derives it. The sum is accumulated per column, so that the compiler vectorises the
@@ -161,10 +163,20 @@ double effective_pixels(const NoiseSums& s) {
 // Returns true if the pixels with the largest noise have light in both halves: they are not outliers.
 bool settled(const NoiseSums& s) { return s.one_sided < kSettledShare * s.squares; }
 
+// Returns true if a single pixel has a large share of the error of a large image.
+bool one_pixel_rules(const NoiseSums& s, double pixels) {
+  return s.largest > kLargeShare * s.squares && pixels * kLargeShare > 4 * kFewPixels;
+}
+
+// Returns true if RMSE has an interval: pixels with light in both halves carry the error, and not few.
+bool rmse_known(const NoiseSums& s, double pixels) {
+  return settled(s) && effective_pixels(s) >= std::min(kFewUnweighed, pixels / kPartUnweighed) &&
+         !one_pixel_rules(s, pixels);
+}
+
 // Returns true if few pixels carry the error.
 bool carried_by_few(const NoiseSums& s, double pixels) {
-  return effective_pixels(s) < std::min(kFewPixels, pixels / kPartOfSmall) ||
-         (s.largest > kLargeShare * s.squares && pixels * kLargeShare > 4 * kFewPixels);
+  return effective_pixels(s) < std::min(kFewPixels, pixels / kPartOfSmall) || one_pixel_rules(s, pixels);
 }
 
 // Returns true if single pixels have far more noise than their neighbours, as outliers do. The noise of the
@@ -251,6 +263,7 @@ void TileError::add(const TileError& o) {
   lit += o.lit;
   skew += o.skew;
   other_weights += o.other_weights;
+  unsure_weights += o.unsure_weights;
   areas.add(o.areas);
   plain.add(o.plain);
   relative.add(o.relative);
@@ -347,6 +360,7 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMea
   for (std::size_t i = 0; i < 3 * n; ++i) d[i] *= w.roots[i];
   out.relative = noise_sums(d, w.edges, h.width, h.height);
   out.relative.one_sided = one_sided_squares(d, sides);
+  for (const double delta : w.unsure) out.unsure_weights += delta * delta;
   for (NoiseSums* sums : {&out.plain, &out.relative})
     sums->changes = {sums->squares, trace_of_moments(*sums, true), 0};
   out.areas = area_sums(h, spp, earlier);
@@ -401,7 +415,7 @@ ImageError image_error(const TileError& sums) {
   out.lit = sums.lit > 0;
   judge(out, sums.relative, pixels);
   out.settled = settled(sums.plain);
-  if (!out.trusted || (out.settled && !carried_by_few(sums.plain, pixels))) {
+  if (!out.trusted || rmse_known(sums.plain, pixels)) {
     const double plain = half_width(sums.plain, pixels, out.trusted);
     out.rmse_lo = out.rmse * std::exp(-plain / 2);
     out.rmse_hi = out.rmse * std::exp(plain / 2);
@@ -409,7 +423,8 @@ ImageError image_error(const TileError& sums) {
   const double relative = half_width(sums.relative, pixels, out.trusted);
   const double other = std::max(0.0, out.relmse + sums.other_weights / (3 * pixels));
   const double apart = other > 0 && out.relmse > 0 ? std::log(other / out.relmse) : 0;
-  const double up = std::max(apart, -kBeyond * apart), down = std::max(-apart, kBeyond * apart);
+  const double unsure = out.relmse > 0 ? std::sqrt(sums.unsure_weights) / sums.relative.squares : 0;
+  const double up = std::max(apart, -kBeyond * apart), down = std::max({-apart, kBeyond * apart, unsure});
   out.relmse_lo = out.relmse * std::exp(-relative - down);
   out.relmse_hi = out.relmse * std::exp(relative + up);
   return out;

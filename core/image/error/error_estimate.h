@@ -49,6 +49,18 @@
 // belongs to the larger, and beyond the first sum by half of their distance on the other side, since both may
 // be on the same side of the right value. (Half: chosen with images of few samples of tests/coverage.)
 //
+// Outliers: where v is D^2 of the pixel, the pixel is taken to be like its neighbours, and one half to hold
+// an outlier. But the pixel may also be bright, and the other half have missed its light, as at the edge of a
+// glint that one sample in 20 finds: then its weight is f(S), which is far smaller. Two halves cannot tell
+// which of the two is true. Let
+//   delta = sum over channels of max(0, w - f(S)) D^2
+// be what such a pixel adds to the sum in the first case and not in the second. If p is the probability of
+// the second case, the pixel's part of the sum has the variance p (1 - p) delta^2 <= delta^2 / 4. Pixels are
+// of either kind independently, so 1.96 standard deviations are at most
+//   sqrt(sum over pixels of delta^2).
+// The lower end of the interval reaches lower by this, relative to the sum, or as far as the other sum of
+// weights requires, whichever is more. No pixel is missing at the upper end: w > f(S).
+//
 // Interval of the realised error: d - e^2 = -ab, so Var(sum of d - sum of e^2) = sum of 4 v^2 exactly,
 // whatever the distribution of a and b. Over channels it is 4 tr(V^2), with V the covariance of the channels
 // of D. Divided by the square of the sum of tr V, it depends only on how unevenly noise is spread over pixels
@@ -159,6 +171,7 @@ struct TileError {
   // The sum of squared relative errors with weights from independent samples, minus relative.squares; 0 if
   // the rounds do not have equally many samples
   double other_weights = 0;
+  double unsure_weights = 0;  // sum over pixels of delta^2, for outliers that may be bright pixels
   AreaSums areas;
   void add(const TileError& other);
   void subtract_skew(double part);
@@ -190,7 +203,7 @@ bool has_few_hits(const HalfMeans& halves, int x, int y);
 struct ImageError {
   // root mean squared error, and the 95 % interval of this image's realised error. The interval is unknown
   // (both ends are 0) if the image is trusted, but so few bright pixels carry this error that it is not
-  // known.
+  // known, or that brighter ones may not have been found yet.
   double rmse = 0, rmse_lo = 0, rmse_hi = 0;
   // the interval contains what is unknown of the weights, too
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;

@@ -95,7 +95,8 @@ struct Channel {
 // Computes the weights of one row of pixels, which starts at the index `at` of the channel. spans[x] is the
 // width of the window of pixel x, in pixels; `rows` is the height of all these windows.
 void weigh_row(const Channel& c, std::size_t at, const std::vector<double>& spans, double rows,
-               double* __restrict roots, double* __restrict leans, double* __restrict edges) {
+               double* __restrict roots, double* __restrict leans, double* __restrict edges,
+               double* __restrict unsure) {
   const double *__restrict own = c.own.at(at), *__restrict square = c.square.at(at), *__restrict noise = c.noise.at(at);
   const double *__restrict sum = c.own_sum.at(at), *__restrict squares = c.square_sum.at(at),
                *__restrict noises = c.noise_sum.at(at), *__restrict span = spans.data();
@@ -106,10 +107,13 @@ void weigh_row(const Channel& c, std::size_t at, const std::vector<double>& span
     double structure = larger(0, (squares[x] - square[x]) / others - mean * mean - u * (1 - 1 / others));
     const double bright = off * off > kSignificant * larger(u, d2) ? off * off : 0;
     structure = larger(structure, bright);
-    const double v = d2 > structure + u ? d2 : u, all = structure + v;
+    const bool outlier = d2 > structure + u;
+    const double v = outlier ? d2 : u, all = structure + v;
     const double g = structure > 0 ? structure / all : 0;
     const double m = mean + g * off, f = 1 / (m * m + kRelMseDenominator);
-    roots[x] = std::sqrt(corrected(m, f, u * (g * g + (1 - g) * (1 - g) / others)));
+    const double w = corrected(m, f, u * (g * g + (1 - g) * (1 - g) / others));
+    roots[x] = std::sqrt(w);
+    unsure[x] += outlier ? d2 * larger(0, w - 1 / (s * s + kRelMseDenominator)) : 0;
     leans[x] = -2 * m * f * f * g;
     edges[x] += g / 3;
   }
@@ -132,7 +136,8 @@ double relative_weight(double m, double s2) { return corrected(m, 1 / (m * m + k
 RelativeWeights relative_weights(const HalfMeans& h) {
   const auto width = static_cast<std::size_t>(h.width), height = static_cast<std::size_t>(h.height),
              n = width * height;
-  RelativeWeights out{std::vector<double>(3 * n), std::vector<double>(3 * n), std::vector<double>(n)};
+  RelativeWeights out{std::vector<double>(3 * n), std::vector<double>(3 * n), std::vector<double>(n),
+                      std::vector<double>(n)};
   if (n == 1) {
     weigh_alone(h, out);
     return out;
@@ -145,7 +150,7 @@ RelativeWeights relative_weights(const HalfMeans& h) {
     channel.read(&h.a[plane], &h.b[plane], windows);
     for (std::size_t y = 0; y < height; ++y)
       weigh_row(channel, y * width, spans, span_of(y, height), &out.roots[plane + y * width],
-                &out.leans[plane + y * width], &out.edges[y * width]);
+                &out.leans[plane + y * width], &out.edges[y * width], &out.unsure[y * width]);
   }
   for (double& g : out.edges) g *= g;
   return out;

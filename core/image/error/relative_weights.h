@@ -14,9 +14,10 @@ inline constexpr double kRelMseDenominator = 0.01;
 
 // The weights w of the pixels of a tile, for relMSE. `roots` is the square root of the weight in each
 // channel, and `leans` the derivative of the weight with respect to the pixel's own value; both have three
-// planes. `edges` has one plane: the square of the mean of g (error_estimate.h) over the channels.
+// planes. `edges` has one plane: the square of the mean of g (error_estimate.h) over the channels. `unsure`
+// has one plane: delta (error_estimate.h), what the pixel would lose if it were as bright as it looks.
 struct RelativeWeights {
-  std::vector<double> roots, leans, edges;
+  std::vector<double> roots, leans, edges, unsure;
 };
 RelativeWeights relative_weights(const HalfMeans& halves);
 

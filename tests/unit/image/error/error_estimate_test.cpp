@@ -289,14 +289,47 @@ TEST(ErrorEstimate, RmseHasNoIntervalWhereFewBrightPixelsCarryIt) {
 
   const ImageError some = image_error(run(glints, relative, grey, random).estimate);
   const ImageError none = image_error(run(bright, uneven, grey, random).estimate);
+  // A pixel in eight, with Gaussian noise: they count as 43, and 64 are asked of an image of 1,024.
+  const auto one_in_eight = [](std::size_t p, std::size_t) { return p % 8 == 5 ? .1 : .001; };
+  const ImageError several = image_error(run(bright, one_in_eight, grey, random).estimate);
 
   ASSERT_TRUE(some.trusted) << some.verdict;
   EXPECT_EQ(some.rmse_lo, 0);
   EXPECT_EQ(some.rmse_hi, 0);
   EXPECT_GT(some.relmse_lo, 0);
   EXPECT_GT(some.relmse_hi, some.relmse);
+  ASSERT_TRUE(several.trusted) << several.verdict;
+  EXPECT_EQ(several.rmse_hi, 0);
   EXPECT_GT(none.rmse_lo, 0);
   EXPECT_GT(none.rmse_hi, none.rmse);
+}
+
+// One half of a pixel is 9, all else is 1. If the pixel is like its neighbours, half A holds an outlier; if
+// it is as bright as it looks (5), its weight is 1 / 25.01.
+TEST(ErrorEstimate, IntervalReachesLowerByOutliersThatMayBeBrightPixels) {
+  std::vector<double> a(3 * kErrorPixels, 1.0), b(3 * kErrorPixels, 1.0);
+  for (std::size_t c = 0; c < 3; ++c) a[c * kErrorPixels + 10 * kErrorSide + 10] = 9;
+
+  const TileError told = estimate_error({kErrorSide, kErrorSide, a, b}, 64);
+  TileError sure = told;
+  sure.unsure_weights = 0;
+
+  const double delta = 3 * 16 * (1 / 1.01 - 1 / 25.01);
+  EXPECT_NEAR(told.unsure_weights, delta * delta, 1e-12 * delta * delta);  // rounding of a few sums
+  const ImageError image = image_error(told), without = image_error(sure);
+  EXPECT_DOUBLE_EQ(image.relmse_lo, without.relmse_lo * std::exp(-delta / told.relative.squares));
+  EXPECT_EQ(image.relmse_hi, without.relmse_hi);
+  EXPECT_EQ(image.relmse, without.relmse);
+}
+
+TEST(ErrorEstimate, BrightPixelsWithLightInBothHalvesAreNoOutliers) {
+  std::vector<double> a(3 * kErrorPixels, 1.0), b(3 * kErrorPixels, 1.0);
+  for (std::size_t c = 0; c < 3; ++c) {
+    a[c * kErrorPixels + 10 * kErrorSide + 10] = 9;
+    b[c * kErrorPixels + 10 * kErrorSide + 10] = 8;
+  }
+
+  EXPECT_EQ(estimate_error({kErrorSide, kErrorSide, a, b}, 64).unsure_weights, 0);
 }
 
 TEST(ErrorEstimate, LowerEndStaysAboveZeroForAllPixels) {

@@ -104,7 +104,7 @@ TEST(SkewedNoise, IntervalOfFewSamplesIsWiderThanTheIntervalsOfBothWeightings) {
   const EarlierMeans earlier{{kSkewedSide, kSkewedSide, before[0], before[1]}, 4};
   const TileError told = estimate_error({kSkewedSide, kSkewedSide, now[0], now[1]}, 8, &earlier);
   TileError alone = told;
-  alone.other_weights = 0;
+  alone.other_weights = alone.unsure_weights = 0;
   for (const double other : {.3, -.3}) {
     TileError both = alone;
     both.other_weights = other * both.relative.squares;
