@@ -63,6 +63,8 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class):
     if render.use_motion_blur:
         problems.unsupported("Render Properties: Motion Blur. Lightshaft renders an instant: switch it off")
     transparent = True if render.film_transparent else None
+    if transparent and getattr(getattr(scene, "cycles", None), "film_transparent_glass", False):
+        problems.unsupported("Render Properties > Film > Transparent Glass. Glass is opaque in Lightshaft's alpha: switch it off")
     film = element(
         "film",
         "hdrfilm",

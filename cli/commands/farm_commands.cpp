@@ -93,7 +93,11 @@ int extend(FarmApi& api, const FarmFlags& flags) {
   return flags.spp.empty() ? change(api, flags, "target_error", flags.target_error)
                            : change(api, flags, "spp", flags.spp);
 }
-int rename(FarmApi& api, const FarmFlags& flags) { return change(api, flags, "name", flags.name); }
+int rename(FarmApi& api, const FarmFlags& flags) {
+  if (!flags.frame.empty())
+    return usage_error("a frame has the name of its sequence: rename the sequence, without --frame");
+  return change(api, flags, "name", flags.name);
+}
 int priority(FarmApi& api, const FarmFlags& flags) { return change(api, flags, "priority", flags.priority); }
 
 int after(FarmApi& api, const FarmFlags& flags) { return change(api, flags, {{"after", flags.after}}); }

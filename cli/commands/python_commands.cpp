@@ -68,7 +68,8 @@ void add_python_commands(CLI::App& app, Action& action) {
               "scene of the first picture; default: the one that comes with Lightshaft");
   CLI::App& join = add(app, action, "join", "render for the farm of another machine, until Ctrl-C");
   pass_option(join, "host", "HOST", "the machine on which `lightshaft up --lan` runs")->required();
-  pass_option(join, "--code", "CODE", "the code that it printed; if it is missing, `join` asks for it");
+  pass_option(join, "--code", "CODE",
+              "the code that `lightshaft up --lan` printed; without this option `join` asks for it");
 }
 
 }  // namespace ls::cli

@@ -217,7 +217,7 @@ void add_workers(std::vector<Finding>& all, const FarmFacts& facts, const std::s
   for (const WorkerFacts& worker : *facts.workers)
     if (worker.state != "lost" && worker.state != "gone") present.push_back(worker);
   if (present.empty()) {
-    all.push_back(warning("workers", "none is connected, so no job makes progress",
+    all.push_back(warning("workers", "none is connected, so no job can make progress",
                           "start lightshaft-worker with this coordinator's address for workers (--grpc)"));
     return;
   }
@@ -253,11 +253,13 @@ void add_workers(std::vector<Finding>& all, const FarmFacts& facts, const std::s
 }
 
 Finding of_jobs(const std::vector<StuckJob>& stuck) {
-  if (stuck.empty()) return ok("jobs", "all that have not ended make progress");
+  if (stuck.empty()) return ok("jobs", "no unfinished job is stuck");
   const StuckJob& first = stuck.front();
   return warning("jobs",
-                 fmt::format("{} of those that have not ended {} no progress; {}: {}", stuck.size(),
-                             stuck.size() == 1 ? "makes" : "make", first.id, first.why),
+                 fmt::format("{} no progress; {}: {}",
+                             stuck.size() == 1 ? "1 unfinished job makes"
+                                               : fmt::format("{} unfinished jobs make", stuck.size()),
+                             first.id, first.why),
                  fmt::format("lightshaft show {}", shell_word(first.id)));
 }
 

@@ -111,7 +111,8 @@ void JobOptions::add_to(CLI::App& app, Command command) {
   job::for_each_setting(any, [&]<class T>(const Setting& s, const T& value) {
     if (!has(command, s)) return;
     Given& given = given_[s.name];
-    const std::string option(s.option), placeholder(s.placeholder), help = help_of(s);
+    const std::string option(s.option), placeholder(s.placeholder),
+        help = help_of(command == Command::again ? job::described_for_again(s) : s);
     if constexpr (std::is_same_v<T, bool>)
       app.add_flag(option, given.flag, help);
     else if constexpr (std::is_same_v<T, job::Names>)

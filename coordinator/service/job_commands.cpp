@@ -25,6 +25,11 @@ Result<void> check(const JobChange& change) {
     return fail(Errc::invalid_argument,
                 "samples (spp) and target_error cannot be changed at once: one decides "
                 "how far the job goes; change one, then the other");
+  const auto is_control = [](unsigned char c) { return c < ' ' || c == 0x7f; };
+  if (change.name && (std::ranges::any_of(*change.name, is_control) ||
+                      change.name->find_first_not_of(' ') == std::string::npos))
+    return fail(Errc::invalid_argument,
+                "change: 'name' must have a character that is not blank, and no control characters");
   return {};
 }
 
@@ -226,6 +231,8 @@ Result<void> JobCommands::remove_job(Core& core, const JobId& id) const {
 
 Result<void> JobCommands::change_job(Core& core, const EntryPtr& entry, const JobChange& change) const {
   if (auto ok = check(change); !ok) return ok;
+  if (change.name && frame_of(entry->stored.id))
+    return fail(Errc::invalid_argument, "a frame has the name of its sequence: rename the sequence");
   if (change.state)
     if (auto ok = may_become(*entry, *change.state, change.spp || change.target_error); !ok) return ok;
   if (auto ok = check_focus(change, {entry}); !ok) return ok;

@@ -139,9 +139,10 @@ void describe(V& v, T& f) {
           "no_worker: every worker has failed too many units of the job.",
           Word{to_string(f.kind), kKinds});
   v.field("tile", "", f.tile);
-  v.field("rect", "[x0, y0, x1, y1] of the tile, in pixels, without x1 and y1.", corners(f.rect));
+  v.field("rect", "[x0, y0, x1, y1] of the tile, in pixels; x1 and y1 are exclusive.", corners(f.rect));
   v.field("round", "", f.round);
-  v.field("samples", "[first, last) sample of the round.", std::array{f.samples.s0, f.samples.s1});
+  v.field("samples", "[first, end]: the samples of the round; end is exclusive.",
+          std::array{f.samples.s0, f.samples.s1});
   v.field("frame", "The frame that failed, of a sequence.", f.frame);
   v.field("attempts", "What the workers reported, the latest attempt last.", f.attempts);
   v.field("replay", "Command that renders the failed pixel again. null: the pixel is not known.",

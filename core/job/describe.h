@@ -20,13 +20,14 @@ std::string integrator_names();  // returns "volpath, volpath_distant_mis, ..."
 inline constexpr Setting kSpp{
     .name = "spp",
     .doc = "Samples per pixel; the scene's number if spp, a target error and a time are all missing.",
-    .more =
-        "With a target error, no pixel gets more samples than this. A job that is submitted again without "
-        "the three keeps those of the earlier job.",
+    .more = "With a target error, no pixel gets more samples than this.",
     .range = {1, kMaxSpp},
     .option = "--spp",
     .render = true,
-    .again = true};
+    .again = true,
+    .again_doc =
+        "Samples per pixel. Without spp, a target error and a time, the new job ends as the earlier "
+        "one was asked to."};
 inline constexpr Setting kTargetError{
     .name = "target_error",
     .doc = "The job ends when the estimated relMSE of its image is at most this.",
@@ -87,6 +88,8 @@ void describe(V& v, T& s) {
              .absent = "0",
              .render = true,
              .again = true,
+             .again_doc = "Number from which all random numbers follow. Without it, the seed of the earlier "
+                          "job.",
              .pixels = true},
             s.seed);
   v.setting(
@@ -150,15 +153,18 @@ void describe(V& v, T& s) {
              .render = true,
              .always = true},
             s.float_output);
-  v.setting({.name = "denoise",
-             .doc = "The image also has the layers denoised.R, denoised.G and denoised.B, whose error is in "
-                    "the report.",
-             .more = "Needs Open Image Denoise (deploy/install-denoiser.sh); 409 if the coordinator does not "
-                     "have it.",
-             .option = "--denoise",
-             .render = true,
-             .again = true},
-            s.denoise);
+  v.setting(
+      {.name = "denoise",
+       .doc = "The image also has the layers denoised.R, denoised.G and denoised.B, whose error is in "
+              "the report.",
+       .more = "Needs Open Image Denoise (deploy/install-denoiser.sh); 409 if the coordinator does not "
+               "have it.",
+       .option = "--denoise",
+       .render = true,
+       .again = true,
+       .again_doc = "The image also has the layers denoised.R, denoised.G and denoised.B, whose error is "
+                    "in the report. Without it, the job has them if the earlier job has."},
+      s.denoise);
   v.setting({.name = "tags",
              .doc = "Only workers that have all of these tags render the job.",
              .option = "--tags",
@@ -183,7 +189,9 @@ void describe(V& v, T& s) {
              .range = {1, kMaxMemory},
              .option = "--memory",
              .placeholder = "BYTES",
-             .again = true},
+             .again = true,
+             .again_doc = "Only workers with at least this many bytes of memory render the job. Without it, "
+                          "the memory of the earlier job."},
             s.memory);
   v.setting({.name = "numeric_class",
              .doc = "Only workers of this numeric class render the job: the beginning of its digest or of "

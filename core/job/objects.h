@@ -13,6 +13,13 @@ namespace ls::job {
 using Chosen = bool (*)(const Setting&);
 inline bool is_chosen(Chosen chosen, const Setting& s) { return !chosen || chosen(s); }
 inline bool goes_with_again(const Setting& s) { return s.again; }
+// Returns the row with the sentences for a request to submit a job again.
+inline Setting described_for_again(Setting s) {
+  if (s.again_doc.empty()) return s;
+  s.doc = s.again_doc;
+  s.more = {};
+  return s;
+}
 
 template <class F>
 struct Visitor {
@@ -42,7 +49,7 @@ std::vector<std::string> names_of(Chosen chosen = nullptr) {
 // Returns how a message calls the setting: "spec: 'spp'", "query parameter 'spp'" or "--spp". `what` is the
 // name of the JSON object.
 inline std::string called(const Setting& s, Form form, std::string_view what) {
-  if (form == Form::option) return std::string(s.option);
+  if (form == Form::option) return s.option.empty() ? fmt::format("the {}", s.name) : std::string(s.option);
   return form == Form::query ? fmt::format("query parameter '{}'", s.query_name())
                              : fmt::format("{}: '{}'", what, s.name);
 }

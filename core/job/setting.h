@@ -37,6 +37,8 @@ struct Setting {
   // submit a job again also accepts only the settings with `again`.
   bool render = false;
   bool again = false;
+  // What it does in a request to submit a job again, if that differs: instead of `doc` and `more`
+  std::string_view again_doc = {};
   bool pixels = false;  // the command that renders one sample again needs this setting
   // The key is in canonical JSON also if the setting has its default value. Digests and stored jobs depend on
   // that text, so a new setting leaves this false.

@@ -9,7 +9,7 @@ from typing import IO
 
 from lightshaft_command.console import Given
 from lightshaft_command.farm_up.numbers import whole_option
-from lightshaft_command.programs import Problem
+from lightshaft_command.programs import Problem, Usage
 
 MOST_THREADS = 256  # as the worker has it
 
@@ -20,7 +20,12 @@ def usual() -> pathlib.Path:
 
 
 def data_of(given: Given) -> pathlib.Path:
-    return (pathlib.Path(given.text("--data")).expanduser() if given.flag("--data") else usual()).absolute()
+    if not given.flag("--data"):
+        return usual().absolute()
+    try:
+        return pathlib.Path(given.text("--data")).expanduser().absolute()
+    except RuntimeError:
+        raise Usage(f"--data '{given.text('--data')}': there is no such user") from None
 
 
 def threads_of(given: Given) -> int | None:

@@ -144,8 +144,7 @@ INSTANTIATE_TEST_SUITE_P(
         FarmFault{"version", Status::warning, "0.9", [](FarmFacts& f) { f.version = "0.9"; }},
         FarmFault{"version", Status::warning, "does not tell", [](FarmFacts& f) { f.version = ""; }},
         FarmFault{"workers", Status::warning, "none", [](FarmFacts& f) { f.workers->at(0).state = "lost"; }},
-        FarmFault{"jobs", Status::warning,
-                  "1 of those that have not ended makes no progress; j-7: lacks a tag",
+        FarmFault{"jobs", Status::warning, "1 unfinished job makes no progress; j-7: lacks a tag",
                   [](FarmFacts& f) {
                     f.stuck_jobs = std::vector{StuckJob{"j-7", "lacks a tag"}};
                   }},

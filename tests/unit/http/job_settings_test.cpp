@@ -101,7 +101,7 @@ std::string properties_of(const std::string& indent, job::Chosen chosen = nullpt
   job::for_each_setting(object, [&](const Setting& s, const auto& value) {
     if (!job::is_chosen(chosen, s)) return;
     Json schema = schema_of(s, value);
-    schema["description"] = sentences(s);
+    schema["description"] = sentences(chosen == job::goes_with_again ? job::described_for_again(s) : s);
     lines += fmt::format("{}{}\"{}\": {}", lines.empty() ? "" : ",\n", indent, s.name, in_a_line(schema));
   });
   return lines;

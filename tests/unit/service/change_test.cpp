@@ -192,6 +192,8 @@ TEST(Change, JobsAndSequencesGetAnotherNameWhichSurvivesARestart) {
     EXPECT_EQ(coordinator->job(id)->name, "Chapel, take 2") << id.value;
   EXPECT_FALSE(coordinator->change(job, {.name = ""}));
   EXPECT_FALSE(coordinator->change(job, {.name = std::string(257, 'x')}));
+  EXPECT_FALSE(coordinator->change(job, {.name = "  "}));
+  EXPECT_FALSE(coordinator->change(job, {.name = "a\nb"}));
 }
 
 TEST(Change, FarmsOwnChangesAreStoredOnceTheDiskWorksAgain) {

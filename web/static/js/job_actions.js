@@ -12,10 +12,18 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
     set(withUi(get(), { busy: null }));
   }
 
+  /** Tells whether the job has been changed. */
   async function alter(id, changes) {
-    set(withUi(get(), { busy: id, confirming: null }));
-    await snapshot(`job ${id}`, () => attempt(() => api.change(id, changes)), withJob);
+    let changed;
+    set(withUi(get(), { busy: id, confirming: null, notice: null }));
+    await snapshot(`job ${id}`, async () => (changed = await attempt(() => api.change(id, changes))), withJob);
     set(withUi(get(), { busy: null }));
+    return changed !== undefined;
+  }
+
+  function closeRename() {
+    set(withUi(get(), { renaming: null }));
+    requestAnimationFrame(() => document.getElementById("rename")?.focus());
   }
 
   async function remove(id) {
@@ -90,14 +98,13 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
     },
     renderOn: alter,
     setPriority: (id, priority) => alter(id, { priority }),
-    /** null: of none. */
     openRename: (id) => {
       set(withUi(get(), { renaming: id }));
-      if (id) requestAnimationFrame(() => document.getElementById("new-name")?.select());
+      requestAnimationFrame(() => document.getElementById("new-name")?.select());
     },
+    closeRename,
     rename: async (id, name) => {
-      await alter(id, { name });
-      if (!get().ui.notice) set(withUi(get(), { renaming: null }));
+      if (await alter(id, { name })) closeRename();
     },
     remove,
     cancel: (id) => change(id, "cancelled"),

@@ -11,7 +11,7 @@ export function againForm(state, job, actions) {
   const { again } = state.ui;
   if (again?.id !== job.id) return null;
   return h("form", { key: "again-form", class: "panel again", onsubmit: actions.submitAgain },
-    h("p", { class: "help" }, `The same scene${job.frames ? ", with all its frames," : ""} as a new job. It ends with these samples, at this error or after these seconds; with none of the three as this one does.`),
+    h("p", { class: "help" }, `The same scene${job.frames ? ", with all its frames," : ""} as a new job. It ends at these samples, this error or this time. Leave all three empty to use the limits of this job.`),
     h("div", { class: "settings" },
       kFields.map(([name, label]) => h("div", { key: name, class: "field" }, h("label", { for: `again-${name}` }, label),
         h("input", { id: `again-${name}`, inputmode: "decimal", autocomplete: "off", ".value": again.form[name], oninput: (event) => actions.typeAgain(name, event.currentTarget.value) }))),

@@ -58,17 +58,17 @@ function heading(state, job, actions) {
 function title(state, job, actions) {
   if (state.ui.renaming !== job.id) {
     return [h("h1", { key: "name" }, jobName(job)),
-      mayChange(state) ? h("button", { key: "rename", type: "button", class: "small quiet", "aria-label": `Rename: ${jobName(job)}`, onclick: () => actions.openRename(job.id) }, "Rename") : null];
+      mayChange(state) ? h("button", { key: "rename", id: "rename", type: "button", class: "small quiet", "aria-label": `Rename: ${jobName(job)}`, onclick: () => actions.openRename(job.id) }, "Rename") : null];
   }
   const rename = (event) => {
     event.preventDefault();
     actions.rename(job.id, new FormData(event.currentTarget).get("name"));
   };
   return [h("h1", { key: "unseen", class: "unseen" }, jobName(job)),
-    h("form", { key: "renaming", class: "rename", onsubmit: rename },
+    h("form", { key: "renaming", class: "rename", onsubmit: rename, onkeydown: (event) => (event.key === "Escape" ? actions.closeRename() : null) },
       h("input", { id: "new-name", name: "name", "aria-label": "New name", required: true, maxlength: 256, autocomplete: "off", value: job.name }),
       h("button", { type: "submit", class: "small", disabled: state.ui.busy === job.id }, "Rename"),
-      h("button", { type: "button", class: "small quiet", onclick: () => actions.openRename(null) }, "Keep"))];
+      h("button", { type: "button", class: "small quiet", onclick: () => actions.closeRename() }, "Keep the old name"))];
 }
 
 function sentence(job) {

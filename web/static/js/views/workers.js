@@ -22,7 +22,7 @@ export function workersView(state, actions) {
     h("div", { class: "heading" }, h("h1", null, "Workers"), h("p", { class: "sub" }, `${plural(workers.length, "worker")} · ${plural(threads, "thread")} connected`)),
     classesApart(workers),
     narrowing(state, workers, actions),
-    shown.length === 0 ? h("p", { key: "nothing", class: "waiting" }, "No worker is like this.") : h("table", { key: "list", class: "list worker-list" },
+    shown.length === 0 ? h("p", { key: "nothing", class: "waiting" }, "No worker matches.") : h("table", { key: "list", class: "list worker-list" },
       h("thead", null, h("tr", null, kColumns.map((column) => head(column, state.workerList, actions)), mayDrain(state) ? h("th", { key: "actions", scope: "col" }, h("span", { class: "unseen" }, "Actions")) : null)),
       h("tbody", null, shown.map((worker) => row(state, worker, actions)))),
     mayChange(state) ? h("details", { key: "add", class: "panel add-worker" }, h("summary", null, "Add a worker"), howToJoin(state)) : null);
