@@ -317,6 +317,7 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
 Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, const BlobStore& blobs,
                               std::optional<std::uint32_t> frame) {
   StoredJob job{.name = before.name,
+                .scene_name = before.scene_name,
                 .scene = before.scene,
                 .settings = before.settings,
                 .spec = before.spec,
@@ -381,7 +382,7 @@ Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const Blob
 
 std::string replay_of(const StoredJob& job) {
   const auto frame = frame_of(job.id);
-  return replay_command(job.name, job.spec, frame ? std::optional(frame->frame) : std::nullopt);
+  return replay_command(scene_file_of(job), job.spec, frame ? std::optional(frame->frame) : std::nullopt);
 }
 
 // Returns the total size of the job's files, or the memory that the user requests if that is more. A loaded

@@ -23,7 +23,7 @@ constexpr int kSweepsPerTime = 4;
 constexpr std::size_t kJobsAtOnce = 256;
 
 std::optional<BlobRef> file_of(const StoredJob& job, const Digest& digest) {
-  if (job.scene == digest) return BlobRef{digest, 0, job.name};
+  if (job.scene == digest) return BlobRef{digest, 0, scene_file_of(job)};
   const auto asset = std::find_if(job.assets.begin(), job.assets.end(),
                                   [&](const BlobRef& a) { return a.digest == digest; });
   return asset == job.assets.end() ? std::nullopt : std::optional(*asset);
@@ -46,7 +46,7 @@ bool is_open(JobState state) { return state == JobState::queued || state == JobS
 
 Result<std::vector<BlobRef>> missing_blobs_of(const StoredJob& job, const BlobStore& blobs) {
   std::vector<BlobRef> files = job.assets;
-  files.push_back({job.scene, 0, job.name});
+  files.push_back({job.scene, 0, scene_file_of(job)});
   std::vector<Digest> digests;
   for (const BlobRef& file : files) digests.push_back(file.digest);
   const auto lacking = blobs.missing(digests);

@@ -158,8 +158,10 @@ void FarmDriver::on(const RecordUnit& e) {
   entry->leased.erase({e.unit.tile, e.unit.round});
   if (entry->clock.started()) return;
   const auto figures = farm_.job(e.unit.job);
-  const auto zero = figures ? figures->clock.zero(clock_.now()) : std::nullopt;
-  entry->clock.start(zero.value_or(clock_.now()));
+  if (figures && figures->clock.started())
+    entry->clock = figures->clock;
+  else
+    entry->clock.start(clock_.now());
   if (entry->stored.totals.began_unix == 0)
     entry->stored.totals.began_unix = system_unix_seconds() - entry->elapsed(clock_.now());
 }

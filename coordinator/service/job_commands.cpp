@@ -12,6 +12,7 @@
 #include "coordinator/service/state/prerequisites.h"
 #include "coordinator/views/describe_change.h"
 #include "core/base/log.h"
+#include "core/base/safe_text.h"
 #include "core/image/frame/frame.h"
 #include "core/job/objects.h"
 
@@ -25,9 +26,8 @@ Result<void> check(const JobChange& change) {
     return fail(Errc::invalid_argument,
                 "samples (spp) and target_error cannot be changed at once: one decides "
                 "how far the job goes; change one, then the other");
-  const auto is_control = [](unsigned char c) { return c < ' ' || c == 0x7f; };
-  if (change.name && (std::ranges::any_of(*change.name, is_control) ||
-                      change.name->find_first_not_of(' ') == std::string::npos))
+  if (change.name &&
+      (plain_text(*change.name) != *change.name || change.name->find_first_not_of(' ') == std::string::npos))
     return fail(Errc::invalid_argument,
                 "change: 'name' must have a character that is not blank, and no control characters");
   return {};
@@ -322,7 +322,10 @@ Result<void> JobCommands::edit_all(Core& core, const Entries& jobs, Edit edit) c
 }
 
 Result<void> JobCommands::rename(Core& core, const Entries& jobs, const std::string& name) const {
-  return edit_all(core, jobs, [&](StoredJob& job) { job.name = name; });
+  return edit_all(core, jobs, [&](StoredJob& job) {
+    if (job.scene_name.empty()) job.scene_name = job.name;
+    job.name = name;
+  });
 }
 
 Result<void> JobCommands::set_priority(Core& core, const Entries& jobs, int priority) const {

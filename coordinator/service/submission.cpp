@@ -73,6 +73,10 @@ Result<JobId> Submission::submit_again(const JobId& before, const JobSpec& chang
       jobs.push_back(entry->stored);
     }
     if (const Sequence* sequence = core->jobs.sequence(before)) range = sequence->range();
+    if (range && range->count() != jobs.size())
+      return fail(Errc::failed_precondition,
+                  fmt::format("{} of its {} frames are missing: submit the scene again",
+                              range->count() - jobs.size(), range->count()));
   }
   if (jobs.front().spec.denoise || changes.denoise)
     if (const auto possible = denoising_.available(); !possible) return tl::unexpected(possible.error());

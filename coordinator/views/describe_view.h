@@ -247,7 +247,7 @@ void describe(V& v, T& j) {
   v.field("error", "Why the job failed or does not progress.", unless_empty(j.error));
   v.field("failure",
           "Why the job failed, as data. null: it has not failed, or not because of a unit that could not be "
-          "rendered; then `error` says why.",
+          "rendered; then `error` says why. Always null in lists.",
           j.failure);
   v.field(
       "after",

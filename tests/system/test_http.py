@@ -72,11 +72,11 @@ def test_the_pages_are_those_of_this_checkout(farm):
     assert "index.html" in names and "js/main.js" in names
     served = {name: farm.get(f"/{name}", token=None).body for name in names}
     assert [name for name in names if served[name] != (pages / name).read_bytes()] == ["index.html"]
-    # The page names one script that has all modules, and one style.
+    # The page names a script that asks for the session and the jobs, one that has all other modules, and one style.
     page = served["index.html"].decode()
-    joined = {kind: re.search(rf'"([^"]+\.{kind})"', page).group(1) for kind in ("js", "css")}
-    assert page.count(".js") == page.count(".css") == 1
-    script, style = (farm.get(f"/{joined[kind]}", token=None).body.decode() for kind in ("js", "css"))
+    scripts, styles = (re.findall(rf'"([^"]+\.{kind})"', page) for kind in ("js", "css"))
+    assert len(scripts) == page.count(".js") == 2 and len(styles) == page.count(".css") == 1
+    script, style = (farm.get(f"/{name}", token=None).body.decode() for name in (scripts[-1], styles[0]))
     assert len(script) > (pages / "js" / "main.js").stat().st_size and script != served["js/main.js"].decode()
     assert all(served[name].decode().strip() in style for name in re.findall(r'css/\w+\.css', (pages / "index.html").read_text()))
 

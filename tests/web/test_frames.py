@@ -150,6 +150,7 @@ def test_the_slider_scrubs_through_the_frames_that_are_done(farm, dashboard):
 
     wait_film(page, 200)
     assert shown(page) == "4"
+    assert page.evaluate("getComputedStyle(document.querySelector('frame-film canvas')).backgroundColor") == "rgb(5, 6, 8)", "a picture with alpha hides the one below"
     assert page.evaluate("document.getElementById('scrub').getAttribute('aria-valuetext')") == "Frame 4"
     assert page.evaluate("location.hash") == f"#/jobs/{SEQUENCE}/1", "the page stays at its frame until the slider is let go"
     page.evaluate("document.getElementById('scrub').dispatchEvent(new Event('change'))")

@@ -122,6 +122,28 @@ def test_a_job_gets_another_name(farm, dashboard):
     page.click(".rename button[type=submit]")
     page.wait("document.querySelector('h1').innerText === 'Steam, take 2' && !document.querySelector('.rename')")
     assert farm.changes == [("j-1", {"name": "Steam, take 2"})]
+    page.wait("document.activeElement.id === 'rename'")
+
+
+def test_the_form_for_a_name_stays_while_it_is_refused_and_closes_by_escape(farm, dashboard):
+    farm.jobs["j-1"] = job(name="steam.xml")
+    page = dashboard("#/jobs/j-1")
+    page.click("#rename")
+    page.wait("document.activeElement.id === 'new-name'")
+    page.type("Steam, take 2")
+    farm.broken.add("jobs")
+    page.click(".rename button[type=submit]")
+    page.wait("document.querySelector('.toast')?.innerText.includes('The store is away.')")
+    assert page.count(".rename") == 1
+
+    farm.broken.discard("jobs")
+    page.click(".rename button[type=submit]")
+    page.wait("document.querySelector('h1').innerText === 'Steam, take 2' && !document.querySelector('.rename') && !document.querySelector('.toast')")
+
+    page.click("#rename")
+    page.wait("document.activeElement.id === 'new-name'")
+    page.key("Escape")
+    page.wait("!document.querySelector('.rename') && document.activeElement.id === 'rename'")
 
 
 def test_a_finished_job_is_denoised_as_a_new_job_with_its_samples(farm, dashboard):

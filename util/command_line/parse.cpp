@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "core/base/text/suggest.h"
@@ -90,6 +91,8 @@ std::string path_of(const CLI::App& command) {
   return above + command.get_name();
 }
 
+constexpr std::string_view kEmptyValue = "the value is empty; leave the option out for the default";
+
 }  // namespace
 
 void use_plain_help(CLI::App& app) { app.formatter(std::make_shared<PlainHelp>()); }
@@ -116,8 +119,7 @@ std::string unknown_argument(const CLI::App& app, const CLI::ParseError& error) 
 void refuse_empty_values(CLI::App& app) {
   const CLI::Validator not_empty(
       [](const std::string& value) {
-        return value.empty() ? std::string("the value is empty; leave the option out for the default")
-                             : std::string();
+        return value.empty() ? std::string(kEmptyValue) : std::string();
       },
       "");
   for (CLI::Option* option : app.get_options())
@@ -126,6 +128,15 @@ void refuse_empty_values(CLI::App& app) {
 }
 
 std::optional<int> parse_arguments(CLI::App& app, int argc, const char* const* argv) {
+  // CLI11 gives an option that ends with "=" the next argument as its value.
+  const auto empty = std::find_if(argv + 1, argv + argc, [](const std::string_view argument) {
+    return argument.starts_with("--") && argument.find('=') == argument.size() - 1;
+  });
+  if (argc > 1 && empty != argv + argc) {
+    fmt::print(stderr, "{}: error: {}: {}\n", app.get_name(),
+               std::string_view(*empty).substr(0, std::string_view(*empty).size() - 1), kEmptyValue);
+    return kUsage;
+  }
   refuse_empty_values(app);
   try {
     app.parse(argc, argv);

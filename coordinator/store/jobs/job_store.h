@@ -66,7 +66,8 @@ struct JobTotals {
 
 struct StoredJob {
   JobId id;
-  std::string name;   // scene file name
+  std::string name;   // name in lists: at first that of the scene file
+  std::string scene_name = {};  // name of the scene file, if it is not `name`
   std::string owner;  // user name; empty: the administrator
   double submitted_unix = 0;
   // W3C `traceparent` of the span in which another program submitted the job; the job's spans belong to its
@@ -111,6 +112,11 @@ struct StoredJob {
   bool damaged = false;  // true if its record cannot be read: only id, state (failed) and error are set
   bool operator==(const StoredJob&) const = default;
 };
+
+// Returns the name of the job's scene file, for diagnostics and commands.
+inline const std::string& scene_file_of(const StoredJob& job) {
+  return job.scene_name.empty() ? job.name : job.scene_name;
+}
 std::string to_json(const StoredJob& job);
 Result<StoredJob> parse_stored_job(std::string_view json);
 

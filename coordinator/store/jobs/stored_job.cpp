@@ -24,6 +24,15 @@ std::uint64_t count_of(const json& j) {
   return j.get<std::uint64_t>();
 }
 
+// Throws unless the value is an integer that T can have.
+template <class T>
+T whole(const json& j) {
+  if (j.is_number_unsigned() ? !std::in_range<T>(j.get<std::uint64_t>())
+                             : !j.is_number_integer() || !std::in_range<T>(j.get<std::int64_t>()))
+    throw std::invalid_argument("a number is not an integer in the range of its field");
+  return j.get<T>();
+}
+
 // Invalid UTF-8, which may come from a worker's name or message, is replaced, so that dump() never throws.
 std::string dumped(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
 
@@ -114,26 +123,36 @@ json to_value(const JobFailure& f) {
 JobFailure failure_from(const json& j) {
   JobFailure f;
   f.kind = enum_from(j.at("kind"), {FailureKind::unit, FailureKind::scene, FailureKind::no_worker});
-  f.tile = j.at("tile");
+  f.tile = whole<TileIndex>(j.at("tile"));
   const json& rect = j.at("rect");
-  f.rect = {rect.at(0), rect.at(1), rect.at(2), rect.at(3)};
-  f.round = j.at("round");
+  f.rect = {whole<int>(rect.at(0)), whole<int>(rect.at(1)), whole<int>(rect.at(2)), whole<int>(rect.at(3))};
+  f.round = whole<RoundIndex>(j.at("round"));
   f.samples = {count_of(j.at("samples").at(0)), count_of(j.at("samples").at(1))};
   for (const json& a : j.at("attempts")) {
     JobFailure::Attempt& attempt = f.attempts.emplace_back();
     attempt.worker = a.at(0), attempt.reason = a.at(1);
-    if (!a.at(2).is_null()) attempt.signal = a.at(2).get<int>();
-    if (const json& pixel = a.at(3); !pixel.is_null()) attempt.pixel = {pixel.at(0), pixel.at(1)};
+    if (!a.at(2).is_null()) attempt.signal = whole<int>(a.at(2));
+    if (const json& pixel = a.at(3); !pixel.is_null()) attempt.pixel = {whole<int>(pixel.at(0)), whole<int>(pixel.at(1))};
     if (!a.at(4).is_null()) attempt.sample = count_of(a.at(4));
   }
   f.replay = j.at("replay");
   return f;
 }
 
+// The job's error says the same as its failure, so a record whose failure cannot be read is not damaged.
+std::optional<JobFailure> failure_or_none(const json& j) {
+  try {
+    return failure_from(j);
+  } catch (const std::exception&) {
+    return std::nullopt;
+  }
+}
+
 StoredJob stored_from(const json& j) {
   StoredJob job;
   job.id.value = j.at("id");
   job.name = j.at("name");
+  job.scene_name = j.value("scene_name", std::string());
   job.owner = j.at("owner");
   job.submitted_unix = j.at("submitted_unix");
   job.traceparent = j.value("traceparent", std::string());
@@ -155,7 +174,7 @@ StoredJob stored_from(const json& j) {
     job.stopped =
         enum_from(j.at("stopped"), {StopReason::spp, StopReason::error, StopReason::time, StopReason::user});
   job.error = j.at("error");
-  if (const auto failure = j.find("failure"); failure != j.end()) job.failure = failure_from(*failure);
+  if (const auto failure = j.find("failure"); failure != j.end()) job.failure = failure_or_none(*failure);
   if (!j.at("numeric_class").is_null()) job.numeric_class = digest_from(j.at("numeric_class"));
   job.build = j.at("build");
   job.platform = j.value("platform", std::string());
@@ -234,6 +253,7 @@ std::string to_json(const StoredJob& job) {
          {"build", job.build},
          {"totals", to_value(job.totals)}};
   for (const Digest& digest : job.missing_blobs) j["awaited"].push_back(digest.hex());
+  if (!job.scene_name.empty()) j["scene_name"] = job.scene_name;
   if (job.failure) j["failure"] = to_value(*job.failure);
   if (job.techniques != TechniqueSet{}) j["techniques"] = job.techniques.bits();
   for (const DenoisedCheck& c : job.denoised_checks)

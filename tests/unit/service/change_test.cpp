@@ -9,7 +9,9 @@
 #include <functional>
 #include <thread>
 
+#include "coordinator/admission/admission.h"
 #include "coordinator/base/work_queue.h"
+#include "tests/support/fake_clock.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -176,6 +178,14 @@ TEST(Change, IsRefusedWithoutEffectIfItCannotBeStored) {
     }
 }
 
+TEST(Change, CommandsNameTheSceneFileOfAJobThatHasAnotherName) {
+  StoredJob job;
+  job.id = {"j-1"};
+  job.name = "Chapel, take 2";
+  job.scene_name = "chapel.xml";
+  EXPECT_THAT(replay_of(job), HasSubstr("lightshaft render chapel.xml"));
+}
+
 TEST(Change, JobsAndSequencesGetAnotherNameWhichSurvivesARestart) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
@@ -194,6 +204,33 @@ TEST(Change, JobsAndSequencesGetAnotherNameWhichSurvivesARestart) {
   EXPECT_FALSE(coordinator->change(job, {.name = std::string(257, 'x')}));
   EXPECT_FALSE(coordinator->change(job, {.name = "  "}));
   EXPECT_FALSE(coordinator->change(job, {.name = "a\nb"}));
+  EXPECT_FALSE(coordinator->change(frame_job(sequence, 2), {.name = "one frame"}));
+}
+
+// The first ray was traced before the pause; the farm and the job in memory count the same seconds.
+TEST(Change, FirstResultThatArrivesDuringAPauseStartsTheClockAtTheFirstRay) {
+  const auto clock = std::make_shared<FakeClock>();
+  Coordinator::Options options;
+  options.clock = clock;
+  auto coordinator = Coordinator::open(options).value();
+  const JobId job = submit(*coordinator);
+  FakeFarm farm(*coordinator, 1);
+  farm.tamper = [&](UnitResult r) {
+    if (farm.results_sent > 0) return std::vector<UnitResult>{};
+    clock->advance(std::chrono::seconds(100));
+    EXPECT_TRUE(coordinator->change(job, {.state = JobState::paused}));
+    clock->advance(std::chrono::seconds(10));
+    r.cpu_seconds = 20;
+    return std::vector{r};
+  };
+
+  ASSERT_TRUE(farm.run([&] { return coordinator->job(job)->units_done == 1; }));
+
+  EXPECT_DOUBLE_EQ(coordinator->job(job)->elapsed_seconds, 10) << "from 20 s before the result to the pause";
+  clock->advance(std::chrono::seconds(10));
+  ASSERT_TRUE(coordinator->change(job, {.state = JobState::running}));
+  clock->advance(std::chrono::seconds(5));
+  EXPECT_DOUBLE_EQ(coordinator->job(job)->elapsed_seconds, 15);
 }
 
 TEST(Change, FarmsOwnChangesAreStoredOnceTheDiskWorksAgain) {

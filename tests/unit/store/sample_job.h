@@ -10,7 +10,8 @@ namespace ls::coordinator {
 inline StoredJob sample_job(std::string id) {
   StoredJob job;
   job.id.value = std::move(id);
-  job.name = "steam.xml";
+  job.name = "Steam, take 2";
+  job.scene_name = "steam.xml";
   job.owner = "anna";
   job.submitted_unix = 1.7e9 + .25;
   job.scene = sha256("scene");

@@ -105,6 +105,7 @@ Opacity PathTracer<F, Light>::opacity(const CameraRay& ray) {
       RandomStream tracker = stream_.stream(segment_, Purpose::track_opacity);
       media *= through_media(medium_, ray_.start, ray_.d, t, tracker);
     }
+    if (!met && world_.lights.has_sky() && !world_.hide_environment) surfaces = C3(0);
     if (!met || is_black(media)) break;
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     if (!sees_past(hit, surface)) {

@@ -125,7 +125,8 @@ class Lights {
   // Sets the radiance of the constant environment and returns the previous one, which is black if there was
   // no constant environment.
   C3 exchange_constant_environment(const C3& radiance) { return std::exchange(environment_, radiance); }
-  bool has_environment() const { return sky_.sampled() || !suns_.empty() || !is_black(environment_); }
+  bool has_sky() const { return sky_.sampled() || !is_black(environment_); }  // light from all directions
+  bool has_environment() const { return has_sky() || !suns_.empty(); }
   const EnvironmentMap* map() const { return map_.get(); }
   bool is_sky(const LightChoice& choice) const;
   // From this call on, directions towards the environment map and the constant environment are also sampled

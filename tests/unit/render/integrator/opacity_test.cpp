@@ -45,6 +45,11 @@ void fill(SceneBuilder& builder, MediumIndex medium) {
 }
 void remove_wall(SceneBuilder& builder) { builder.scene.shapes.erase(builder.scene.shapes.begin()); }
 
+SceneBuilder transparent(SceneBuilder builder) {
+  builder.scene.film.transparent = true;
+  return builder;
+}
+
 // The derivative of 1 - exp(-tau) by log tau is at most 1/e. The length of the ray in the cube is the
 // difference of float32 coordinates of a world of unit size, a quarter of that size or more: it is accurate
 // to 4 kClose of itself, and so the opacity to 4 kClose / e, plus its own rounding.
@@ -52,7 +57,7 @@ constexpr double kSlabClose = 2 * kClose;
 
 TEST(Opacity, OfAHomogeneousSlabIsOneMinusItsTransmittance) {
   const std::array<double, 3> sigma = {.25, .5, 2};
-  SceneBuilder builder = wall();
+  SceneBuilder builder = transparent(wall());
   fill(builder, builder.homogeneous({sigma[0], sigma[1], sigma[2]}, {.9, .5, .1}));
   const Picture before(builder, kOfOpacity);
   remove_wall(builder);
@@ -72,7 +77,7 @@ TEST(Opacity, OfAHomogeneousSlabIsOneMinusItsTransmittance) {
 }
 
 TEST(Opacity, OfNothingIsZeroAndOfGlassAndMirrorsOne) {
-  SceneBuilder builder = wall();
+  SceneBuilder builder = transparent(wall());
   builder.scene.shapes[0].bsdf = builder.glass(1.5);
   EXPECT_EQ(mean_of(Picture(builder, kOfOpacity), "alpha", 'A').value, 1);
   builder.scene.shapes[0].bsdf = builder.mirror();
@@ -82,8 +87,25 @@ TEST(Opacity, OfNothingIsZeroAndOfGlassAndMirrorsOne) {
   EXPECT_EQ(mean_of(Picture(builder, kOfOpacity), "alpha", 'A').value, 0);
 }
 
+// So an image with alpha can be laid over another one, and written as a PNG, whether or not its film is
+// transparent.
+TEST(Opacity, OfAnEnvironmentThatTheCameraSeesIsOne) {
+  SceneBuilder builder({8, 8});
+  builder.environment();
+  builder.look({0, 0, 7}, {0, 0, 0}, 1e-3, {0, 1, 0});
+  fill(builder, builder.homogeneous({1, 1, 1}, {.9, .9, .9}));
+
+  const Picture seen(builder, kOfOpacity);
+  EXPECT_EQ(mean_of(seen, "alpha", 'A').value, 1);
+  EXPECT_EQ(mean_of(seen, "opacity", 'G').value, 1);
+  EXPECT_NEAR(mean_of(seen, "volume_opacity", 'G').value, 1 - std::exp(-2.), kSlabClose);
+
+  std::get<ConstantEmitter>(builder.scene.emitters[0]).visible_camera = false;
+  EXPECT_NEAR(mean_of(Picture(builder, kOfOpacity), "alpha", 'A').value, 1 - std::exp(-2.), kSlabClose);
+}
+
 TEST(Opacity, IgnoresMediaThatTheIntegratorIgnores) {
-  SceneBuilder builder = wall();
+  SceneBuilder builder = transparent(wall());
   remove_wall(builder);
   fill(builder, builder.homogeneous({1, 1, 1}, {.9, .9, .9}));
   builder.scene.integrator.name = "path";
@@ -95,7 +117,6 @@ TEST(Opacity, IgnoresMediaThatTheIntegratorIgnores) {
 TEST(Opacity, OfAGridIsUnbiased) {
   const auto opacity = [](const std::vector<float>& values) {
     SceneBuilder builder({16, 16});
-    builder.environment();
     builder.look({0, 0, 7}, {0, 0, 0}, 1e-3, {0, 1, 0});
     fill(builder,
          builder.heterogeneous(builder.grid({1, 1, 2}, values, translate({-1, -1, 1}) * test::scale(2)),
@@ -113,7 +134,7 @@ TEST(Opacity, OfAGridIsUnbiased) {
 }
 
 TEST(Opacity, OfAMaskIsItsOpacity) {
-  SceneBuilder builder = wall();
+  SceneBuilder builder = transparent(wall());
   builder.scene.shapes[0].bsdf =
       builder.bsdf(MaskBsdf{builder.texture({.25, .25, .25}), builder.scene.shapes[0].bsdf});
 
@@ -148,11 +169,6 @@ TEST(Opacity, OfAColouredPaneIsTheLightThatDoesNotPass) {
 }
 
 // ---- the transparent film
-
-SceneBuilder transparent(SceneBuilder builder) {
-  builder.scene.film.transparent = true;
-  return builder;
-}
 
 // Over a backdrop of the environment's radiance B, the image with a transparent film is the image with the
 // environment in it: C + (1 - O) B. Both renders trace the same paths. In a medium a path that escapes sees B
@@ -261,9 +277,9 @@ TEST(Visibility, MediumInAHiddenBodyIsSeen) {
   remove_wall(builder);
   Shape& body = builder.container(CubeShape{}, translate({0, 0, 2}), builder.diffuse(.5),
                                   builder.homogeneous({1, 1, 1}, {0, 0, 0}));
-  EXPECT_EQ(mean_of(Picture(builder, kOfOpacity), "alpha", 'A').value, 1);
+  EXPECT_EQ(mean_of(Picture(transparent(builder), kOfOpacity), "alpha", 'A').value, 1);
   body.visible_camera = false;
-  EXPECT_NEAR(mean_of(Picture(builder, kOfOpacity), "alpha", 'A').value, 1 - std::exp(-2.), kSlabClose);
+  EXPECT_NEAR(mean_of(Picture(transparent(builder), kOfOpacity), "alpha", 'A').value, 1 - std::exp(-2.), kSlabClose);
   // The medium absorbs: each sample is 1 or 0.
   EXPECT_NEAR(Picture(builder, {}, 256).whole(0, 0) / 256, std::exp(-2.), 5 * std::sqrt(.12 / 256));
 }
