@@ -26,6 +26,10 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class):
         problems.unsupported("Output > Stereoscopy. Lightshaft renders one view: switch it off")
     if abs(scene.cycles.film_exposure - 1) > 1e-6:
         problems.unsupported("Render Properties > Film: Exposure. Set it to 1, and use Color Management")
+    if render.film_transparent and scene.cycles.film_transparent_glass:
+        problems.unsupported(
+            "Render Properties > Film: Transparent Glass. Lightshaft's glass is opaque: switch it off"
+        )
     if scene.cycles.use_fast_gi:
         problems.warning(
             "Render Properties > Light Paths: Fast GI Approximation has no effect: all light is traced"
@@ -54,7 +58,7 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class):
         dof = data.dof
         if dof.use_dof:
             plugin = "thinlens"
-            values["aperture_radius"] = data.lens * 1e-3 / (2 * dof.aperture_fstop)
+            values["aperture_radius"] = lens_radius(data)
             values["focus_distance"] = focus_distance(camera)
             if dof.aperture_blades >= 3 or abs(dof.aperture_ratio - 1) > 1e-6:
                 problems.unsupported(
@@ -63,8 +67,6 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class):
     if render.use_motion_blur:
         problems.unsupported("Render Properties: Motion Blur. Lightshaft renders an instant: switch it off")
     transparent = True if render.film_transparent else None
-    if transparent and getattr(getattr(scene, "cycles", None), "film_transparent_glass", False):
-        problems.unsupported("Render Properties > Film > Transparent Glass. Glass is opaque in Lightshaft's alpha: switch it off")
     film = element(
         "film",
         "hdrfilm",
@@ -78,6 +80,30 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class):
     inside = reference(medium, "medium") if medium else None
     document.add(element("sensor", plugin, None, film, sampler, inside, to_world=to_world, **values))
     document.add(element("integrator", "volpath", None, max_depth=int(scene.lightshaft.max_depth)))
+
+
+def may_see(camera, scene, size, centre, radius, matrix_class):
+    """Returns False if no ray of the camera meets the ball around `centre` before the ray is scattered."""
+    data = camera.data
+    x, y, z = unscaled(camera.matrix_world, matrix_class).inverted() @ centre
+    depth, corners = -z, data.view_frame(scene=scene)
+    # How far rays spread per unit of depth; the corners of a perspective frame are at the depth 1 / spread.
+    spread = -1 / corners[0].z if data.type == "PERSP" else 0
+    if spread and data.dof.use_dof:
+        # A ray from the edge of the lens leaves the ray through its middle by |1 - depth / focus| of the lens's radius.
+        radius += lens_radius(data) * max(1, (depth + radius) / focus_distance(camera))
+    for place, axis in ((x, 0), (y, 1)):
+        low, high = (bound(corner[axis] for corner in corners) for bound in (min, max))
+        edge = 2 * (high - low) / size[axis]  # the filter reaches less than two pixels beyond the frame
+        for side, outer in ((-1, edge - low), (1, edge + high)):
+            slope = outer * spread
+            if side * place > (slope * depth if spread else outer) + radius * math.hypot(1, slope):
+                return False
+    return depth > -radius
+
+
+def lens_radius(data):
+    return data.lens * 1e-3 / (2 * data.dof.aperture_fstop)
 
 
 def unscaled(matrix, matrix_class):

@@ -5,7 +5,7 @@ from mathutils import Matrix
 from mathutils.bvhtree import BVHTree
 
 from . import meshes
-from .camera import add_camera
+from .camera import add_camera, may_see
 from .document import Document, element, reference
 from .lights import add_light, only_if_hidden
 from .materials import Materials, Owner
@@ -71,7 +71,7 @@ class Exporter:
             return
         self.check_visibility(item)
         if item.type == "LIGHT":
-            add_light(self.document, self.problems, item, matrix, Matrix)
+            add_light(self.document, self.problems, item, matrix, Matrix, self.may_see)
         elif item.type == "VOLUME":
             self.add_grid(item, matrix)
         elif item.type in MESHES:
@@ -106,6 +106,10 @@ class Exporter:
                 f"object '{name}': Lightshaft renders no {item.type.replace('_', ' ').title()}. Convert it to a mesh (Object > Convert)"
             )
 
+    def may_see(self, centre, radius):
+        camera = self.scene.camera.evaluated_get(self.depsgraph)
+        return may_see(camera, self.scene, self.size, centre, radius, Matrix)
+
     def check_collections(self, layer):
         """Reports Holdout and Indirect Only of collections, since the objects inside do not have these flags
         themselves."""
@@ -128,6 +132,10 @@ class Exporter:
         if (item.is_holdout and not mesh) or (item.is_shadow_catcher and kind == "object"):
             self.problems.unsupported(
                 f"{kind} '{item.name}': Holdout or Shadow Catcher. Switch it off in {where}"
+            )
+        if item.is_holdout and mesh and not self.scene.render.film_transparent:
+            self.problems.warning(
+                f"object '{item.name}': Holdout leaves black where it is seen. Set Render Properties > Film > Transparent for alpha"
             )
         rays = ["diffuse", "glossy", "transmission", "volume_scatter"]
         if kind == "object":
@@ -173,6 +181,10 @@ class Exporter:
             if not part.closed:
                 self.problems.error(
                     f"{owner}: a volume needs a closed mesh. Fill its holes and merge its doubles (Edit Mode, M > By Distance)"
+                )
+            if not item.visible_camera:  # Blender's camera then does not see the volume, and Lightshaft's does
+                self.problems.unsupported(
+                    f"{owner}: hidden from rays (camera) with a volume in it. Switch Camera on in Object properties > Visibility"
                 )
             medium = self.volumes.homogeneous(f"{item.name}-{material.name}", found)
         sides = [part.front()]

@@ -11,8 +11,9 @@ FLIP = ((1, 0, 0, 0), (0, -1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1))  # Blender's l
 PROFILE = 512  # pixels of the image that a spot light throws
 
 
-def add_light(document, problems, item, matrix, matrix_class):
-    """Adds a light object at `matrix`. Its power is in W, as in the Light properties."""
+def add_light(document, problems, item, matrix, matrix_class, may_see):
+    """Adds a light object at `matrix`. Its power is in W, as in the Light properties. `may_see`: a function of a
+    centre and a radius, False if the camera does not see the ball."""
     data, name = item.data, item.name
     colour = light_colour(data)
     if (
@@ -57,7 +58,7 @@ def add_light(document, problems, item, matrix, matrix_class):
         if radius > 0:
             ball = matrix_class.Translation(matrix.translation) @ matrix_class.Scale(radius, 4)
             radiance = [c / (4 * math.pi**2 * radius**2) for c in colour]
-            document.add(lamp("sphere", ball, radiance, item))
+            document.add(lamp("sphere", ball, radiance, item, may_see))
         else:
             point = element("emitter", "point", None, intensity=[c / (4 * math.pi) for c in colour])
             point.append(vector("position", matrix.translation, "point"))
@@ -65,7 +66,7 @@ def add_light(document, problems, item, matrix, matrix_class):
     elif data.type == "SPOT":
         add_spot(document, problems, data, name, colour, rigid @ matrix_class(FLIP))
     else:
-        add_area(document, problems, item, colour, matrix @ matrix_class(FLIP), matrix_class)
+        add_area(document, problems, item, colour, matrix @ matrix_class(FLIP), matrix_class, may_see)
 
 
 def light_colour(data):
@@ -88,8 +89,11 @@ def only_if_hidden(item):
     return None if item.visible_camera else False
 
 
-def lamp(shape, to_world, radiance, item):
-    """Adds a shape that emits light and lets the light of others pass, like Blender's lamps."""
+def lamp(shape, to_world, radiance, item, may_see):
+    """Makes a shape that emits light and lets the light of others pass, like Blender's lamps. They are hidden from the
+    camera by default; a lamp that is out of sight anyway is not marked, because marked shapes cost render time."""
+    radius = to_world.col[0].xyz.length + to_world.col[1].xyz.length
+    hidden = only_if_hidden(item) if may_see(to_world.translation, radius) else None
     emitter = element("emitter", "area", None, radiance=radiance)
     return element(
         "shape",
@@ -98,7 +102,7 @@ def lamp(shape, to_world, radiance, item):
         element("bsdf", "null"),
         emitter,
         to_world=to_world,
-        visible_camera=only_if_hidden(item),
+        visible_camera=hidden,
     )
 
 
@@ -146,7 +150,7 @@ def spot_profile(half, blend):
     return step * step * (3 - 2 * step)
 
 
-def add_area(document, problems, item, colour, to_world, matrix_class):
+def add_area(document, problems, item, colour, to_world, matrix_class, may_see):
     data, name = item.data, item.name
     if data.spread < math.pi - 1e-4:
         problems.unsupported(
@@ -162,4 +166,4 @@ def add_area(document, problems, item, colour, to_world, matrix_class):
         problems.error(f"light '{name}': its size is 0. Give it a size, or make it a point light")
         return
     radiance = [c / (math.pi * area) for c in colour]
-    document.add(lamp("disk" if round_one else "rectangle", placed, radiance, item))
+    document.add(lamp("disk" if round_one else "rectangle", placed, radiance, item, may_see))

@@ -8,14 +8,19 @@ class LightshaftPanel(bpy.types.Panel):
     bl_region_type = "WINDOW"
     rows = ()
 
+    @staticmethod
+    def owner(context):
+        """Returns what has the properties of `rows`, or None."""
+        return context.scene.lightshaft
+
     @classmethod
     def poll(cls, context):
-        return context.engine == "LIGHTSHAFT"
+        return context.engine == "LIGHTSHAFT" and cls.owner(context) is not None
 
     def draw(self, context):
         self.layout.use_property_split = True
         for name in self.rows:
-            self.layout.prop(context.scene.lightshaft, name)
+            self.layout.prop(self.owner(context), name)
 
 
 class LIGHTSHAFT_PT_render(LightshaftPanel):
@@ -38,6 +43,37 @@ class LIGHTSHAFT_PT_render(LightshaftPanel):
         self.layout.operator("lightshaft.bake")
 
 
+class LIGHTSHAFT_PT_film(LightshaftPanel):
+    bl_label = "Film"
+    bl_context = "render"
+    rows = ("film_transparent",)
+
+    @staticmethod
+    def owner(context):
+        return context.scene.render
+
+
+class LIGHTSHAFT_PT_object(LightshaftPanel):
+    bl_label = "Ray Visibility"
+    bl_context = "object"
+    bl_parent_id = "OBJECT_PT_visibility"  # which has Holdout
+    rows = ("visible_camera",)
+
+    @staticmethod
+    def owner(context):
+        return context.object
+
+
+class LIGHTSHAFT_PT_world(LightshaftPanel):
+    bl_label = "Ray Visibility"
+    bl_context = "world"
+    rows = ("camera",)
+
+    @staticmethod
+    def owner(context):
+        return context.scene.world.cycles_visibility if context.scene.world else None
+
+
 class LIGHTSHAFT_PT_passes(LightshaftPanel):
     bl_label = "Passes"
     bl_context = "view_layer"
@@ -50,7 +86,13 @@ class LIGHTSHAFT_PT_passes(LightshaftPanel):
         super().draw(context)
 
 
-CLASSES = (LIGHTSHAFT_PT_render, LIGHTSHAFT_PT_passes)
+CLASSES = (
+    LIGHTSHAFT_PT_render,
+    LIGHTSHAFT_PT_film,
+    LIGHTSHAFT_PT_object,
+    LIGHTSHAFT_PT_world,
+    LIGHTSHAFT_PT_passes,
+)
 
 
 def register():

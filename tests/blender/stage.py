@@ -22,6 +22,7 @@ class Stage:
         self.scene.frame_set(1)
         self.scene.render.resolution_x, self.scene.render.resolution_y = size
         self.scene.render.resolution_percentage = 100
+        self.scene.render.film_transparent = False
         data = bpy.data.cameras.new("Camera")
         self.camera = self.put(bpy.data.objects.new("Camera", data), (7.36, -6.93, 4.96), (1.109, 0, 0.815))
         self.scene.camera = self.camera
@@ -69,11 +70,12 @@ class Stage:
             item.name = material.name + " thing"
         return item
 
-    def render(self, engine="LIGHTSHAFT", samples=64, layer=None):
-        """Linear pixels, height x width x channels; of a `layer` those of a pass. RuntimeError with Blender's report."""
+    def render(self, engine="LIGHTSHAFT", samples=64, layer=None, seed=0):
+        """Linear pixels, height x width x channels, with alpha if the film is transparent; of a `layer` those of a pass. RuntimeError with Blender's report."""
         scene, image = self.scene, self.scene.render.image_settings
         scene.render.engine, self.settings.samples = engine, samples
         cycles = scene.cycles
+        self.settings.seed = cycles.seed = seed
         cycles.samples, cycles.use_adaptive_sampling, cycles.use_denoising = samples, False, False
         for name in ("", "diffuse_", "glossy_", "transmission_", "volume_"):
             setattr(cycles, f"{name}max_bounces" if not name else f"{name}bounces", 64)
@@ -93,7 +95,7 @@ class Stage:
                 )
         self.layers = found
         planes = found[layer or "Combined"]
-        order = [c for c in "RGBXYZV" if c in planes]
+        order = [c for c in "RGBXYZVA" if c in planes and (c != "A" or scene.render.film_transparent)]
         return np.stack([planes[c] for c in order], axis=2)
 
 

@@ -220,7 +220,7 @@ def test_a_farm_that_is_not_there(stage, monkeypatch):
     stage.settings.where = "FARM"
     monkeypatch.setenv("LIGHTSHAFT_URL", "http://127.0.0.1:9")
 
-    assert "The farm at http://127.0.0.1:9 does not answer" in refused(stage)
+    assert "The farm at http://127.0.0.1:9 does not respond" in refused(stage)
 
 
 def test_a_wrong_token(stage, on_farm, monkeypatch):

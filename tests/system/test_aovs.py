@@ -2,13 +2,16 @@
 
 import json
 import os
+import re
 import struct
 
+import numpy as np
 import pytest
 from cli_kit import FOG, digest, lightshaft, write_fog
-from exr_layers import read
+from exr_layers import read, write_rgb
 from local_farm import SCENE, HttpError
 
+STANDARD_ERRORS = 5  # kStandardErrors of tests/support/significance.h
 SPP = 12  # rounds of 2, 2, 4 and a cut one of 4
 ALL = ("albedo,alpha,coverage,depth,direct,emission,geo_normal,indirect,material_id,multiple,normal,opacity,position,"
        "shape_id,single,surface,uv,volume,volume_opacity")
@@ -126,6 +129,31 @@ def test_a_transparent_film_has_alpha_in_every_form(fog, tmp_path):
     assert (tmp_path / "film.png").read_bytes()[24:26] == bytes([8, 6])
     lightshaft("merge", tmp_path / "partials", "-o", tmp_path / "merged.exr")
     assert layers(tmp_path / "merged.exr") == film
+
+
+def test_over_a_plate_it_is_the_image_with_the_plate_behind_it(tmp_path):
+    """By the arithmetic of `oiiotool --over`. The plate is a sky that varies too little within a pixel to matter."""
+    write_rgb(tmp_path / "sky.exr", {c: [[.1 + .1 * (x + y + i) for x in range(4)] for y in range(3)] for i, c in enumerate("RGB")})
+    sky = '<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter>'
+    scene = write_fog(tmp_path).read_text().replace('<emitter type="constant"><rgb name="radiance" value="0.1"/></emitter>', sky)
+    film = scene.replace('<film type="hdrfilm">', '<film type="hdrfilm"><boolean name="transparent" value="true"/>')
+    scenes = {"shot": scene, "smoke": film, "plate": re.sub("<shape.*</shape>", "", scene, flags=re.DOTALL)}
+    image = {}
+    for name, text in scenes.items():
+        (tmp_path / f"{name}.xml").write_text(text)
+        render(tmp_path / f"{name}.xml", tmp_path / f"{name}.exr", spp=64)
+        image[name] = {c: np.array(rows) for c, rows in layers(tmp_path / f"{name}.exr").items()}
+    shot, smoke, plate = (image[name] for name in scenes)
+
+    assert .1 < smoke["A"].mean() < .9 and smoke["A"].max() > .9
+    for c in "RGB":
+        over = smoke[c] + (1 - smoke["A"]) * plate[c]
+        # The errors of one pixel may be those of the same samples: they add up. Pixels are independent.
+        error = shot[f"stderr.{c}"] + smoke[f"stderr.{c}"] + plate[c] * smoke["stderr.A"] + plate[f"stderr.{c}"]
+        rounding = 2 ** -11 * (shot[c] + smoke[c] + 2 * plate[c])  # halves, of A up to 1
+        band = STANDARD_ERRORS * np.sqrt((error ** 2).sum()) / error.size + rounding.mean()
+        assert band < .02 * shot[c].mean()
+        assert abs((over - shot[c]).mean()) < band
 
 
 def test_mitsubas_wrapper_asks_for_layers(fog, expected, tmp_path):
