@@ -136,7 +136,7 @@ JobsPage list_jobs(Guarded<Core>& core, const JobsAsked& asked) {
   step_through(core, count, [&](Core& locked, std::size_t i) {
     Row& row = rows[first + i];
     auto view = row.view ? std::move(row.view) : view_of(locked, row.id);
-    if (!view) continue;
+    if (!view) return;
     view->failure.reset();  // `error` says the same; a list of many failed jobs would be twice as long
     page.jobs.push_back(std::move(*view));
   });

@@ -118,10 +118,7 @@ std::string unknown_argument(const CLI::App& app, const CLI::ParseError& error) 
 
 void refuse_empty_values(CLI::App& app) {
   const CLI::Validator not_empty(
-      [](const std::string& value) {
-        return value.empty() ? std::string(kEmptyValue) : std::string();
-      },
-      "");
+      [](const std::string& value) { return value.empty() ? std::string(kEmptyValue) : std::string(); }, "");
   for (CLI::Option* option : app.get_options())
     if (option->nonpositional() && option->get_items_expected_max() > 0) option->check(not_empty);
   for (CLI::App* command : app.get_subcommands({})) refuse_empty_values(*command);

@@ -66,9 +66,9 @@ struct JobTotals {
 
 struct StoredJob {
   JobId id;
-  std::string name;   // name in lists: at first that of the scene file
+  std::string name;             // name in lists: at first that of the scene file
   std::string scene_name = {};  // name of the scene file, if it is not `name`
-  std::string owner;  // user name; empty: the administrator
+  std::string owner;            // user name; empty: the administrator
   double submitted_unix = 0;
   // W3C `traceparent` of the span in which another program submitted the job; the job's spans belong to its
   // trace (util/trace/span.h). Empty: there is none

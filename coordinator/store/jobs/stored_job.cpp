@@ -132,7 +132,8 @@ JobFailure failure_from(const json& j) {
     JobFailure::Attempt& attempt = f.attempts.emplace_back();
     attempt.worker = a.at(0), attempt.reason = a.at(1);
     if (!a.at(2).is_null()) attempt.signal = whole<int>(a.at(2));
-    if (const json& pixel = a.at(3); !pixel.is_null()) attempt.pixel = {whole<int>(pixel.at(0)), whole<int>(pixel.at(1))};
+    if (const json& pixel = a.at(3); !pixel.is_null())
+      attempt.pixel = {whole<int>(pixel.at(0)), whole<int>(pixel.at(1))};
     if (!a.at(4).is_null()) attempt.sample = count_of(a.at(4));
   }
   f.replay = j.at("replay");

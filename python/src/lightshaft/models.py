@@ -66,8 +66,7 @@ class Token(TypedDict):
 class JobSpec(TypedDict):
     spp: NotRequired[int]
     """Samples per pixel; the scene's number if spp, a target error and a time are all missing. With a
-    target error, no pixel gets more samples than this. A job that is submitted again without the three
-    keeps those of the earlier job."""
+    target error, no pixel gets more samples than this."""
     target_error: NotRequired[float]
     """The job ends when the estimated relMSE of its image is at most this. Tiles that need more samples for
     it get more."""
@@ -240,7 +239,7 @@ class Job(TypedDict):
     """Why the job failed or does not progress."""
     failure: NotRequired[Union["JobFailure", None]]
     """Why the job failed, as data. null: it has not failed, or not because of a unit that could not be
-    rendered; then `error` says why."""
+    rendered; then `error` says why. Always null in lists."""
     after: NotRequired[list["JobAfter"]]
     """The jobs that this job waits for and that are not done yet. Until they are done it is `queued` and
     gets no worker. For a sequence: those of its first waiting frame."""
@@ -344,16 +343,16 @@ class JobEtaWithMore(TypedDict):
 
 class JobFailure(TypedDict):
     """Why the job failed, as data. null: it has not failed, or not because of a unit that could not be
-    rendered; then `error` says why."""
+    rendered; then `error` says why. Always null in lists."""
     kind: NotRequired[Literal["unit", "scene", "no_worker"]]
     """unit: a unit failed on several workers. scene: the last worker said that the scene is at fault.
     no_worker: every worker has failed too many units of the job."""
     tile: NotRequired[int]
     rect: NotRequired[list[int]]
-    """[x0, y0, x1, y1] of the tile, in pixels, without x1 and y1."""
+    """[x0, y0, x1, y1] of the tile, in pixels; x1 and y1 are exclusive."""
     round: NotRequired[int]
     samples: NotRequired[list[int]]
-    """[first, last) sample of the round."""
+    """[first, end]: the samples of the round; end is exclusive."""
     frame: NotRequired[Union[int, None]]
     """The frame that failed, of a sequence."""
     attempts: NotRequired[list["JobFailureAttempts"]]

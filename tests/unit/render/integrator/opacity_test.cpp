@@ -279,7 +279,8 @@ TEST(Visibility, MediumInAHiddenBodyIsSeen) {
                                   builder.homogeneous({1, 1, 1}, {0, 0, 0}));
   EXPECT_EQ(mean_of(Picture(transparent(builder), kOfOpacity), "alpha", 'A').value, 1);
   body.visible_camera = false;
-  EXPECT_NEAR(mean_of(Picture(transparent(builder), kOfOpacity), "alpha", 'A').value, 1 - std::exp(-2.), kSlabClose);
+  EXPECT_NEAR(mean_of(Picture(transparent(builder), kOfOpacity), "alpha", 'A').value, 1 - std::exp(-2.),
+              kSlabClose);
   // The medium absorbs: each sample is 1 or 0.
   EXPECT_NEAR(Picture(builder, {}, 256).whole(0, 0) / 256, std::exp(-2.), 5 * std::sqrt(.12 / 256));
 }
