@@ -107,7 +107,7 @@ def test_the_layers_are_typed_named_and_add_up(expected):
     assert rows["crypto_object00.R"][height - 1][width // 2] == floor
     assert rows["crypto_object00.G"][height - 1][width // 2] == 1
     assert rows["normal.Y"][height - 1][width // 2] == 1 and rows["albedo.G"][height - 1][width // 2] == .5
-    assert rows["coverage.A"][0][0] == rows["depth.Z"][0][0] == rows["A"][0][0] == 0
+    assert rows["coverage.A"][0][0] == rows["depth.Z"][0][0] == 0 and rows["A"][0][0] == 1, "the environment alone"
     assert rows["A"][height - 1][width // 2] == 1 and rows["stderr.A"][height - 1][width // 2] == 0
 
 

@@ -43,7 +43,7 @@ def test_workers_are_searched_by_all_words(some, dashboard):
     page.type("GPU lab-1")
     shows(page, ["lab-12"])
     page.type("x")
-    page.wait("document.querySelector('main').innerText.includes('No worker is like this.')")
+    page.wait("document.querySelector('main').innerText.includes('No worker matches.')")
 
 
 def test_the_search_has_a_line_for_itself_on_a_phone(some, dashboard):
