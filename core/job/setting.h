@@ -37,7 +37,7 @@ struct Setting {
   // submit a job again also accepts only the settings with `again`.
   bool render = false;
   bool again = false;
-  // What it does in a request to submit a job again, if that differs: instead of `doc` and `more`
+  // Sentences that replace `doc` and `more` in a request to submit a job again; empty: these apply there, too
   std::string_view again_doc = {};
   bool pixels = false;  // the command that renders one sample again needs this setting
   // The key is in canonical JSON also if the setting has its default value. Digests and stored jobs depend on

@@ -65,7 +65,7 @@ class Renders {
     }
     return stages;
   }
-  // Whether all pixels of an image have errors in common (area_error.h).
+  // True if the errors of all pixels of an image are correlated (area_error.h).
   bool common() const { return world_of(jobs_.first_seed)->need.connected; }
 
  private:

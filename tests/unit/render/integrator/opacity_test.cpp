@@ -142,7 +142,7 @@ TEST(Opacity, OfAMaskIsItsOpacity) {
 
   for (std::size_t i = 0; i < p.pixels(); ++i) {
     const double alpha = p.sum("aov.alpha.A.A", i) + p.sum("aov.alpha.B.A", i);
-    // Of the 128 points of each half, the first dimension of a Sobol sequence, one at most is on a wrong
+    // Each half has 128 points, the first dimension of a Sobol sequence. At most one of them is on the wrong
     // side.
     EXPECT_NEAR(alpha, 64, 2);
     EXPECT_EQ(alpha, p.sum("aov.coverage.A", i)) << "both decide by the same number";
