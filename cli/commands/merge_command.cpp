@@ -11,10 +11,11 @@
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
-#include "coordinator/admission/cryptomatte_manifests.h"
+#include "coordinator/admission/layer_names.h"
 #include "coordinator/store/files.h"
 #include "core/image/exr/final_image.h"
 #include "core/image/film/merge.h"
+#include "core/scene/analysis/light_groups.h"
 #include "core/scene/analysis/prune.h"
 #include "core/scene/json/serialize.h"
 #include "util/protocol/limits.h"
@@ -93,10 +94,9 @@ bool is_of(const Scene& scene, const Digest& digest) {
       });
 }
 
-// Returns the Cryptomatte manifests, which give each identifier its name. The names come from the scene,
-// because partials contain only the identifiers.
-tl::expected<CryptomatteManifests, coordinator::Rejected> manifests(const MergeFlags& flags,
-                                                                    const Merged& merged) {
+// Returns the names of identifiers and light groups. They come from the scene, because partials have only the
+// identifiers and the numbers of the groups.
+tl::expected<LayerNames, coordinator::Rejected> layer_names(const MergeFlags& flags, const Merged& merged) {
   const AovSet aovs = merged.film.aovs();
   const auto defines = parse_defines(flags.defines);
   if (!defines) return coordinator::rejected(defines.error());
@@ -111,7 +111,8 @@ tl::expected<CryptomatteManifests, coordinator::Rejected> manifests(const MergeF
          fmt::format("the partial images were rendered from scene {}, and {} is another scene: give the same "
                      "scene file, with the same -D, --techniques and --frame",
                      merged.scene.hex(), flags.scene)});
-  return coordinator::manifests_of(scene->scene, aovs);
+  auto groups = aovs.groups() > 0 ? scene::light_groups_of(scene->scene) : std::vector<std::string>();
+  return coordinator::layer_names_of(scene->scene, aovs, std::move(groups));
 }
 
 int run(const MergeFlags& flags) {
@@ -133,9 +134,9 @@ int run(const MergeFlags& flags) {
   provenance.build = LIGHTSHAFT_VERSION;
   provenance.numeric_class = merged->numeric_class;
   if (!flags.scene.empty()) {
-    auto names = manifests(flags, *merged);
+    auto names = layer_names(flags, *merged);
     if (!names) return print_rejected(names.error());
-    provenance.manifests = std::move(*names);
+    provenance.names = std::move(*names);
   }
   const auto image = final_exr(merged->film, provenance, flags.float_output);
   if (!image) return print_error(image.error());

@@ -17,7 +17,7 @@
 #include "cli/output/console.h"
 #include "cli/output/interrupt.h"
 #include "cli/output/job_options.h"
-#include "coordinator/admission/cryptomatte_manifests.h"
+#include "coordinator/admission/layer_names.h"
 #include "coordinator/store/files.h"
 #include "core/base/safe_text.h"
 #include "core/image/film/film.h"
@@ -134,7 +134,7 @@ VerifiedTile verify_tile(const render::World& world, const SealedImage& image, T
 // If `tiles` has all tiles of the image, also returns headers that contradict the tiles' samples. The other
 // headers (seconds, health, ...) are not checked here: only the seal (the digests of all layers and headers)
 // protects them.
-std::vector<std::string> wrong_headers(const SealedImage& image, const CryptomatteManifests& names,
+std::vector<std::string> wrong_headers(const SealedImage& image, const LayerNames& names,
                                        const std::vector<VerifiedTile>& tiles) {
   auto expected = final_layers(Film(image.grid(), aovs_of(image.settings)).row(0), names, true).strings;
   expected["lightshaft:seed"] = fmt::format("{}", image.settings.seed);
@@ -287,7 +287,7 @@ int run(const VerifyFlags& flags) {
   const auto tiles = random_tiles(image->grid().count(), numbers->tiles, numbers->seed);
   const auto verified = verify_all(**world, *image, tiles, threads, flags.json, stop);
   for (std::string& header :
-       wrong_headers(*image, coordinator::manifests_of(scene->scene, aovs_of(image->settings)), verified))
+       wrong_headers(*image, coordinator::layer_names_of(scene->scene, image->settings), verified))
     if (std::find(contents.changed.begin(), contents.changed.end(), header) == contents.changed.end())
       contents.changed.push_back(std::move(header));
   if (flags.json) print(to_json(verified, contents, numbers->seed).dump(2));

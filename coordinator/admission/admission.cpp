@@ -10,7 +10,7 @@
 #include <ranges>
 #include <set>
 
-#include "coordinator/admission/cryptomatte_manifests.h"
+#include "coordinator/admission/layer_names.h"
 #include "coordinator/admission/decoded_reference.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/store/jobs/job_store.h"
@@ -18,6 +18,7 @@
 #include "core/base/text/name_forms.h"
 #include "core/job/health_notes.h"
 #include "core/job/spec_draft.h"
+#include "core/scene/analysis/light_groups.h"
 #include "core/scene/analysis/needs.h"
 #include "core/scene/analysis/prune.h"
 #include "core/scene/json/serialize.h"
@@ -95,12 +96,22 @@ Result<void> choose_integrator(const Scene& scene, const JobSpec& spec, RenderSe
   return {};
 }
 
-// Sets the AOVs: those of these names, and those that the denoiser needs.
-Result<void> set_aovs(std::vector<std::string> names, bool denoise, RenderSettings& settings) {
+// Sets the AOVs: those of these names, and those that the denoiser needs. `light_groups` are the groups of
+// the scene's lights.
+Result<void> set_aovs(std::vector<std::string> names, bool denoise,
+                      const std::vector<std::string>& light_groups, RenderSettings& settings) {
   if (denoise) std::ranges::move(names_of(aovs_of(AovKind::guide)), std::back_inserter(names));
-  const auto aovs = parse_aovs(names);
+  auto aovs = parse_aovs(names);
   if (!aovs) return tl::unexpected(aovs.error());
+  // The light of a group's surfaces is the difference between the two layers.
+  if (aovs->has(Aov::volume_light_groups)) *aovs = aovs->with(Aov::light_groups);
   settings.aov = names_of(*aovs);
+  settings.light_groups.clear();
+  if (!aovs->has(Aov::light_groups)) return {};
+  if (light_groups.size() > kMostLightGroups)
+    return invalid(fmt::format("the scene has {} light groups; layers can have at most {}",
+                               light_groups.size(), kMostLightGroups));
+  settings.light_groups = light_groups;
   return {};
 }
 
@@ -114,7 +125,7 @@ Result<void> choose_aovs(const Scene& scene, const JobSpec& spec, RenderSettings
     names.emplace_back(rest.substr(0, end));
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }
-  return set_aovs(std::move(names), spec.denoise, settings);
+  return set_aovs(std::move(names), spec.denoise, scene::light_groups_of(scene), settings);
 }
 
 Result<RenderSettings> settings_of(const Scene& scene, const JobSpec& spec, std::uint32_t frame,
@@ -341,7 +352,9 @@ Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, c
   if (changes.seed) job.settings.seed = *(job.spec.seed = changes.seed) + frame.value_or(0);
   if (changes.denoise && !job.spec.denoise) {
     job.spec.denoise = true;
-    if (auto ok = set_aovs(job.settings.aov, true, job.settings); !ok) return tl::unexpected(ok.error());
+    const std::vector<std::string> groups = job.settings.light_groups;
+    if (auto ok = set_aovs(job.settings.aov, true, groups, job.settings); !ok)
+      return tl::unexpected(ok.error());
   }
   for (const BlobRef& asset : job.assets)
     if (!blobs.has(asset.digest))

@@ -24,7 +24,12 @@ std::vector<std::byte> head_of(const TileGrid& grid, AovSet aovs, std::string_vi
   append_value(out, std::uint64_t{format.size()});
   out.insert(out.end(), name.begin(), name.end());
   for (const int side : {grid.frame.width, grid.frame.height, grid.tile}) append_value(out, side);
-  append_value(out, std::uint32_t{aovs.bits()});
+  // Names, because the numbers of AOVs change when one is added
+  for (const std::string& plane : planes_of(aovs).names) {
+    const auto bytes = std::as_bytes(std::span(plane));
+    out.insert(out.end(), bytes.begin(), bytes.end());
+    out.push_back(std::byte{'\n'});
+  }
   return out;
 }
 

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,8 +21,10 @@ namespace ls::coordinator {
 // One image: its tiles on disk, and the small versions kept in memory.
 class StoredLayers {
  public:
-  StoredLayers(SnapshotTiles tiles, TileGrid grid, AovSet aovs)
-      : tiles_(std::move(tiles)), grid_(grid), aovs_(aovs), layers_(pixel_layers(aovs)) {}
+  // `light_groups` are the names of the light groups, as for pixel_layers().
+  StoredLayers(SnapshotTiles tiles, TileGrid grid, AovSet aovs,
+               std::span<const std::string> light_groups = {})
+      : tiles_(std::move(tiles)), grid_(grid), aovs_(aovs), layers_(pixel_layers(aovs, light_groups)) {}
 
   // Returns the pixels of `rect` at mip level `level` of the layer, in the format of LayerMosaic::bytes().
   // `rect` is in pixels of that level.

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "coordinator/admission/cryptomatte_manifests.h"
+#include "coordinator/admission/layer_names.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/service/core.h"
 #include "coordinator/store/log/audit_file.h"
@@ -297,16 +297,17 @@ void ImageWriter::write_retired(const EntryPtr& entry) {
   core->driver.unload(*entry);
 }
 
-CryptomatteManifests cryptomatte_manifests_of(const StoredJob& job, const BlobStore& blobs) {
-  if (!wants_labels(job.settings)) return {};
+LayerNames layer_names_of(const StoredJob& job, const BlobStore& blobs) {
+  const LayerNames groups{.light_groups = job.settings.light_groups};
+  if (!wants_labels(job.settings)) return groups;
   const auto size = blobs.size(job.scene);
   const auto json = size ? blobs.read(job.scene, 0, *size)
                          : Result<std::vector<std::byte>>(fail(Errc::not_found, "its scene is not stored"));
   const auto scene = json ? deserialize_scene({reinterpret_cast<const char*>(json->data()), json->size()})
                           : Result<Scene>(tl::unexpected(json.error()));
-  if (scene) return manifests_of(*scene, aovs_of(job.settings));
+  if (scene) return layer_names_of(*scene, job.settings);
   log_warn(fmt::format("job={}", job.id.value), "mattes without names: " + scene.error().message);
-  return {};
+  return groups;
 }
 
 Provenance provenance_of(const ReportFacts& facts, const BlobStore& blobs) {
@@ -322,7 +323,7 @@ Provenance provenance_of(const ReportFacts& facts, const BlobStore& blobs) {
           job.settings.seed,
           job.totals.render_seconds,
           health.clean() ? "clean" : canonical_json(health),
-          cryptomatte_manifests_of(job, blobs),
+          layer_names_of(job, blobs),
           job.totals.core_seconds,
           std::move(stopped),
           convergence_status_of(facts),

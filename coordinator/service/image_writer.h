@@ -72,8 +72,9 @@ class ImageWriter {
 // cryptomattes (layers that identify shapes or materials), the scene is read for the names of shapes and
 // materials.
 Provenance provenance_of(const ReportFacts& facts, const BlobStore& blobs);
-// Returns the names of the shapes and materials that the identifiers in the job's cryptomattes stand for.
-// Reads the scene if the job has cryptomattes. Empty if the job has none, or if the scene cannot be read.
-CryptomatteManifests cryptomatte_manifests_of(const StoredJob& job, const BlobStore& blobs);
+// Returns the names in the job's image: those of its light groups, and those of the shapes and materials that
+// the identifiers in its cryptomattes stand for. Reads the scene if the job has cryptomattes; if the scene
+// cannot be read, they get no names.
+LayerNames layer_names_of(const StoredJob& job, const BlobStore& blobs);
 
 }  // namespace ls::coordinator

@@ -101,17 +101,17 @@ Result<std::string> Pictures::layers_json(const JobId& id) const {
     facts = facts_of(**entry, clock_.now());
   }
   const AovSet aovs = aovs_of(facts.job.settings);
-  const auto manifests = cryptomatte_manifests_of(facts.job, blobs_);
+  const LayerNames names = layer_names_of(facts.job, blobs_);
   json layers = json::array();
-  std::vector<PixelLayer> all = pixel_layers(aovs);
+  std::vector<PixelLayer> all = pixel_layers(aovs, names.light_groups);
   if (facts.job.spec.denoise) all.insert(all.begin() + 1, denoised_layer());
   for (const PixelLayer& layer : all) {
     json row{{"name", layer.name},
              {"channels", layer.channels},
              {"format", layer.half ? "half" : "float"},
              {"blocks", to_string(layer.rule)}};
-    if (layer.aov == Aov::shape_id) row["names"] = names_of_identifiers(manifests.shapes);
-    if (layer.aov == Aov::material_id) row["names"] = names_of_identifiers(manifests.materials);
+    if (layer.aov == Aov::shape_id) row["names"] = names_of_identifiers(names.shapes);
+    if (layer.aov == Aov::material_id) row["names"] = names_of_identifiers(names.materials);
     layers.push_back(std::move(row));
   }
   const FrameSize size = facts.job.settings.size;
@@ -130,7 +130,7 @@ Result<std::vector<std::byte>> Pictures::pixels(const JobId& id, const PixelsAsk
   const TileGrid grid = (*entry)->grid;
   const StoredJob& job = (*entry)->stored;
   const bool denoised = job.spec.denoise && asked.layer == denoised_layer().name;
-  const auto layer = denoised ? denoised_layer() : pixel_layer(aovs_of(job.settings), asked.layer);
+  const auto layer = denoised ? denoised_layer() : pixel_layer(aovs_of(job.settings), asked.layer, job.settings.light_groups);
   if (!layer) return tl::unexpected(layer.error());
   if (auto fits = check_layer_rect(grid.frame, asked.level, asked.rect); !fits)
     return tl::unexpected(fits.error());
@@ -156,7 +156,8 @@ Result<std::vector<std::byte>> Pictures::pixels(const JobId& id, const PixelsAsk
   core.unlock();
   const auto image = stored_images_.image(files_.image_version(stored), [&]() {
     auto tiles = files_.tiles_of_image(stored, grid);
-    return tiles ? std::make_shared<StoredLayers>(std::move(*tiles), grid, aovs_of(stored.settings))
+    return tiles ? std::make_shared<StoredLayers>(std::move(*tiles), grid, aovs_of(stored.settings),
+                                                  stored.settings.light_groups)
                  : std::shared_ptr<StoredLayers>();
   });
   if (image) return image->pixels(*layer, asked.level, asked.rect);

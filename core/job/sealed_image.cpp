@@ -117,7 +117,8 @@ Result<std::uint64_t> tile_samples(const SealedImage& image, TileIndex tile) {
 std::optional<PixelDifference> first_difference(const SealedImage& image, const Film& film, TileIndex tile) {
   const int row = static_cast<int>(tile) / film.grid().columns();
   const PixelRect rect = film.grid().rect(tile);
-  for (const auto& [name, ours] : final_layers(film.row(row), {}, !image.picture.half).channels) {
+  const LayerNames names{.light_groups = image.settings.light_groups};
+  for (const auto& [name, ours] : final_layers(film.row(row), names, !image.picture.half).channels) {
     const auto theirs = image.picture.channels.find(name);
     if (theirs == image.picture.channels.end() || theirs->second.index() != ours.index())
       return PixelDifference{rect.x0, rect.y0, name};

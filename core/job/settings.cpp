@@ -3,15 +3,23 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/base/light_group.h"
 #include "core/image/frame/rounds.h"
 #include "core/job/describe.h"
 #include "core/job/spec_draft.h"
 
 namespace ls {
 namespace job {
+namespace {
+
+constexpr std::string_view kLightGroups = "light_groups";
+
+}  // namespace
 
 // RenderSettings are made by the coordinator, and users do not see their names: the rows have no sentences.
 template <class V, Of<RenderSettings> T>
@@ -21,6 +29,7 @@ void describe(V& v, T& s) {
   };
   row("aov", s.aov);
   row("integrator", s.integrator);
+  v.setting({.name = kLightGroups}, s.light_groups);
   row("max_depth", s.max_depth, {-1, kMaxDepthSetting});
   row("rr_depth", s.rr_depth, {0, kMaxDepthSetting});
   row("seed", s.seed, {0, UINT64_MAX});
@@ -33,6 +42,7 @@ void describe(V& v, T& s) {
 namespace {
 
 using job::Json;
+using job::kLightGroups;
 using job::printable;
 
 constexpr int kMaxNesting = 8;
@@ -74,6 +84,23 @@ Result<Json> parse_object(std::string_view text, std::string_view what) {
   }
 }
 
+Result<void> check_light_groups(const RenderSettings& settings, AovSet aovs) {
+  const std::vector<std::string>& groups = settings.light_groups;
+  const auto refuse = [](std::string_view why) {
+    return bad_argument(fmt::format("{}: '{}' {}", kRenderSettings, kLightGroups, why));
+  };
+  for (const std::string& group : groups)
+    if (const std::string wrong = wrong_light_group(group); !wrong.empty())
+      return refuse("is not possible: " + wrong);
+  if (std::ranges::adjacent_find(groups, std::ranges::greater_equal{}) != groups.end())
+    return refuse("must be sorted, each name once");
+  if (groups.size() > kMostLightGroups)
+    return refuse(fmt::format("may have at most {} names", kMostLightGroups));
+  if (groups.empty() == aovs.any_of(aovs_of(AovKind::groups)))
+    return refuse("must be given with AOVs of light groups, and only then");
+  return {};
+}
+
 }  // namespace
 
 std::string canonical_json(const RenderSettings& s) { return dump(job::write_object(s)); }
@@ -86,7 +113,9 @@ std::optional<TargetLayer> parse_target_layer(std::string_view text) {
   return std::nullopt;
 }
 
-AovSet aovs_of(const RenderSettings& settings) { return parse_aovs(settings.aov).value_or(AovSet{}); }
+AovSet aovs_of(const RenderSettings& settings) {
+  return parse_aovs(settings.aov).value_or(AovSet{}).with_groups(settings.light_groups.size());
+}
 
 Digest digest_of(const RenderSettings& settings) { return sha256(canonical_json(settings)); }
 
@@ -96,13 +125,15 @@ Result<RenderSettings> parse_render_settings(std::string_view text) {
   auto settings = job::read_object<RenderSettings>(*json, kRenderSettings);
   if (!settings) return settings;
   for (const std::string& key : job::names_of<RenderSettings>())
-    if (!json->contains(key)) return bad_argument(fmt::format("{}: '{}' is missing", kRenderSettings, key));
+    if (key != kLightGroups && !json->contains(key))
+      return bad_argument(fmt::format("{}: '{}' is missing", kRenderSettings, key));
   const auto aovs = parse_aovs(settings->aov);
   if (!aovs)
     return bad_argument(fmt::format("{}: 'aov' is not possible: {}", kRenderSettings, aovs.error().message));
   if (ls::names_of(*aovs) != settings->aov)
     return bad_argument(
         fmt::format("{}: 'aov' must be sorted, each name once, as it is called", kRenderSettings));
+  if (auto ok = check_light_groups(*settings, *aovs); !ok) return tl::unexpected(ok.error());
   return settings;
 }
 

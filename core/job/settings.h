@@ -31,6 +31,9 @@ struct RenderSettings {
   int max_depth = -1;            // -1: unlimited; counts path segments, as in Mitsuba
   int rr_depth = 5;              // first depth at which Russian roulette may act
   std::vector<std::string> aov;  // sorted names of AOVs, as returned by names_of(AovSet); empty: colour only
+  // Sorted names of the light groups, for AOVs of AovKind::groups; empty without such AOVs. A light whose
+  // group is not in the list belongs to the group `other` if the list has it, and else to none.
+  std::vector<std::string> light_groups;
   bool operator==(const RenderSettings&) const = default;
 };
 AovSet aovs_of(const RenderSettings& settings);

@@ -270,6 +270,7 @@ struct HomogeneousMedium {
   Rgb emission{0, 0, 0};         // radiance per scene unit, independent of extinction
   Rgb source_radiance{0, 0, 0};  // radiance of an infinitely deep medium without scattering
   int priority = 0;              // where media overlap, only the media of the highest priority exist
+  std::string light_group;  // of the light that the medium gives off (Emitter)
   bool operator==(const HomogeneousMedium&) const = default;
 };
 // A medium whose properties vary in space. The extinction is sigma_t * scale * tint. At most one of emission,
@@ -290,17 +291,22 @@ struct HeterogeneousMedium {
   bool peak_one = false;  // true: the spectrum of a black body is divided by its largest value
   std::optional<VolumeIndex> emission_weight;  // factor on the black-body emission
   int priority = 0;  // where media overlap, only the media of the highest priority exist
+  std::string light_group;  // of the light that the medium gives off (Emitter)
   bool operator==(const HeterogeneousMedium&) const = default;
 };
 using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
 
 // Emitters without a shape.
 //
+// `light_group` is the name of the emitter's light group: the AOV light_groups has the light of each group
+// apart. Empty: the emitter is in the group `other`.
+//
 // Camera rays that leave the scene before they are scattered do not see an emitter whose visible_camera is
 // false.
 struct ConstantEmitter {  // the same radiance from all directions
   Rgb radiance{1, 1, 1};
   bool visible_camera = true;
+  std::string light_group;
   bool operator==(const ConstantEmitter&) const = default;
 };
 // Parallel light. `direction` is the direction in which the light travels, in world space. `irradiance` is
@@ -312,11 +318,13 @@ struct DirectionalEmitter {
   // the sky, whose radiance is uniform and gives the same irradiance.
   double angular_radius = 0;
   bool visible_camera = true;
+  std::string light_group;
   bool operator==(const DirectionalEmitter&) const = default;
 };
 struct PointEmitter {
   Vec3 position{0, 0, 0};
   Rgb intensity{1, 1, 1};  // W/sr
+  std::string light_group;
   bool operator==(const PointEmitter&) const = default;
 };
 struct SpotEmitter {  // a spot light at the origin of to_world, which emits along its +z axis
@@ -327,6 +335,7 @@ struct SpotEmitter {  // a spot light at the origin of to_world, which emits alo
   // linearly with the angle to 0.
   double beam_width = 15;
   std::optional<TextureIndex> texture;  // factor on the intensity, projected along +z as by Mitsuba
+  std::string light_group;
   bool operator==(const SpotEmitter&) const = default;
 };
 // How an environment map's image covers the directions, in the map's own space.
@@ -343,6 +352,7 @@ struct EnvmapEmitter {
   Transform to_world;
   SkyMapping mapping = SkyMapping::latlong;
   bool visible_camera = true;
+  std::string light_group;
   bool operator==(const EnvmapEmitter&) const = default;
 };
 
@@ -357,6 +367,7 @@ struct ProjectorEmitter {
   double fov = 50;
   FovAxis fov_axis = FovAxis::x;
   bool as_intensity = false;
+  std::string light_group;
   bool operator==(const ProjectorEmitter&) const = default;
 };
 // A light at the origin of to_world, whose intensity is multiplied by an image of all directions: a square in
@@ -367,6 +378,7 @@ struct GoniometricEmitter {
   Transform to_world;
   Rgb intensity{1, 1, 1};  // W/sr where the image is 1
   TextureIndex texture;
+  std::string light_group;
   bool operator==(const GoniometricEmitter&) const = default;
 };
 using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter, EnvmapEmitter,

@@ -52,6 +52,7 @@ struct AreaEmitter {
   TextureIndex radiance;
   double cutoff_angle = 90, beam_width = 90, falloff = 1;
   bool two_sided = false;
+  std::string light_group;  // as of the emitters without a shape (scene.h)
   bool operator==(const AreaEmitter&) const = default;
 };
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "core/base/light_group.h"
 #include "core/base/text/suggest.h"
 #include "core/scene/schema/materials.h"
 #include "formats/reader/reader.h"
@@ -196,7 +197,11 @@ void Params::convert(const Field& f, const Element& e, bool& value) {
 }
 
 void Params::convert(const Field& f, const Element& e, std::string& value) {
-  if (auto text = string_value(f.name, e)) value = std::move(*text);
+  auto text = string_value(f.name, e);
+  if (!text) return;
+  if (const std::string wrong = f.light_group ? wrong_light_group(*text) : ""; !wrong.empty())
+    return reader_.report().error(e.at, wrong);
+  value = std::move(*text);
 }
 
 void Params::convert(const Field& f, const Element& e, Vec3& value) {

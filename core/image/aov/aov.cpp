@@ -23,6 +23,7 @@ constexpr std::array<AovRow, kAovs> kAovRows = {{
     {Aov::emission, "emission", AovKind::light, "RGB", true},
     {Aov::geo_normal, "geo_normal", AovKind::of_all, "XYZ", true},
     {Aov::indirect, "indirect", AovKind::light, "RGB", true},
+    {Aov::light_groups, "light_groups", AovKind::groups, "RGB", true},
     {Aov::material_id, "material_id", AovKind::ids, "", false},
     {Aov::multiple, "multiple", AovKind::light, "RGB", true},
     {Aov::normal, "normal", AovKind::of_all, "XYZ", true},
@@ -33,6 +34,7 @@ constexpr std::array<AovRow, kAovs> kAovRows = {{
     {Aov::surface, "surface", AovKind::light, "RGB", true},
     {Aov::uv, "uv", AovKind::of_hits, "UV", false},
     {Aov::volume, "volume", AovKind::light, "RGB", true},
+    {Aov::volume_light_groups, "volume_light_groups", AovKind::groups, "RGB", true},
     {Aov::volume_opacity, "volume_opacity", AovKind::opacity, "RGB", true},
 }};
 static_assert([] {
@@ -132,18 +134,21 @@ AovPlanes planes_of(AovSet set) {
       out.ids.push_back(row.aov);
       continue;
     }
-    for (std::size_t c = 0; c < row.components.size(); ++c) {
-      const char letter = row.components[c];
-      const auto component = static_cast<int>(c);
-      if (!has_halves(row.kind))
-        out.sums.push_back({fmt::format("aov.{}.{}", row.name, letter), row.aov, component});
-      else
-        for (const int half : {0, 1})
-          out.sums.push_back(
-              {fmt::format("aov.{}.{}.{}", row.name, "AB"[half], letter), row.aov, component, half});
+    const bool by_group = row.kind == AovKind::groups;
+    for (std::size_t g = 0; g < (by_group ? set.groups() : 1); ++g) {
+      const std::string layer = by_group ? fmt::format("{}.{:02}", row.name, g) : std::string(row.name);
+      for (std::size_t c = 0; c < row.components.size(); ++c) {
+        const char letter = row.components[c];
+        AovPlane plane{.name = {}, .aov = row.aov, .component = static_cast<int>(c), .group = g};
+        for (plane.half = 0; plane.half < (has_halves(row.kind) ? 2 : 1); ++plane.half) {
+          plane.name = has_halves(row.kind) ? fmt::format("aov.{}.{}.{}", layer, "AB"[plane.half], letter)
+                                            : fmt::format("aov.{}.{}", layer, letter);
+          out.sums.push_back(plane);
+        }
+      }
     }
   }
-  if (set.any_of(aovs_of(AovKind::of_hits))) out.sums.push_back({"aov.hits", Aov::depth, 0, 0, true});
+  if (set.any_of(aovs_of(AovKind::of_hits))) out.sums.push_back({.name = "aov.hits", .hits = true});
   std::sort(out.sums.begin(), out.sums.end(),
             [](const AovPlane& a, const AovPlane& b) { return a.name < b.name; });
   for (std::size_t i = 0; i < out.sums.size(); ++i) {

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/light_group.h"
 
 namespace ls {
 
@@ -33,6 +34,7 @@ enum class Aov : std::uint8_t {
   emission,
   geo_normal,
   indirect,
+  light_groups,
   material_id,
   multiple,
   normal,
@@ -43,9 +45,10 @@ enum class Aov : std::uint8_t {
   surface,
   uv,
   volume,
+  volume_light_groups,
   volume_opacity
 };
-inline constexpr std::size_t kAovs = 21;
+inline constexpr std::size_t kAovs = 23;
 
 // The type of an AOV's values, and by what number of samples its sums are divided.
 enum class AovKind {
@@ -55,9 +58,12 @@ enum class AovKind {
   light,    // components of the radiance, divided by the number of all samples
   guide,    // for a denoiser: sums over all samples, separately for the two halves of the samples
   opacity,  // sums over all samples, separately for the two halves of the samples
-  ids       // identifiers, each with the number of samples that hit it
+  groups,   // like `opacity`, and separately for each light group
+  ids          // identifiers, each with the number of samples that hit it
 };
-constexpr bool has_halves(AovKind kind) { return kind == AovKind::guide || kind == AovKind::opacity; }
+constexpr bool has_halves(AovKind kind) {
+  return kind == AovKind::guide || kind == AovKind::opacity || kind == AovKind::groups;
+}
 
 struct AovRow {
   Aov aov;
@@ -70,19 +76,23 @@ struct AovRow {
 std::span<const AovRow> aov_rows();  // all AOVs, sorted by name
 const AovRow& row_of(Aov aov);
 
+// A set of AOVs, and the number of light groups for those of AovKind::groups.
 class AovSet {
  public:
   constexpr AovSet() = default;
-  constexpr explicit AovSet(std::uint32_t bits) : bits_(bits & ((1u << kAovs) - 1)) {}
+  constexpr explicit AovSet(std::uint32_t bits, std::size_t groups = 0)
+      : bits_(bits & ((1u << kAovs) - 1)), groups_(static_cast<std::uint32_t>(groups)) {}
   constexpr bool has(Aov a) const { return bits_ >> static_cast<int>(a) & 1; }
   constexpr bool any_of(AovSet other) const { return bits_ & other.bits_; }
   constexpr bool empty() const { return bits_ == 0; }
   constexpr std::uint32_t bits() const { return bits_; }
-  constexpr AovSet with(Aov a) const { return AovSet(bits_ | 1u << static_cast<int>(a)); }
+  constexpr std::size_t groups() const { return groups_; }
+  constexpr AovSet with(Aov a) const { return AovSet(bits_ | 1u << static_cast<int>(a), groups_); }
+  constexpr AovSet with_groups(std::size_t groups) const { return AovSet(bits_, groups); }
   bool operator==(const AovSet&) const = default;
 
  private:
-  std::uint32_t bits_ = 0;
+  std::uint32_t bits_ = 0, groups_ = 0;
 };
 AovSet aovs_of(AovKind kind);  // returns all AOVs of a kind
 
@@ -95,7 +105,8 @@ std::string known_aovs();                       // returns "albedo, coverage, ..
 
 // One plane of sums: a component of an AOV, or the number of samples that hit a surface.
 struct AovPlane {
-  // name of its channel in the partial's file: "aov.albedo.B", "aov.denoising_albedo.A.B", "aov.hits"
+  // name of its channel in the partial's file: "aov.albedo.B", "aov.denoising_albedo.A.B", "aov.hits",
+  // "aov.light_groups.03.A.B"
   std::string name;
   Aov aov = Aov::depth;  // not used in the plane of hits
   int component = 0;     // index in AovRow::components
@@ -103,6 +114,7 @@ struct AovPlane {
   // is for all samples
   int half = 0;
   bool hits = false;
+  std::size_t group = 0;  // index of the light group, for AovKind::groups
 };
 struct AovPlanes {
   std::vector<AovPlane> sums;

@@ -75,7 +75,9 @@ class Layers {
     // half A.
     for (std::size_t p = 0; p < sums_.size(); ++p)
       if (p != planes_.hits && planes_.sums[p].half == 0) sums_[p].resize(frame_.pixels());
-    if (film.aovs().has(Aov::alpha)) alpha_error_.resize(frame_.pixels());
+    differences_.assign(planes_.sums.size(), {});
+    for (std::size_t p = 0; p < sums_.size(); ++p)
+      if (!sums_[p].empty() && keeps_difference(planes_.sums[p].aov)) differences_[p].resize(frame_.pixels());
     ids_.assign(planes_.ids.size() * 2 * kCryptomatteRanks, std::vector<float>(frame_.pixels()));
   }
 
@@ -88,30 +90,43 @@ class Layers {
     }
   }
 
-  std::uint64_t move_to(ExrPicture& picture, const CryptomatteManifests& manifests, bool float_output) {
+  std::uint64_t move_to(ExrPicture& picture, const LayerNames& names, bool float_output) {
     std::uint64_t clamped = 0;
     for (std::size_t p = 0; p < sums_.size(); ++p) {
       if (sums_[p].empty()) continue;
-      const AovRow& row = row_of(planes_.sums[p].aov);
-      const char component = row.components[static_cast<std::size_t>(planes_.sums[p].component)];
+      const AovPlane& plane = planes_.sums[p];
+      const AovRow& row = row_of(plane.aov);
+      const char component = row.components[static_cast<std::size_t>(plane.component)];
+      const bool halves = row.half && !float_output;
+      if (row.kind == AovKind::groups) {
+        const std::string layer = layer_of_group(row.aov, plane.group, names.light_groups);
+        clamped +=
+            add_layer(picture, fmt::format("{}.{}", layer, component), std::move(sums_[p]), halves) +
+            add_layer(picture, fmt::format("{}{}.{}", layer, kHalfDifference, component),
+                      std::move(differences_[p]), halves);
+        continue;
+      }
       // Alpha belongs to R, G and B, which have no layer's name either.
       const std::string name = row.aov == Aov::alpha ? std::string(1, component)
                                                      : fmt::format("{}.{}", layer_of(row.aov), component);
-      clamped += add_layer(picture, name, std::move(sums_[p]), row.half && !float_output);
+      clamped += add_layer(picture, name, std::move(sums_[p]), halves);
+      if (row.aov != Aov::alpha) continue;
+      for (float& d : differences_[p]) d = std::abs(d);
+      picture.channels["stderr.A"] = ExrFloat{std::move(differences_[p])};
     }
-    if (!alpha_error_.empty()) picture.channels["stderr.A"] = ExrFloat{std::move(alpha_error_)};
     for (std::size_t i = 0; i < planes_.ids.size(); ++i) {
       const std::string layer = layer_of(planes_.ids[i]);
       for (std::size_t c = 0; c < 2 * kCryptomatteRanks; ++c)
         picture.channels[fmt::format("{}{:02}.{}", layer, c / 4, "RGBA"[c % 4])] =
             ExrFloat{std::move(ids_[i * 2 * kCryptomatteRanks + c])};
       picture.strings.merge(cryptomatte_header(
-          layer, planes_.ids[i] == Aov::shape_id ? manifests.shapes : manifests.materials));
+          layer, planes_.ids[i] == Aov::shape_id ? names.shapes : names.materials));
     }
     return clamped;
   }
 
  private:
+  static bool keeps_difference(Aov aov) { return aov == Aov::alpha || row_of(aov).kind == AovKind::groups; }
   void gather_means(const TileAovs& tile) {
     const auto n = static_cast<std::size_t>(tile.rect.pixels());
     const double* hits = planes_.hits == SIZE_MAX ? nullptr : &tile.sums[planes_.hits * n];
@@ -120,15 +135,14 @@ class Layers {
       const AovRow& row = row_of(planes_.sums[p].aov);
       const bool by_hits = row.kind == AovKind::of_hits;
       const double* other = has_halves(row.kind) ? &tile.sums[(p + row.components.size()) * n] : nullptr;
-      // Half the difference of the means of the two halves, as for the colour (Film::pixels())
-      const bool with_error = row.aov == Aov::alpha;
       each_pixel(tile.rect, frame_, [&](std::size_t to, std::size_t from) {
         const double count = by_hits ? hits[from] : static_cast<double>(tile.spp);
         const double sum = tile.sums[p * n + from] + (other ? other[from] : 0);
         // Adding 0 turns -0 into +0 and changes no other value.
         if (count > 0) sums_[p][to] = static_cast<float>(sum / count) + 0.f;
-        if (with_error)
-          alpha_error_[to] = static_cast<float>(std::abs(tile.sums[p * n + from] - other[from]) / count);
+        // Half the difference of the means of the two halves, as for the colour (Film::pixels())
+        if (!differences_[p].empty())
+          differences_[p][to] = static_cast<float>((tile.sums[p * n + from] - other[from]) / count) + 0.f;
       });
     }
   }
@@ -149,7 +163,8 @@ class Layers {
   FrameSize frame_;
   AovPlanes planes_;
   std::vector<std::vector<float>> sums_, ids_;
-  std::vector<float> alpha_error_;  // standard error of the AOV alpha; empty if the film does not have it
+  // Half the differences between the two halves of the samples; empty for planes that keep none
+  std::vector<std::vector<float>> differences_;
 };
 
 std::string tile_digests(const Film& film) {
@@ -202,15 +217,20 @@ std::string layer_of(Aov aov) {
   return std::string(row_of(aov).name);
 }
 
-std::uint64_t add_aov_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
+std::string layer_of_group(Aov aov, std::size_t group, std::span<const std::string> light_groups) {
+  return fmt::format("RGB_{}{}", group < light_groups.size() ? light_groups[group] : fmt::format("{}", group),
+                     aov == Aov::volume_light_groups ? ".volume" : "");
+}
+
+std::uint64_t add_aov_layers(const Film& film, const LayerNames& names, bool float_output,
                              ExrPicture& picture) {
   if (film.aovs().empty()) return 0;
   Layers layers(film);
   layers.gather();
-  return layers.move_to(picture, manifests, float_output);
+  return layers.move_to(picture, names, float_output);
 }
 
-ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
+ExrPicture final_layers(const Film& film, const LayerNames& names, bool float_output,
                         std::uint64_t* clamped) {
   Gathered planes = gather(film);
   ExrPicture picture{film.grid().frame, {}, {}};
@@ -222,7 +242,7 @@ ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests,
     picture.channels[layer] = ExrFloat{std::move(planes.standard_error[c])};
   }
   picture.channels["spp"] = ExrUint{std::move(planes.spp)};
-  above += add_aov_layers(film, manifests, float_output, picture);
+  above += add_aov_layers(film, names, float_output, picture);
   if (clamped) *clamped += above;
   return picture;
 }
@@ -311,7 +331,7 @@ Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& from, 
                          // the first band
                          if (row == 0) clamped = 0;
                          ExrPicture band =
-                             final_layers(film.row(row), from.manifests, float_output, &clamped);
+                             final_layers(film.row(row), from.names, float_output, &clamped);
                          if (!denoised.empty())
                            clamped += add_denoised(denoised, film.grid(), row, float_output, band);
                          return band;

@@ -23,10 +23,14 @@ namespace ls {
 // by +0. The order is R, G, B of each pixel, row by row, little endian. Pixels without samples are zero.
 Digest pixels_sha256(const Film& film);
 
-// Cryptomatte manifests of the two identifier layers (cryptomatte_manifest() in identifiers.h). An empty text
-// means that the layer gets no manifest.
-struct CryptomatteManifests {
+// Names in the image that the film does not have.
+struct LayerNames {
+  // Cryptomatte manifests of the two identifier layers (cryptomatte_manifest() in identifiers.h). Empty: the
+  // layer gets no manifest.
   std::string shapes, materials;
+  // Names of the light groups, as in RenderSettings. Groups beyond the end of the list are called by their
+  // index: "0", "1", ...
+  std::vector<std::string> light_groups;
 };
 
 // A fake worker (--fake, for tests) sends generated pixels instead of rendering. An image with such pixels
@@ -48,7 +52,7 @@ struct Provenance {
   std::optional<double> seconds = {};  // render time in seconds
   // "clean", or canonical_json() of the Health (numeric problems found); empty: unknown, and not written
   std::string health;
-  CryptomatteManifests manifests = {};
+  LayerNames names = {};
   double core_seconds = 0;  // CPU seconds of all rendering; 0: unknown, and not written
   // why sampling stopped before the requested number of samples, and the consequences; empty: not written
   std::string stopped = {};
@@ -68,17 +72,23 @@ struct FinalImage {
 };
 // Returns the layers of the final EXR with their header strings. `film` is a whole film or one row of its
 // tiles. Adds the number of clamped values to `clamped` unless it is null.
-ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
+ExrPicture final_layers(const Film& film, const LayerNames& names, bool float_output,
                         std::uint64_t* clamped = nullptr);
 // Returns the name of the layer of an AOV: the AOV's name, or for identifiers "crypto_object" or
-// "crypto_material".
+// "crypto_material". Not for AOVs of AovKind::groups, which have a layer for each group.
 std::string layer_of(Aov aov);
+// Returns the name of a light group's layer: "RGB_key", or "RGB_key.volume" for volume_light_groups.
+std::string layer_of_group(Aov aov, std::size_t group, std::span<const std::string> light_groups);
+// The layer with this ending has half the difference between the means of the two halves of the samples,
+// (A - B) / 2, of the layer without it. For a mix that multiplies each light group g by w_g, the standard
+// error is the magnitude of the sum of w_g times the difference.
+inline constexpr std::string_view kHalfDifference = ".delta";
 
 // Adds the film's AOVs to `picture`: channels NAME.R, NAME.X, ...; for alpha A, and its standard error
-// stderr.A (FLOAT); for identifiers NAME00.R to NAME02.A with their header strings. Pixels without a surface
+// stderr.A (FLOAT); for light groups RGB_NAME.R, ... and RGB_NAME.delta.R, ...; for identifiers NAME00.R to NAME02.A with their header strings. Pixels without a surface
 // are 0 in the AOVs of surfaces (AovKind::of_hits, of_all and ids). Returns the number of values that were
 // clamped because their magnitude exceeded 65504, the largest half.
-std::uint64_t add_aov_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
+std::uint64_t add_aov_layers(const Film& film, const LayerNames& names, bool float_output,
                              ExrPicture& picture);
 
 // Makes the final EXR; the film may be unfinished. The layers are R, G, B (half, or float if `float_output`),

@@ -12,6 +12,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <charconv>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -37,8 +38,9 @@ constexpr std::array<int, kPartialChannels> kFileOrder = {2, 1, 0, 5, 4, 3};
 constexpr std::int64_t kMaxPartialPixels = 256 * 256;  // number of pixels of the largest tile
 
 constexpr std::int32_t kMaxUnitJson = 1024;
-// upper limit of the size of the channel list, in bytes; all AOVs together need about 2700
-constexpr std::int32_t kMaxChannelList = 8192;
+// upper limit of the size of the channel list, in bytes; all AOVs together need about 2700, and the light
+// groups up to 47 for each of 2 x 6 x kMostLightGroups channels
+constexpr std::int32_t kMaxChannelList = 32768;
 // longest name, unless the file has the flag for long names, which partials never have
 constexpr std::size_t kMaxNameBytes = 31;
 
@@ -104,15 +106,24 @@ Result<std::vector<std::string_view>> channel_names(std::span<const std::byte> r
   return names;
 }
 
-// Returns the AOVs of which at least one channel is among `names`.
+// Returns the AOVs of which at least one channel is among `names`. There are as many light groups as the
+// largest two-digit number after the AOV's name says, but at most kMostLightGroups.
 AovSet aovs_among(std::span<const std::string_view> names) {
   AovSet set;
+  std::size_t groups = 0;
   for (const AovRow& row : aov_rows()) {
     const std::string prefix = fmt::format("{}.{}.", row.kind == AovKind::ids ? "id" : "aov", row.name);
-    for (const std::string_view name : names)
-      if (name.starts_with(prefix)) set = set.with(row.aov);
+    for (const std::string_view name : names) {
+      if (!name.starts_with(prefix)) continue;
+      set = set.with(row.aov);
+      std::size_t group = 0;
+      const std::string_view rest = name.substr(prefix.size());
+      if (row.kind == AovKind::groups &&
+          std::from_chars(rest.data(), rest.data() + rest.size(), group).ec == std::errc())
+        groups = std::max(groups, std::min(group, kMostLightGroups - 1) + 1);
+    }
   }
-  return set;
+  return set.with_groups(groups);
 }
 
 Result<AovSet> check_channels(std::span<const std::byte> raw) {
@@ -319,6 +330,11 @@ Result<Partial> finish(std::span<const std::byte> exr, const Shape& shape, UnitH
   return partial;
 }
 
+std::string told(AovSet aovs) {
+  return fmt::format("the AOVs [{}]{}", fmt::join(names_of(aovs), ", "),
+                     aovs.groups() > 0 ? fmt::format(" with {} light groups", aovs.groups()) : "");
+}
+
 }  // namespace
 
 Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader& expected, FrameSize frame,
@@ -326,9 +342,7 @@ Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader&
   const auto shape = read_shape(exr);
   if (!shape) return tl::unexpected(shape.error());
   if (shape->aovs != aovs)
-    return refuse_partial(fmt::format("it has the AOVs [{}], expected [{}]",
-                                      fmt::join(names_of(shape->aovs), ", "),
-                                      fmt::join(names_of(aovs), ", ")));
+    return refuse_partial(fmt::format("it has {}, expected {}", told(shape->aovs), told(aovs)));
   const PixelRect& display = *shape->display;
   if (display.x1 != frame.width || display.y1 != frame.height)
     return refuse_partial(

@@ -21,9 +21,10 @@ static_assert(std::endian::native == std::endian::little);
 // number of identifiers shown per pixel: those with the largest coverage
 constexpr std::size_t kShownRanks = 3;
 
-PixelLayer layer_of_aov(Aov aov) {
+PixelLayer layer_of_aov(Aov aov, std::string name) {
   const AovRow& row = row_of(aov);
-  PixelLayer layer{.name = layer_of(aov), .channels = {}, .rule = BlockRule::mean, .half = true, .aov = aov};
+  PixelLayer layer{
+      .name = std::move(name), .channels = {}, .rule = BlockRule::mean, .half = true, .aov = aov};
   if (row.kind == AovKind::ids) {
     layer.rule = BlockRule::first;
     layer.half = false;  // a half float cannot represent the bits of an identifier
@@ -48,19 +49,22 @@ std::vector<float> relative_errors(const TilePixels& tile) {
   return out;
 }
 
-std::vector<float> means(const TileAovs& tile, const AovPlanes& planes, const AovRow& row) {
+// Returns the means of a layer of an AOV or, if layer.difference, half the differences between the means of the
+// two halves of the samples.
+std::vector<float> means(const TileAovs& tile, const AovPlanes& planes, const PixelLayer& layer) {
+  const AovRow& row = row_of(*layer.aov);
   const auto n = static_cast<std::size_t>(tile.rect.pixels()), channels = row.components.size();
   std::vector<float> out(n * channels);
   const double* hits = planes.hits == SIZE_MAX ? nullptr : &tile.sums[planes.hits * n];
   for (std::size_t plane = 0; plane < planes.sums.size(); ++plane) {
     const AovPlane& p = planes.sums[plane];
-    if (p.hits || p.aov != row.aov || p.half != 0) continue;
+    if (p.hits || p.aov != row.aov || p.half != 0 || p.group != layer.group) continue;
     // An AOV with halves has its planes for half A of the samples, then those for half B, at an offset of
-    // `channels` planes. The sums of the two halves are added.
+    // `channels` planes. The sums of the two halves are added or, for the difference, subtracted.
     const double* other = has_halves(row.kind) ? &tile.sums[(plane + channels) * n] : nullptr;
     for (std::size_t i = 0; i < n; ++i) {
       const double count = row.kind == AovKind::of_hits ? hits[i] : static_cast<double>(tile.spp);
-      const double sum = tile.sums[plane * n + i] + (other ? other[i] : 0);
+      const double b = other ? other[i] : 0, sum = tile.sums[plane * n + i] + (layer.difference ? -b : b);
       out[i * channels + static_cast<std::size_t>(p.component)] =
           count > 0 ? static_cast<float>(sum / count) : 0.f;
     }
@@ -96,20 +100,34 @@ std::string_view to_string(BlockRule rule) {
   return kNames[static_cast<std::size_t>(rule)];
 }
 
-std::vector<PixelLayer> pixel_layers(AovSet aovs) {
+std::vector<PixelLayer> pixel_layers(AovSet aovs, std::span<const std::string> light_groups) {
   std::vector<PixelLayer> out = {
       {.name = "rgb", .channels = {"R", "G", "B"}, .aov = {}},
       {.name = "stderr", .channels = {"R", "G", "B"}, .rule = BlockRule::error_of_mean, .aov = {}},
       {.name = "error", .channels = {"Y"}, .rule = BlockRule::root_mean_square, .aov = {}},
       {.name = "spp", .channels = {"Y"}, .aov = {}}};
-  for (const AovRow& row : aov_rows())
-    if (aovs.has(row.aov)) out.push_back(layer_of_aov(row.aov));
+  for (const AovRow& row : aov_rows()) {
+    if (!aovs.has(row.aov)) continue;
+    if (row.kind != AovKind::groups) {
+      out.push_back(layer_of_aov(row.aov, layer_of(row.aov)));
+      continue;
+    }
+    for (std::size_t g = 0; g < aovs.groups(); ++g) {
+      const std::string name = layer_of_group(row.aov, g, light_groups);
+      for (const bool difference : {false, true}) {
+        out.push_back(layer_of_aov(row.aov, name + std::string(difference ? kHalfDifference : "")));
+        out.back().group = g;
+        out.back().difference = difference;
+      }
+    }
+  }
   return out;
 }
 
-Result<PixelLayer> pixel_layer(AovSet aovs, std::string_view name) {
+Result<PixelLayer> pixel_layer(AovSet aovs, std::string_view name,
+                               std::span<const std::string> light_groups) {
   std::string known;
-  for (PixelLayer& layer : pixel_layers(aovs)) {
+  for (PixelLayer& layer : pixel_layers(aovs, light_groups)) {
     if (layer.name == name) return std::move(layer);
     known += (known.empty() ? "" : ", ") + layer.name;
   }
@@ -152,7 +170,7 @@ std::vector<float> TileLayers::values(const PixelLayer& layer) const {
   if (colour_.spp == 0) return {};
   if (layer.aov) {
     const AovRow& row = row_of(*layer.aov);
-    return row.kind == AovKind::ids ? identifiers(*aovs_, planes_, row.aov) : means(*aovs_, planes_, row);
+    return row.kind == AovKind::ids ? identifiers(*aovs_, planes_, row.aov) : means(*aovs_, planes_, layer);
   }
   if (layer.name == "rgb") return narrowed(colour_.mean);
   if (layer.name == "stderr") return narrowed(colour_.standard_error);

@@ -35,13 +35,19 @@ struct PixelLayer {
   BlockRule rule = BlockRule::mean;
   bool half = true;        // true: values are sent as half floats; false: as floats, which identifiers need
   std::optional<Aov> aov;  // the AOV of this layer; nullopt: the layer is computed from the colour
+  std::size_t group = 0;   // index of the light group, for an AOV of AovKind::groups
+  // True: the values are half the differences between the two halves of the samples (kHalfDifference in
+  // final_image.h). With BlockRule::mean these are the half differences of the blocks' means.
+  bool difference = false;
 };
 // Returns the layers of a film with these AOVs: "rgb", "stderr" (the standard error of each value of rgb),
 // "error" (the relative standard error of the pixel: the square root of the mean over channels of stderr^2 /
-// (rgb^2 + 0.01)), "spp", and each AOV under the name of its layer in the final EXR.
-std::vector<PixelLayer> pixel_layers(AovSet aovs);
+// (rgb^2 + 0.01)), "spp", and each AOV under the name of its layer in the final EXR. `light_groups` are the
+// names of the light groups (LayerNames in final_image.h).
+std::vector<PixelLayer> pixel_layers(AovSet aovs, std::span<const std::string> light_groups = {});
 // Returns the layer of this name. invalid_argument: there is no such layer; the message lists the layers.
-Result<PixelLayer> pixel_layer(AovSet aovs, std::string_view name);
+Result<PixelLayer> pixel_layer(AovSet aovs, std::string_view name,
+                               std::span<const std::string> light_groups = {});
 
 // Limits of one request: kMaxLayerSide is the largest width and height of the answer, in its pixels.
 // kMaxLayerPixels is the largest number of pixels of the image that the answer may represent.

@@ -233,6 +233,59 @@ Film Film::row(int row) const {
   return band;
 }
 
+Film Film::mixed(std::span<const GroupFactors> factors) const {
+  CHECK(aovs_.has(Aov::light_groups) && factors.size() == aovs_.groups(), "a mix of {} groups out of {}",
+        factors.size(), aovs_.groups());
+  const AovPlanes from = planes_of(aovs_);
+  AovSet rest;
+  for (const AovRow& row : aov_rows())
+    if (aovs_.has(row.aov) && row.kind != AovKind::groups) rest = rest.with(row.aov);
+  // Returns the mixed colour planes, and the planes that stay as they are, of sums in the form of Tile::sums.
+  const auto mix = [&](const auto& sums, std::size_t pixels) {
+    using Value = typename std::decay_t<decltype(sums)>::value_type;
+    std::vector<double> colour(kPartialChannels * pixels);
+    std::vector<Value> kept;
+    for (std::size_t p = 0; p < from.sums.size(); ++p) {
+      const AovPlane& plane = from.sums[p];
+      const auto begin = sums.begin() + static_cast<std::ptrdiff_t>((kPartialChannels + p) * pixels);
+      if (plane.hits || row_of(plane.aov).kind != AovKind::groups) {
+        kept.insert(kept.end(), begin, begin + static_cast<std::ptrdiff_t>(pixels));
+        continue;
+      }
+      const auto c = static_cast<std::size_t>(plane.component);
+      const GroupFactors& f = factors[plane.group];
+      // The plane of a group has the light of its media, too.
+      const double factor =
+          plane.aov == Aov::light_groups ? f.surface[c] : f.volume[c] - f.surface[c];
+      double* to = &colour[(3 * static_cast<std::size_t>(plane.half) + c) * pixels];
+      for (std::size_t i = 0; i < pixels; ++i) to[i] += factor * double{begin[static_cast<std::ptrdiff_t>(i)]};
+    }
+    std::vector<Value> out(colour.begin(), colour.end());
+    out.insert(out.end(), kept.begin(), kept.end());
+    return out;
+  };
+  Film out(grid_, rest);
+  for (TileIndex t = 0; t < tiles_.size(); ++t) {
+    if (!tiles_[t]) continue;
+    const auto pixels = static_cast<std::size_t>(grid_.rect(t).pixels());
+    auto next = std::make_shared<Tile>();
+    next->full_rounds = tiles_[t]->full_rounds;
+    next->chain = tiles_[t]->chain;
+    if (tiles_[t]->full_rounds > 0) next->sums = mix(tiles_[t]->sums, pixels);
+    else next->sums.resize(out.planes_.sums * pixels);
+    next->ids = tiles_[t]->ids;
+    if (const auto& tail = tiles_[t]->tail) {
+      auto sums = mix(tail->sums, pixels);
+      sums.insert(sums.end(), tail->sums.begin() + static_cast<std::ptrdiff_t>(planes_.sums * pixels),
+                  tail->sums.end());
+      next->tail = Tail{tail->samples, tail->digest, std::move(sums)};
+    }
+    next->error = estimate(*next, nullptr, grid_.rect(t));
+    out.tiles_[t] = std::move(next);
+  }
+  return out;
+}
+
 bool Film::operator==(const Film& other) const {
   if (grid_ != other.grid_ || aovs_ != other.aovs_) return false;
   for (std::size_t i = 0; i < tiles_.size(); ++i) {

@@ -51,6 +51,13 @@ struct TileAovs {
   std::vector<float> ids;
 };
 
+// Factors of a light group's light, R G B: of the light that was last scattered in a medium (`volume`), and of
+// all other light.
+struct GroupFactors {
+  std::array<double, 3> surface{1, 1, 1}, volume{1, 1, 1};
+  bool operator==(const GroupFactors&) const = default;
+};
+
 class Film {
  public:
   explicit Film(TileGrid grid, AovSet aovs = {});
@@ -99,6 +106,12 @@ class Film {
   // Returns row number `row` of the tiles (0: the top) as a film of its own, which shares the tiles with this
   // film. Outputs that are written in bands use it.
   Film row(int row) const;
+
+  // Returns the film with another colour: the sum over the light groups of their light times these factors,
+  // one for each group. The AOVs of light groups are left out; the digests of tiles stay those of the samples.
+  // Without the AOV volume_light_groups, the factors `surface` apply to all light. The film must have the AOV
+  // light_groups.
+  Film mixed(std::span<const GroupFactors> factors) const;
 
   // Saving and loading of tiles, so that a job continues after a restart of the coordinator.
 

@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "core/base/check.h"
+#include "core/base/light_group.h"
 #include "core/scene/schema/describe_fields.h"
 #include "core/scene/schema/validate.h"
 
@@ -89,6 +90,8 @@ class ObjectReader {
   void read(const Field& f, const Json& j, std::string& x) {
     if (!j.is_string()) return fail(f.name, "is not a string");
     x = j.get<std::string>();
+    if (f.light_group && !x.empty() && !wrong_light_group(x).empty())
+      fail(f.name, "is not the name of a light group");
   }
   void read(const Field& f, const Json& j, Digest& x) {
     const auto digest = j.is_string() ? Digest::parse(j.get_ref<const std::string&>()) : std::nullopt;

@@ -30,6 +30,7 @@ void describe(V& v, T& e) {
   v.field({.name = "falloff", .doc = "exponent between the two", .range = {0, 1000}, .unwritten = 1},
           e.falloff);
   v.field({.name = "two_sided", .doc = "the back shines like the front", .elided = true}, e.two_sided);
+  v.field(kLightGroup, e.light_group);
 }
 
 LS_TYPE(ConstantEmitter, "emitter", "constant", "", "the same radiance from everywhere around")
@@ -38,6 +39,7 @@ void describe(V& v, T& e) {
   v.field({.name = "radiance", .doc = "radiance", .range = kNonNegative}, e.radiance);
   v.field(on_unless_given("visible_camera", "whether the camera sees the light itself. Not in Mitsuba"),
           e.visible_camera);
+  v.field(kLightGroup, e.light_group);
 }
 
 LS_TYPE(DirectionalEmitter, "emitter", "directional", "",
@@ -58,6 +60,7 @@ void describe(V& v, T& e) {
           e.angular_radius);
   v.field(on_unless_given("visible_camera", "whether the camera sees the light itself. Not in Mitsuba"),
           e.visible_camera);
+  v.field(kLightGroup, e.light_group);
 }
 
 LS_TYPE(PointEmitter, "emitter", "point", "",
@@ -67,6 +70,7 @@ void describe(V& v, T& e) {
   v.field({.name = "position", .doc = "where, in the world", .unit = "length", .given_as = "point"},
           e.position);
   v.field(quantity("intensity", "radiant intensity", "W/sr", kNonNegative), e.intensity);
+  v.field(kLightGroup, e.light_group);
 }
 
 LS_TYPE(SpotEmitter, "emitter", "spot", "",
@@ -81,6 +85,7 @@ void describe(V& v, T& e) {
                    "degrees", {0, 180}),
           e.beam_width);
   v.field({.name = "texture", .doc = "an image projected by the light", .range = kNonNegative}, e.texture);
+  v.field(kLightGroup, e.light_group);
 }
 
 LS_TYPE(EnvmapEmitter, "emitter", "envmap", "",
@@ -101,6 +106,7 @@ void describe(V& v, T& e) {
           e.mapping);
   v.field(on_unless_given("visible_camera", "whether the camera sees the light itself. Not in Mitsuba"),
           e.visible_camera);
+  v.field(kLightGroup, e.light_group);
 }
 
 LS_TYPE(ProjectorEmitter, "emitter", "projector", "",
@@ -121,6 +127,7 @@ void describe(V& v, T& e) {
                   "irradiance. Not in Mitsuba",
            .elided = true},
           e.as_intensity);
+  v.field(kLightGroup, e.light_group);
 }
 
 LS_TYPE(GoniometricEmitter, "emitter", "goniometric", "",
@@ -135,6 +142,7 @@ void describe(V& v, T& e) {
   v.field(quantity("intensity", "radiant intensity where the image is 1", "W/sr", kNonNegative), e.intensity);
   v.field({.name = "texture", .doc = "the image, which multiplies the intensity", .range = kNonNegative},
           e.texture);
+  v.field(kLightGroup, e.light_group);
 }
 
 }  // namespace ls::scene

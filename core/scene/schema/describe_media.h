@@ -101,6 +101,7 @@ void describe(V& v, T& m) {
            .unwritten = 0},
           m.source_radiance);
   describe_priority(v, m.priority);
+  v.field(kLightGroup, m.light_group);
 }
 
 LS_TYPE(HeterogeneousMedium, "medium", "heterogeneous", "", "varies in space by volumes")
@@ -162,6 +163,7 @@ void describe(V& v, T& m) {
            .elided = true},
           m.emission_weight);
   describe_priority(v, m.priority);
+  v.field(kLightGroup, m.light_group);
 }
 
 }  // namespace ls::scene

@@ -89,7 +89,7 @@ TEST(SealedImage, ReadsBackTheFinalImage) {
 
 // Returns a film with all AOVs, with samples in every pixel.
 Film film_with_aovs() {
-  AovSet all;
+  AovSet all = AovSet{}.with_groups(2);
   for (const AovRow& row : aov_rows()) all = all.with(row.aov);
   Film film(kGrid, all);
   for (TileIndex t = 0; t < kGrid.count(); ++t)
@@ -114,7 +114,7 @@ TEST(SealedImage, FindsTheFirstChangedValueOfEachLayer) {
   const int x = 11, y = 9;  // in tile 5, whose first pixel is (8, 8)
   for (const bool floats : {false, true}) {
     const auto whole = read(sealed(film, floats)).value();
-    EXPECT_EQ(whole.picture.channels.size(), 82u);
+    EXPECT_EQ(whole.picture.channels.size(), 82u + 2 * 2 * 6);
     for (const auto& [layer, values] : whole.picture.channels) {
       auto image = whole;
       change(image.picture.channels.at(layer), static_cast<std::size_t>(y * 25 + x));

@@ -1,5 +1,6 @@
 #include "core/job/settings.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -53,6 +54,7 @@ TEST(RenderSettings, EveryFieldChangesTheDigest) {
   EXPECT_TRUE(changed([](RenderSettings& s) { s.max_depth = -1; }));
   EXPECT_TRUE(changed([](RenderSettings& s) { s.rr_depth = 6; }));
   EXPECT_TRUE(changed([](RenderSettings& s) { s.aov.pop_back(); }));
+  EXPECT_TRUE(changed([](RenderSettings& s) { s.light_groups = {"key"}; }));
 }
 
 TEST(RenderSettings, RefusesMissingUnknownAndOutOfRangeKeysByName) {
@@ -72,6 +74,28 @@ TEST(RenderSettings, RefusesMissingUnknownAndOutOfRangeKeysByName) {
               HasSubstr("'maxdepth' is not known; did you mean 'max_depth'"));
   EXPECT_THAT(with("[\"albedo\",\"depth\"]", "[\"depth\",\"albedo\"]"), HasSubstr("'aov' must be sorted"));
   EXPECT_THAT(with("[640,480]", "[0,480]"), HasSubstr("'size'"));
+}
+
+TEST(RenderSettings, HaveLightGroupsWithTheirLayersOnly) {
+  RenderSettings s = some_settings();
+  EXPECT_EQ(canonical_json(s).find("light_groups"), std::string::npos) << "digests of other jobs stay";
+  const auto error = [&](std::vector<std::string> aov, std::vector<std::string> groups) {
+    s.aov = std::move(aov);
+    s.light_groups = std::move(groups);
+    const auto got = parse_render_settings(canonical_json(s));
+    if (got) EXPECT_EQ(*got, s);
+    return got ? "" : got.error().message;
+  };
+  EXPECT_EQ(error({"depth", "light_groups"}, {"fill", "key", "other"}), "");
+  EXPECT_EQ(aovs_of(s).groups(), 3u);
+  EXPECT_THAT(error({"light_groups"}, {}), HasSubstr("'light_groups' must be given with AOVs of light groups"));
+  EXPECT_THAT(error({"depth"}, {"key"}), HasSubstr("and only then"));
+  EXPECT_THAT(error({"light_groups"}, {"key", "fill"}), HasSubstr("must be sorted"));
+  EXPECT_THAT(error({"light_groups"}, {"key", "key"}), HasSubstr("each name once"));
+  EXPECT_THAT(error({"light_groups"}, {"a.b"}), HasSubstr("a light group's name has"));
+  std::vector<std::string> many;
+  for (std::size_t i = 0; i <= kMostLightGroups; ++i) many.push_back(fmt::format("g{:02}", i));
+  EXPECT_THAT(error({"light_groups"}, many), HasSubstr("at most 32 names"));
 }
 
 TEST(JobSpec, EmptyObjectRequestsNothing) { EXPECT_EQ(parse_job_spec("{}").value(), JobSpec{}); }

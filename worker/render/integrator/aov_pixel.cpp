@@ -24,9 +24,11 @@ constexpr AovSet kOfLight = AovSet{}
                                 .with(Aov::emission)
                                 .with(Aov::indirect)
                                 .with(Aov::multiple)
+                                .with(Aov::light_groups)
                                 .with(Aov::single)
                                 .with(Aov::surface)
-                                .with(Aov::volume);
+                                .with(Aov::volume)
+                                .with(Aov::volume_light_groups);
 constexpr AovSet kOfGuide = AovSet{}.with(Aov::denoising_albedo).with(Aov::denoising_normal);
 constexpr AovSet kOfOpacity = AovSet{}.with(Aov::alpha).with(Aov::opacity).with(Aov::volume_opacity);
 static_assert((kOfSurface.bits() ^ kOfLight.bits() ^ kOfGuide.bits() ^ kOfOpacity.bits()) ==
@@ -62,10 +64,15 @@ AovPixel::AovPixel(const World& world)
       wants_surface_(world.aovs.any_of(kOfSurface)),
       wants_light_(world.aovs.any_of(kOfLight)),
       wants_guide_(world.aovs.any_of(kOfGuide)),
-      wants_opacity_(world.aovs.any_of(kOfOpacity)) {}
+      wants_opacity_(world.aovs.any_of(kOfOpacity)) {
+  for (auto& of_aov : group_sums_)
+    for (auto& of_half : of_aov) of_half.resize(world.aovs.groups());
+}
 
 void AovPixel::begin_pixel() {
   sums_ = {};
+  for (auto& of_aov : group_sums_)
+    for (auto& of_half : of_aov) std::ranges::fill(of_half, Sums{});
   hits_ = 0;
   shapes_.clear();
   materials_.clear();
@@ -77,7 +84,7 @@ void AovPixel::add(Aov aov, const V3d& v, std::size_t half) {
 }
 
 void AovPixel::end_sample(int x, int y, std::uint64_t sample, bool usable) {
-  if (wants_light_ && usable) add_light();
+  if (wants_light_ && usable) add_light(sample & 1);
   if (!wants_surface_ && !wants_guide_ && !wants_opacity_) return;
   x += world_.origin_x;
   y += world_.origin_y;
@@ -92,9 +99,9 @@ void AovPixel::end_sample(int x, int y, std::uint64_t sample, bool usable) {
 }
 
 // Adds the light components of a sample whose radiance is usable. A component that is not finite counts as 0.
-void AovPixel::add_light() {
+void AovPixel::add_light(std::size_t half) {
   const auto part = [&](LightPart p) {
-    const C3& c = split_[static_cast<std::size_t>(p)];
+    const C3& c = split_.parts[static_cast<std::size_t>(p)];
     return is_finite(c) ? V3d(c) : V3d(0);
   };
   const V3d e = part(LightPart::unscattered), s1 = part(LightPart::surface_once),
@@ -107,6 +114,13 @@ void AovPixel::add_light() {
   add(Aov::volume, v1 + v2);
   add(Aov::single, v1);
   add(Aov::multiple, v2);
+  for (std::size_t g = 0; g < split_.groups; ++g)
+    for (const bool volume : {false, true}) {
+      const C3& light = (volume ? split_.volume_by_group : split_.by_group)[g];
+      if (!is_finite(light)) continue;
+      Sums& sums = group_sums_[volume][half][g];
+      for (std::size_t c = 0; c < 3; ++c) sums[c] += double{light[static_cast<int>(c)]};
+    }
 }
 
 void AovPixel::add_surface(const FirstSurface& first, const SampleStream& stream, const CameraRay& ray) {
@@ -158,11 +172,11 @@ void AovPixel::add_id(std::vector<IdSlot>& seen, float id) {
 void AovPixel::store(float* planes, std::size_t pixels, std::size_t i) const {
   for (std::size_t p = 0; p < planes_.sums.size(); ++p) {
     const AovPlane& plane = planes_.sums[p];
-    const double sum = plane.hits
-                           ? hits_
-                           : sums_[static_cast<std::size_t>(plane.half)][static_cast<std::size_t>(plane.aov)]
-                                  [static_cast<std::size_t>(plane.component)];
-    planes[p * pixels + i] = rounded(sum);
+    const auto half = static_cast<std::size_t>(plane.half), aov = static_cast<std::size_t>(plane.aov);
+    const bool by_group = row_of(plane.aov).kind == AovKind::groups;
+    const Sums& of_aov = by_group ? group_sums_[plane.aov == Aov::volume_light_groups][half][plane.group]
+                                  : sums_[half][aov];
+    planes[p * pixels + i] = rounded(plane.hits ? hits_ : of_aov[static_cast<std::size_t>(plane.component)]);
   }
   float* ids = planes + planes_.sums.size() * pixels + i;
   for (const Aov aov : planes_.ids) {

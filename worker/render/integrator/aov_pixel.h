@@ -19,7 +19,7 @@ class AovPixel {
 
   LightSplit* split() { return &split_; }  // light components of the current sample
   void begin_pixel();
-  void begin_sample() { split_.fill(C3(0)); }  // C3's default constructor leaves values uninitialised
+  void begin_sample() { split_.clear(world_.aovs.groups()); }
   // Call after sample number `sample` of the image's pixel (x, y) has been rendered. `usable` is true if the
   // radiance of the sample counts.
   void end_sample(int x, int y, std::uint64_t sample, bool usable);
@@ -30,7 +30,7 @@ class AovPixel {
  private:
   using Sums = std::array<double, 3>;
   void add(Aov aov, const V3d& v, std::size_t half = 0);
-  void add_light();
+  void add_light(std::size_t half);
   void add_surface(const FirstSurface& first, const SampleStream& stream, const CameraRay& ray);
   void add_guide(const CameraRay& ray, const SampleStream& stream, std::size_t half);
   void add_opacity(const CameraRay& ray, const SampleStream& stream, std::size_t half);
@@ -43,6 +43,8 @@ class AovPixel {
   // Sums over the samples. For AOVs with halves, [0] is the sum over the even samples and [1] that over the
   // odd ones; for other AOVs, [0] is the sum over all samples.
   std::array<std::array<Sums, kAovs>, 2> sums_{};
+  // Sums of light_groups [0] and volume_light_groups [1], by half and group
+  std::array<std::array<std::vector<Sums>, 2>, 2> group_sums_;
   double hits_ = 0;
   std::vector<IdSlot> shapes_, materials_;
 };

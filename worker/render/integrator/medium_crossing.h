@@ -215,7 +215,7 @@ void PathTracer<F, Light>::light_vertex_by(const LightChoice& choice, const Medi
   const float weight = light->delta ? 1 : light->pdf / (light->pdf + sampled);
   const C3 arriving =
       unoccluded(ray_.start, p, *light, medium_, stream_.stream(depth_, Purpose::track_shadow));
-  if (!is_black(arriving)) add(beta_ * arriving * (phase * weight / light->pdf));
+  if (!is_black(arriving)) add(beta_ * arriving * (phase * weight / light->pdf), group_of(choice));
 }
 
 // For each medium, adds its emission up to the point where a flight through the other media ends. The
@@ -242,7 +242,7 @@ void PathTracer<F, Light>::add_medium_emission_among(float t_max) {
       }
       light[c] = up_to_last[c];
     }
-    if (!is_black(light)) add(beta_ * light);
+    if (!is_black(light)) add(beta_ * light, m.light_group);
   }
 }
 
@@ -269,7 +269,7 @@ void PathTracer<F, Light>::add_medium_emission(const Medium& medium, float t_max
   const C3 light = medium.grid ? emission_of_grid(medium, ray_.start, ray_.d, t_max,
                                                   stream_.stream(segment_, Purpose::emission))
                                : emission_of_length(medium, t_max);
-  if (!is_black(light)) add(beta_ * light);
+  if (!is_black(light)) add(beta_ * light, medium.light_group);
 }
 
 template <Features F, template <Features> class Light>

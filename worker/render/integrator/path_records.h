@@ -3,6 +3,7 @@
 // share.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -12,6 +13,7 @@
 #include "core/image/film/health.h"
 #include "worker/render/bsdf/bsdf.h"
 #include "worker/render/geometry/geometry.h"
+#include "worker/render/base/light_group.h"
 #include "worker/render/math/math.h"
 #include "worker/render/media/medium.h"
 #include "worker/render/media/medium_stack.h"
@@ -49,10 +51,10 @@ struct Opacity {
   C3 all{0, 0, 0}, media{0, 0, 0};
 };
 
-// The components into which the radiance of a sample is split, by the scatterings on the light's path. The
-// light AOVs (auxiliary images) are sums of components.
+// The components into which the radiance of a sample is split. The light AOVs (auxiliary images) are sums of
+// components. One split is by the scatterings on the light's path (LightPart), the other by the light groups.
 //
-// A component is defined by the first scattering of the path, counted from the camera, and by whether more
+// A LightPart is defined by the first scattering of the path, counted from the camera, and by whether more
 // scatterings follow.
 enum class LightPart : std::uint8_t {
   unscattered,    // directly visible: lights, environment, medium emission
@@ -63,7 +65,29 @@ enum class LightPart : std::uint8_t {
 };
 inline constexpr std::size_t kLightParts = 5;
 
-using LightSplit = std::array<C3, kLightParts>;
+constexpr bool in_volume(LightPart part) {
+  return part == LightPart::volume_once || part == LightPart::volume_again;
+}
+struct LightSplit {
+  std::array<C3, kLightParts> parts;
+  // The first `groups` elements of `by_group` have the light of each group; those of `volume_by_group` the
+  // part of it whose first scattering was in a medium (in_volume()). The other elements are not set.
+  std::size_t groups = 0;
+  std::array<C3, kMostLightGroups> by_group, volume_by_group;
+
+  // Makes all components black. C3's default constructor leaves values uninitialised.
+  void clear(std::size_t light_groups) {
+    groups = light_groups;
+    parts.fill(C3(0));
+    std::fill_n(by_group.begin(), groups, C3(0));
+    std::fill_n(volume_by_group.begin(), groups, C3(0));
+  }
+  void add_to_group(LightGroup group, LightPart part, const C3& light) {
+    if (group >= groups) return;
+    by_group[group] += light;
+    if (in_volume(part)) volume_by_group[group] += light;
+  }
+};
 
 constexpr LightPart part_of(int scatterings, bool first_in_medium) {
   if (scatterings == 0) return LightPart::unscattered;
@@ -149,6 +173,9 @@ struct SharedTail {
   V3 onward{0, 0, 0};
   C3 emitted{0, 0, 0}, scattered{0, 0, 0};
   float hit_pdf = 0;
+
+  // With Features::split: the groups of `light` and of `emitted`.
+  LightGroup light_group = kNoLightGroup, emitted_group = kNoLightGroup;
 
   bool brings_light() const { return light_pdf > 0 || !is_black(emitted) || !is_black(scattered); }
 };

@@ -91,6 +91,7 @@ void PathTracer<F, Light>::begin_tail(const PathVertex& at, const LightPlace& pl
   tail.light_pdf = light->pdf;
   tail.light_is_delta = light->delta;
   tail.light = arriving;
+  tail.light_group = group_of(choice);
 }
 
 // Continues the path from the second vertex along w, which a smooth lobe sampled with this weight.
@@ -99,6 +100,7 @@ void PathTracer<F, Light>::go_on_as_tail(const V3& w, const C3& weight) {
   sharing_.tail.goes_on = true;
   sharing_.tail.onward = w;
   sharing_.part = SharingPath::Part::tail;
+  if constexpr (F.split) tail_by_group_.clear(split_->groups);
   C3 size = sharing_.scale * beta_ * weight;
   if constexpr (F.chromatic) {
     size /= mean(density_);
@@ -108,13 +110,14 @@ void PathTracer<F, Light>::go_on_as_tail(const V3& w, const C3& weight) {
   beta_ = C3(1);
 }
 
-// Stores the light of a light source that the ray from the path's second vertex hit. Next-event estimation
+// Stores the light of a light source, of this light group, that the ray from the path's second vertex hit. Next-event estimation
 // would find this light with the density `pdf`.
 template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::keep_emitted(const C3& emitted, float pdf) {
+void PathTracer<F, Light>::keep_emitted(const C3& emitted, float pdf, LightGroup group) {
   sharing_.tail.emitted = beta_ * emitted;
   if constexpr (F.chromatic) sharing_.tail.emitted /= mean(density_);
   sharing_.tail.hit_pdf = pdf;
+  sharing_.tail.emitted_group = group;
 }
 
 // Returns the BSDF at the path's first vertex, on a surface, for light from wi in its local frame. On a
@@ -311,6 +314,16 @@ void PathTracer<F, Light>::share(std::span<PathTracer* const> group) {
       if (scattered > 0) light += s.onward * tail.scattered / scattered;
       if (emitted > 0) light += s.onward * tail.emitted / emitted;
       group[k]->add_shared(s.look.value * light);
+      if constexpr (F.split) {
+        const auto add = [&](LightGroup of, const C3& part) {
+          group[k]->add_shared_to_group(of, s.look.value * part);
+        };
+        if (lit > 0) add(tail.light_group, s.lit * tail.light / lit);
+        if (emitted > 0) add(tail.emitted_group, s.onward * tail.emitted / emitted);
+        if (!(scattered > 0)) continue;
+        for (std::size_t g = 0; g < giver->tail_by_group_.groups; ++g)
+          add(static_cast<LightGroup>(g), s.onward * giver->tail_by_group_.scattered[g] / scattered);
+      }
     }
   }
   // If a path was cut off (SampleOutcome::cut_off), all samples of the group are rejected, since the light of

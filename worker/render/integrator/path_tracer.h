@@ -251,7 +251,10 @@ class PathTracer {
   BsdfEval scattered_at(const PathVertex& y, const V3& d, const V3& w) const;
   void add_shared(const C3& light) {
     outcome_.radiance += light;
-    if constexpr (F.split) (*split_)[static_cast<std::size_t>(part_of(2, first_in_medium_))] += light;
+    if constexpr (F.split) split_->parts[static_cast<std::size_t>(part_of(2, first_in_medium_))] += light;
+  }
+  void add_shared_to_group(LightGroup group, const C3& light) {
+    split_->add_to_group(group, part_of(2, first_in_medium_), light);
   }
   bool looks_for_second() const {
     if constexpr (F.reuse) return sharing_.part == SharingPath::Part::second;
@@ -259,7 +262,7 @@ class PathTracer {
   }
   // True while the path is on the way from its second vertex to its third.
   bool is_leaving_second() const { return sharing_.part == SharingPath::Part::tail && depth_ == 2; }
-  void keep_emitted(const C3& emitted, float pdf);
+  void keep_emitted(const C3& emitted, float pdf, LightGroup group);
 
   // Returns densities_.sum(back()). Calls back() only if the sum depends on it.
   template <class Back>
@@ -287,26 +290,47 @@ class PathTracer {
         }
       }
     }
-    add(light);
+    add(light, group_of(choice));
   }
 
-  // Adds `weighted`, light multiplied by beta_, to the sample. If `ahead`, this light was scattered once more
-  // than the path so far, in the medium on the path's next segment.
-  void add(const C3& weighted, bool ahead = false) {
+  // With F.split: the light group of a chosen light.
+  LightGroup group_of([[maybe_unused]] const LightChoice& choice) const {
+    if constexpr (F.split) return world_.lights.group(choice.light);
+    return kNoLightGroup;
+  }
+  // Adds `weighted`, light of this group multiplied by beta_, to the sample. If `ahead`, this light was
+  // scattered once more than the path so far, in the medium on the path's next segment.
+  void add(const C3& weighted, [[maybe_unused]] LightGroup group, bool ahead = false) {
     C3 light = weighted;
     if constexpr (F.chromatic) light = weighted / mean(density_);
     if constexpr (F.reuse) {
       if (sharing_.part == SharingPath::Part::tail) {
         sharing_.tail.scattered += light;
+        if constexpr (F.split) tail_by_group_.add(group, light);
         return;
       }
       light *= sharing_.scale;
     }
     outcome_.radiance += light;
     if constexpr (F.split) {
-      const bool in_medium = depth_ == 0 ? ahead : first_in_medium_;
-      (*split_)[static_cast<std::size_t>(part_of(depth_ + ahead, in_medium))] += light;
+      const LightPart part = part_ahead(ahead);
+      split_->parts[static_cast<std::size_t>(part)] += light;
+      split_->add_to_group(group, part, light);
     }
+  }
+  LightPart part_ahead(bool ahead) const {
+    return part_of(depth_ + ahead, depth_ == 0 ? ahead : first_in_medium_);
+  }
+  // With F.split: adds `weighted` to the group alone. The caller has added it to the sample, with other
+  // light, without a group.
+  void add_to_group(LightGroup group, const C3& weighted) {
+    C3 light = weighted;
+    if constexpr (F.chromatic) light = weighted / mean(density_);
+    if constexpr (F.reuse) {
+      if (sharing_.part == SharingPath::Part::tail) return tail_by_group_.add(group, light);
+      light *= sharing_.scale;
+    }
+    split_->add_to_group(group, part_ahead(false), light);
   }
   static float mean(const C3& c) { return (c.x + c.y + c.z) / 3; }
   void apply(const Flight& f) {
@@ -346,6 +370,19 @@ class PathTracer {
   float aim_ = 1;
   struct Nothing {};
   std::conditional_t<F.reuse, SharingPath, Nothing> sharing_;
+  // With F.reuse and F.split: SharedTail::scattered by light groups.
+  struct TailByGroup {
+    std::size_t groups = 0;
+    std::array<C3, kMostLightGroups> scattered;
+    void clear(std::size_t light_groups) {
+      groups = light_groups;
+      std::fill_n(scattered.begin(), groups, C3(0));
+    }
+    void add(LightGroup group, const C3& light) {
+      if (group < groups) scattered[group] += light;
+    }
+  };
+  std::conditional_t<F.reuse && F.split, TailByGroup, Nothing> tail_by_group_;
 };
 
 template <Features F, template <Features> class Light>
@@ -500,7 +537,7 @@ void PathTracer<F, Light>::look_for_sky(const SurfaceHit& hit, const SurfaceInfo
   // There are no media, so unoccluded() draws no random numbers
   const C3 arriving = unoccluded(hit.p, offset_point(hit, sky.direction), sky, medium_,
                                  stream_.stream(depth_, Purpose::track_shadow));
-  if (!is_black(arriving)) add(beta_ * s->weight * arriving * .5f);
+  if (!is_black(arriving)) add(beta_ * s->weight * arriving * .5f, world_.lights.sky_group());
 }
 
 // Scatters the path at a surface. Returns Collision::absorbed if the surface absorbs the path, or if the path
@@ -641,13 +678,13 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
         world_.lights.pdf(hit, last_.p, ray_.d, last_.place, last_.in_medium.light_chosen_first());
     if constexpr (F.reuse) {
       if (is_leaving_second()) {
-        keep_emitted(emitted, p_l);
+        keep_emitted(emitted, p_l, world_.lights.group(hit));
         return;
       }
     }
     weight = balance_weight(last_.pdf, p_l * last_.in_medium.found_as_light(world_.lights.pivot(hit)));
   }
-  add(beta_ * emitted * weight);
+  add(beta_ * emitted * weight, F.split ? world_.lights.group(hit) : kNoLightGroup);
 }
 
 template <Features F, template <Features> class Light>
@@ -657,8 +694,8 @@ void PathTracer<F, Light>::add_environment() {
   if constexpr (F.reuse) {
     if (is_leaving_second()) {
       const Lights::EnvironmentParts parts = world_.lights.environment_parts(last_.p, ray_.d, last_.place);
-      keep_emitted(parts.sampled, parts.pdf);
-      add(beta_ * parts.unsampled);
+      keep_emitted(parts.sampled, parts.pdf, parts.group);
+      add(beta_ * parts.unsampled, world_.lights.sky_group());
       return;
     }
   }
@@ -670,15 +707,28 @@ void PathTracer<F, Light>::add_environment() {
       connections_.learner->found_sky(last_.p, ray_.d, mean(beta_ * light));
     }
   }
-  if (depth_ == 1 && looked_for_sky_) light -= world_.lights.constant_environment() * .5f;
-  add(beta_ * light);
+  const bool half_sky = depth_ == 1 && looked_for_sky_;
+  if (half_sky) light -= world_.lights.constant_environment() * .5f;
+  add(beta_ * light, kNoLightGroup);
+  if constexpr (F.split) {
+    if (split_->groups == 0) return;
+    world_.lights.environment_by_group(
+        last_.p, ray_.d, last_.delta ? kInfinity : pdf, last_.place,
+        [&](LightGroup group, const C3& part) { add_to_group(group, beta_ * part); });
+    if (half_sky)
+      add_to_group(world_.lights.sky_group(), beta_ * world_.lights.constant_environment() * -.5f);
+  }
 }
 
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_environment_seen() {
   if (world_.hide_emitters || world_.transparent) return;
   const C3 light = world_.lights.environment_seen(ray_.d);
-  if (!is_black(light)) add(beta_ * light);
+  if (is_black(light)) return;
+  add(beta_ * light, kNoLightGroup);
+  if constexpr (F.split)
+    world_.lights.environment_seen_by_group(
+        ray_.d, [&](LightGroup group, const C3& part) { add_to_group(group, beta_ * part); });
 }
 
 template <Features F, template <Features> class Light>

@@ -142,7 +142,7 @@ class Samples {
       if (crumb_) mark(pixels.front(), s);
       std::array<SampleOutcome, kMostTogether> outcomes;
       LightSplit black;
-      black.fill(C3(0));
+      black.clear(w_.aovs.groups());
       std::vector<LightSplit> splits(v_.covers.split ? pixels.size() : 0, black);
       v_.group(w_, pixels, s, splits, outcomes);
       for (std::size_t k = 0; k < pixels.size(); ++k) {
@@ -262,7 +262,7 @@ TileResult render_tile_as(const World& world, const std::string& name, PixelRect
 SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample) {
   const FlushDenormals mode;
   LightSplit split;
-  split.fill(C3(0));
+  split.clear(world.aovs.groups());
   const SampleOutcome out = Samples(world, choose(world), {sample, sample + 1}).of(x, y, sample, &split);
   SampleValue value{{out.radiance.x, out.radiance.y, out.radiance.z}, usable(out), {}};
   count(out, {x, y, sample}, value.health);

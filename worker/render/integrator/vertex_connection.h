@@ -170,7 +170,8 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
   ++depth_;
   const C3 arriving = unoccluded(start, scattering.origin(w), light, scattering.media(w),
                                  stream_.stream(depth_, Purpose::track_connect));
-  if (!is_black(arriving)) add(added * arriving);
+  if (!is_black(arriving))
+    add(added * arriving, F.split ? world_.lights.group(world_.sun.light) : kNoLightGroup);
   --depth_;
 }
 

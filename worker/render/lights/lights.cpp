@@ -22,7 +22,7 @@ void Lights::add(Kind kind) {
   if (kind.dark(world()))
     ++left_out_;
   else
-    lights_.push_back({std::move(kind)});
+    lights_.push_back({.kind = std::move(kind)});
 }
 template <class... Kind>
 void Lights::add(std::variant<Kind...> kind) {
@@ -92,16 +92,29 @@ Result<void> Lights::add_emitter(const Scene& scene, const Emitter& emitter, con
 }
 
 Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const TextureTable& textures,
-                             const ImageLoader& images) {
+                             const ImageLoader& images, std::span<const std::string> light_groups) {
   Lights l;
+  // Sets the group of the lights that were added last, as it has none yet.
+  const auto group = [&](const std::string& name) {
+    const LightGroup index = light_group_of(light_groups, name);
+    for (auto light = l.lights_.rbegin(); light != l.lights_.rend() && light->group == kNoLightGroup; ++light)
+      light->group = index;
+    return index;
+  };
   l.geometry_ = &geometry;
   l.textures_ = &textures;
   const SurfacePrimitives primitives(geometry);
   for (std::uint32_t i = 0; i < scene.shapes.size(); ++i) {
-    if (scene.shapes[i].emitter) l.add_area(scene, i, primitives, geometry);
+    const auto& emitter = scene.shapes[i].emitter;
+    if (!emitter) continue;
+    l.add_area(scene, i, primitives, geometry);
+    group(emitter->light_group);
   }
   for (const Emitter& e : scene.emitters) {
     if (auto ok = l.add_emitter(scene, e, images); !ok) return tl::unexpected(ok.error());
+    const LightGroup index = std::visit([&](const auto& any) { return group(any.light_group); }, e);
+    if (std::holds_alternative<ConstantEmitter>(e) || std::holds_alternative<EnvmapEmitter>(e))
+      l.sky_group_ = index;
   }
   l.sort_places_first();
   l.set_probabilities();
@@ -191,7 +204,7 @@ void Lights::set_portals(std::unique_ptr<const Portals> portals) {
   } else if (at != lights_.end()) {
     at->kind = sky_;
   } else {
-    lights_.push_back({sky_});
+    lights_.push_back({.kind = sky_, .group = sky_group_});
   }
   local_ = nullptr;
   set_probabilities();
@@ -204,37 +217,36 @@ std::uint64_t Lights::map_bytes() const {
 
 Lights::EnvironmentParts Lights::environment_parts(const V3& x, const V3& direction,
                                                    const LightPlace& place) const {
-  EnvironmentParts parts{environment_, C3(0), 0};
+  EnvironmentParts parts{.unsampled = environment_, .sampled = C3(0), .pdf = 0};
   if (sky_.sampled()) {
     const EnvironmentMap::Light light = sky_.from(x, direction);
     parts.sampled = light.radiance;
     parts.pdf = light.pdf * probability_at(sky_index_, place);
+    parts.group = sky_group_;
   } else if (!suns_.empty()) {
-    const SunLight& sun = *std::get_if<SunLight>(&lights_[suns_.front()].kind);
-    parts.sampled = sun.found(direction, kInfinity, 1);
-    parts.pdf = sun.density * probability_at(suns_.front(), place);
+    const SunLight& only = sun(suns_.front());
+    parts.sampled = only.found(direction, kInfinity, 1);
+    parts.pdf = only.density * probability_at(suns_.front(), place);
+    parts.group = group(suns_.front());
   }
   return parts;
 }
 
 bool Lights::hides_environment() const {
-  return hides_sky_ || std::ranges::any_of(suns_, [&](std::uint32_t i) {
-           return !std::get_if<SunLight>(&lights_[i].kind)->seen;
-         });
+  return hides_sky_ || std::ranges::any_of(suns_, [&](std::uint32_t i) { return !sun(i).seen; });
 }
 
 C3 Lights::environment_seen(const V3& direction) const {
   C3 sum = hides_sky_ ? C3(0) : environment_ + sky_.radiance(direction);
   for (const std::uint32_t i : suns_)
-    if (const SunLight& sun = *std::get_if<SunLight>(&lights_[i].kind); sun.seen)
-      sum += sun.found(direction, kInfinity, 1);
+    if (sun(i).seen) sum += sun(i).found(direction, kInfinity, 1);
   return sum;
 }
 
 C3 Lights::suns(const V3& direction, float pdf, const LightPlace& place) const {
   C3 sum(0);
   for (const std::uint32_t i : suns_)
-    sum += std::get_if<SunLight>(&lights_[i].kind)->found(direction, pdf, probability_at(i, place));
+    sum += sun(i).found(direction, pdf, probability_at(i, place));
   return sum;
 }
 

@@ -9,12 +9,15 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "core/base/error.h"
 #include "worker/render/lights/area.h"
 #include "worker/render/lights/distant.h"
+#include "worker/render/base/light_group.h"
 #include "worker/render/lights/local_lights.h"
 #include "worker/render/lights/punctual.h"
 
@@ -40,9 +43,15 @@ class Lights {
  public:
   // Builds the list of the scene's lights and sets the light index of the surfaces of `geometry`. Lights
   // without power or area are left out and counted. `images` loads environment maps; it may be empty if the
-  // scene has no environment map.
+  // scene has no environment map. `light_groups` are the names of the light groups, sorted.
   static Result<Lights> build(const Scene& scene, Geometry& geometry, const TextureTable& textures,
-                              const ImageLoader& images = {});
+                              const ImageLoader& images = {}, std::span<const std::string> light_groups = {});
+
+  // Returns the light group of a light, of the surface light that was hit, and of the environment map or the
+  // constant environment.
+  LightGroup group(std::uint32_t light) const { return lights_[light].group; }
+  LightGroup group(const SurfaceHit& hit) const { return group(geometry_->surfaces[hit.surface].light); }
+  LightGroup sky_group() const { return sky_group_; }
 
   // False if there is no light that next-event estimation can sample.
   bool can_sample() const { return !lights_.empty(); }
@@ -98,15 +107,25 @@ class Lights {
   // environment is never sampled as a light, since it is smooth and paths find it when they leave.
   C3 environment(const V3& x, const V3& direction, float pdf, const LightPlace& place) const {
     const C3 beside = suns_.empty() ? environment_ : environment_ + suns(direction, pdf, place);
-    if (!sky_.sampled()) return beside;
-    if (std::isinf(pdf)) return beside + sky_.radiance(direction);
-    const EnvironmentMap::Light light = sky_.from(x, direction);
-    const float as_light = light.pdf * probability_at(sky_index_, place);
-    return beside + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);
+    return sky_.sampled() ? beside + sky(x, direction, pdf, place) : beside;
+  }
+  // Calls f(group, radiance) for each part of environment() that belongs to one light: the sky, and each sun
+  // in this direction.
+  template <class F>
+  void environment_by_group(const V3& x, const V3& direction, float pdf, const LightPlace& place, F f) const {
+    f(sky_group_, sky_.sampled() ? environment_ + sky(x, direction, pdf, place) : environment_);
+    for (const std::uint32_t i : suns_) f(group(i), sun(i).found(direction, pdf, probability_at(i, place)));
   }
   // The radiance that a camera ray sees if it leaves the scene in this direction without a scattering: that
   // of the lights whose visible_camera is true.
   C3 environment_seen(const V3& direction) const;
+  // Calls f(group, radiance) for each of these lights.
+  template <class F>
+  void environment_seen_by_group(const V3& direction, F f) const {
+    if (!hides_sky_) f(sky_group_, environment_ + sky_.radiance(direction));
+    for (const std::uint32_t i : suns_)
+      if (sun(i).seen) f(group(i), sun(i).found(direction, kInfinity, 1));
+  }
   bool hides_environment() const;  // true if visible_camera of one of these lights is false
   // The radiance of the constant environment; black while portals are set, since the constant environment is
   // then a part of the sky, which is sampled as a light.
@@ -117,6 +136,7 @@ class Lights {
     C3 unsampled;  // never sampled as a light
     C3 sampled;    // sampled as a light with the density `pdf`, per steradian
     float pdf;
+    LightGroup group = kNoLightGroup;  // of `sampled`
   };
   EnvironmentParts environment_parts(const V3& x, const V3& direction, const LightPlace& place) const;
   // True if next-event estimation samples a direction by at most one light that paths can also hit when they
@@ -170,6 +190,7 @@ class Lights {
   struct Light {
     VariantOf<AreaKinds, PunctualKinds, DistantKinds> kind;
     float probability = 0;
+    LightGroup group = kNoLightGroup;
   };
 
   static bool has_place(const Light& light) {
@@ -218,7 +239,15 @@ class Lights {
     const Light& light = lights_[drawn.light];
     return {drawn.light, drawn.probability, has_place(light), is_point(light), numbers};
   }
+  const SunLight& sun(std::uint32_t i) const { return *std::get_if<SunLight>(&lights_[i].kind); }
   C3 suns(const V3& direction, float pdf, const LightPlace& place) const;
+  // The part of environment() that next-event estimation samples by directions of the sky.
+  C3 sky(const V3& x, const V3& direction, float pdf, const LightPlace& place) const {
+    if (std::isinf(pdf)) return sky_.radiance(direction);
+    const EnvironmentMap::Light light = sky_.from(x, direction);
+    const float as_light = light.pdf * probability_at(sky_index_, place);
+    return as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance;
+  }
 
   std::vector<Light> lights_;
   std::vector<std::uint32_t> suns_;  // indices of the suns in lights_
@@ -241,6 +270,7 @@ class Lights {
   std::uint64_t tree_words_ = 0, table_words_ = 0;
   bool tree_in_media_ = false;
   bool any_with_place_ = false;
+  LightGroup sky_group_ = kNoLightGroup;
   bool hides_sky_ = false;  // true if the camera does not see the environment map or the constant environment
   std::uint64_t left_out_ = 0, clamped_ = 0;
 };

@@ -17,6 +17,7 @@
 #include "worker/render/base/features.h"
 #include "worker/render/base/work_counters.h"
 #include "worker/render/geometry/clear_region.h"
+#include "worker/render/base/light_group.h"
 #include "worker/render/math/math.h"
 #include "worker/render/math/random.h"
 #include "worker/render/math/sampler.h"
@@ -64,6 +65,7 @@ struct Medium {
   // sampled before their rays are traced: if the medium does not emit, and light in it is sampled at vertices
   // alone.
   const ClearRegion* clear = nullptr;
+  LightGroup light_group = kNoLightGroup;  // of the emission
   int priority = 0;  // where media overlap, only those of the highest priority are in effect
   bool chromatic() const { return sigma_t.x != sigma_t.y || sigma_t.y != sigma_t.z || by_channel[0]; }
 

@@ -219,6 +219,10 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
   note_surface_needs(scene, w);
   if (w.use_media) {
     if (auto ok = build_media(scene, loader, w); !ok) return tl::unexpected(ok.error());
+    for (std::size_t i = 0; i < w.media.size(); ++i)
+      w.media[i].light_group =
+          std::visit([&](const auto& m) { return light_group_of(settings.light_groups, m.light_group); },
+                     scene.media.at(i));
     if (scene.sensor.medium) w.camera_medium = scene.sensor.medium->value;
   }
   if (auto ok = BuildStop::go_on(); !ok) return tl::unexpected(ok.error());
@@ -229,7 +233,7 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
     if (!image && image.error().code == Errc::resource_exhausted)
       image.error().message += "; scale the environment map down to 8192 x 4096 pixels or less";
     return image;
-  });
+  }, settings.light_groups);
   if (!lights) return tl::unexpected(lights.error());
   w.lights = std::move(*lights);
   w.hide_environment = w.hide_emitters || w.transparent || w.lights.hides_environment();
@@ -262,7 +266,7 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
     return fail(Errc::internal, "the scene's analysis left out something that the scene has: this is a bug");
   w.overlaps = found.overlaps;
   if (w.overlaps) w.camera_media = camera_media(w);
-  w.need.split = w.aovs.any_of(aovs_of(AovKind::light));
+  w.need.split = w.aovs.any_of(aovs_of(AovKind::light)) || w.aovs.any_of(aovs_of(AovKind::groups));
   if (w.aovs.any_of(aovs_of(AovKind::ids))) name_surfaces(scene, w);
   bool homogeneous_media = false;
   for (const Medium& m : w.media) homogeneous_media = homogeneous_media || (!m.grid && !is_black(m.sigma_t));

@@ -77,14 +77,20 @@ TEST(Aovs, PlanesAreInTheOrderOfTheFile) {
               ElementsAre("aov.alpha.A.A", "aov.alpha.B.A", "aov.volume_opacity.A.B",
                           "aov.volume_opacity.A.G", "aov.volume_opacity.A.R", "aov.volume_opacity.B.B",
                           "aov.volume_opacity.B.G", "aov.volume_opacity.B.R"));
-  const auto all = planes_of(AovSet(~0u)).names;
+  EXPECT_EQ(planes_of(AovSet{}.with(Aov::light_groups)).count(), 0u) << "without groups";
+  EXPECT_THAT(planes_of(AovSet{}.with(Aov::light_groups).with_groups(2)).names,
+              ElementsAre("aov.light_groups.00.A.B", "aov.light_groups.00.A.G", "aov.light_groups.00.A.R",
+                          "aov.light_groups.00.B.B", "aov.light_groups.00.B.G", "aov.light_groups.00.B.R",
+                          "aov.light_groups.01.A.B", "aov.light_groups.01.A.G", "aov.light_groups.01.A.R",
+                          "aov.light_groups.01.B.B", "aov.light_groups.01.B.G", "aov.light_groups.01.B.R"));
+  const auto all = planes_of(AovSet(~0u, kMostLightGroups)).names;
   EXPECT_TRUE(std::is_sorted(all.begin(), all.end()));
   EXPECT_EQ(std::adjacent_find(all.begin(), all.end()), all.end());
   for (const std::string& name : all) EXPECT_LE(name.size(), 31u) << name;
 }
 
 TEST(Partial, WithAovsSurvivesEncodingBitForBit) {
-  for (const AovSet aovs : {kSome, AovSet(~0u), AovSet{}.with(Aov::coverage)}) {
+  for (const AovSet aovs : {kSome, AovSet(~0u, 1), AovSet(~0u, kMostLightGroups), AovSet{}.with(Aov::coverage)}) {
     const Partial partial = with_aovs(4, {4, 8}, aovs);
     const auto exr = encoded(partial);
 
@@ -97,6 +103,35 @@ TEST(Partial, WithAovsSurvivesEncodingBitForBit) {
     EXPECT_EQ(file->partial, partial);
     EXPECT_EQ(unit_digest(*back), unit_digest(partial));
   }
+}
+
+TEST(PartialGate, CountsLightGroups) {
+  const AovSet two = AovSet{}.with(Aov::light_groups).with_groups(2);
+  const Partial partial = with_aovs(0, {0, 2}, two);
+  const auto exr = encoded(partial);
+
+  EXPECT_TRUE(decode_partial(exr, partial.header, kFrame, two));
+  for (const std::size_t groups : {std::size_t{0}, std::size_t{1}, std::size_t{3}})
+    EXPECT_THAT(refusal(decode_partial(exr, partial.header, kFrame, two.with_groups(groups))),
+                HasSubstr("AOVs [light_groups] with 2 light groups"))
+        << groups;
+  for (const std::string_view other : {"99", "7x", "x0"}) {
+    auto bytes = exr;
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const auto at = text.find("aov.light_groups.01.B.R") + 17;
+    std::memcpy(bytes.data() + at, other.data(), other.size());
+    EXPECT_THAT(refusal(decode_partial(bytes, partial.header, kFrame, two)), HasSubstr("stands where"))
+        << other;
+  }
+}
+
+TEST(LightGroupName, HasLettersDigitsAndLinesOnly) {
+  for (const std::string& good : {std::string("key"), std::string("Key_2-b"), std::string(63, 'a')})
+    EXPECT_EQ(wrong_light_group(good), "");
+  for (const std::string& bad :
+       {std::string(), std::string(64, 'a'), std::string("a.b"), std::string("a b"), std::string("\xc3\xa9"),
+        std::string("a\0b", 3), std::string("a\n")})
+    EXPECT_THAT(wrong_light_group(bad), HasSubstr("a light group's name has 1 to 63")) << bad;
 }
 
 TEST(Partial, WithoutAovsHasSixChannels) {
@@ -113,10 +148,10 @@ TEST(PartialGate, RequiresExactlyTheRequestedAovs) {
   const Partial partial = with_aovs(0, {0, 2}), plain = with_aovs(0, {0, 2}, {});
 
   EXPECT_THAT(refusal(decode_partial(encoded(partial), partial.header, kFrame)),
-              HasSubstr("AOVs [albedo, depth, direct, shape_id], expected []"));
+              HasSubstr("AOVs [albedo, depth, direct, shape_id], expected the AOVs []"));
   EXPECT_THAT(refusal(decode_partial(encoded(plain), plain.header, kFrame, kSome)), HasSubstr("AOVs []"));
   EXPECT_THAT(refusal(decode_partial(encoded(partial), partial.header, kFrame, kSome.with(Aov::coverage))),
-              HasSubstr("expected [albedo, coverage"));
+              HasSubstr("expected the AOVs [albedo, coverage"));
 }
 
 TEST(PartialGate, RefusesChannelsThatNoAovHas) {
@@ -221,7 +256,7 @@ TEST(Film, AddsAovsAsItAddsColour) {
 }
 
 TEST(Film, BeautyHasTheSameBitsWithAndWithoutAovs) {
-  const Film plain = film_of(40, {}), rich = film_of(40, AovSet(~0u));
+  const Film plain = film_of(40, {}), rich = film_of(40, AovSet(~0u, 3));
 
   EXPECT_EQ(pixels_sha256(rich), pixels_sha256(plain));
   EXPECT_EQ(rich.error(), plain.error());

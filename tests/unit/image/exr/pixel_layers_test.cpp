@@ -1,9 +1,12 @@
 #include "core/image/exr/pixel_layers.h"
 #include "core/image/frame/frame.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "core/image/exr/final_image.h"
 #include "tests/unit/image/support.h"
@@ -113,6 +116,50 @@ TEST(PixelLayers, AovLayersAreNamedAsInTheExr) {
   EXPECT_EQ(id[1], channel("crypto_object00.G")[at]);
   EXPECT_EQ(id[4], channel("crypto_object01.R")[at]);
   EXPECT_FALSE(pixel_layer(aovs, "albedo")) << "the job did not ask for it";
+}
+
+TEST(PixelLayers, LightGroupsHaveMeansAndHalfDifferences) {
+  const AovSet aovs = AovSet().with(Aov::light_groups).with(Aov::volume_light_groups).with_groups(2);
+  const std::vector<std::string> groups = {"fill", "key"};
+  Film film(kLayerGrid, aovs);
+  const UnitHeader header{test::name_of("s"), test::name_of("t"), test::name_of("c"), kLayerGrid.rect(0),
+                          cut_range(0, 16)};
+  const Partial partial = fake_partial(header, aovs);
+  ASSERT_TRUE(film.fold(0, 0, partial));
+  ExrPicture exr{kLayerGrid.frame, {}, {}};
+  add_aov_layers(film, {.light_groups = groups}, true, exr);
+  std::vector<std::string> names;
+  for (const PixelLayer& layer : pixel_layers(aovs, groups)) names.push_back(layer.name);
+  EXPECT_THAT(names, testing::ElementsAre("rgb", "stderr", "error", "spp", "RGB_fill", "RGB_fill.delta",
+                                          "RGB_key", "RGB_key.delta", "RGB_fill.volume",
+                                          "RGB_fill.volume.delta", "RGB_key.volume", "RGB_key.volume.delta"));
+
+  const AovPlanes planes = planes_of(aovs);
+  const auto rect = kLayerGrid.rect(0);
+  const auto pixels = static_cast<std::size_t>(rect.pixels()), at = std::size_t{3};
+  const auto sum = [&](const std::string& plane) {
+    const auto index = std::ranges::find(planes.names, plane) - planes.names.begin();
+    return double{partial.sums[(6 + static_cast<std::size_t>(index)) * pixels + at]};
+  };
+  for (const auto& [layer, plane] : std::map<std::string, std::string>{
+           {"RGB_key", "aov.light_groups.01"}, {"RGB_fill.volume", "aov.volume_light_groups.00"}}) {
+    const double a = sum(plane + ".A.G"), b = sum(plane + ".B.G");
+    const auto value = [&](const std::string& name) {
+      return std::get<ExrFloat>(exr.channels.at(name + ".G")).values[at];  // in the first row of the image
+    };
+    const auto shown = [&](const std::string& name) {
+      const PixelLayer found = pixel_layer(aovs, name, groups).value();
+      return TileLayers(film, 0, true).values(found)[3 * at + 1];
+    };
+    EXPECT_EQ(value(layer), static_cast<float>((a + b) / 16));
+    EXPECT_EQ(value(layer + ".delta"), static_cast<float>((a - b) / 16));
+    EXPECT_EQ(shown(layer), value(layer));
+    EXPECT_EQ(shown(layer + ".delta"), value(layer + ".delta"));
+    EXPECT_NE(a, b) << "the test needs halves that differ";
+  }
+  ExrPicture unnamed{kLayerGrid.frame, {}, {}};
+  add_aov_layers(film, {}, true, unnamed);
+  EXPECT_TRUE(unnamed.channels.contains("RGB_1.delta.B")) << "groups without names have numbers";
 }
 
 TEST(PixelLayers, RequestIsBounded) {

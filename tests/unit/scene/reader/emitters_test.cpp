@@ -38,6 +38,25 @@ TEST(Emitters, DirectionalLightMayHaveAnAngularRadius) {
               HasSubstr("out of its range 0 <= angular_radius <= 90"));
 }
 
+TEST(Emitters, AndGlowingMediaMayBelongToALightGroup) {
+  const std::string group = R"(<string name="light_group" value="key-1_B"/>)";
+  EXPECT_EQ(emitter<DirectionalEmitter>("", "directional").light_group, "");
+  EXPECT_EQ(emitter<ConstantEmitter>(group, "constant").light_group, "key-1_B");
+  EXPECT_EQ(emitter<DirectionalEmitter>(group, "directional").light_group, "key-1_B");
+  EXPECT_EQ(emitter<PointEmitter>(group, "point").light_group, "key-1_B");
+  EXPECT_EQ(emitter<SpotEmitter>(group, "spot").light_group, "key-1_B");
+  EXPECT_EQ(area(group).light_group, "key-1_B");
+  const Scene s = must_read(with_sensor(R"(<shape type="cube"><medium name="interior" type="homogeneous">)" +
+                                        group + "</medium></shape>"));
+  EXPECT_EQ(std::get<HomogeneousMedium>(s.media.at(0)).light_group, "key-1_B");
+  EXPECT_EQ(must_read(write_xml(s)), s);
+  for (const char* wrong : {"", "a.b", "a b", "\xc3\xa9"})
+    EXPECT_THAT(refusal("<emitter type=\"constant\">\n<string name=\"light_group\" value=\"" +
+                        std::string(wrong) + "\"/></emitter>"),
+                HasSubstr("a light group's name has 1 to 63 ASCII letters"))
+        << wrong;
+}
+
 TEST(Emitters, AreaLightMayBeABeam) {
   const AreaEmitter plain = area("");
   EXPECT_EQ(plain.cutoff_angle, 90);

@@ -1,0 +1,106 @@
+#include "core/image/light_mix/light_mix.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "core/base/light_group.h"
+
+namespace ls {
+namespace {
+
+using nlohmann::json;
+using Factors = std::array<double, 3>;
+
+bool is_factor(const json& value) {
+  return value.is_number() && value.get<double>() >= 0 && value.get<double>() <= kMostMixFactor;
+}
+
+std::optional<Factors> factors(const json& value) {
+  if (is_factor(value)) return Factors{value, value, value};
+  if (!value.is_array() || value.size() != 3 || !std::ranges::all_of(value, is_factor)) return std::nullopt;
+  return Factors{value[0], value[1], value[2]};
+}
+
+json written(const Factors& f) {
+  if (f[0] == f[1] && f[1] == f[2]) return f[0];
+  return f;
+}
+
+}  // namespace
+
+Result<LightMix> parse_light_mix(std::string_view text) {
+  const json parsed = json::parse(text, nullptr, false);
+  if (!parsed.is_object())
+    return bad_argument("a mix must be a JSON object of light groups and factors, as {\"key\": 2}");
+  LightMix mix;
+  for (const auto& [group, value] : parsed.items()) {
+    if (const std::string wrong = wrong_light_group(group); !wrong.empty()) return bad_argument(wrong);
+    GroupFactors& of = mix.groups[group];
+    const auto refuse = [&, name = group] {
+      return bad_argument(
+          fmt::format("the factor of the light group \"{}\" must be a number from 0 to {}, a list of three, or "
+                      "an object of \"surface\" and \"volume\" with such values",
+                      name, kMostMixFactor));
+    };
+    if (!value.is_object()) {
+      const auto both = factors(value);
+      if (!both) return refuse();
+      of = {*both, *both};
+      continue;
+    }
+    for (const auto& [part, part_value] : value.items()) {
+      const auto one = factors(part_value);
+      if (!one || (part != "surface" && part != "volume")) return refuse();
+      (part == "surface" ? of.surface : of.volume) = *one;
+    }
+  }
+  return mix;
+}
+
+std::string canonical_json(const LightMix& mix) {
+  json out = json::object();
+  for (const auto& [group, f] : mix.groups)
+    out[group] = f.surface == f.volume
+                     ? written(f.surface)
+                     : json{{"surface", written(f.surface)}, {"volume", written(f.volume)}};
+  return out.dump();
+}
+
+Result<std::vector<GroupFactors>> factors_of(const LightMix& mix, AovSet aovs,
+                                             std::span<const std::string> groups) {
+  if (!aovs.has(Aov::light_groups))
+    return fail(Errc::failed_precondition,
+                "the image has no light groups: render it with --aov light_groups to mix them");
+  std::vector<GroupFactors> out(groups.size());
+  for (const auto& [group, of] : mix.groups) {
+    const auto at = std::ranges::find(groups, group);
+    if (at == groups.end())
+      return bad_argument(fmt::format("the image has no light group \"{}\"; it has {}", group,
+                                      fmt::join(groups, ", ")));
+    if (of.surface != of.volume && !aovs.has(Aov::volume_light_groups))
+      return fail(Errc::failed_precondition,
+                  "the image does not have the light of media apart: render it with --aov "
+                  "volume_light_groups to mix them");
+    out[static_cast<std::size_t>(at - groups.begin())] = of;
+  }
+  return out;
+}
+
+ImageError mixed_error(const Film& mixed, const ImageError& colour) {
+  ImageError error = image_error(mixed.error());
+  const auto widen = [](double value, double& low, double& high, double of, double of_low, double of_high) {
+    if (!(of > 0) || !(of_high > 0)) return;
+    low = std::min(low, value * of_low / of);
+    high = std::max(high, value * of_high / of);
+  };
+  widen(error.relmse, error.relmse_lo, error.relmse_hi, colour.relmse, colour.relmse_lo, colour.relmse_hi);
+  widen(error.rmse, error.rmse_lo, error.rmse_hi, colour.rmse, colour.rmse_lo, colour.rmse_hi);
+  return error;
+}
+
+}  // namespace ls
