@@ -17,9 +17,11 @@
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
 #include "coordinator/base/limits.h"
+#include "coordinator/store/files.h"
 #include "coordinator/views/describe_change.h"
 #include "core/base/parse_number.h"
 #include "core/base/safe_text.h"
+#include "core/image/light_mix/light_mix.h"
 #include "core/job/objects.h"
 
 namespace ls::cli {
@@ -29,7 +31,7 @@ using nlohmann::json;
 
 struct FarmFlags {
   FarmOptions farm;
-  std::string id, frame, spp, target_error, out, report, html, region, fps, exposure, role, user;
+  std::string id, frame, spp, target_error, out, report, html, region, fps, exposure, role, user, mix;
   std::string state, search, owner, sort, limit, offset, priority, name;
   std::vector<std::string> after;
   JobOptions job;
@@ -190,6 +192,16 @@ int watch(FarmApi& api, const FarmFlags& flags) {
   return kOk;
 }
 
+// Reads a mix of light groups from a text of the command line or, if its name ends in .json, from a file.
+Result<LightMix> mix_of(const std::string& text) {
+  if (!text.ends_with(".json")) return parse_light_mix_option(text);
+  const auto bytes = coordinator::read_file(text, std::uint64_t{1} << 16);
+  if (!bytes) return tl::unexpected(bytes.error());
+  auto mix = parse_light_mix({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+  if (!mix) mix.error().message = text + ": " + mix.error().message;
+  return mix;
+}
+
 int fetch(FarmApi& api, const FarmFlags& flags) {
   std::string out = flags.out;
   if (flags.out.empty() && flags.report.empty() && flags.html.empty()) {
@@ -198,7 +210,14 @@ int fetch(FarmApi& api, const FarmFlags& flags) {
     out = default_image(*job);
     if (!flags.farm.json) print_note("writes " + out);
   }
-  return fetch_results(api, flags.id, {out, flags.report, flags.html, flags.farm.json, false});
+  std::string mix;
+  if (!flags.mix.empty()) {
+    const auto read = mix_of(flags.mix);
+    if (!read) return print_error(read.error());
+    mix = canonical_json(*read);
+  }
+  return fetch_results(api, flags.id,
+                       {.image = out, .report = flags.report, .html = flags.html, .mix = mix, .json = flags.farm.json});
 }
 
 // With --frame, replaces the id of a sequence (a job with several frames) in `flags` by the id of that frame,
@@ -304,10 +323,14 @@ void add_farm_commands(CLI::App& app, Action& action) {
       "Examples:\n"
       "  lightshaft fetch j-1234abcd                     writes SCENE.exr, or SCENE_####.exr of a sequence\n"
       "  lightshaft fetch j-1234abcd -o image.png\n"
-      "  lightshaft fetch j-1234abcd --frame 7 -o seventh.exr");
+      "  lightshaft fetch j-1234abcd --frame 7 -o seventh.exr\n"
+      "  lightshaft fetch j-1234abcd --mix key=2,fill=0.5 -o brighter.exr");
   add_option(*fetch_command, "-o,--output", fetching->out, "OUT.exr",
              "file of the image, .exr or .png; for a sequence with # for the frame number, for example "
              "out_####.exr; default: the scene's name in this folder");
+  add_option(*fetch_command, "--mix", fetching->mix, "GROUP=FACTOR,...",
+             "multiply the light of light groups: key=2,fill=0.5:0.4:0.3 (R:G:B), fog.volume=4 for the light of "
+             "media alone; or a file MIX.json that the dashboard has saved. The job must have --aov light_groups");
   add_option(*fetch_command, "--report", fetching->report, "REPORT.json",
              "also write the report as JSON; with # in the name, one for each frame");
   add_option(*fetch_command, "--html", fetching->html, "REPORT.html",

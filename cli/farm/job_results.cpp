@@ -38,11 +38,12 @@ struct Plan {
   std::vector<std::uint32_t> left_out;  // numbers of the frames of which nothing is downloaded
 };
 
-// Returns the part of the image's URL that follows the path of the job: "/image.exr" or "/image.png", the
-// latter with a query for the denoised image if the job requests denoising.
+// Returns the part of the image's URL that follows the path of the job: "/image.exr" or "/image.png", with a
+// query for the mix of light groups and, for a PNG, for the denoised image if the job requests denoising.
 std::string image_of(const json& job, const Results& wanted) {
-  if (image_format(wanted.image) != ImageFormat::png) return "/image.exr";
-  return flag_field(job, "denoise") ? "/image.png?layer=denoised" : "/image.png";
+  const bool png = image_format(wanted.image) == ImageFormat::png;
+  return (png ? "/image.png" : "/image.exr") +
+         query_of({{"layer", png && flag_field(job, "denoise") ? "denoised" : ""}, {"mix", wanted.mix}});
 }
 
 Result<Plan> plan_sequence(const std::string& id, const json& job, const json& frames,
@@ -88,6 +89,17 @@ Plan plan_image(const std::string& id, const json& job, const Results& wanted) {
   if (!wanted.report.empty()) plan.downloads.push_back({job_path(id) + "/report", "--report", wanted.report});
   if (!wanted.html.empty()) plan.downloads.push_back({job_path(id) + "/report.html", "--html", wanted.html});
   return plan;
+}
+
+void print_mix_error(FarmApi& api, const std::string& id, const std::string& mix) {
+  const auto error = api.get(job_path(id) + "/mix" + query_of({{"mix", mix}}));
+  if (!error) return static_cast<void>(print_rejected(error.error()));
+  const auto relmse = number_field(*error, "relmse");
+  const auto interval = error->find("relmse_ci95");
+  if (!relmse || interval == error->end() || !interval->is_array() || interval->size() != 2) return;
+  print_note(fmt::format("relMSE of the mix: {:.3g} (95 %: {:.3g} to {:.3g}){}", *relmse,
+                         (*interval)[0].get<double>(), (*interval)[1].get<double>(),
+                         flag_field(*error, "trusted") ? "" : "; " + plain_text(text_field(*error, "verdict"))));
 }
 
 // Returns the command by which a person downloads the same results.
@@ -215,6 +227,7 @@ int fetch_results(FarmApi& api, const std::string& id, const Results& wanted) {
       return print_rejected(got.error());
     if (wanted.json) print(dump(json{{"file", d.file}}, -1));
   }
+  if (!wanted.mix.empty() && !wanted.image.empty() && !frames && !wanted.json) print_mix_error(api, id, wanted.mix);
   const std::vector<std::uint32_t>& left_out = plan->left_out;
   if (left_out.empty()) return kOk;
   constexpr std::size_t kShown = 20;

@@ -268,12 +268,18 @@ std::optional<trace::SpanContext> Coordinator::trace_of(const JobId& id) const {
 
 // Images and reports
 
-Result<std::vector<std::byte>> Coordinator::image_exr(const JobId& id) const {
-  return parts_->pictures.image_exr(id);
+Result<std::vector<std::byte>> Coordinator::image_exr(const JobId& id,
+                                                     const std::optional<LightMix>& mix) const {
+  return parts_->pictures.image_exr(id, mix);
 }
 
-Result<std::vector<std::byte>> Coordinator::image_png(const JobId& id, double exposure, bool denoised) const {
-  return parts_->pictures.image_png(id, exposure, denoised);
+Result<std::string> Coordinator::mix_json(const JobId& id, const LightMix& mix) const {
+  return parts_->pictures.mix_json(id, mix);
+}
+
+Result<std::vector<std::byte>> Coordinator::image_png(const JobId& id, double exposure, bool denoised,
+                                                     const std::optional<LightMix>& mix) const {
+  return parts_->pictures.image_png(id, exposure, denoised, mix);
 }
 
 Result<std::vector<std::byte>> Coordinator::thumbnail_png(const JobId& id) const {

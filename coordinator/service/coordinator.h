@@ -97,11 +97,15 @@ class Coordinator {
 
   // Images and reports
 
-  // The final image if there is one, else the current image
-  Result<std::vector<std::byte>> image_exr(const JobId& id) const;
+  // The final image if there is one, else the current image;
+  // or, with `mix`, that image with other factors of its light groups.
+  Result<std::vector<std::byte>> image_exr(const JobId& id, const std::optional<LightMix>& mix = {}) const;
+  // Returns the error of a mix of light groups as JSON.
+  Result<std::string> mix_json(const JobId& id, const LightMix& mix) const;
   // The image as an 8-bit PNG. With `denoised`, returns the denoised image of a job with JobSpec::denoise,
   // even while the job renders. One image is denoised at a time, which takes seconds.
-  Result<std::vector<std::byte>> image_png(const JobId& id, double exposure, bool denoised = false) const;
+  Result<std::vector<std::byte>> image_png(const JobId& id, double exposure, bool denoised = false,
+                                           const std::optional<LightMix>& mix = {}) const;
   // A small picture of the final or the current image, for lists
   Result<std::vector<std::byte>> thumbnail_png(const JobId& id) const;
   // Videos of sequences (service/videos.h)

@@ -36,7 +36,18 @@ void shorten(std::vector<LogLine>& lines, std::size_t most) {
 }  // namespace
 
 // Returns the job's current image in memory (the film) and the values for its report (the facts).
-Result<Pictures::Picture> Pictures::picture(const JobId& id) const {
+Result<Pictures::Picture> Pictures::picture(const JobId& id, const std::optional<LightMix>& mix) const {
+  if (mix) {
+    auto plain = picture(id);
+    if (!plain) return plain;
+    const auto factors =
+        factors_of(*mix, plain->film.aovs(), plain->facts.job.settings.light_groups);
+    if (!factors) return tl::unexpected(factors.error());
+    const ImageError colour = image_error(plain->film.error());
+    plain->film = plain->film.mixed(*factors);
+    plain->error_of_mix = mixed_error(plain->film.error(), colour);
+    return plain;
+  }
   auto core = core_.lock();
   const auto entry = core->jobs.usable(id);
   if (!entry) return tl::unexpected(entry.error());
@@ -56,25 +67,64 @@ std::filesystem::path Pictures::final_file(const JobId& id, const std::string& n
   return files_.folder(id) / name;
 }
 
-Result<std::vector<std::byte>> Pictures::image_exr(const JobId& id) const {
-  if (const auto file = final_file(id, "image.exr"); !file.empty())
+Result<std::vector<std::byte>> Pictures::image_exr(const JobId& id,
+                                                  const std::optional<LightMix>& mix) const {
+  if (const auto file = mix ? std::filesystem::path() : final_file(id, "image.exr"); !file.empty())
     return read_file(file, std::uint64_t{1} << 33);
-  auto shown = picture(id);
+  auto shown = picture(id, mix);
   if (!shown) return tl::unexpected(shown.error());
+  // A reference is of the image itself, not of a mix
+  if (mix) shown->facts.job.spec.reference.reset();
   const auto made = denoising_.of_job(shown->film, shown->facts);
-  auto image = final_exr(shown->film, provenance_of(shown->facts, blobs_), shown->facts.job.spec.float_output,
+  Provenance provenance = provenance_of(shown->facts, blobs_);
+  if (mix) {
+    provenance.error_of_mix = shown->error_of_mix;
+    provenance.convergence_status.reset();
+    provenance.figures.clear();
+    provenance.notes["mix"] = canonical_json(*mix);
+  }
+  auto image = final_exr(shown->film, provenance, shown->facts.job.spec.float_output,
                          made ? std::span(made->image.rgb) : std::span<const float>());
   if (!image) return tl::unexpected(image.error());
   return std::move(image->exr);
 }
 
-Result<std::vector<std::byte>> Pictures::image_png(const JobId& id, double exposure, bool denoised) const {
-  auto shown = picture(id);
+Result<std::string> Pictures::mix_json(const JobId& id, const LightMix& mix) const {
+  const auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  const auto factors = factors_of(mix, shown->film.aovs(), shown->facts.job.settings.light_groups);
+  if (!factors) return tl::unexpected(factors.error());
+  TileError sums;
+  // Row by row, because a mix of the whole film would take as much memory as the film's colour once more
+  for (int row = 0; row < shown->film.grid().rows(); ++row)
+    sums.add(shown->film.row(row).mixed(*factors).error());
+  const ImageError error = mixed_error(sums, image_error(shown->film.error()));
+  json out{{"mix", json::parse(canonical_json(mix))},
+           {"groups", shown->facts.job.settings.light_groups},
+           {"relmse", nullptr},
+           {"relmse_ci95", nullptr},
+           {"rmse", nullptr},
+           {"trusted", false},
+           {"verdict", "no samples yet"}};
+  if (sums.samples > 0) {
+    out["relmse"] = error.relmse;
+    out["relmse_ci95"] = {error.relmse_lo, error.relmse_hi};
+    out["rmse"] = error.rmse;
+    out["trusted"] = error.trusted;
+    out["verdict"] = error.trusted ? "trusted" : error.verdict;
+  }
+  return out.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+Result<std::vector<std::byte>> Pictures::image_png(const JobId& id, double exposure, bool denoised,
+                                                  const std::optional<LightMix>& mix) const {
+  auto shown = picture(id, mix);
   if (!shown) return tl::unexpected(shown.error());
   if (!denoised) return preview_png(shown->film, exposure);
   if (!shown->facts.job.spec.denoise)
     return fail(Errc::failed_precondition,
                 fmt::format("job {} was submitted without \"denoise\": it has no denoised image", id.value));
+  if (mix) shown->facts.job.spec.reference.reset();
   const auto made = denoising_.of_job(shown->film, shown->facts);
   if (!made) return preview_png(shown->film, exposure);  // without samples there is nothing to denoise
   if (made->image.rgb.empty()) return fail(Errc::unavailable, made->figures.trouble);

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "coordinator/service/state/job_files.h"
 #include "coordinator/service/state/job_table.h"
 #include "core/base/guarded.h"
+#include "core/image/light_mix/light_mix.h"
 
 namespace ls::coordinator {
 
@@ -24,8 +26,11 @@ class Pictures {
            Denoising& denoising, const Clock& clock)
       : core_(core), store_(store), files_(files), blobs_(blobs), denoising_(denoising), clock_(clock) {}
 
-  Result<std::vector<std::byte>> image_exr(const JobId& id) const;
-  Result<std::vector<std::byte>> image_png(const JobId& id, double exposure, bool denoised) const;
+  // `mix`: the image with other factors of its light groups, instead of the image itself.
+  Result<std::vector<std::byte>> image_exr(const JobId& id, const std::optional<LightMix>& mix) const;
+  Result<std::vector<std::byte>> image_png(const JobId& id, double exposure, bool denoised,
+                                           const std::optional<LightMix>& mix) const;
+  Result<std::string> mix_json(const JobId& id, const LightMix& mix) const;  // the error of a mix
   Result<std::vector<std::byte>> thumbnail_png(const JobId& id) const;
   // A job's tone-mapped picture for screens, reduced to the finest mip level at which neither side has more
   // than `most_side` pixels. `rgb` holds 8 bits each of R, G and B for every pixel, row by row. Pixels
@@ -53,6 +58,7 @@ class Pictures {
   struct Picture {
     Film film;
     ReportFacts facts;
+    std::optional<ImageError> error_of_mix;  // set if the film is a mix
   };
   // The denoised image that clients requested last. While its job runs, requests get this image until its age
   // is kDenoisedAge times the time that denoising took, although the job's image changes meanwhile.
@@ -62,7 +68,7 @@ class Pictures {
     Duration cost{};
     std::shared_ptr<const Denoised> image;  // null: no samples yet
   };
-  Result<Picture> picture(const JobId& id) const;
+  Result<Picture> picture(const JobId& id, const std::optional<LightMix>& mix = {}) const;
   Result<std::shared_ptr<const Denoised>> denoised_view(const JobId& id) const;
   Result<LayerMosaic> mosaic_of(const JobId& id, const PixelLayer& layer, int level) const;
   std::string sequence_report(const JobView& view) const;

@@ -94,6 +94,8 @@ Result<SealedImage> read_sealed_image(FinalPicture picture, const std::string& n
   image.numeric_class = *numeric_class;
   image.build = std::move(*build);
   if (const auto ok = read_settings(image, name); !ok) return tl::unexpected(ok.error());
+  if (image.picture.strings.contains("lightshaft:mix"))
+    return bad(name, "it is a mix of light groups; only the image that it was mixed from can be verified");
   if (const auto ok = read_tiles(image, name); !ok) return tl::unexpected(ok.error());
   return image;
 }

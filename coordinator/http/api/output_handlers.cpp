@@ -61,9 +61,27 @@ Result<VideoAsked> read_asked_video(std::string_view text) {
   return asked;
 }
 
+// Returns the mix of light groups in the query; nullopt: there is none.
+Result<std::optional<LightMix>> mix_asked(const Request& request) {
+  const auto text = request.parameter("mix");
+  if (!text) return std::optional<LightMix>();
+  auto mix = parse_light_mix(*text);
+  if (!mix) return tl::unexpected(mix.error());
+  return std::move(*mix);
+}
+
 }  // namespace
 
-Response get_image_exr(Api& api, const Request&, const JobId& id) {
+Response get_mix(Api& api, const Request& request, const JobId& id) {
+  const auto mix = mix_asked(request);
+  if (!mix) return problem(mix.error());
+  return answer_json(api.coordinator().mix_json(id, mix->value_or(LightMix{})));
+}
+
+Response get_image_exr(Api& api, const Request& request, const JobId& id) {
+  const auto mix = mix_asked(request);
+  if (!mix) return problem(mix.error());
+  if (*mix) return file_response("image/x-exr", api.coordinator().image_exr(id, *mix), id.value + "-mix.exr");
   if (const auto path = api.coordinator().final_file(id, "image.exr"); !path.empty())
     if (auto file = open_file_body(path))
       return file_response("image/x-exr", std::move(file), id.value + ".exr");
@@ -78,7 +96,9 @@ Response get_image_png(Api& api, const Request& request, const JobId& id) {
   const auto layer = request.parameter("layer");
   if (layer && *layer != "denoised")
     return problem(400, "'layer' must be \"denoised\", or be left out for the image itself");
-  return file_response("image/png", api.coordinator().image_png(id, *exposure, layer.has_value()),
+  const auto mix = mix_asked(request);
+  if (!mix) return problem(mix.error());
+  return file_response("image/png", api.coordinator().image_png(id, *exposure, layer.has_value(), *mix),
                        id.value + ".png");
 }
 

@@ -251,6 +251,18 @@ namespace {
 
 std::string pair_text(double lo, double hi) { return fmt::format("{:.9g} {:.9g}", lo, hi); }
 
+std::map<std::string, std::string> error_strings(const ImageError& error) {
+  std::map<std::string, std::string> strings = {
+      {"lightshaft:relmse", fmt::format("{:.9g}", error.relmse)},
+      {"lightshaft:relmse_ci95", pair_text(error.relmse_lo, error.relmse_hi)},
+      {"lightshaft:rmse", fmt::format("{:.9g}", error.rmse)},
+      {"lightshaft:verdict", error.trusted ? "trusted" : error.verdict},
+      {"lightshaft:few_hits", fmt::format("{}", error.few_hits)}};
+  if (error.rmse_hi > 0 || error.rmse == 0)
+    strings["lightshaft:rmse_ci95"] = pair_text(error.rmse_lo, error.rmse_hi);
+  return strings;
+}
+
 }  // namespace
 
 std::map<std::string, std::string> error_strings(const TileError& sums,
@@ -258,15 +270,7 @@ std::map<std::string, std::string> error_strings(const TileError& sums,
   std::map<std::string, std::string> strings;
   if (pixels_without_samples > 0)
     strings["lightshaft:pixels_without_samples"] = fmt::format("{}", pixels_without_samples);
-  if (sums.samples == 0) return strings;
-  const ImageError error = image_error(sums);
-  strings["lightshaft:relmse"] = fmt::format("{:.9g}", error.relmse);
-  strings["lightshaft:relmse_ci95"] = pair_text(error.relmse_lo, error.relmse_hi);
-  strings["lightshaft:rmse"] = fmt::format("{:.9g}", error.rmse);
-  if (error.rmse_hi > 0 || error.rmse == 0)
-    strings["lightshaft:rmse_ci95"] = pair_text(error.rmse_lo, error.rmse_hi);
-  strings["lightshaft:verdict"] = error.trusted ? "trusted" : error.verdict;
-  strings["lightshaft:few_hits"] = fmt::format("{}", error.few_hits);
+  if (sums.samples > 0) strings.merge(error_strings(image_error(sums)));
   return strings;
 }
 
@@ -276,8 +280,11 @@ std::map<std::string, std::string> strings_of(const Film& film, const Provenance
   std::map<std::string, std::string> strings = {{"lightshaft:scene", from.scene.hex()},
                                                 {"lightshaft:job", from.settings_json},
                                                 {"lightshaft:build", from.build},
-                                                {"lightshaft:class", from.numeric_class.hex()},
-                                                {"lightshaft:tiles", tile_digests(film)}};
+                                                {"lightshaft:class", from.numeric_class.hex()}};
+  if (from.error_of_mix)
+    strings.merge(error_strings(*from.error_of_mix));
+  else
+    strings["lightshaft:tiles"] = tile_digests(film);
   strings.merge(error_strings(film.error(), film.pixels_without_samples()));
   // The error over time (`convergence_status`) may show problems that the film alone does not show. Then its
   // text replaces the verdict "trusted".

@@ -271,8 +271,7 @@ Film Film::mixed(std::span<const GroupFactors> factors) const {
     auto next = std::make_shared<Tile>();
     next->full_rounds = tiles_[t]->full_rounds;
     next->chain = tiles_[t]->chain;
-    if (tiles_[t]->full_rounds > 0) next->sums = mix(tiles_[t]->sums, pixels);
-    else next->sums.resize(out.planes_.sums * pixels);
+    next->sums = mix(tiles_[t]->sums, pixels);
     next->ids = tiles_[t]->ids;
     if (const auto& tail = tiles_[t]->tail) {
       auto sums = mix(tail->sums, pixels);

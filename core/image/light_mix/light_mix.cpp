@@ -9,6 +9,8 @@
 #include <optional>
 
 #include "core/base/light_group.h"
+#include "core/base/parse_number.h"
+#include "core/base/safe_text.h"
 
 namespace ls {
 namespace {
@@ -62,6 +64,45 @@ Result<LightMix> parse_light_mix(std::string_view text) {
   return mix;
 }
 
+Result<LightMix> parse_light_mix_option(std::string_view text) {
+  json groups = json::object();
+  for (std::string_view rest = text; !rest.empty();) {
+    const std::string_view item = rest.substr(0, rest.find(','));
+    rest.remove_prefix(std::min(item.size() + 1, rest.size()));
+    const auto refuse = [&] {
+      return bad_argument(fmt::format(
+          "'{}' is no factor of a light group: give GROUP=FACTOR or GROUP=R:G:B, for the light of surfaces or "
+          "media alone GROUP.surface or GROUP.volume",
+          plain_text(item)));
+    };
+    const std::size_t equals = item.find('=');
+    if (equals == std::string_view::npos) return refuse();
+    const std::string_view name = item.substr(0, equals), group = name.substr(0, name.find('.'));
+    json value = json::array();
+    for (std::string_view numbers = item.substr(equals + 1);;) {
+      const std::size_t colon = numbers.find(':');
+      const auto number = parse_number<double>(numbers.substr(0, colon));
+      if (!number) return refuse();
+      value.push_back(*number);
+      if (colon == std::string_view::npos) break;
+      numbers.remove_prefix(colon + 1);
+    }
+    if (value.size() != 1 && value.size() != 3) return refuse();
+    if (value.size() == 1) value = json(value[0]);
+    json& of = groups[std::string(group)];
+    if (group == name) {
+      if (!of.is_null()) return bad_argument(fmt::format("the light group '{}' is given twice", plain_text(group)));
+      of = std::move(value);
+      continue;
+    }
+    const std::string part(name.substr(group.size() + 1));
+    if (!of.is_null() && (!of.is_object() || of.contains(part)))
+      return bad_argument(fmt::format("the light group '{}' is given twice", plain_text(group)));
+    of[part] = std::move(value);
+  }
+  return parse_light_mix(groups.dump(-1, ' ', false, json::error_handler_t::replace));
+}
+
 std::string canonical_json(const LightMix& mix) {
   json out = json::object();
   for (const auto& [group, f] : mix.groups)
@@ -91,8 +132,8 @@ Result<std::vector<GroupFactors>> factors_of(const LightMix& mix, AovSet aovs,
   return out;
 }
 
-ImageError mixed_error(const Film& mixed, const ImageError& colour) {
-  ImageError error = image_error(mixed.error());
+ImageError mixed_error(const TileError& mixed, const ImageError& colour) {
+  ImageError error = image_error(mixed);
   const auto widen = [](double value, double& low, double& high, double of, double of_low, double of_high) {
     if (!(of > 0) || !(of_high > 0)) return;
     low = std::min(low, value * of_low / of);

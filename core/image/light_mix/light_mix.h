@@ -29,6 +29,9 @@ struct LightMix {
 // (R, G, B), or an object with the keys `surface` and `volume`, each with such a value: `volume` is for light
 // that was last scattered in a medium, `surface` for all other light; the one that is missing is 1.
 Result<LightMix> parse_light_mix(std::string_view json);
+// Parses the notation of the command line: "key=2,fill=0.5:0.4:0.3,fog.volume=4", with one factor or three (R,
+// G, B), for a group or for its `.surface` or `.volume` alone.
+Result<LightMix> parse_light_mix_option(std::string_view text);
 std::string canonical_json(const LightMix& mix);
 
 // Returns the factors of each light group of an image with these AOVs. `groups` are the names of its groups.
@@ -37,9 +40,9 @@ std::string canonical_json(const LightMix& mix);
 Result<std::vector<GroupFactors>> factors_of(const LightMix& mix, AovSet aovs,
                                              std::span<const std::string> groups);
 
-// Returns the error of a mixed image (Film::mixed()). `colour` is the error of the image before mixing. The
-// relative width of the mix's interval is at least that of the colour's: only of the colour the film has
-// earlier sums, by which the interval takes account of skewed noise.
-ImageError mixed_error(const Film& mixed, const ImageError& colour);
+// Returns the error of a mixed image (Film::mixed()) with this sum of the errors of its tiles. `colour` is the
+// error of the image before mixing. The relative width of the mix's interval is at least that of the colour's:
+// only of the colour the film knows earlier sums, by which the interval takes account of skewed noise.
+ImageError mixed_error(const TileError& mixed, const ImageError& colour);
 
 }  // namespace ls
