@@ -1,6 +1,7 @@
 // The short look at tests/coverage: a few seconds. docs/measurements/error.md has the long one.
 #include "tests/coverage/coverage.h"
 #include "tests/coverage/denominators.h"
+#include "tests/coverage/mixes.h"
 #include "tests/coverage/rendered.h"
 #include "tests/support/significance.h"
 
@@ -104,6 +105,27 @@ TEST(ShortCoverage, HoldsForImagesOfFewSamplesWithPathReuse) {
     const double bound = kCovered - share_slack(cell.trusted, level) + kMayBeOff;
     EXPECT_GE(cell.relmse.share, bound) << cell.spp << " samples";
     EXPECT_GT(bound, .89) << "what covers 88 % would pass too often";
+  }
+}
+
+// 2,000 random mixes of 200 images. Mixes of one image are not independent; as if only the images were, a share
+// of 200 that is .95 is known to .015, and the bound is .95 - (.02 + .07) at the level of one figure. An
+// estimate that adds the errors of groups as if they were independent covers far less.
+TEST(ShortCoverage, HoldsForRandomMixesOfLightGroups) {
+  const double level = Tests("coverage/mixes").level(4);
+  for (const bool fog : {false, true}) {
+    const auto file = std::filesystem::path(testing::TempDir()) / "mixed.xml";
+    std::ofstream(file) << mix_scene(fog);
+    const MixJobs jobs{.scene = file};
+    const MixCoverage c = measure_mixes(jobs);
+    fmt::print("{}\n", mix_line(jobs, c));
+    ASSERT_GT(c.trusted, c.mixes / 2);
+    EXPECT_GE(c.held, kCovered - share_slack(jobs.images, level)) << "fog " << fog;
+    const double errors = cli::student_quantile(level, jobs.images - 1);
+    // The sigma takes the mixes of an image to be independent: at worst it is sqrt(10) too small
+    EXPECT_NEAR(c.relmse_ratio.value, 1,
+                kRatioMayBeOff + errors * std::sqrt(jobs.mixes) * c.relmse_ratio.sigma)
+        << "fog " << fog;
   }
 }
 

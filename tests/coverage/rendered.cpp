@@ -3,22 +3,19 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <atomic>
 #include <cmath>
-#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <stdexcept>
-#include <thread>
 #include <utility>
 
 #include "cli/local/local_scene.h"
 #include "core/image/error/convergence.h"
 #include "core/image/error/relative_weights.h"
 #include "core/image/film/film.h"
+#include "tests/support/threads.h"
 #include "worker/render/render.h"
 #include "worker/render/world/world.h"
 
@@ -83,27 +80,6 @@ class Renders {
   const cli::LocalScene scene_;
   render::AssetFiles files_;
 };
-
-// Calls work(0), ..., work(count - 1) on several threads, and throws what one of them threw.
-template <class Work>
-void on_threads(int threads, std::size_t count, const Work& work) {
-  std::atomic<std::size_t> next{0};
-  std::mutex mutex;
-  std::exception_ptr thrown;
-  std::vector<std::jthread> pool;
-  for (int i = 0; i < threads; ++i)
-    pool.emplace_back([&] {
-      try {
-        for (std::size_t n; (n = next++) < count;) work(n);
-      } catch (...) {
-        const std::lock_guard lock(mutex);
-        thrown = std::current_exception();
-        next = count;
-      }
-    });
-  pool.clear();
-  if (thrown) std::rethrow_exception(thrown);
-}
 
 // The halves of an image as float64, one round after the other.
 void keep(const Stages& stages, const std::filesystem::path& path) {

@@ -88,7 +88,21 @@ std::string lit_from_within() {
 )") + fog(.6, .9, .995);
 }
 
+std::string in_group(const std::string& group, double red, double green, double blue) {
+  return fmt::format(
+      R"(<emitter type="area"><string name="light_group" value="{}"/><rgb name="radiance" value="{}, {}, {}"/></emitter>)",
+      group, red, green, blue);
+}
+
 }  // namespace
+
+std::string mix_scene(bool with_fog) {
+  return scene(room(sphere(.2, 1.15, 1.7, .25, in_group("key", 60, 50, 37)) +
+                    sphere(-.6, .6, .6, .15, in_group("fill", 5, 9, 20)) +
+                    sphere(.5, .7, -.6, .1, in_group("rim", 30, 10, 5)) + sky(.2)) +
+                   (with_fog ? fog(.6, .9, .995) : ""),
+               "0, 0, 3.9", 8, 0);
+}
 
 const std::vector<CoverageScene>& coverage_scenes() {
   static const std::vector<CoverageScene> all = {

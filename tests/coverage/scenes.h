@@ -18,4 +18,7 @@ struct CoverageScene {
 // Smooth and noisy, surfaces and media, light and dark; fireflies last.
 const std::vector<CoverageScene>& coverage_scenes();
 
+// A room with three lamps in the light groups key, fill and rim under a sky without a group; `fog`: with fog.
+std::string mix_scene(bool fog);
+
 }  // namespace ls::test

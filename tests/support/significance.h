@@ -75,6 +75,7 @@ inline constexpr std::array kShares = {Share{Family::chi_square, "bsdf/sampling"
                                        Share{Family::coverage, "coverage/short", 4 * 7},
                                        Share{Family::coverage, "coverage/rendered", 2},
                                        Share{Family::coverage, "coverage/target", 3},
+                                       Share{Family::coverage, "coverage/mixes", 4},
                                        Share{Family::coverage, "coverage/fireflies", 1},
                                        Share{Family::coverage, "coverage/denominators", 24},
                                        Share{Family::scenes, "property/agreement", 180},
