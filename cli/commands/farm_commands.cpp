@@ -194,7 +194,7 @@ int watch(FarmApi& api, const FarmFlags& flags) {
 
 // Reads a mix of light groups from a text of the command line or, if its name ends in .json, from a file.
 Result<LightMix> mix_of(const std::string& text) {
-  if (!text.ends_with(".json")) return parse_light_mix_option(text);
+  if (!text.ends_with(".json")) return parse_light_mix(text);
   const auto bytes = coordinator::read_file(text, std::uint64_t{1} << 16);
   if (!bytes) return tl::unexpected(bytes.error());
   auto mix = parse_light_mix({reinterpret_cast<const char*>(bytes->data()), bytes->size()});

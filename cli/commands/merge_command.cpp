@@ -27,7 +27,8 @@ namespace fs = std::filesystem;
 
 struct MergeFlags {
   std::vector<std::string> partials, defines;
-  std::string out, report, scene, techniques;
+  std::string out, report, scene;
+  SceneChanges changes;
   std::optional<std::uint32_t> frame;
   bool float_output = false;
 };
@@ -103,13 +104,13 @@ tl::expected<LayerNames, coordinator::Rejected> layer_names(const MergeFlags& fl
   auto scene =
       read_local_scene(flags.scene, *defines, false, flags.frame, aovs.any_of(aovs_of(AovKind::ids)));
   if (!scene) return tl::unexpected(scene.error());
-  if (const auto ok = use_techniques(flags.techniques, scene->scene); !ok)
+  if (const auto ok = change_scene(flags.changes, scene->scene); !ok)
     return coordinator::rejected(ok.error());
   if (!is_of(scene->scene, merged.scene))
     return coordinator::rejected(
         {Errc::invalid_argument,
          fmt::format("the partial images were rendered from scene {}, and {} is another scene: give the same "
-                     "scene file, with the same -D, --techniques and --frame",
+                     "scene file, with the same -D, --techniques, --mix and --frame",
                      merged.scene.hex(), flags.scene)});
   auto groups = aovs.groups() > 0 ? scene::light_groups_of(scene->scene) : std::vector<std::string>();
   return coordinator::layer_names_of(scene->scene, aovs, std::move(groups));
@@ -166,7 +167,7 @@ void add_merge(CLI::App& app, Action& action) {
   add_option(*merge, "--scene", flags->scene, "SCENE",
              "the scene that was rendered; cryptomattes get their names from it");
   add_defines(*merge, flags->defines);
-  add_techniques(*merge, flags->techniques);
+  add_scene_changes(*merge, flags->changes);
   add_option(*merge, "--frame", flags->frame, "N", "for a sequence: only this frame");
   merge->add_flag("--float", flags->float_output, "write 32-bit pixels instead of half");
 }

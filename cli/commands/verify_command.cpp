@@ -34,7 +34,8 @@ namespace {
 constexpr std::uint64_t kDefaultTiles = 4;
 
 struct VerifyFlags {
-  std::string image, scene, frame, tiles, seed, techniques;
+  std::string image, scene, frame, tiles, seed;
+  SceneChanges changes;
   std::vector<std::string> defines;
   int threads = 0;
   bool json = false;
@@ -51,7 +52,7 @@ Result<void> check_same(const SealedImage& image, const LocalScene& scene, const
   if (const Digest mine = digest_of(scene.scene); mine != image.scene)
     return bad_argument(fmt::format(
         "{} was rendered from scene {}, and {} is scene {}: give the same scene file, with the same -D, "
-        "--techniques and --frame",
+        "--techniques, --mix and --frame",
         flags.image, image.scene.hex(), flags.scene, mine.hex()));
   if (render::numeric_class() != image.numeric_class)
     return fail(
@@ -274,7 +275,7 @@ int run(const VerifyFlags& flags) {
   auto scene = read_local_scene(flags.scene, *defines, false, numbers->frame,
                                 coordinator::wants_labels(image->settings));
   if (!scene) return print_rejected(scene.error());
-  if (const auto ok = use_techniques(flags.techniques, scene->scene); !ok) return print_error(ok.error());
+  if (const auto ok = change_scene(flags.changes, scene->scene); !ok) return print_error(ok.error());
   // A job renders its scene pruned: without what its integrator and max_depth do not need.
   scene->scene =
       scene::pruned(scene->scene, scene::pruned_for(image->settings.integrator, image->settings.max_depth))
@@ -317,7 +318,7 @@ void add_verify(CLI::App& app, Action& action) {
   add_option(*verify, "--seed", flags->seed, "N",
              "seed for the choice of tiles; default: another one each time");
   add_defines(*verify, flags->defines);
-  add_techniques(*verify, flags->techniques);
+  add_scene_changes(*verify, flags->changes);
   add_option(*verify, "--frame", flags->frame, "N", "for a sequence: only this frame");
   add_option(*verify, "--threads", flags->threads, "N", "default: all")->check(CLI::Range(1, 1024));
   verify->add_flag("--json", flags->json, "as JSON");

@@ -9,6 +9,7 @@
 #include "core/base/parse_number.h"
 #include "core/job/describe.h"
 #include "core/job/spec_draft.h"
+#include "core/scene/analysis/light_groups.h"
 
 namespace ls::cli {
 namespace {
@@ -90,20 +91,28 @@ void add_defines(CLI::App& app, std::vector<std::string>& defines) {
       ->allow_extra_args(false);
 }
 
-void add_techniques(CLI::App& app, std::string& techniques) {
-  add_option(app, "--techniques", techniques, "-NAME,+NAME", "as given to the job");
+void add_scene_changes(CLI::App& app, SceneChanges& changes) {
+  add_option(app, "--techniques", changes.techniques, "-NAME,+NAME", "as given to the job");
+  add_option(app, "--mix", changes.mix, "GROUP=FACTOR,...", "as given to the job");
 }
 
-Result<void> use_techniques(const std::string& techniques, Scene& scene) {
+Result<void> change_scene(const SceneChanges& changes, Scene& scene) {
   std::optional<TechniqueChoice> choice;
+  std::optional<LightMix> mix;
   const auto parse = [](const std::string& text) -> Result<TechniqueChoice> {
     if (const auto parsed = parse_technique_choice(text)) return *parsed;
     return bad_argument("--techniques " +
                         job::must_be(job::allowed<TechniqueChoice>({}, job::Form::option), text));
   };
-  if (auto ok = take(techniques, choice, parse); !ok) return ok;
+  if (auto ok = take(changes.techniques, choice, parse); !ok) return ok;
+  const auto parse_mix = [](const std::string& text) -> Result<LightMix> {
+    auto parsed = parse_light_mix(text);
+    if (!parsed) parsed.error().message = "--mix: " + parsed.error().message;
+    return parsed;
+  };
+  if (auto ok = take(changes.mix, mix, parse_mix); !ok) return ok;
   if (choice) scene.integrator = with_choice(scene.integrator, *choice);
-  return {};
+  return mix ? scene::multiply_light(*mix, scene) : Result<void>();
 }
 
 void JobOptions::add_to(CLI::App& app, Command command) {

@@ -48,10 +48,12 @@ class JobOptions {
 
 void add_defines(CLI::App& app, std::vector<std::string>& defines);  // adds -D NAME=VALUE
 
-// Adds --techniques, which `use_techniques()` takes.
-void add_techniques(CLI::App& app, std::string& techniques);
-// Lets the scene use the techniques that the option names; empty text: those of the scene.
-Result<void> use_techniques(const std::string& techniques, Scene& scene);
+// The options of a job that change its scene: --techniques and --mix. An empty text changes nothing.
+struct SceneChanges {
+  std::string techniques, mix;
+};
+void add_scene_changes(CLI::App& app, SceneChanges& changes);
+Result<void> change_scene(const SceneChanges& changes, Scene& scene);
 
 // Parses a whole number, as in "--threads 4". `what` is the option's name, for the message.
 Result<std::uint64_t> parse_whole(const std::string& what, const std::string& text, std::uint64_t least,

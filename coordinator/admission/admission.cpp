@@ -255,7 +255,7 @@ tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, 
   // no error now, the missing files have arrived meanwhile.
   const auto again = read_uploaded(request, blobs, read_scene, frame, true);
   if (!again) return tl::unexpected(again.error());
-  return scene::pruned(again->scene, whom);
+  return pruned;
 }
 
 Result<void> check_job(const StoredJob& job) {
@@ -289,6 +289,8 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
   job.settings = std::move(*settings);
   if (request.spec.techniques)
     read->scene.integrator = with_choice(read->scene.integrator, *request.spec.techniques);
+  if (request.spec.mix)
+    if (auto ok = scene::multiply_light(*request.spec.mix, read->scene); !ok) return rejected(ok.error());
   ReferenceOrigin origin;
   if (request.spec.reference) {
     auto right = load_reference(request.spec, job.settings.size, blobs);
@@ -325,9 +327,39 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
   return admission;
 }
 
-Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, const BlobStore& blobs,
+namespace {
+
+// Gives the job another scene: its own with the light of its groups multiplied.
+Result<void> mix_again(const LightMix& mix, const BlobStore& blobs, Admission& admission) {
+  StoredJob& job = admission.job;
+  const auto size = blobs.size(job.scene);
+  const auto json = size ? blobs.read(job.scene, 0, *size) : tl::unexpected(size.error());
+  if (!json) return tl::unexpected(json.error());
+  auto scene = deserialize_scene({reinterpret_cast<const char*>(json->data()), json->size()});
+  if (!scene) return tl::unexpected(scene.error());
+  if (auto ok = scene::multiply_light(mix, *scene); !ok) return ok;
+  const scene::Pruned pruned =
+      scene::pruned(*scene, scene::pruned_for(job.settings.integrator, job.settings.max_depth));
+  job.assets.clear();
+  for (const Asset& a : pruned.scene.assets)
+    if (std::ranges::find(job.assets, a.digest, &BlobRef::digest) == job.assets.end())
+      job.assets.push_back({a.digest, a.bytes, a.name});
+  job.features_used.clear();
+  job.features_left_out.clear();
+  note_analysis(pruned, job.settings, job);
+  job.spec.mix = job.spec.mix ? product(*job.spec.mix, mix) : mix;
+  admission.scene_json = serialize(pruned.scene);
+  job.scene = sha256(admission.scene_json);
+  return {};
+}
+
+}  // namespace
+
+Result<Admission> admit_again(const StoredJob& before, const JobSpec& changes, const BlobStore& blobs,
                               std::optional<std::uint32_t> frame) {
-  StoredJob job{.name = before.name,
+  Admission admission;
+  StoredJob& job = admission.job;
+  job = {.name = before.name,
                 .scene_name = before.scene_name,
                 .scene = before.scene,
                 .settings = before.settings,
@@ -338,7 +370,7 @@ Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, c
                 .features_used = before.features_used,
                 .features_left_out = before.features_left_out,
                 .needs = before.needs,
-                .analysis = before.analysis};
+         .analysis = before.analysis};
   if (!frame) job.spec.frames = {};  // a single image, even if the old job was a frame of a sequence
   if (changes.spp || changes.target_error || changes.time) {
     job.spp = job.spec.spp = changes.spp;
@@ -363,13 +395,15 @@ Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, c
                               asset.name, asset.digest.hex()));
   if (!blobs.has(job.scene))
     return fail(Errc::failed_precondition, "the scene of this job is not here any more: submit it again");
+  if (changes.mix)
+    if (auto ok = mix_again(*changes.mix, blobs, admission); !ok) return tl::unexpected(ok.error());
   if (job.spec.reference) {
     const auto reference = load_reference(job.spec, job.settings.size, blobs);
     if (!reference) return tl::unexpected(reference.error());
     job.reference_same_seed = same_noise(reference->origin, job.scene, job.settings.seed);
   }
   if (auto ok = check_job(job); !ok) return tl::unexpected(ok.error());
-  return job;
+  return admission;
 }
 
 Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const BlobStore& blobs) {

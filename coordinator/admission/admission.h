@@ -37,10 +37,12 @@ tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitReques
 
 // Returns a new job with the scene, settings and files of the job `before`, but without id, owner and time of
 // submission. If `changes` has any of spp, target_error and time, all three are taken from `changes`. Its
-// seed and memory (if set), priority, and denoise (if true) also apply; its other members are ignored.
+// seed and memory (if set), priority, and denoise (if true) also apply, and its mix multiplies the light of
+// the scene, which is then another scene (Admission::scene_json; empty if it is the scene of `before`). Its
+// other members are ignored.
 // `frame`: the number of the frame, if the new job is one of a new sequence, as `before` is one of the old
 // sequence. failed_precondition: a file of the scene is no longer in `blobs`.
-Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, const BlobStore& blobs,
+Result<Admission> admit_again(const StoredJob& before, const JobSpec& changes, const BlobStore& blobs,
                               std::optional<std::uint32_t> frame = {});
 
 // Reads the reference image of a job whose image has this size. failed_precondition: its blob is missing.

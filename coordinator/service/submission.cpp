@@ -85,7 +85,10 @@ Result<JobId> Submission::submit_again(const JobId& before, const JobSpec& chang
     const auto frame = range ? std::optional(frame_of(job.id)->frame) : std::nullopt;
     auto again = admit_again(job, changes, blobs_, frame);
     if (!again) return tl::unexpected(again.error());
-    job = std::move(*again);
+    job = std::move(again->job);
+    if (!again->scene_json.empty())
+      if (const auto put = blobs_.put(job.scene, std::as_bytes(std::span(again->scene_json))); !put)
+        return tl::unexpected(put.error());
     job.owner = owner;
     job.submitted_unix = at;
     job.traceparent = clean_traceparent(traceparent);

@@ -137,6 +137,18 @@ void describe(V& v, T& s) {
              .render = true,
              .always = true},
             s.aov);
+  v.setting({.name = "mix",
+             .doc = "Multiplies the light of the scene's light groups (docs/guide/light-groups.md): "
+                    "key=2,fill=0.5:0.4:0.3 (R:G:B).",
+             .more = "The groups are those of `light_group` in the scene; `other` is the light without one.",
+             .option = "--mix",
+             .placeholder = "GROUP=FACTOR,...",
+             .render = true,
+             .again = true,
+             .again_doc = "Multiplies the light of the light groups of the earlier job's scene: "
+                          "key=2,fill=0.5:0.4:0.3 (R:G:B).",
+             .pixels = true},
+            s.mix);
   v.setting({.name = "defines",
              .doc = "Values of the scene's $NAME parameters.",
              .query = "define",

@@ -15,6 +15,7 @@
 #include "core/base/digest.h"
 #include "core/base/error.h"
 #include "core/base/frame_range.h"
+#include "core/base/light_mix.h"
 #include "core/image/aov/aov.h"
 #include "core/image/frame/frame.h"
 #include "core/job/techniques.h"
@@ -56,6 +57,7 @@ struct JobSpec {
   std::optional<std::string> integrator;
   std::optional<TechniqueChoice> techniques;  // instead of what the scene's integrator says
   std::vector<std::string> aov;
+  std::optional<LightMix> mix;  // factors of the light of the scene's light groups
   std::map<std::string, std::string> defines;  // values of the $name parameters in Mitsuba scenes, by name
   int priority = 0;
   bool float_output = false;

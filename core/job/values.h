@@ -88,6 +88,8 @@ bool parse(std::string_view from, T& out) {
     return take(parse_frames(from));
   } else if constexpr (kIs<T, TechniqueChoice>) {
     return take(parse_technique_choice(from));
+  } else if constexpr (kIs<T, LightMix>) {
+    return take(parse_light_mix(from));
   } else if constexpr (kIs<T, Digest>) {
     return take(Digest::parse(from));
   } else {
@@ -190,6 +192,10 @@ std::string allowed(const Setting& s, Form form) {
         "-NAME or +NAME, separated by commas, each once and not both -equiangular and -exponential; names "
         "are {}",
         technique_names());
+  } else if constexpr (kIs<T, LightMix>) {
+    return fmt::format(
+        "GROUP=FACTOR or GROUP=R:G:B, separated by commas, each group once; factors are numbers from 0 to {}",
+        kMostMixFactor);
   } else if constexpr (kIs<T, PixelRect>) {
     return json ? "[x0, y0, x1, y1] in whole pixels, or null" : "X0,Y0,X1,Y1 in whole pixels: 0,0,64,64";
   } else {
@@ -200,7 +206,7 @@ std::string allowed(const Setting& s, Form form) {
 
 template <class T, IsJson J = Json>
 J write(const T& value) {
-  if constexpr (std::is_enum_v<T> || kIs<T, FrameRange, TechniqueChoice>)
+  if constexpr (std::is_enum_v<T> || kIs<T, FrameRange, TechniqueChoice, LightMix>)
     return to_string(value);
   else if constexpr (kIs<T, FrameSize>)
     return J::array({value.width, value.height});
@@ -219,7 +225,7 @@ std::string text_of(const T& value) {
     return fmt::format("{}", fmt::join(value, ","));
   else if constexpr (kIs<T, FrameSize>)
     return fmt::format("{}x{}", value.width, value.height);
-  else if constexpr (std::is_enum_v<T> || kIs<T, FrameRange, TechniqueChoice>)
+  else if constexpr (std::is_enum_v<T> || kIs<T, FrameRange, TechniqueChoice, LightMix>)
     return std::string(to_string(value));
   else if constexpr (kIs<T, Digest>)
     return value.hex();

@@ -245,5 +245,48 @@ TEST(LightGroups, AreTheImagesOfTheirLightsAlone) {
   tests.close();
 }
 
+// A mix of the groups is the image of the scene whose lights are multiplied.
+TEST(LightGroups, MixedAreTheImageOfTheMixedScene) {
+  Tests tests("property/light_mixes");
+  std::uint64_t seed = 8000;
+  int compared = 0;
+  for (const NamedScene& s : all_scenes()) {
+    const std::vector<std::string> groups = scene::light_groups_of(s.builder.scene);
+    if (groups.size() < 2 || pixels_depend_on_each_other(s.builder) || compared == 8) continue;
+    LightMix mix;
+    // Grey, because some lights take no colour
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const double f = g == 0 ? 3 : g == 1 ? .25 : 1;
+      mix.groups[groups[g]] = {{f, f, f}, {f, f, f}};
+    }
+    SceneBuilder mixed = s.builder;
+    ASSERT_TRUE(scene::multiply_light(mix, mixed.scene)) << s.name;
+    ++compared;
+    const auto at = [&](std::uint64_t spp, double level) {
+      const Picture apart = picture(s.builder, {"light_groups"}, spp, ++seed);
+      Picture sum = apart;  // with the mix in the place of group 0
+      for (int half = 0; half < 2; ++half)
+        for (int c = 0; c < 3; ++c) {
+          const auto to = sum.sums.begin() + (sum.plane(plane_of("light_groups", 0, half, c)).data() -
+                                              sum.sums.data());
+          for (std::size_t i = 0; i < sum.pixels; ++i) {
+            double value = 0;
+            for (std::size_t g = 0; g < groups.size(); ++g)
+              value += mix.groups[groups[g]].surface[0] *
+                       double{apart.plane(plane_of("light_groups", g, half, c))[i]};
+            to[static_cast<std::ptrdiff_t>(i)] = static_cast<float>(value);
+          }
+        }
+      return compare(estimate_of_group(sum, 0, spp), estimate(mixed, spp, ++seed), level);
+    };
+    const double level = tests.level(3);
+    Comparison c = at(64, .01);
+    if (c.verdict != Verdict::alike) c = at(1024, level);
+    EXPECT_NE(c.verdict, Verdict::different) << s.name << ": " << c.told;
+  }
+  EXPECT_GE(compared, 6);
+  tests.close();
+}
+
 }  // namespace
 }  // namespace ls::test

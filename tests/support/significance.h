@@ -99,6 +99,7 @@ inline constexpr std::array kShares = {Share{Family::chi_square, "bsdf/sampling"
                                        Share{Family::scenes, "property/channels", 60},
                                        Share{Family::scenes, "property/sum_of_lights", 60},
                                        Share{Family::scenes, "property/light_groups", (8 + 5) * 2 * 3},
+                                       Share{Family::scenes, "property/light_mixes", 8 * 3},
                                        Share{Family::scenes, "property/twice_the_grid", 6},
                                        Share{Family::scenes, "property/majorant", 6},
                                        Share{Family::scenes, "property/boundaries", 60},

@@ -26,6 +26,7 @@
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
+#include "core/base/light_mix.h"
 #include "core/image/error/error_estimate.h"
 #include "core/image/film/partial.h"
 #include "core/image/frame/frame.h"
@@ -49,13 +50,6 @@ struct TileAovs {
   std::vector<double> sums;
   // The identifier planes: kIdPlanes for each AOV in planes_of(aovs).ids.
   std::vector<float> ids;
-};
-
-// Factors of a light group's light, R G B: of the light that was last scattered in a medium (`volume`), and of
-// all other light.
-struct GroupFactors {
-  std::array<double, 3> surface{1, 1, 1}, volume{1, 1, 1};
-  bool operator==(const GroupFactors&) const = default;
 };
 
 class Film {

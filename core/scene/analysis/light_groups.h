@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "core/base/error.h"
+#include "core/base/light_mix.h"
 #include "core/scene/scene.h"
 
 namespace ls::scene {
@@ -14,5 +16,11 @@ std::vector<std::string> light_groups_of(const Scene& scene);
 
 // Returns whether the medium gives off light.
 bool gives_off_light(const Medium& medium);
+
+// Multiplies the light of the scene's light groups by the factors of the mix. invalid_argument: the scene has
+// no group of a name in the mix, or a light cannot have such factors: factors of media differ from those of
+// surfaces, or a colour is asked of a light that has no place for it (an environment map, a projector, a
+// medium whose emission is a grid).
+Result<void> multiply_light(const LightMix& mix, Scene& scene);
 
 }  // namespace ls::scene
