@@ -42,8 +42,10 @@ def test_where_denoising_failed_the_picture_is_shown_and_the_reason(farm, dashbo
 
 
 @pytest.mark.parametrize("fields, label, changes", [
-    ({"spp_asked": 64}, "Render on (128 samples)", {"spp": 128}),
-    ({"spp_asked": None, "spp": 65536, "spp_done": 36.4, "stopped": "time"}, "Render on (74 samples)", {"spp": 74}),
+    ({"spp_asked": 64}, "Render on (256 samples)", {"spp": 256}),
+    ({"spp_asked": 16, "spp": 16, "spp_done": 16}, "Render on (64 samples)", {"spp": 64}),
+    ({"spp_asked": 4, "spp": 4, "spp_done": 4}, "Render on (64 samples)", {"spp": 64}),
+    ({"spp_asked": None, "spp": 65536, "spp_done": 36.4, "stopped": "time"}, "Render on (148 samples)", {"spp": 148}),
     ({"spp_asked": None, "spp": 65536, "target_error": 0.001, "stopped": "error"}, "Render on (to relMSE 0.0005)", {"target_error": 0.0005})])
 def test_a_noisy_job_says_so_plainly_and_renders_on(farm, dashboard, fields, label, changes):
     farm.jobs["j-1"] = job(**{"state": "done", "spp": 64, "spp_done": 64, "verdict": HEAVY, **fields})

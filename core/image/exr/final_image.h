@@ -60,13 +60,13 @@ struct Provenance {
   // If the verdict from the film is "trusted", but `trusted` is false in this status, `:verdict` becomes the
   // `words` of the status.
   std::optional<ConvergenceStatus> convergence_status = {};
-  // The error, instead of that of the film; it does not name the tiles then. Used for mixes of light groups,
-  // which no tile can be verified against.
-  std::optional<ImageError> error_of_mix = {};
   // further header strings that are numbers; the keys are their names without "lightshaft:"
   std::map<std::string, double> figures = {};
   // further header strings that are texts; the keys are their names without "lightshaft:"
   std::map<std::string, std::string> notes = {};
+  // Set for a mix of light groups: its error, instead of that of the film. The header then does not name the
+  // tiles, since no tile can be verified against a mix.
+  std::optional<ImageError> error_of_mix = {};
 };
 struct FinalImage {
   std::vector<std::byte> exr;

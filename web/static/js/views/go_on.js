@@ -10,8 +10,10 @@ export function further(job) {
   if (job.state !== "done" || job.frames) return null;
   // tiles differ in their samples: each gets what half the error takes
   if (job.stopped === "error" && job.target_error > 0) return { changes: { target_error: job.target_error / 2 }, words: `to relMSE ${given(job.target_error / 2)}` };
-  const spp = 2 * Math.ceil(job.spp_asked === null ? job.spp_done : Math.max(job.spp, job.spp_done));
-  return spp > 0 ? { changes: { spp }, words: `${count(spp)} samples` } : null;
+  const done = Math.ceil(job.spp_asked === null ? job.spp_done : Math.max(job.spp, job.spp_done));
+  // of a noisy image as many as the coordinator's advice asks for (core/job/advice.cpp): they halve its noise
+  const spp = doubtful(job.verdict) ? Math.max(4 * done, 64) : 2 * done;
+  return done > 0 ? { changes: { spp }, words: `${count(spp)} samples` } : null;
 }
 
 /** Both keep their height while they are empty, so that what is below does not move when the job ends. */
