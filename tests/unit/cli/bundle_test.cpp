@@ -84,6 +84,8 @@ T other_value(const job::Setting& s) {
     return {32768, 2};
   else if constexpr (job::kIs<T, FrameRange>)
     return {7, 7, 1};  // one frame, which a job with a reference may have
+  else if constexpr (job::kIs<T, LightMix>)
+    return parse_light_mix("key=2").value();
   else if constexpr (job::kIs<T, TechniqueChoice>)
     return *parse_technique_choice("+light_tree,-path_reuse");
   else
