@@ -26,7 +26,7 @@ def scene(tmp_path_factory):
     """The fog under its sky, which has no group, and two lamps."""
     path = write_fog(tmp_path_factory.mktemp("lamps"))
     path.write_text(path.read_text().replace(
-        "</scene>", lamp("key", (2, 2, 1), "3 2 1") + lamp("fill", (-2, 1, 2), ".2 .5 1") + "</scene>"))
+        "</scene>", lamp("key", (2, 2, 1), "3 2 1") + lamp("fill", (-2, 1, 2), "2 5 10") + "</scene>"))
     return path
 
 
@@ -174,7 +174,7 @@ def test_a_job_without_groups_cannot_be_mixed(farm, scene, tmp_path):
     job = submit(farm, scene)
     farm.wait_for_job(job)
 
-    said = lightshaft("fetch", job, "-o", tmp_path / "no.exr", "--mix", "key=2", env=environment(farm), code=2).stderr
+    said = lightshaft("fetch", job, "-o", tmp_path / "no.exr", "--mix", "key=2", env=environment(farm), code=1).stderr
 
     assert "the image has no light groups: render it with --aov light_groups to mix them" in said
     assert not (tmp_path / "no.exr").exists()

@@ -330,7 +330,7 @@ Result<Partial> finish(std::span<const std::byte> exr, const Shape& shape, UnitH
   return partial;
 }
 
-std::string told(AovSet aovs) {
+std::string described(AovSet aovs) {
   return fmt::format("the AOVs [{}]{}", fmt::join(names_of(aovs), ", "),
                      aovs.groups() > 0 ? fmt::format(" with {} light groups", aovs.groups()) : "");
 }
@@ -342,7 +342,7 @@ Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader&
   const auto shape = read_shape(exr);
   if (!shape) return tl::unexpected(shape.error());
   if (shape->aovs != aovs)
-    return refuse_partial(fmt::format("it has {}, expected {}", told(shape->aovs), told(aovs)));
+    return refuse_partial(fmt::format("it has {}, expected {}", described(shape->aovs), described(aovs)));
   const PixelRect& display = *shape->display;
   if (display.x1 != frame.width || display.y1 != frame.height)
     return refuse_partial(

@@ -3,6 +3,23 @@
 from typing import Any, Literal, NotRequired, TypedDict, Union
 
 
+class MixError(TypedDict):
+    mix: dict[str, Any]
+    """The mix as it was read."""
+    groups: list[str]
+    """The names of the image's light groups."""
+    relmse: Union[float, None]
+    """The estimated relMSE of the mixed image. null: there are no samples yet."""
+    relmse_ci95: Union[list[float], None]
+    """[low, high]: the 95 % interval of relmse."""
+    rmse: Union[float, None]
+    """The estimated root mean squared error."""
+    trusted: bool
+    """Whether the figures can be trusted."""
+    verdict: str
+    """"trusted", or why the figures cannot be trusted."""
+
+
 class Layers(TypedDict):
     size: list[int]
     """Width and height of level 0."""
@@ -97,8 +114,12 @@ class JobSpec(TypedDict):
     are chosen for the scene. Every image is right with any of them; only its noise differs."""
     aov: NotRequired[list[str]]
     """Further layers of the image (docs/reference/aovs.md). Possible are albedo, alpha, coverage,
-    denoising_albedo, denoising_normal, depth, direct, emission, geo_normal, indirect, material_id,
-    multiple, normal, opacity, position, shape_id, single, surface, uv, volume, volume_opacity."""
+    denoising_albedo, denoising_normal, depth, direct, emission, geo_normal, indirect, light_groups,
+    material_id, multiple, normal, opacity, position, shape_id, single, surface, uv, volume,
+    volume_light_groups, volume_opacity."""
+    mix: NotRequired[str]
+    """Multiplies the light of the scene's light groups (docs/guide/light-groups.md): key=2,fill=0.5:0.4:0.3
+    (R:G:B). The groups are those of `light_group` in the scene; `other` is the light without one."""
     defines: NotRequired[dict[str, str]]
     """Values of the scene's $NAME parameters."""
     priority: NotRequired[int]
