@@ -18,16 +18,16 @@ namespace ls::test {
 namespace {
 
 // The groups of an image: [group][3 * pixel + channel], tile by tile.
-using Means = std::vector<std::vector<double>>;
+using GroupMeans = std::vector<std::vector<double>>;
 
-struct Image {
+struct GroupsImage {
   Film film;
-  Means means;
+  GroupMeans means;
 };
 
-Means means_of(const Film& film) {
+GroupMeans means_of(const Film& film) {
   const AovPlanes planes = planes_of(film.aovs());
-  Means out(film.aovs().groups());
+  GroupMeans out(film.aovs().groups());
   for (TileIndex t = 0; t < film.grid().count(); ++t) {
     const TileAovs tile = film.aov_pixels(t);
     const auto n = static_cast<std::size_t>(tile.rect.pixels());
@@ -43,9 +43,9 @@ Means means_of(const Film& film) {
   return out;
 }
 
-class Renders {
+class MixRenders {
  public:
-  explicit Renders(const MixJobs& jobs) : jobs_(jobs) {
+  explicit MixRenders(const MixJobs& jobs) : jobs_(jobs) {
     auto scene = cli::read_local_scene(jobs.scene, {}, false);
     if (!scene) throw std::runtime_error(scene.error().error.message);
     scene_ = std::move(*scene);
@@ -56,13 +56,13 @@ class Renders {
     settings_.aov = {"light_groups"};
     settings_.light_groups = scene::light_groups_of(scene_.scene);
   }
-  Image render(std::uint64_t seed) const {
+  GroupsImage render(std::uint64_t seed) const {
     RenderSettings settings = settings_;
     settings.seed = seed;
     const auto world = render::build_world(scene_.scene, settings, {}, 1);
     if (!world) throw std::runtime_error(world.error().message);
     const TileGrid grid{jobs_.size, RenderSettings{}.tile};
-    Image out{Film(grid, aovs_of(settings)), {}};
+    GroupsImage out{Film(grid, aovs_of(settings)), {}};
     for (TileIndex t = 0; t < grid.count(); ++t)
       for (RoundIndex k = 0; k < round_count(jobs_.spp); ++k) {
         const SampleRange range = cut_range(k, jobs_.spp);
@@ -83,15 +83,15 @@ class Renders {
 };
 
 // The sums over all images of the groups' values, and of the products of two groups' values.
-struct Moments {
-  Means sum;
+struct GroupMoments {
+  GroupMeans sum;
   std::vector<std::vector<std::vector<double>>> product;
 
-  explicit Moments(const std::vector<Image>& all) {
+  explicit GroupMoments(const std::vector<GroupsImage>& all) {
     const std::size_t groups = all.front().means.size(), values = all.front().means.front().size();
     sum.assign(groups, std::vector<double>(values));
-    product.assign(groups, Means(groups, std::vector<double>(values)));
-    for (const Image& image : all)
+    product.assign(groups, GroupMeans(groups, std::vector<double>(values)));
+    for (const GroupsImage& image : all)
       for (std::size_t g = 0; g < groups; ++g)
         for (std::size_t i = 0; i < values; ++i) {
           sum[g][i] += image.means[g][i];
@@ -113,16 +113,16 @@ std::vector<GroupFactors> random_factors(std::size_t groups, std::mt19937_64& ra
   return out;
 }
 
-struct Look {
+struct MixLook {
   double estimated = 0, real = 0;
   bool trusted = false, held = false, held_ignoring = false;
 };
 
-Look look_at(const Image& image, const Moments& all, std::size_t images,
+MixLook look_at(const GroupsImage& image, const GroupMoments& all, std::size_t images,
              const std::vector<GroupFactors>& factors) {
   const ImageError colour = image_error(image.film.error());
   const ImageError e = mixed_error(image.film.mixed(factors).error(), colour);
-  Look look{.estimated = e.relmse, .trusted = e.trusted};
+  MixLook look{.estimated = e.relmse, .trusted = e.trusted};
   const auto n = static_cast<double>(images), others = n - 1;
   const std::size_t values = all.sum.front().size();
   double ignoring = 0;
@@ -154,11 +154,11 @@ Look look_at(const Image& image, const Moments& all, std::size_t images,
 }  // namespace
 
 MixCoverage measure_mixes(const MixJobs& jobs) {
-  const Renders renders(jobs);
-  std::vector<Image> all(static_cast<std::size_t>(jobs.images), {Film({jobs.size, 32}), {}});
+  const MixRenders renders(jobs);
+  std::vector<GroupsImage> all(static_cast<std::size_t>(jobs.images), {Film({jobs.size, 32}), {}});
   on_threads(jobs.threads, all.size(), [&](std::size_t n) { all[n] = renders.render(jobs.first_seed + n); });
-  const Moments moments(all);
-  std::vector<Look> looks(all.size() * static_cast<std::size_t>(jobs.mixes));
+  const GroupMoments moments(all);
+  std::vector<MixLook> looks(all.size() * static_cast<std::size_t>(jobs.mixes));
   on_threads(jobs.threads, all.size(), [&](std::size_t n) {
     std::mt19937_64 random(jobs.first_seed + n);
     for (std::size_t m = 0; m < static_cast<std::size_t>(jobs.mixes); ++m)
@@ -167,7 +167,7 @@ MixCoverage measure_mixes(const MixJobs& jobs) {
   });
   MixCoverage out{.mixes = static_cast<int>(looks.size())};
   Quotient ratio;
-  for (const Look& l : looks) {
+  for (const MixLook& l : looks) {
     out.trusted += l.trusted;
     out.held += l.trusted && l.held;
     out.held_ignoring += l.trusted && l.held_ignoring;

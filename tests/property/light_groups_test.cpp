@@ -235,7 +235,7 @@ TEST(LightGroups, AreTheImagesOfTheirLightsAlone) {
         return compare(one, other, level);
       };
       const double level = tests.level(3);
-      Comparison c = at(64, .01);
+      Comparison c = at(by_seeds ? 32 : 64, .01);
       if (c.verdict != Verdict::alike) c = at(by_seeds ? 128 : 1024, level);
       EXPECT_NE(c.verdict, Verdict::different) << s.name << ", group " << groups[g] << ": " << c.told;
     }
