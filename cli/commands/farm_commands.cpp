@@ -63,7 +63,10 @@ int workers(FarmApi& api, const FarmFlags& flags) {
   return show_answer(api.get("/api/v1/workers"), flags, workers_table);
 }
 int show(FarmApi& api, const FarmFlags& flags) {
-  return show_answer(api.get(job_path(flags.id)), flags, job_text);
+  const auto job = api.get(job_path(flags.id));
+  const int code = show_answer(job, flags, job_text);
+  if (code == kOk && !flags.farm.json) print_meters(api, *job);
+  return code;
 }
 
 int change(FarmApi& api, const FarmFlags& flags, const json& body) {
@@ -187,6 +190,7 @@ int watch(FarmApi& api, const FarmFlags& flags) {
   if (const int code = print_end(*end, flags.quiet || !flags.farm.json); code != kOk) return code;
   if (!flags.farm.json) print(job_text(*end));
   if (!flags.quiet) print_denoised(api, *end);
+  if (!flags.farm.json) print_meters(api, *end);
   return kOk;
 }
 
@@ -305,9 +309,10 @@ void add_farm_commands(CLI::App& app, Action& action) {
       "  lightshaft fetch j-1234abcd                     writes SCENE.exr, or SCENE_####.exr of a sequence\n"
       "  lightshaft fetch j-1234abcd -o image.png\n"
       "  lightshaft fetch j-1234abcd --frame 7 -o seventh.exr");
-  add_option(*fetch_command, "-o,--output", fetching->out, "OUT.exr",
-             "file of the image, .exr or .png; for a sequence with # for the frame number, for example "
-             "out_####.exr; default: the scene's name in this folder");
+  add_option(
+      *fetch_command, "-o,--output", fetching->out, "OUT.exr",
+      "file of the image, .exr or .png, or of the values of meters, .json; for a sequence with # for the "
+      "frame number, for example out_####.exr; default: the scene's name in this folder");
   add_option(*fetch_command, "--report", fetching->report, "REPORT.json",
              "also write the report as JSON; with # in the name, one for each frame");
   add_option(*fetch_command, "--html", fetching->html, "REPORT.html",

@@ -31,9 +31,11 @@ struct RenderSettings {
   int max_depth = -1;            // -1: unlimited; counts path segments, as in Mitsuba
   int rr_depth = 5;              // first depth at which Russian roulette may act
   std::vector<std::string> aov;  // sorted names of AOVs, as returned by names_of(AovSet); empty: colour only
+  int meters = 0;                // number of meters that the scene has; `size` is then that of their blocks
   bool operator==(const RenderSettings&) const = default;
 };
 AovSet aovs_of(const RenderSettings& settings);
+inline TileGrid grid_of(const RenderSettings& s) { return {s.size, s.tile, s.meters > 0}; }
 
 // Which layers must reach the target error: the image as rendered, or its denoised layers.
 enum class TargetLayer { raw, denoised };

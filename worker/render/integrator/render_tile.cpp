@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <memory>
 #include <span>
@@ -170,6 +171,13 @@ struct PixelSums {
   double half[2][3] = {};
 };
 
+// Multiplies the sums by the weight of a meter, within the range of float32, as the film has no infinities.
+void weigh(PixelSums& sums, double weight) {
+  constexpr double kMost = std::numeric_limits<float>::max();
+  for (auto& half : sums.half)
+    for (double& sum : half) sum = std::clamp(sum * weight, -kMost, kMost);
+}
+
 // The sums of a pixel besides its colour: none (NoAovs), or AOVs (AovPixel).
 struct NoAovs {
   static LightSplit* split() { return nullptr; }
@@ -213,7 +221,8 @@ TileResult render_tile_with(const World& w, const Variant& v, PixelRect tile, Sa
     }
     for (int x = tile.x0; x < tile.x1; ++x, ++i) {
       aovs.begin_pixel();
-      const PixelSums sums = render_pixel(samples, x, y, range, r.health, aovs);
+      PixelSums sums = render_pixel(samples, x, y, range, r.health, aovs);
+      if (w.meters.any()) weigh(sums, w.meters.at(x, y).weight);
       aovs.store(r.sums.data() + 6 * pixels, pixels, i);
       for (std::size_t h = 0; h < 2; ++h)
         for (std::size_t c = 0; c < 3; ++c) r.sums[(3 * h + c) * pixels + i] = rounded(sums.half[h][c]);
@@ -267,6 +276,10 @@ SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample
   SampleValue value{{out.radiance.x, out.radiance.y, out.radiance.z}, usable(out), {}};
   count(out, {x, y, sample}, value.health);
   return value;
+}
+
+double sample_weight(const World& world, int x, int y) {
+  return world.meters.any() ? world.meters.at(x, y).weight : 1;
 }
 
 const Health& changed_inputs(const World& world) { return world.inputs; }
