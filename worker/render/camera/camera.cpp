@@ -138,7 +138,7 @@ CameraRay Camera::spherical_ray(double u, double v) const {
           std::numeric_limits<float>::infinity()};
 }
 
-CameraRay Camera::meter_ray(double fx, double fy, V2 lens) const {
+[[gnu::cold, gnu::noinline]] CameraRay Camera::meter_ray(double fx, double fy, V2 lens) const {
   const double x = std::floor(fx), y = std::floor(fy);
   const MeterStart& start = meters_->at(static_cast<int>(x), static_cast<int>(y));
   const Meters::Point from =

@@ -171,11 +171,20 @@ struct PixelSums {
   double half[2][3] = {};
 };
 
-// Multiplies the sums by the weight of a meter, within the range of float32, as the film has no infinities.
-void weigh(PixelSums& sums, double weight) {
+// Multiplies the colours of a tile by the weights of its meters, within the range of float32, as the film has
+// no infinities.
+[[gnu::cold, gnu::noinline]] void weigh(const Meters& meters, PixelRect tile, std::vector<float>& sums) {
   constexpr double kMost = std::numeric_limits<float>::max();
-  for (auto& half : sums.half)
-    for (double& sum : half) sum = std::clamp(sum * weight, -kMost, kMost);
+  const auto pixels = static_cast<std::size_t>(tile.pixels());
+  std::size_t i = 0;
+  for (int y = tile.y0; y < tile.y1; ++y)
+    for (int x = tile.x0; x < tile.x1; ++x, ++i) {
+      const double weight = meters.at(x, y).weight;
+      for (std::size_t plane = 0; plane < 6; ++plane) {
+        float& sum = sums[plane * pixels + i];
+        sum = rounded(std::clamp(sum * weight, -kMost, kMost));
+      }
+    }
 }
 
 // The sums of a pixel besides its colour: none (NoAovs), or AOVs (AovPixel).
@@ -221,13 +230,13 @@ TileResult render_tile_with(const World& w, const Variant& v, PixelRect tile, Sa
     }
     for (int x = tile.x0; x < tile.x1; ++x, ++i) {
       aovs.begin_pixel();
-      PixelSums sums = render_pixel(samples, x, y, range, r.health, aovs);
-      if (w.meters.any()) weigh(sums, w.meters.at(x, y).weight);
+      const PixelSums sums = render_pixel(samples, x, y, range, r.health, aovs);
       aovs.store(r.sums.data() + 6 * pixels, pixels, i);
       for (std::size_t h = 0; h < 2; ++h)
         for (std::size_t c = 0; c < 3; ++c) r.sums[(3 * h + c) * pixels + i] = rounded(sums.half[h][c]);
     }
   }
+  if (w.meters.any()) weigh(w.meters, tile, r.sums);
   return r;
 }
 TileResult render_tile_with(const World& w, const Variant& v, PixelRect tile, SampleRange range,
