@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cmath>
 
+#include "core/base/file_form.h"
 #include "core/base/frame_range.h"
 #include "core/scene/schema/validate.h"
 #include "formats/reader/mitsuba_plugins.h"
@@ -222,7 +223,7 @@ std::optional<std::vector<MeterPoint>> Reader::read_meter_file(const std::string
   meter_file_bytes_ += text->size();
   if (meter_file_bytes_ > kMaxTotalTextBytes)
     return report_.refuse(at, fmt::format("files of points have more than {} MiB", kMaxTotalTextBytes >> 20));
-  const std::uint32_t file = report_.add_file(SourceText(found, std::move(*text)));
+  const std::uint32_t file = report_.add_file(SourceText(found, std::string(without_mark(*text))));
   const std::string_view rows = report_.file(file).text();
   std::vector<MeterPoint> points;
   bool may_be_heading = true;

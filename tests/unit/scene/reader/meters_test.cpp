@@ -73,6 +73,15 @@ TEST(Meters, ListsAreReadFromTextAndFromFiles) {
   EXPECT_EQ(listed.film.size, (FrameSize{kMeterSide, 2 * kMeterSide}));
 }
 
+TEST(Meters, FilesMayBeginWithAByteOrderMark) {
+  const auto r = read_with_file(from_file("fluencemeter"),
+                                "\xef\xbb\xbf"
+                                "1 2 3\n");
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  EXPECT_EQ(r.scene->meters[0].points[0].position, (Vec3{{1, 2, 3}}));
+}
+
 TEST(Meters, FluenceHasNoDirections) {
   const Scene s = must_read(points("fluencemeter", "0 0 1; 2 0 0"));
 
