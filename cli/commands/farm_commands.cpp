@@ -65,7 +65,10 @@ int workers(FarmApi& api, const FarmFlags& flags) {
   return show_answer(api.get("/api/v1/workers"), flags, workers_table);
 }
 int show(FarmApi& api, const FarmFlags& flags) {
-  return show_answer(api.get(job_path(flags.id)), flags, job_text);
+  const auto job = api.get(job_path(flags.id));
+  const int code = show_answer(job, flags, job_text);
+  if (code == kOk && !flags.farm.json) print_meters(api, *job);
+  return code;
 }
 
 int change(FarmApi& api, const FarmFlags& flags, const json& body) {
@@ -189,6 +192,7 @@ int watch(FarmApi& api, const FarmFlags& flags) {
   if (const int code = print_end(*end, flags.quiet || !flags.farm.json); code != kOk) return code;
   if (!flags.farm.json) print(job_text(*end));
   if (!flags.quiet) print_denoised(api, *end);
+  if (!flags.farm.json) print_meters(api, *end);
   return kOk;
 }
 
@@ -214,6 +218,8 @@ int fetch(FarmApi& api, const FarmFlags& flags) {
   if (!flags.mix.empty()) {
     const auto read = mix_of(flags.mix);
     if (!read) return print_error(read.error());
+    if (image_format(out) == ImageFormat::json)
+      return usage_error("--mix: an image can be mixed, the values of meters cannot");
     mix = canonical_json(*read);
   }
   return fetch_results(api, flags.id,
@@ -325,9 +331,10 @@ void add_farm_commands(CLI::App& app, Action& action) {
       "  lightshaft fetch j-1234abcd -o image.png\n"
       "  lightshaft fetch j-1234abcd --frame 7 -o seventh.exr\n"
       "  lightshaft fetch j-1234abcd --mix key=2,fill=0.5 -o brighter.exr");
-  add_option(*fetch_command, "-o,--output", fetching->out, "OUT.exr",
-             "file of the image, .exr or .png; for a sequence with # for the frame number, for example "
-             "out_####.exr; default: the scene's name in this folder");
+  add_option(
+      *fetch_command, "-o,--output", fetching->out, "OUT.exr",
+      "file of the image, .exr or .png, or of the values of meters, .json; for a sequence with # for the "
+      "frame number, for example out_####.exr; default: the scene's name in this folder");
   add_option(*fetch_command, "--mix", fetching->mix, "GROUP=FACTOR,...",
              "multiply the light of light groups: key=2,fill=0.5:0.4:0.3 (R:G:B), fog.volume=4 for the light of "
              "media alone; or a file MIX.json that the dashboard has saved. The job must have --aov light_groups");

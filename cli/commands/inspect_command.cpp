@@ -48,7 +48,7 @@ tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> small_
   const bool shared = render::techniques_of(*whole.world).has(Technique::path_reuse);
   if (path_reuse == 0) path_reuse = shared ? kUsualPathReuse : -1;
   RenderSettings settings = whole.job.settings;
-  settings.size = small(settings.size);
+  if (settings.meters == 0) settings.size = small(settings.size);  // meters have the size of their blocks
   scene.scene = scene::pruned(scene.scene, scene::pruned_for(settings.integrator, settings.max_depth)).scene;
   return build_world_again(scene, settings, worker::usable_cpus());
 }

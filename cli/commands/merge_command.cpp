@@ -118,6 +118,8 @@ tl::expected<LayerNames, coordinator::Rejected> layer_names(const MergeFlags& fl
 
 int run(const MergeFlags& flags) {
   if (const auto ok = check_outputs("-o", flags.out, std::nullopt); !ok) return print_error(ok.error());
+  if (image_format(flags.out) == ImageFormat::json)
+    return usage_error(fmt::format("-o {}: partials become an image, .exr or .png", flags.out));
   if (!flags.report.empty())
     if (const auto ok = check_output("--report", flags.report); !ok) return print_error(ok.error());
   const auto files = files_of(flags.partials);

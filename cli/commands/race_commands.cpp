@@ -101,7 +101,7 @@ int run_lane(const LaneFlags& flags) {
           {"integrator", settings.integrator},
           {"whole", scene->scene.media.empty() || scene::sees_media(settings.integrator)},
           {"scene", world->job.scene.hex()}});
-  return serve_lane({world->world, {settings.size, settings.tile}, flags.name, flags.folder}, conditions);
+  return serve_lane({world->world, grid_of(settings), flags.name, flags.folder}, conditions);
 }
 
 // ---- race-tool ----

@@ -47,6 +47,7 @@ Result<LocalRenderOptions> options_of(const RenderFlags& flags) {
   options.strict = flags.job.strict;
   const char* ending = options.spec.frames ? "_####.exr" : ".exr";
   options.out = flags.out.empty() ? std::filesystem::path(flags.scene).stem().string() + ending : flags.out;
+  options.out_by_default = flags.out.empty();
   options.report = path_of(flags.report);
   options.html = path_of(flags.html);
   options.partial_dir = path_of(flags.partial_dir);
@@ -66,8 +67,9 @@ int replay_sample(const LocalScene& scene, const JobSpec& spec, int threads, std
         fmt::format("--pixel {},{} is outside of the image: it has {} x {} pixels, counted from 0", x, y,
                     size.width, size.height));
   const render::SampleValue value = render::render_sample(*built->world, x, y, sample);
-  print(fmt::format("pixel {},{} sample {}: {:.9g} {:.9g} {:.9g}", x, y, sample, value.rgb[0], value.rgb[1],
-                    value.rgb[2]));
+  const double weight = render::sample_weight(*built->world, x, y);
+  print(fmt::format("pixel {},{} sample {}: {:.9g} {:.9g} {:.9g}", x, y, sample, weight * value.rgb[0],
+                    weight * value.rgb[1], weight * value.rgb[2]));
   for (const auto& [cause, entry] : value.health.causes) print(sentence(cause, entry.count));
   return kOk;
 }
@@ -156,9 +158,11 @@ void add_render(CLI::App& app, Action& action) {
       "  lightshaft render smoke.xml --frames 1-10 -o out_####.exr\n"
       "LIGHTSHAFT_LOG=warn, info or debug shows what coordinator and worker do inside `render`.");
   add_option(*render, "scene", flags->scene, "SCENE", "Mitsuba XML, .pbrt, .gltf or .glb")->required();
-  add_option(*render, "-o,--output", flags->out, "OUT.exr",
-             "file of the image: .exr with all layers, or .png; for a sequence with # for the frame number, "
-             "for example out_####.exr; default: the scene's name with .exr, in this folder");
+  add_option(
+      *render, "-o,--output", flags->out, "OUT.exr",
+      "file of the image: .exr with all layers, or .png; of a scene with meters the values: .json; for a "
+      "sequence with # for the frame number, for example out_####.exr; default: the scene's name with "
+      ".exr or .json, in this folder");
   flags->job.add_to(*render, JobOptions::Command::render);
   add_option(*render, "--threads", flags->threads, "N", "default: all");
   add_option(*render, "--pixel", flags->pixel, "X,Y",

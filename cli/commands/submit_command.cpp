@@ -134,9 +134,10 @@ void add_submit(CLI::App& app, Action& action) {
   add_option(*submit, "--reference", flags->reference, "REF.exr",
              "the true image, rendered with another seed: every checkpoint is compared with it");
   submit->add_flag("--wait", flags->wait, "wait until the job is done");
-  add_option(*submit, "-o,--output", flags->out, "OUT.exr",
-             "wait, then fetch the image, .exr or .png; of a sequence those of all frames, for example "
-             "out_####.exr");
+  add_option(
+      *submit, "-o,--output", flags->out, "OUT.exr",
+      "wait, then fetch the image, .exr or .png, or the values of meters, .json; of a sequence those of "
+      "all frames, for example out_####.exr");
   add_option(*submit, "--report", flags->report, "REPORT.json",
              "wait, then fetch the report; with # in its name, every frame's");
   add_option(*submit, "--html", flags->html, "REPORT.html",

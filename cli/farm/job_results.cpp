@@ -10,6 +10,7 @@
 #include "cli/farm/http_client.h"
 #include "cli/output/console.h"
 #include "cli/output/convergence_text.h"
+#include "cli/output/meter_table.h"
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
 #include "core/base/safe_text.h"
@@ -38,10 +39,13 @@ struct Plan {
   std::vector<std::uint32_t> left_out;  // numbers of the frames of which nothing is downloaded
 };
 
-// Returns the part of the image's URL that follows the path of the job: "/image.exr" or "/image.png", with a
-// query for the mix of light groups and, for a PNG, for the denoised image if the job requests denoising.
+// Returns the part of the result's URL that follows the path of the job: "/image.exr", "/meters" or
+// "/image.png", of an image with a query for the mix of light groups and, for a PNG, for the denoised image if
+// the job requests denoising.
 std::string image_of(const json& job, const Results& wanted) {
-  const bool png = image_format(wanted.image) == ImageFormat::png;
+  const auto format = image_format(wanted.image);
+  if (format == ImageFormat::json) return "/meters";
+  const bool png = format == ImageFormat::png;
   return (png ? "/image.png" : "/image.exr") +
          query_of({{"layer", png && flag_field(job, "denoise") ? "denoised" : ""}, {"mix", wanted.mix}});
 }
@@ -119,12 +123,14 @@ std::string goes_on(const std::string& id) {
                      word, word);
 }
 
+bool measures(const json& job) { return int_field(job, "meters", 0) > 0; }
+
 std::string default_image(const json& job) {
   // The name comes from whoever submitted the job: only its last part is used, and no hidden file is made.
   std::string stem = std::filesystem::path(plain_text(text_field(job, "name"))).stem().string();
   stem.erase(0, stem.find_first_not_of('.'));
   if (stem.empty()) stem = "image";
-  return stem + (object_field(job, "frames") ? "_####.exr" : ".exr");
+  return stem + (object_field(job, "frames") ? "_####" : "") + (measures(job) ? ".json" : ".exr");
 }
 
 int done_frames(const json& job) {
@@ -211,12 +217,24 @@ void print_denoised(FarmApi& api, const json& job) {
     print_note("denoised relMSE: " + denoised);
 }
 
+void print_meters(FarmApi& api, const json& job) {
+  if (!measures(job) || object_field(job, "frames")) return;
+  const auto answer = api.get(job_path(text_field(job, "id")) + "/meters");
+  if (!answer)
+    print_note("the values of its meters are unknown: " + answer.error().error.message);
+  else if (const std::string table = meter_table(list_field(*answer, "meters")); !table.empty())
+    print(table);
+}
+
 int fetch_results(FarmApi& api, const std::string& id, const Results& wanted) {
   if (wanted.image.empty() && wanted.report.empty() && wanted.html.empty()) return kOk;
   if (const auto format = image_format(wanted.image); !format) return print_error(format.error());
   const auto call = [&](auto request) { return wanted.patient ? with_retries(request) : request(); };
   const auto job = call([&] { return api.get(job_path(id)); });
   if (!job) return print_rejected(job.error());
+  if (!measures(*job) && image_format(wanted.image) == ImageFormat::json)
+    return usage_error(
+        fmt::format("-o {}: job {} has no meters: its result is an image, .exr or .png", wanted.image, id));
   const json* frames = object_field(*job, "frames");
   const auto plan =
       frames ? plan_sequence(id, *job, *frames, wanted) : Result<Plan>(plan_image(id, *job, wanted));

@@ -33,6 +33,9 @@ int print_end(const nlohmann::json& job, bool quiet);
 // Prints the error of the denoised image of a job that is done, or why there is none, of the job's report,
 // which this function downloads. Prints nothing if no denoising was requested, or if `job` has that error.
 void print_denoised(FarmApi& api, const nlohmann::json& job);
+// Prints what the meters of the job have measured, which this function downloads. Prints nothing if the job
+// makes an image or is a sequence.
+void print_meters(FarmApi& api, const nlohmann::json& job);
 
 struct Results {
   // Names of the files to write; empty: this result is not wanted. A run of # in the last component is

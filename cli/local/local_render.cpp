@@ -17,6 +17,7 @@
 #include "cli/output/console.h"
 #include "cli/output/convergence_text.h"
 #include "cli/output/interrupt.h"
+#include "cli/output/meter_table.h"
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
 #include "coordinator/service/coordinator.h"
@@ -201,11 +202,18 @@ class LocalRender {
 
   Result<void> write_results(bool cut) {
     coordinator::Coordinator& coordinator = farm_->coordinator();
-    const bool png = image_format(options_.out) == ImageFormat::png;
-    const auto image =
-        png ? coordinator.image_png(job_, 0, options_.spec.denoise) : coordinator.image_exr(job_);
-    if (!image) return tl::unexpected(image.error());
-    const auto saved = save_result(options_.out, *image);
+    const auto format = image_format(options_.out);
+    Result<void> saved;
+    if (format == ImageFormat::json) {
+      const auto meters = coordinator.meters_json(job_);
+      if (!meters) return tl::unexpected(meters.error());
+      saved = save_result(options_.out, *meters + "\n");
+    } else {
+      const auto image = format == ImageFormat::png ? coordinator.image_png(job_, 0, options_.spec.denoise)
+                                                    : coordinator.image_exr(job_);
+      if (!image) return tl::unexpected(image.error());
+      saved = save_result(options_.out, *image);
+    }
     const auto report_text = write_report(cut, saved.has_value());
     return saved ? report_text : saved;
   }
@@ -235,6 +243,7 @@ class LocalRender {
       if (const std::string advice = text_field(*report, "advice"); !advice.empty()) print_note(advice);
     print_report_health(*report);
     if (options_.quiet || !print_summary) return {};
+    if (const std::string table = meter_table(list_field(*report, "meters")); !table.empty()) print(table);
     print("pixels_sha256 " + text_field(*report, "pixels_sha256"));
     return {};
   }
@@ -308,7 +317,15 @@ std::string report_summary(const json& j) {
 }
 
 int render_locally(const LocalScene& scene, const LocalRenderOptions& options) {
-  return LocalRender(scene, options).run();
+  const bool measures = !scene.scene.meters.empty();
+  if (!measures && image_format(options.out) == ImageFormat::json)
+    return usage_error(
+        fmt::format("-o {}: the scene has a camera and no meters: its result is an image, .exr "
+                    "or .png",
+                    options.out.string()));
+  LocalRenderOptions chosen = options;
+  if (measures && options.out_by_default) chosen.out.replace_extension(".json");
+  return LocalRender(scene, chosen).run();
 }
 
 }  // namespace ls::cli

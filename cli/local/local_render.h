@@ -18,6 +18,7 @@ struct LocalRenderOptions {
   bool isolate = false, quiet = false, strict = false;
   ProgressForm progress = ProgressForm::bar;
   std::filesystem::path out;
+  bool out_by_default = false;  // true: the user has not named `out`, which is for an image
   std::optional<std::filesystem::path> report, html, partial_dir, reference;
 };
 // Renders the scene, and writes the output files; returns the exit code.

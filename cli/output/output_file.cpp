@@ -41,8 +41,11 @@ Result<ImageFormat> image_format(const fs::path& file) {
   std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
   if (ending.empty() || ending == ".exr") return ImageFormat::exr;
   if (ending == ".png") return ImageFormat::png;
+  if (ending == ".json") return ImageFormat::json;
   return bad_argument(
-      fmt::format("-o {}: an image is written as .exr (all layers) or .png (8-bit colours)", file.string()));
+      fmt::format("-o {}: an image is written as .exr (all layers) or .png (8-bit colours), and what meters "
+                  "measure as .json",
+                  file.string()));
 }
 
 Result<void> check_folder(const std::string& option, const fs::path& folder) {

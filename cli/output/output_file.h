@@ -19,8 +19,9 @@ namespace ls::cli {
 // in its folder; the file itself is not touched. `option` is the command line option that names the file, for
 // messages.
 Result<void> check_output(const std::string& option, const std::filesystem::path& file);
-// How an image file is written: all layers as EXR, or the colours as an 8-bit sRGB PNG.
-enum class ImageFormat { exr, png };
+// How the result of a job is written: all layers as EXR, the colours as an 8-bit sRGB PNG, or what meters
+// have measured as JSON.
+enum class ImageFormat { exr, png, json };
 // Returns the format from the file name's extension, in upper or lower case; EXR if it has none.
 // invalid_argument: it has the extension of another format.
 Result<ImageFormat> image_format(const std::filesystem::path& file);

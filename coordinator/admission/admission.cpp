@@ -25,6 +25,7 @@
 #include "core/scene/limits.h"
 #include "core/scene/schema/integrators.h"
 #include "core/scene/schema/nori_integrators.h"
+#include "core/scene/schema/validate.h"
 #include "util/protocol/limits.h"
 
 namespace ls::coordinator {
@@ -135,6 +136,11 @@ Result<RenderSettings> settings_of(const Scene& scene, const JobSpec& spec, std:
   if (!job::fits({}, settings.size))
     return invalid("the image's size " +
                    job::must_be(job::allowed<FrameSize>({}, job::Form::query), job::text_of(settings.size)));
+  settings.meters = static_cast<int>(scene::meter_count(scene));
+  if (settings.meters > 0 && spec.size)
+    return invalid("the scene has meters and no camera, so there is no image of a size: leave the size out");
+  if (settings.meters > 0 && (!spec.aov.empty() || spec.denoise))
+    return invalid("the scene has meters and no camera, so there is no image with AOVs or denoised layers");
   settings.seed = spec.seed.value_or(0) + frame;
   if (auto ok = choose_integrator(scene, spec, settings, warnings); !ok) return tl::unexpected(ok.error());
   if (auto ok = choose_aovs(scene, spec, settings); !ok) return tl::unexpected(ok.error());
@@ -318,6 +324,7 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
         {Errc::invalid_argument,
          fmt::format("the scene uses {} files; a message to a worker holds {}: merge some of its meshes",
                      job.assets.size(), ls::limits::kAssetsPerJob)});
+  job.meters = meter_groups(scene);
   note_analysis(*pruned, job.settings, job);
   admission.text_bytes = request.scene_text.size() + read->text_bytes;
   admission.scene_json = serialize(scene);
@@ -366,6 +373,7 @@ Result<Admission> admit_again(const StoredJob& before, const JobSpec& changes, c
                 .spec = before.spec,
                 .spp = before.spp,
                 .assets = before.assets,
+                .meters = before.meters,
                 .warnings = before.warnings,
                 .features_used = before.features_used,
                 .features_left_out = before.features_left_out,
@@ -443,7 +451,7 @@ std::uint64_t memory_need(const StoredJob& job) {
 JobPlan plan_of(const StoredJob& job) {
   const auto frame = frame_of(job.id);
   return {.brief = {job.id, job.scene, job.settings, digest_of(job.settings), job.assets, job.needs},
-          .grid = {job.settings.size, job.settings.tile},
+          .grid = grid_of(job.settings),
           .spp = job.spp,
           .target_error = job.spec.target_error,
           .target_denoised = job.spec.target_layer == TargetLayer::denoised,

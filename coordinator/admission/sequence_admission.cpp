@@ -85,7 +85,7 @@ tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitReques
     text += taken->text_bytes;
     kept += taken->scene_json.size();
     files += taken->job.assets.size();
-    tiles += TileGrid{taken->job.settings.size, taken->job.settings.tile}.count();
+    tiles += grid_of(taken->job.settings).count();
     if (text > limits::kMaxSequenceText || kept > limits::kMaxSequenceText)
       return too_much("bytes of scene text", limits::kMaxSequenceText);
     if (files > limits::kMaxSequenceFiles) return too_much("files", limits::kMaxSequenceFiles);

@@ -334,6 +334,7 @@ std::string report_json(const ReportFacts& facts) {
   j["relmse"] = e ? number(e->relmse) : json();
   j["relmse_ci95"] = e ? interval(e->relmse_lo, e->relmse_hi) : json();
   put_areas(j, facts);
+  j["meters"] = json::parse(meters_json(facts.meters));
   const auto reference_error = last_reference_error(facts.convergence);
   if (reference_error) put_reference_error(j, *reference_error);
   j["reference"] = reference_of(facts, reference_error);

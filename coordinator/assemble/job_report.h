@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/assemble/meter_values.h"
 #include "coordinator/store/jobs/job_store.h"
 #include "core/base/digest.h"
 #include "core/image/error/convergence.h"
@@ -39,6 +40,7 @@ struct ReportFacts {
   std::string replay;                             // command that renders one sample again (replay_command())
   std::optional<ReferenceNoise> reference_noise;  // nullopt: unknown, or there is no reference
   std::optional<DenoisedFigures> denoised;        // nullopt: not requested, or not made yet
+  std::vector<MeterValue> meters;                 // empty: the job makes an image
 };
 std::string report_json(const ReportFacts& facts);
 // Sets the facts that come from the film: samples, pixels without samples, error, and areas.

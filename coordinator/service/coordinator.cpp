@@ -308,6 +308,10 @@ Result<std::string> Coordinator::report_json(const JobId& id) const {
   return parts_->pictures.report_json(id);
 }
 
+Result<std::string> Coordinator::meters_json(const JobId& id) const {
+  return parts_->pictures.meters_json(id);
+}
+
 Result<std::vector<ConvergencePoint>> Coordinator::convergence(const JobId& id) const {
   const auto core = parts_->core.lock();
   const auto entry = core->jobs.job(id);

@@ -121,6 +121,7 @@ class Coordinator {
   Result<std::string> layers_json(const JobId& id) const;
   Result<std::vector<std::byte>> pixels(const JobId& id, const PixelsAsked& asked) const;
   Result<std::string> report_json(const JobId& id) const;
+  Result<std::string> meters_json(const JobId& id) const;  // what a job without an image measures
   Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const;
   // Returns the path of the file `name` (image.exr or report.json) of a done job. Empty if the job is not
   // done, or if everything is in memory: then image_exr() and report_json() give the contents.

@@ -269,6 +269,7 @@ Result<void> ImageWriter::write_files(const EntryPtr& entry, const Folded& folde
   if (!clamped) return tl::unexpected(clamped.error());
   facts.clamped_values = *clamped;
   facts.pixels = pixels_sha256(folded.film);
+  facts.meters = meter_values(folded.film, facts.job.meters);
   if (auto done = write_atomically(where / "report.json", bytes_of(report_json(facts))); !done) return done;
   // The files count as written only if the snapshot is written too, since an extension of the job continues
   // from the snapshot.

@@ -184,10 +184,18 @@ Result<std::string> Pictures::report_json(const JobId& id) const {
   if (!shown) return tl::unexpected(shown.error());
   ReportFacts& facts = shown->facts;
   facts.pixels = pixels_sha256(shown->film);
+  facts.meters = meter_values(shown->film, facts.job.meters);
   // The report of a running job is requested often and must not wait for the denoiser.
   if (is_terminal(facts.job.state)) denoising_.of_job(shown->film, facts);
   if (!facts.job.spec.float_output) facts.clamped_values = values_above_half(shown->film);
   return coordinator::report_json(facts);
+}
+
+Result<std::string> Pictures::meters_json(const JobId& id) const {
+  const auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  return fmt::format("{{\"meters\":{}}}",
+                     coordinator::meters_json(meter_values(shown->film, shown->facts.job.meters)));
 }
 
 // Returns the log lines of a job, or those of all frames of a sequence. If the frames have more than

@@ -48,6 +48,9 @@ class Pictures {
   Result<std::vector<TileView>> tiles(const JobId& id) const;
   // The report of a sequence has the values of each frame and those of all frames together.
   Result<std::string> report_json(const JobId& id) const;
+  // Returns {"meters": [...]}, with what each meter has measured so far; of a job with an image the list is
+  // empty.
+  Result<std::string> meters_json(const JobId& id) const;
   // The log of a sequence has the lines of all frames, ordered by time.
   Result<std::string> log(const JobId& id) const;
   // Returns the path of the file `name` (image.exr or report.json) in the folder of a done job. Empty if the

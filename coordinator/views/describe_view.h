@@ -268,6 +268,11 @@ void describe(V& v, T& j) {
           j.fake);
   v.field("size", "[width, height] in pixels.", std::array{j.size.width, j.size.height});
   v.field("tile", "Side of a tile in pixels.", j.tile);
+  v.field(
+      "meters",
+      "Number of values that the job measures (GET /api/v1/jobs/{id}/meters). Each has a square of 16 x 16 "
+      "pixels of the image. 0: the job makes an image.",
+      j.meters);
   v.field("priority", "", j.priority);
   v.field("focus",
           "[x0, y0, x1, y1]: tiles in this rectangle get the next samples first. null: all tiles are treated "

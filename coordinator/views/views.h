@@ -187,6 +187,7 @@ struct JobView {
   std::string waits_for;              // says so in words; empty: it waits for no other job
   FrameSize size;
   int tile = 32;
+  int meters = 0;  // number of meters; 0: the job makes an image
   int priority = 0;
   std::optional<PixelRect> focus;                       // pixels whose tiles are rendered before the others
   std::optional<std::uint32_t> max_workers, max_units;  // limits that the user requested

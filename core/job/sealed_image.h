@@ -27,7 +27,7 @@ struct SealedImage {
   // One per tile: Film::tile_digest(), a digest of the results that were added to the tile.
   std::vector<Digest> tiles;
 
-  TileGrid grid() const { return {picture.size, settings.tile}; }
+  TileGrid grid() const { return {picture.size, settings.tile, settings.meters > 0}; }
 };
 
 // Checks the headers and layers of `picture` and parses its provenance. invalid_argument: a header or layer

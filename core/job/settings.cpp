@@ -30,6 +30,7 @@ void describe(V& v, T& s) {
   row("aov", s.aov);
   row("integrator", s.integrator);
   v.setting({.name = kLightGroups}, s.light_groups);
+  v.setting({.name = "meters", .range = {0, kMaxMeters}}, s.meters);
   row("max_depth", s.max_depth, {-1, kMaxDepthSetting});
   row("rr_depth", s.rr_depth, {0, kMaxDepthSetting});
   row("seed", s.seed, {0, UINT64_MAX});
@@ -124,9 +125,8 @@ Result<RenderSettings> parse_render_settings(std::string_view text) {
   if (!json) return tl::unexpected(json.error());
   auto settings = job::read_object<RenderSettings>(*json, kRenderSettings);
   if (!settings) return settings;
-  for (const std::string& key : job::names_of<RenderSettings>())
-    if (key != kLightGroups && !json->contains(key))
-      return bad_argument(fmt::format("{}: '{}' is missing", kRenderSettings, key));
+  for (const std::string& key : job::names_of<RenderSettings>([](const job::Setting& s) { return s.always; }))
+    if (!json->contains(key)) return bad_argument(fmt::format("{}: '{}' is missing", kRenderSettings, key));
   const auto aovs = parse_aovs(settings->aov);
   if (!aovs)
     return bad_argument(fmt::format("{}: 'aov' is not possible: {}", kRenderSettings, aovs.error().message));
@@ -148,7 +148,7 @@ Result<void> check_job_size(const RenderSettings& s, std::uint64_t spp) {
                     "fewer AOVs or a smaller frame",
                     s.size.width, s.size.height, fmt::join(s.aov, ", "), film_bytes_per_pixel(aovs), film,
                     kMaxFilmBytes));
-  const std::uint64_t tiles = TileGrid{s.size, s.tile}.count(), units = tiles * round_count(spp);
+  const std::uint64_t tiles = grid_of(s).count(), units = tiles * round_count(spp);
   if (tiles > kMaxTiles || units > kMaxUnits)
     return bad_argument(
         fmt::format("{} x {} pixels in tiles of {} at {} samples are {} tiles and {} units of work; the "

@@ -35,9 +35,11 @@ struct RenderSettings {
   // Sorted names of the light groups, for AOVs of AovKind::groups; empty without such AOVs. A light whose
   // group is not in the list belongs to the group `other` if the list has it, and else to none.
   std::vector<std::string> light_groups;
+  int meters = 0;                // number of meters that the scene has; `size` is then that of their blocks
   bool operator==(const RenderSettings&) const = default;
 };
 AovSet aovs_of(const RenderSettings& settings);
+inline TileGrid grid_of(const RenderSettings& s) { return {s.size, s.tile, s.meters > 0}; }
 
 // Which layers must reach the target error: the image as rendered, or its denoised layers.
 enum class TargetLayer { raw, denoised };

@@ -29,7 +29,9 @@ inline constexpr std::size_t kMaxParameterNameBytes = 128;
 inline constexpr std::size_t kMaxValueBytes = std::size_t{64} << 10;
 // Total bytes of all attribute values in which scene parameters were substituted
 inline constexpr std::size_t kMaxSubstitutedBytes = std::size_t{64} << 20;
-inline constexpr std::size_t kMaxSearchPaths = 64;  // number of <path> elements
+inline constexpr std::size_t kMaxSearchPaths = 64;     // number of <path> elements
+inline constexpr std::size_t kMaxMeterSensors = 1000;  // sensors that are meters, each of one point or many
+inline constexpr std::size_t kMaxMeterNameBytes = 128;
 // Children of one object of a Nori file
 inline constexpr std::size_t kMaxObjectChildren = 4096;
 // Parameters of one object of a pbrt file

@@ -468,6 +468,7 @@ struct Scene {
   std::string aovs;
   // The labels of all shapes and of all instances, by index; empty unless requested (ReadOptions::labels).
   std::vector<Label> shape_labels, instance_labels;
+  std::vector<Meter> meters;  // if there are any, they are measured, and no image is rendered
   bool operator==(const Scene&) const = default;
 };
 

@@ -3,7 +3,9 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <variant>
+#include <vector>
 
 #include "core/image/frame/frame.h"
 #include "core/scene/scene_values.h"
@@ -75,6 +77,7 @@ struct Shape {
   // A camera ray that meets the shape and does not pass it ends there without light. The shape has no opacity
   // in the AOVs of opacity, but hides what is behind.
   bool holdout = false;
+  std::optional<MeterIndex> meter;  // a meter measures the light that reaches the shape
   bool operator==(const Shape&) const = default;
 };
 struct ShapeGroup {  // a group of shapes, which refer to it by its index
@@ -92,7 +95,9 @@ enum class FovAxis { x, y, diagonal, smaller, larger };
 // camera's x and y, where a is width / height of the image; to_world may scale this rectangle. spherical: all
 // directions by latitude and longitude, as in Mitsuba 0.x: the top row is +y; on the horizon the left edge is
 // -z, and a quarter of the width further is +x. A spherical camera ignores near_clip and far_clip.
-enum class Projection { perspective, orthographic, spherical };
+// meters: there is no camera. The scene has meters, and each block of pixels of the frame measures one number
+// (core/image/frame/meter_blocks.h).
+enum class Projection { perspective, orthographic, spherical, meters };
 struct Sensor {  // looks along the +z axis of to_world, with +y up and +x to the LEFT, as in Mitsuba
   Transform to_world;
   double fov = 50;  // in degrees, along fov_axis
@@ -107,6 +112,28 @@ struct Sensor {  // looks along the +z axis of to_world, with +y up and +x to th
   // pixel, from 0 to 1, is a factor on aperture_radius.
   std::optional<TextureIndex> aperture_scale;
   bool operator==(const Sensor&) const = default;
+};
+
+// What a meter measures, per colour channel. radiance: the radiance that arrives along a ray that starts at a
+// point. irradiance: the integral of radiance times cosine over the hemisphere of the normal, at a point, or
+// the mean over a shape. flux: the irradiance of a shape times its area. fluence: the integral of radiance
+// over all directions, at a point.
+enum class MeterKind { radiance, irradiance, flux, fluence };
+// A point of the scene, and the unit normal of the plane through which irradiance arrives, or the direction
+// into which a meter of radiance looks; 0 for fluence.
+struct MeterPoint {
+  Vec3 position{0, 0, 0}, direction{0, 0, 0};
+  bool operator==(const MeterPoint&) const = default;
+};
+// Measures at each of its points or, if it has none, on the shape that refers to it (Shape::meter).
+struct Meter {
+  std::string name;
+  MeterKind kind = MeterKind::irradiance;
+  std::vector<MeterPoint> points;
+  // The medium around everything, which no shape bounds. Media that shapes enclose are found by their shapes.
+  std::optional<MediumIndex> medium;
+  std::size_t count() const { return points.empty() ? 1 : points.size(); }
+  bool operator==(const Meter&) const = default;
 };
 
 struct BoxFilter {

@@ -40,6 +40,7 @@ using VolumeIndex = Index<struct VolumeTag>;
 using PhaseIndex = Index<struct PhaseTag>;
 using MediumIndex = Index<struct MediumTag>;
 using GroupIndex = Index<struct GroupTag>;
+using MeterIndex = Index<struct MeterTag>;
 
 // A file that the scene uses. `name` is the file's name as the scene file gives it, for messages; the digest
 // identifies the file's bytes.

@@ -15,6 +15,8 @@ namespace ls::scene {
 
 void Reader::read_sensor(const Element& e) {
   if (!is_read_plugin("sensor", e.get("type"))) return unknown_plugin(e, report_);
+  if (e.get("type") == "batch") return read_batch(e);
+  if (e.get("type").ends_with("meter")) return void(read_meter(e, nullptr));
   if (sensor_)
     return report_.warning(
         e.at, fmt::format("a second sensor; the first ({}) is used", report_.refer_to(sensor_->at, e.at)));
@@ -22,7 +24,7 @@ void Reader::read_sensor(const Element& e) {
   Params p(*this, e);
   Sensor& s = scene_.sensor;
   read_projection(e, p, s);
-  read_sensor_medium(p, s);
+  read_sensor_medium(p, s.medium);
   const auto film = p.take_only("film", "this sensor", "film");
   const auto sampler = p.take_only("sampler", "this sensor", "sampler");
   if (film) read_film(*film->object);
@@ -64,13 +66,13 @@ void Reader::read_projection(const Element& e, Params& p, Sensor& s) {
 
 // Reads the sensor's medium. The name of this parameter is "medium" or absent; any other name is an error,
 // since "interior" and "exterior" are names for the media of shapes.
-void Reader::read_sensor_medium(Params& p, Sensor& s) {
+void Reader::read_sensor_medium(Params& p, std::optional<MediumIndex>& medium_of_sensor) {
   const Element* use = p.take("medium");
-  if (const Element* object = use ? resolve(*use) : nullptr) s.medium = medium(*object, *use);
+  if (const Element* object = use ? resolve(*use) : nullptr) medium_of_sensor = medium(*object, *use);
   for (const auto& nameless : p.take_nested("medium", Params::Names::none)) {
     if (use) return report_.error(nameless.use->at, "this sensor has a second medium");
     use = nameless.use;
-    s.medium = medium(*nameless.object, *use);
+    medium_of_sensor = medium(*nameless.object, *use);
   }
 }
 

@@ -23,8 +23,6 @@ constexpr std::string_view kSplats = "volumetric splats are not supported; write
 constexpr std::string_view kSky =
     "sky models are not supported; save the sky's image in Mitsuba and use it as an \"envmap\", with a "
     "\"directional\" of an `angular_radius` for the sun";
-constexpr std::string_view kMeter =
-    "it measures one number and makes no image; use a \"perspective\" or \"orthographic\"";
 constexpr std::string_view kPhase =
     "only \"isotropic\" and \"hg\" are supported; use an \"hg\" of the same mean cosine";
 constexpr std::string_view kMeasured =
@@ -195,16 +193,19 @@ constexpr PluginRow kPlugins[] = {
     {"integrator", "volpath_distant_mis", kRead, "", kOurs},
     {"integrator", "whitted", kRead, "Nori's", kOurs},
 
-    {"sensor", "batch", kRefused, "a job has one image; submit the scene once for each of its sensors"},
-    {"sensor", "distant", kRefused, kMeter},
+    {"sensor", "batch", kInPart, "of meters; a job has one image, so submit the scene once for each camera"},
+    {"sensor", "distant", kRefused,
+     "it measures light that leaves the scene; use an \"orthographic\", whose image is that light"},
     {"sensor", "flat_sensor", kRefused,
      "it is meant for optimising scenes in Mitsuba; use a \"perspective\""},
-    {"sensor", "irradiancemeter", kRefused, kMeter},
+    {"sensor", "irradiancemeter", kRead, ""},
     {"sensor", "orthographic", kRead, ""},
     {"sensor", "perspective", kRead, ""},
-    {"sensor", "radiancemeter", kRefused, kMeter},
+    {"sensor", "radiancemeter", kRead, ""},
     {"sensor", "thinlens", kRead, ""},
-    {"sensor", "fluencemeter", kRefused, kMeter, kOlder},
+    {"sensor", "fluencemeter", kRead, "the integral over all directions: 4 pi times the mean radiance",
+     kOlder},
+    {"sensor", "fluxmeter", kRead, "", kOurs},
     {"sensor", "perspective_rdist", kRefused, "lens distortion is not supported; use a \"perspective\"",
      kOlder},
     {"sensor", "spherical", kRead, "", kOlder},
@@ -304,7 +305,7 @@ bool is_our_parameter(std::string_view tag, std::string_view plugin, std::string
        {"tint", "emission", "source_radiance", "temperature", "emission_scale", "temperature_scale",
         "temperature_offset", "peak_one", "emission_weight", "priority", "light_group"}},
       {"volume", "gridvolume", {"grid_name", "node_centred", "border", "order"}},
-      {"sensor", "", {"aperture_scale"}},
+      {"sensor", "", {"aperture_scale", "points", "filename"}},
       {"sensor", "perspective", {"aperture_radius", "focus_distance"}},
       {"sensor", "thinlens", {"principal_point_offset_x", "principal_point_offset_y"}},
       {"film", "hdrfilm", {"transparent"}},

@@ -42,7 +42,10 @@ Scene Reader::read() {
   }
   read_idle_parts();
   warn_of_media_around_camera();
-  if (!sensor_) report_.error(document_.root.at, "the scene has no <sensor>: nothing to see it with");
+  if (!meters_.empty())
+    finish_meters();
+  else if (!sensor_)
+    report_.error(document_.root.at, "the scene has no <sensor>: nothing to see it with");
   return std::move(scene_);
 }
 
@@ -206,15 +209,19 @@ const Rgb* Reader::constant(TextureIndex texture) const {
   return c ? &c->value : nullptr;
 }
 
+std::vector<std::string> Reader::places_of(const std::string& name) const {
+  std::vector<std::string> places;
+  for (const std::string& path : document_.search_paths) places.push_back(join_path(path, name));
+  places.push_back(join_path("", name));
+  return places;
+}
+
 std::optional<AssetIndex> Reader::asset(const std::string& written, const Span& at) {
   const std::string name = document_.frame ? numbered(written, *document_.frame) : written;
   if (const auto it = assets_by_name_.find(name); it != assets_by_name_.end()) return it->second;
   if (name.empty()) return report_.refuse(at, "the name of a file is wanted here");
-  std::vector<std::string> places;
-  for (const std::string& path : document_.search_paths) places.push_back(join_path(path, name));
-  places.push_back(join_path("", name));
   Error last;
-  for (const std::string& place : places) {
+  for (const std::string& place : places_of(name)) {
     auto found = assets_.find(place);
     if (!found) {
       last = found.error();

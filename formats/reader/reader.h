@@ -59,6 +59,8 @@ class Reader {
   const Rgb* constant(VolumeIndex volume) const;    // nullptr: the volume is a grid
   const Rgb* constant(TextureIndex texture) const;  // nullptr: the texture varies
   std::optional<AssetIndex> asset(const std::string& name, const Span& at);
+  // Returns the paths at which to look for the file that the scene calls `name`, the likeliest first.
+  std::vector<std::string> places_of(const std::string& name) const;
 
  private:
   template <class I>
@@ -131,8 +133,18 @@ class Reader {
   void check_only_environment(const Element& e);
 
   void read_sensor(const Element& e);
+  void read_batch(const Element& e);
+  // Reads a sensor that is a meter; `shape` is the shape in which it stands, null outside of shapes. Returns
+  // its index if it belongs to the shape.
+  std::optional<MeterIndex> read_meter(const Element& e, const Shape* shape);
+  std::optional<std::vector<MeterPoint>> read_meter_points(const Element& e, Params& p, MeterKind kind);
+  std::optional<MeterPoint> read_meter_point(const Element& e, Params& p, MeterKind kind);
+  std::optional<std::vector<MeterPoint>> read_meter_file(const std::string& name, const Span& at,
+                                                         MeterKind kind);
+  void read_meter_film(Params& p);
+  void finish_meters();
   void read_projection(const Element& e, Params& p, Sensor& sensor);
-  void read_sensor_medium(Params& p, Sensor& sensor);
+  void read_sensor_medium(Params& p, std::optional<MediumIndex>& medium_of_sensor);
   void read_fov(Params& p, Sensor& sensor);
   void read_film(const Element& e);
   void check_crop(const Element& e, Params& p, bool has_width, bool has_height);
@@ -151,7 +163,11 @@ class Reader {
   Ids ids_;
   Scene scene_;
   std::vector<const Element*> shape_elements_;  // the elements of the scene's shapes, in the same order
-  const Element* sensor_ = nullptr;
+  const Element* sensor_ = nullptr;             // the camera
+  std::vector<const Element*> meters_;          // the elements of the scene's meters, in the same order
+  bool sampled_ = false;                        // true if the sampler of a meter was read
+  std::size_t meter_points_ = 0;                // number of points of the meters read so far
+  std::size_t meter_file_bytes_ = 0;            // bytes of the files of points read so far
   const Element* integrator_ = nullptr;
   const Element* material_ = nullptr;  // material of the last shape read; nullptr: the default material
   std::unordered_set<std::string> labels_;

@@ -155,6 +155,16 @@ void Reader::read_shape_parts(Params& p, Shape& shape) {
   else if (emitter)
     shape.emitter = read_area(*emitter->object);
 
+  if (const auto sensor = p.take_only("sensor", p.title(), "sensor")) {
+    if (shape.group)
+      report_.error(sensor->use->at,
+                    fmt::format("{} in a shapegroup can't be measured, since its instances are in several "
+                                "places: place it outside of the group",
+                                p.title()));
+    else
+      shape.meter = read_meter(*sensor->object, &shape);
+  }
+
   const auto given = p.take_only("bsdf", p.title(), "bsdf");
   material_ = given ? given->object : nullptr;
   if (given) {

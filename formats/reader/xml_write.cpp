@@ -62,6 +62,8 @@ std::string_view plugin(const Sensor& s) {
   return is_pinhole(s) ? "perspective" : "thinlens";
 }
 
+std::string_view plugin(const Meter& m) { return name_of(m.kind); }
+
 class Writer {
  public:
   explicit Writer(const Scene& s)
@@ -227,6 +229,7 @@ class Writer {
         },
         shape.geometry);
     describe(*this, shape);
+    nested("", shape.meter);
     close("shape");
   }
 
@@ -266,14 +269,36 @@ class Writer {
         writer.field(f, x);
     }
   };
-  void write_sensor() {
-    const Sensor& s = scene_.sensor;
-    open("sensor", plugin(s), "", "");
-    SensorFields fields{*this, s};
-    describe(fields, s);
+  void write_sampler() {
     open("sampler", "independent", "", "");
     value("integer", "sample_count", std::to_string(scene_.sample_count));
     close("sampler");
+  }
+  void write_meter(const Meter& m) {
+    open("sensor", plugin(m), escaped(m.name), "");
+    describe(*this, m);
+    write_sampler();
+    close("sensor");
+  }
+  // An attribute can hold a part of a long list of points only: the others get a sensor each.
+  void write_meters() {
+    constexpr std::size_t kMost = 256;
+    for (const Meter& m : scene_.meters)
+      for (std::size_t begin = 0; begin < m.points.size(); begin += kMost) {
+        Meter part = m;
+        if (begin > 0) part.name += fmt::format("-{}", begin + 1);
+        const auto at = [&](std::size_t i) { return m.points.begin() + static_cast<std::ptrdiff_t>(i); };
+        part.points.assign(at(begin), at(std::min(begin + kMost, m.points.size())));
+        write_meter(part);
+      }
+  }
+  void write_sensor() {
+    const Sensor& s = scene_.sensor;
+    if (s.projection == Projection::meters) return write_meters();
+    open("sensor", plugin(s), "", "");
+    SensorFields fields{*this, s};
+    describe(fields, s);
+    write_sampler();
     object(scene_.film);
     close("sensor");
   }
@@ -283,6 +308,7 @@ class Writer {
   requires(!std::is_same_v<Tag, AssetTag>) void nested(std::string_view name, const Index<Tag>& i) {
     reference(name, id_of(i));
   }
+  void nested(std::string_view, MeterIndex i) { write_meter(scene_.meters[i.value]); }
   template <class T>
   void nested(std::string_view name, const std::optional<T>& x) {
     if (x) nested(name, *x);
@@ -322,6 +348,14 @@ class Writer {
     line(fmt::format("<{} name=\"{}\" x=\"{}\" y=\"{}\" z=\"{}\"/>",
                      f.given_as == "vector" ? "vector" : "point", f.name, shortest_number(x[0]),
                      shortest_number(x[1]), shortest_number(x[2])));
+  }
+  void property(const Field& f, const std::vector<MeterPoint>& points) {
+    std::string rows;
+    for (const MeterPoint& p : points) {
+      rows += (rows.empty() ? "" : "; ") + numbers(p.position);
+      if (p.direction != Vec3{0, 0, 0}) rows += " " + numbers(p.direction);
+    }
+    if (!rows.empty()) value("string", f.name, rows);
   }
   void property(const Field& f, const Rgb& x) { colour(f, x, f.constvolume); }
   void colour(const Field& f, const Rgb& x, bool stands_for_volume) {

@@ -90,6 +90,7 @@ class Draw {
   void draw(const scene::Field&, MediumIndex& x) { x = medium(); }
   void draw(const scene::Field&, AssetIndex&) {}  // by whoever knows what the file is for
   void draw(const scene::Field&, GroupIndex&) {}
+  void draw(const scene::Field&, MeterIndex&) {}
   template <class T>
   void draw(const scene::Field& f, std::optional<T>& x) {
     draw(f, x.emplace());

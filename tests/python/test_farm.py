@@ -85,6 +85,19 @@ def test_a_dictionary_has_the_pixels_of_the_same_scene_as_text(farm):
     assert np.array_equal(jobs[0].image(), jobs[1].image())
 
 
+def test_what_meters_measure_is_listed(farm):
+    """Under a constant environment of radiance 2 the irradiance is 2 pi."""
+    sky = {
+        "type": "scene",
+        "sky": {"type": "constant", "radiance": {"type": "rgb", "value": 2}},
+        "roof": {"type": "irradiancemeter", "points": "0 0 0 0 0 1; 1 2 3 0 1 0"},
+    }
+    meters = farm.submit(sky, spp=4).wait().meters()
+
+    assert [m["name"] for m in meters] == ["roof[1]", "roof[2]"]
+    assert meters[1]["value"] == pytest.approx([2 * np.pi] * 3, rel=1e-5)  # float32 along a short path
+
+
 def test_layers_are_those_of_the_file(farm, fog, tmp_path):
     job = farm.submit(fog, spp=4, aov=["depth", "normal", "shape_id", "uv"]).wait()
     job.save(tmp_path / "image.exr")

@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "core/scene/schema/validate.h"
 #include "tests/support/scene_builder.h"
 #include "worker/render/render.h"
 
@@ -20,6 +21,7 @@ namespace ls::test {
 inline RenderSettings settings_of(const Scene& s, std::uint64_t seed = 0) {
   RenderSettings r;
   r.size = s.film.image_size();
+  r.meters = static_cast<int>(scene::meter_count(s));
   r.seed = seed;
   r.integrator = s.integrator.name;
   r.max_depth = s.integrator.max_depth;

@@ -69,6 +69,7 @@ ROUTES = {
     "get /api/v1/jobs/{id}/video.mp4": of_job(409, "409: it has no video"),
     "get /api/v1/jobs/{id}/layers": of_job(200),
     "get /api/v1/jobs/{id}/pixels": of_job(200),
+    "get /api/v1/jobs/{id}/meters": of_job(200),
     "get /api/v1/jobs/{id}/report": of_job(200),
     "get /api/v1/jobs/{id}/report.html": of_job(200),
     "get /api/v1/jobs/{id}/convergence.csv": of_job(200),

@@ -209,3 +209,20 @@ def test_a_job_that_has_ended_is_removed_from_its_page_after_one_more_question(f
 
     page.wait("location.hash === '#/jobs'")
     assert farm.jobs == {}
+
+
+def test_a_job_that_measures_shows_its_values_instead_of_a_picture(farm, dashboard):
+    farm.jobs["j-1"] = job(state="done", progress=1, meters=2)
+    meter = {"type": "irradiancemeter", "unit": "W/m^2", "ci95": None, "samples": 1024, "value": [1.5, 2.5, 0.125]}
+    farm.report = {"convergence": [], "meters": [
+        {**meter, "name": "hall[1]", "luminance": 2.25, "luminance_ci95": [2.2, 2.3], "trusted": True},
+        {**meter, "name": "<b>dark</b>", "luminance": 0, "luminance_ci95": None, "trusted": False}]}
+    page = dashboard("#/jobs/j-1")
+
+    page.wait("document.querySelector('.meters table')")
+
+    text = page.text(".meters")
+    assert "hall[1] 1.5000 2.5000 0.12500 2.2500 2.2000 to 2.3000 W/m^2" in " ".join(text.split())
+    assert "<b>dark</b>" in text and "no sample has found light" in text
+    assert not page.evaluate("document.querySelector('live-image') !== null")
+    assert page.evaluate("[...document.querySelectorAll('.downloads a')].some(a => a.href.endsWith('/jobs/j-1/meters'))")

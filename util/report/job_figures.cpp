@@ -133,6 +133,30 @@ std::string bar(const Json& time, double total) {
 
 }  // namespace
 
+std::string meters(const Json& report) {
+  constexpr std::size_t kMost = 500;
+  const std::vector<Json> all = objects(report, "meters");
+  std::string rows;
+  for (std::size_t i = 0; i < all.size() && i < kMost; ++i) {
+    const Json& m = all[i];
+    const auto ci = interval(m, "luminance_ci95");
+    rows += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+                        escape_html(text(m, "name")), figure(number(m, "luminance")),
+                        ci ? fmt::format("{} to {}{}", figure(ci->first), figure(ci->second),
+                                         flag(m, "trusted", false) ? "" : ": don't trust yet")
+                           : "no sample has found light",
+                        escape_html(text(m, "unit")));
+  }
+  if (rows.empty()) return "";
+  if (all.size() > kMost) rows += fmt::format("<tr><th>and {} more</th></tr>\n", all.size() - kMost);
+  return section(
+      "Measured values",
+      "<div class=\"wide\"><table><caption class=\"unseen\">Measured values</caption><thead><tr><th "
+      "scope=\"col\">Meter</th><th scope=\"col\">Luminance</th><th scope=\"col\">95 % interval</th><th "
+      "scope=\"col\">Unit</th></tr></thead><tbody>\n" +
+          rows + "</tbody></table></div>");
+}
+
 std::string figures(const Json& report) {
   const std::string keys = key_figures(report), others = lesser_figures(report);
   std::string out = keys.empty() ? "" : "<dl class=\"figures\">" + keys + "</dl>";

@@ -99,10 +99,11 @@ std::string pictures(const JobPage& page, const Json& report) {
 Result<std::string> job_page(const JobPage& page) {
   const Json report = Json::parse(page.report, nullptr, false);
   if (!report.is_object()) return bad_argument("the report is no JSON object, so no page can be made of it");
-  const std::string body = "<main>\n" + header(report) + failure(report) + pictures(page, report) +
-                           figures(report) + verdict(report) + curves(report) + time_split(report) +
-                           health(report) + techniques(report) + features(report) + provenance(report) +
-                           "</main>";
+  const std::string values = meters(report);
+  const std::string body = "<main>\n" + header(report) + failure(report) +
+                           (values.empty() ? pictures(page, report) : values) + figures(report) +
+                           verdict(report) + curves(report) + time_split(report) + health(report) +
+                           techniques(report) + features(report) + provenance(report) + "</main>";
   return document(name_of(report) + " · Lightshaft report", css(), body);
 }
 

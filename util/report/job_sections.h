@@ -39,7 +39,9 @@ bool denoised_target(const Json& report);  // true if the target error applies t
 std::string curves(const Json& report);
 std::string outlook(const Json& report);  // how much more core time a smaller error needs; empty: unknown
 
-// Key numbers of the job, and where its time was spent (job_figures.cpp).
+// What the scene's meters have measured, key numbers of the job, and where its time was spent
+// (job_figures.cpp).
+std::string meters(const Json& report);
 std::string figures(const Json& report);
 std::string time_split(const Json& report);
 

@@ -12,6 +12,7 @@
 #include "core/base/clock.h"
 #include "core/scene/analysis/prune.h"
 #include "core/scene/json/serialize.h"
+#include "core/scene/schema/validate.h"
 #include "worker/render/render.h"
 
 namespace ls::cli {
@@ -135,6 +136,7 @@ Result<Scene> as_sent(const Scene& scene) {
 RenderSettings settings_of(const Scene& scene, std::uint64_t seed) {
   RenderSettings settings;
   settings.size = scene.film.image_size();
+  settings.meters = static_cast<int>(scene::meter_count(scene));
   settings.seed = seed;
   settings.integrator = scene.integrator.name;
   settings.max_depth = scene.integrator.max_depth;

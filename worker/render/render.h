@@ -78,11 +78,14 @@ TileResult render_tile_as(const World& world, const std::string& variant, PixelR
 // The result of render_sample(), which renders one sample of a pixel on its own, so that a sample of an
 // earlier image can be rendered again and examined.
 struct SampleValue {
-  double rgb[3];
+  double rgb[3];  // the radiance of the path
   bool finite;    // false if the sample is rejected (for the causes see HealthCause)
   Health health;  // the problems of this sample, by cause
 };
 SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample);
+// The factor from the value of a sample to what the pixel measures, if it belongs to a meter; otherwise 1.
+// render_tile() has applied it.
+double sample_weight(const World& world, int x, int y);
 
 // The techniques that the world's integrator uses.
 TechniqueSet techniques_of(const World& world);

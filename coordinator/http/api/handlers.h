@@ -46,6 +46,7 @@ Response get_pixels(Api&, const Request&, const JobId&);
 Response post_video(Api&, const Request&, const JobId&);
 Response get_video(Api&, const Request&, const JobId&);
 Response get_video_mp4(Api&, const Request&, const JobId&);
+Response get_meters(Api&, const Request&, const JobId&);
 Response get_report(Api&, const Request&, const JobId&);
 Response get_report_page(Api&, const Request&, const JobId&);
 Response get_convergence(Api&, const Request&, const JobId&);

@@ -155,6 +155,10 @@ Response get_video_mp4(Api& api, const Request&, const JobId& id) {
   return file_response("video/mp4", std::move(file), id.value + ".mp4");
 }
 
+Response get_meters(Api& api, const Request&, const JobId& id) {
+  return answer_json(api.coordinator().meters_json(id));
+}
+
 Response get_report(Api& api, const Request&, const JobId& id) {
   if (const auto path = api.coordinator().final_file(id, "report.json"); !path.empty())
     if (auto file = open_file_body(path)) {

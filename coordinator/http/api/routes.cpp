@@ -69,6 +69,7 @@ constexpr auto kRoutes = [] {
       picture("/api/v1/jobs/{id}/samples.png", of_job<get_samples_png>),
       picture("/api/v1/jobs/{id}/layers", of_job<get_layers>),
       picture("/api/v1/jobs/{id}/pixels", of_job<get_pixels>),
+      picture("/api/v1/jobs/{id}/meters", of_job<get_meters>),
       picture("/api/v1/jobs/{id}/report", of_job<get_report>),
       picture("/api/v1/jobs/{id}/report.html", of_job<get_report_page>),
       plain(get, "/api/v1/jobs/{id}/convergence.csv", token, quick, of_job<get_convergence>),

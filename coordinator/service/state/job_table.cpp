@@ -33,7 +33,7 @@ double gigabytes(std::uint64_t bytes) { return static_cast<double>(bytes) / (std
 JobEntry::JobEntry(StoredJob job, TimePoint now)
     : stored(std::move(job)),
       settings_digest(digest_of(stored.settings)),
-      grid{stored.settings.size, stored.settings.tile},
+      grid(grid_of(stored.settings)),
       film_bytes(film_bytes_of(stored)),
       snapshots(now),
       fold_seconds(stored.totals.render_seconds) {}

@@ -157,6 +157,7 @@ JobView JobViews::job(const JobEntry& entry) const {
   v.platform = job.platform;
   v.size = job.settings.size;
   v.tile = job.settings.tile;
+  v.meters = job.settings.meters;
   v.priority = job.spec.priority;
   v.focus = job.focus;
   v.max_workers = job.spec.max_workers;

@@ -212,6 +212,7 @@ JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frame
   v.warnings = facts.warnings;
   v.size = first.size;
   v.tile = first.tile;
+  v.meters = first.meters;
   v.priority = first.priority;
   const auto same_focus = [&](const JobView& f) { return f.focus == first.focus; };
   if (std::all_of(frames.begin(), frames.end(), same_focus)) v.focus = first.focus;

@@ -19,6 +19,7 @@
 #include "core/base/digest.h"
 #include "core/base/error.h"
 #include "core/base/id.h"
+#include "core/job/meter_group.h"
 #include "core/job/settings.h"
 #include "core/job/techniques.h"
 #include "util/protocol/messages.h"
@@ -79,6 +80,7 @@ struct StoredJob {
   // Samples per pixel to render; nullopt: an error target or a time limit ends the job.
   std::optional<std::uint64_t> spp;
   std::vector<BlobRef> assets;
+  std::vector<MeterGroup> meters;  // what it measures, in the scene's order; empty: it makes an image
   std::vector<std::string> warnings;
   bool reference_same_seed = false;  // true: its reference image was rendered with this scene and seed
   std::vector<std::string> features_used, features_left_out;

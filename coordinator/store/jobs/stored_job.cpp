@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "coordinator/store/jobs/job_store.h"
+#include "core/scene/schema/describe.h"
 
 namespace ls::coordinator {
 namespace {
@@ -149,6 +150,12 @@ std::optional<JobFailure> failure_or_none(const json& j) {
   }
 }
 
+MeterKind meter_kind_of(const json& name) {
+  for (const auto& [known, kind] : scene::NamesOf<MeterKind>::all)
+    if (name == known) return kind;
+  throw std::invalid_argument("the kind of a meter");
+}
+
 StoredJob stored_from(const json& j) {
   StoredJob job;
   job.id.value = j.at("id");
@@ -163,6 +170,8 @@ StoredJob stored_from(const json& j) {
   if (!j.at("spp").is_null()) job.spp = count_of(j.at("spp"));
   for (const auto& a : j.at("assets"))
     job.assets.push_back({digest_from(a.at("digest")), count_of(a.at("bytes")), a.at("name")});
+  if (const auto meters = j.find("meters"); meters != j.end())
+    for (const json& m : *meters) job.meters.push_back({m.at(0), meter_kind_of(m.at(1)), m.at(2)});
   job.warnings = j.at("warnings");
   job.reference_same_seed = j.value("reference_same_seed", false);
   job.features_used = j.at("features_used");
@@ -255,6 +264,7 @@ std::string to_json(const StoredJob& job) {
          {"totals", to_value(job.totals)}};
   for (const Digest& digest : job.missing_blobs) j["awaited"].push_back(digest.hex());
   if (!job.scene_name.empty()) j["scene_name"] = job.scene_name;
+  for (const MeterGroup& m : job.meters) j["meters"].push_back({m.name, scene::name_of(m.kind), m.count});
   if (job.failure) j["failure"] = to_value(*job.failure);
   if (job.techniques != TechniqueSet{}) j["techniques"] = job.techniques.bits();
   for (const DenoisedCheck& c : job.denoised_checks)

@@ -10,6 +10,7 @@
 
 #include "core/base/check.h"
 #include "core/image/error/relative_weights.h"
+#include "core/image/frame/meter_blocks.h"
 
 namespace ls {
 
@@ -377,6 +378,54 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMea
   if (const auto other = cross_weighted(h, spp, *earlier, w.roots))
     out.other_weights = *other - out.relative.squares;
   send_changes(h, spp, *earlier, w.roots, out);
+  return out;
+}
+
+namespace {
+
+// Returns sqrt(w / n) of each pixel and channel, where w is the weight of the mean of the pixel's block and n
+// the number of its pixels: times D, it is the relative error of that mean.
+std::vector<double> meter_roots(const HalfMeans& h) {
+  const auto side = static_cast<std::size_t>(kMeterSide), width = static_cast<std::size_t>(h.width),
+             height = static_cast<std::size_t>(h.height);
+  std::vector<double> roots(3 * h.pixels());
+  for (std::size_t c = 0; c < 3; ++c)
+    for (std::size_t top = 0; top < height; top += side)
+      for (std::size_t left = 0; left < width; left += side) {
+        const auto each = [&](const auto& f) {
+          for (std::size_t y = top; y < std::min(top + side, height); ++y)
+            for (std::size_t x = left; x < std::min(left + side, width); ++x)
+              f(c * h.pixels() + y * width + x);
+        };
+        double n = 0, sum = 0, squares = 0;
+        each([&](std::size_t i) {
+          const double d = 0.5 * (h.a[i] - h.b[i]);
+          n += 1, sum += 0.5 * (h.a[i] + h.b[i]), squares += d * d;
+        });
+        const double root = std::sqrt(relative_weight(sum / n, squares / (n * n)) / n);
+        each([&](std::size_t i) { roots[i] = root; });
+      }
+  return roots;
+}
+
+}  // namespace
+
+TileError estimate_meter_error(const HalfMeans& h, std::uint64_t spp, const EarlierMeans* earlier) {
+  const std::size_t n = h.pixels();
+  TileError out{.pixels = n, .samples = spp * n};
+  count_hits(h, out);
+  const std::vector<double> roots = meter_roots(h), edges(n), sides = one_sided_pixels(h);
+  std::vector<double> d(3 * n);
+  const auto sums_of = [&](const auto& factor) {
+    for (std::size_t i = 0; i < 3 * n; ++i) d[i] = 0.5 * (h.a[i] - h.b[i]) * factor(i);
+    NoiseSums sums = noise_sums(d, edges, h.width, h.height);
+    sums.one_sided = one_sided_squares(d, sides);
+    sums.changes = {sums.squares, trace_of_moments(sums, true), 0};
+    return sums;
+  };
+  out.plain = sums_of([](std::size_t) { return 1. / kMeterSide; });
+  out.relative = sums_of([&](std::size_t i) { return roots[i]; });
+  out.areas = area_sums(h, spp, earlier);
   return out;
 }
 

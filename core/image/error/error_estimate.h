@@ -194,6 +194,12 @@ struct EarlierMeans {
 // Estimates the error of a tile. `spp` is the number of samples per pixel of both halves together. Without
 // `earlier`, skewed noise is not corrected, and the interval assumes Gaussian noise.
 TileError estimate_error(const HalfMeans& halves, std::uint64_t spp, const EarlierMeans* earlier = nullptr);
+// Estimates the error of a tile of meters (core/image/frame/meter_blocks.h), where the figures are those of
+// the means over blocks: as the pixels of a block are independent, the squared error of its mean is that of
+// its pixels divided by their number. The weight is that of the block's mean m, less the bias that the noise
+// of m causes (relative_weight()). It hardly depends on the value of a single pixel, so that no skew needs to
+// be corrected. The corner of the tile is that of a block.
+TileError estimate_meter_error(const HalfMeans& halves, std::uint64_t spp, const EarlierMeans* earlier);
 // Returns 1 / (m^2 + 0.01), minus the bias that is caused by noise of variance `s2` in `m`.
 double relative_weight(double m, double s2);
 // Returns true if TileError::few_hits counts the pixel (x, y).

@@ -94,7 +94,7 @@ Result<TileError> Film::fold(TileIndex index, RoundIndex round, const Partial& p
   } else {
     next->tail = Tail{partial.header.samples, digest, partial.sums};
   }
-  next->error = estimate(*next, old, grid_.rect(index));
+  next->error = estimate(*next, old, grid_.rect(index), grid_.meters);
   const TileError error = next->error;
   tiles_[index] = std::move(next);
   return error;
@@ -125,14 +125,15 @@ std::array<std::vector<double>, 2> Film::means(const Tile& tile, std::size_t pix
   return out;
 }
 
-TileError Film::estimate(const Tile& tile, const Tile* before, const PixelRect& rect) {
+TileError Film::estimate(const Tile& tile, const Tile* before, const PixelRect& rect, bool meters) {
+  const auto estimate_of = meters ? estimate_meter_error : estimate_error;
   const auto pixels = static_cast<std::size_t>(rect.pixels());
   const auto of = means(tile, pixels);
   const HalfMeans now{rect.width(), rect.height(), of[0], of[1]};
-  if (!before || before->full_rounds == 0) return estimate_error(now, tile.spp());
+  if (!before || before->full_rounds == 0) return estimate_of(now, tile.spp(), nullptr);
   const auto earlier = means(*before, pixels, false);
   const EarlierMeans parts{{rect.width(), rect.height(), earlier[0], earlier[1]}, before->full_spp()};
-  return estimate_error(now, tile.spp(), &parts);
+  return estimate_of(now, tile.spp(), &parts);
 }
 
 std::array<std::vector<double>, 2> Film::half_means(TileIndex index) const {

@@ -145,7 +145,7 @@ class Film {
   static std::array<std::vector<double>, 2> means(const Tile& tile, std::size_t pixels,
                                                   bool with_tail = true);
   // Estimates the error of a tile. `before` is the same tile before its last round was folded; null: unknown.
-  static TileError estimate(const Tile& tile, const Tile* before, const PixelRect& rect);
+  static TileError estimate(const Tile& tile, const Tile* before, const PixelRect& rect, bool meters);
   Result<void> accepts(TileIndex tile, RoundIndex round, const Partial& partial) const;
   static std::vector<std::byte> tile_bytes(const Tile* tile, TileIndex index);
   Result<std::shared_ptr<const Tile>> parse_tile(TileIndex tile, std::span<const std::byte> bytes) const;

@@ -122,7 +122,7 @@ Result<std::shared_ptr<const Film::Tile>> Film::parse_tile(TileIndex index,
     return damaged(fmt::format("tile {} has an impossible last round", index));
   if (!has_tail && tile->full_rounds == 0) return damaged(fmt::format("tile {} has no rounds", index));
   if (has_tail) tile->tail = std::move(tail);
-  tile->error = estimate(*tile, nullptr, rect);
+  tile->error = estimate(*tile, nullptr, rect, grid_.meters);
   tile->error.subtract_skew(skew);
   tile->error.other_weights = other_weights;
   tile->error.plain.changes = plain;

@@ -32,10 +32,11 @@ inline std::string show(const PixelRect& r) { return fmt::format("[{},{},{},{}]"
 using TileIndex = std::uint32_t;
 
 // The tiling of a frame: tiles of `tile` x `tile` pixels (smaller at the right and bottom edges), numbered
-// row by row from the top left.
+// row by row from the top left. `meters`: each block of pixels measures one number (meter_blocks.h).
 struct TileGrid {
   FrameSize frame;
   int tile = 32;
+  bool meters = false;
 
   int columns() const { return (frame.width + tile - 1) / tile; }
   int rows() const { return (frame.height + tile - 1) / tile; }

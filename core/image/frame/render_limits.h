@@ -13,6 +13,7 @@ inline constexpr std::uint32_t kMaxTiles = std::uint32_t{1} << 22;
 inline constexpr std::uint64_t kMaxSpp = std::uint64_t{1} << 24;
 // Largest value of the integrator settings max_depth and rr_depth.
 inline constexpr int kMaxDepthSetting = 1 << 20;
+inline constexpr int kMaxMeters = 100'000;   // numbers that one scene measures
 inline constexpr int kMaxCameraPoints = 64;  // largest value of the integrator setting camera_points
 
 }  // namespace ls

@@ -8,6 +8,7 @@
 
 #include "core/scene/schema/describe_fields.h"
 #include "core/scene/schema/traits.h"
+#include "core/scene/schema/validate.h"
 
 namespace ls::scene {
 namespace {
@@ -39,6 +40,7 @@ class Analyst {
     n_.lens = s_.sensor.aperture_radius > 0;
     n_.crop = s_.film.has_crop();
     n_.transparent_film = s_.film.transparent;
+    n_.meters = static_cast<std::uint32_t>(meter_count(s_));
     files();
     return std::move(n_);
   }
@@ -92,6 +94,7 @@ void Analyst::media() {
     if (m) used[m->value] = true;
   };
   use(s_.sensor.medium);
+  for (const Meter& m : s_.meters) use(m.medium);
   n_.camera_in_medium = s_.sensor.medium.has_value();
   for (const Shape& s : s_.shapes)
     if (s.is_medium_transition) use(s.interior), use(s.exterior);
@@ -170,6 +173,14 @@ class Words {
     media();
     textures();
     lights();
+    if (n_.meters > 0) {
+      say("meters", true,
+          fmt::format(
+              "{} values to measure; paths share nothing, so path_reuse and light_vertices are left out",
+              n_.meters),
+          "");
+      return std::move(out_);
+    }
     say("thin lens", n_.lens, "the aperture has a radius", "the camera is a pinhole");
     say("crop of the frame", n_.crop, "part of the frame", "the whole frame");
     say("transparent film", n_.transparent_film, "the camera does not see the environment",
@@ -221,7 +232,8 @@ class Words {
     say("light given off by media", n_.emission, "some medium glows", n_.media ? "no medium glows" : none);
     say("anisotropic phase functions", n_.anisotropic, "scattering has a direction",
         n_.media ? "all scattering is isotropic" : none);
-    say("camera inside a medium", n_.camera_in_medium, "the sensor names a medium", "it stands in vacuum");
+    if (n_.meters == 0)
+      say("camera inside a medium", n_.camera_in_medium, "the sensor names a medium", "it stands in vacuum");
     say("index-matched boundaries", n_.boundaries, "surfaces that light passes unchanged", "no such surface");
   }
   void textures() {
@@ -273,6 +285,7 @@ std::string canonical_json(const Needs& n) {
          {"only_delta_lights", n.only_delta_lights}};
   // Left out of scenes without them, so that the needs of stored jobs stay the same.
   if (n.transparent_film) j["transparent_film"] = true;
+  if (n.meters > 0) j["meters"] = n.meters;
   if (n.flagged_shapes > 0) j["flagged_shapes"] = n.flagged_shapes;
   return j.dump(-1, ' ', false, json::error_handler_t::replace);
 }

@@ -36,6 +36,7 @@ struct Needs {
   bool lens = false, crop = false;
   bool transparent_film = false;
   std::uint32_t flagged_shapes = 0;  // number of shapes that the camera does not see, or that are held out
+  std::uint32_t meters = 0;          // number of values that are measured; 0: the scene has a camera
   // Number of objects of each type. The key is the name of the type (describe.h). Types without objects are
   // left out.
   std::map<std::string, std::uint32_t> shapes, materials, textures, lights, media_kinds;

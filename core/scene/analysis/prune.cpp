@@ -88,6 +88,7 @@ std::vector<bool> Pruner::named_media() const {
     if (m) named[m->value] = true;
   };
   name(s_.sensor.medium);
+  for (const Meter& m : s_.meters) name(m.medium);
   for (const Shape& s : s_.shapes) name(s.interior), name(s.exterior);
   return named;
 }
@@ -117,6 +118,7 @@ std::uint32_t Pruner::drop_idle_media() {
     if (m && dead[m->value]) m.reset();
   };
   drop(s_.sensor.medium);
+  for (Meter& m : s_.meters) drop(m.medium);
   for (Shape& s : s_.shapes) drop(s.interior), drop(s.exterior);
   return count;
 }
@@ -250,7 +252,7 @@ std::uint32_t erase_labelled(std::vector<T>& all, std::vector<Label>& labels, co
 void Pruner::invisible() {
   const auto unseen = [&](const Shape& s) {
     return !whom_.passing_counts && std::holds_alternative<NullBsdf>(s_.bsdfs[s.bsdf.value]) &&
-           !s.is_medium_transition && !s.emitter;
+           !s.is_medium_transition && !s.emitter && !s.meter;
   };
   note("surface", "light passes it unchanged, and there is no medium on either side",
        erase_labelled(s_.shapes, s_.shape_labels, unseen));

@@ -46,8 +46,9 @@ class Search {
 
   bool unreachable(std::size_t i) {
     const Shape& s = s_.shapes[i];
-    // Camera rays pass a surface that they do not see.
-    if (!s.interior || s.group || !s.visible_camera || !has_interior_behind(s)) return false;
+    // Camera rays pass a surface that they do not see. Meters may be anywhere.
+    if (!s_.meters.empty() || !s.interior || s.group || !s.visible_camera || !has_interior_behind(s))
+      return false;
     const auto box = box_of(s);
     const bool clear = box ? camera_is_outside(s_.sensor, *box) : !s_.sensor.medium;
     return clear && (traits_[s.bsdf.value].black_behind || (box && sealed(s, i, *box)));

@@ -177,7 +177,10 @@ LS_NAMES(Microfacet, {"beckmann", beckmann}, {"ggx", ggx})
 LS_NAMES(VolumeFilter, {"nearest", nearest}, {"trilinear", trilinear})
 LS_NAMES(GridOrder, {"x_fastest", x_fastest}, {"z_fastest", z_fastest})
 LS_NAMES(MeshFormat, {"obj", obj}, {"ply", ply}, {"serialized", serialized})
-LS_NAMES(Projection, {"perspective", perspective}, {"orthographic", orthographic}, {"spherical", spherical})
+LS_NAMES(Projection, {"perspective", perspective}, {"orthographic", orthographic}, {"spherical", spherical},
+         {"meters", meters})
+LS_NAMES(MeterKind, {"radiancemeter", radiance}, {"irradiancemeter", irradiance}, {"fluxmeter", flux},
+         {"fluencemeter", fluence})
 LS_NAMES(FovAxis, {"x", x}, {"y", y}, {"diagonal", diagonal}, {"smaller", smaller}, {"larger", larger})
 LS_NAMES(SkyMapping, {"latlong", latlong}, {"equal_area", equal_area})
 LS_NAMES(DistanceSampling, {"exponential", exponential}, {"equiangular", equiangular}, {"mis", mis})

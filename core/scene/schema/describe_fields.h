@@ -128,6 +128,7 @@ void describe(V& v, T& s) {
   v.field({.name = "aovs", .doc = "", .elided = true}, s.aovs);
   v.field({.name = "shape_labels", .doc = "", .elided = true}, s.shape_labels);
   v.field({.name = "instance_labels", .doc = "", .elided = true}, s.instance_labels);
+  v.field({.name = "meters", .doc = "", .elided = true}, s.meters);
 }
 
 // A visitor that does nothing; the concept Described uses it to find out whether a type has a describe().
@@ -156,6 +157,8 @@ auto& pool(S& s, Index<Tag>) {
     return (s.phases);
   else if constexpr (std::is_same_v<Tag, MediumTag>)
     return (s.media);
+  else if constexpr (std::is_same_v<Tag, MeterTag>)
+    return (s.meters);
   else
     return (s.groups);
 }

@@ -95,6 +95,7 @@ void describe(V& v, T& s) {
               "media in front. Not in Mitsuba",
        .elided = true},
       s.holdout);
+  v.field({.name = "meter", .doc = "what is measured on it", .derived = true, .elided = true}, s.meter);
 }
 
 // Camera and film.
@@ -170,6 +171,35 @@ void describe(V& v, T& s) {
   describe_perspective(v, s);
   describe_lens(v, s);
   v.field(nested_field("medium", "what the camera is in; the name may be left out", "medium"), s.medium);
+}
+
+LS_TYPE(
+    Meter, "sensor", "irradiancemeter", "irradiancemeter, fluxmeter, radiancemeter, fluencemeter",
+    "measures numbers instead of an image (docs/guide/meters.md). `irradiancemeter`: in a shape, the mean "
+    "irradiance of the shape's surface, on the side of its normal; or at points. `fluxmeter`, only in a "
+    "shape: the same times the area of the shape. `radiancemeter`: the radiance that arrives at points "
+    "along directions. `fluencemeter`: the integral of the radiance over all directions, at points. Also "
+    "a `batch` of such sensors. `fluxmeter`, `points` and `filename` are not in Mitsuba")
+template <class V, Of<MeterPoint> T>
+void describe(V& v, T& p) {
+  v.field({.name = "position", .doc = "", .derived = true}, p.position);
+  v.field({.name = "direction", .doc = "", .derived = true}, p.direction);
+}
+template <class V, Of<Meter> T>
+void describe(V& v, T& m) {
+  v.field({.name = "name", .doc = "the sensor's id", .derived = true}, m.name);
+  v.field({.name = "kind", .doc = "the plugin", .derived = true}, m.kind);
+  v.field({.name = "points",
+           .doc = "positions, each with its normal (`irradiancemeter`) or direction (`radiancemeter`): rows "
+                  "of `x y z nx ny nz`, of a `fluencemeter` `x y z`, separated by `;`; or, in a text or CSV "
+                  "file that `filename` names, by ends of lines. A single one may be given by `origin` and "
+                  "`direction`, or by `to_world`, which looks along +z",
+           .derived = true,
+           .given_as = "string"},
+          m.points);
+  v.field(nested_field("medium", "what is around everything; media that shapes hold are found by themselves",
+                       "medium"),
+          m.medium);
 }
 
 LS_TYPE(FilmSettings, "film", "hdrfilm", "", "size of the frame and its reconstruction filter")

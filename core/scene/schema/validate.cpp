@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/image/frame/meter_blocks.h"
 #include "core/scene/limits.h"
 #include "core/scene/schema/describe_fields.h"
 #include "core/scene/schema/traits.h"
@@ -27,6 +28,7 @@ class ValueChecker {
     check_list("shapes", s_.shapes);
     check_list("emitters", s_.emitters);
     check_list("instances", s_.instances);
+    check_list("meters", s_.meters);
     IndexWalker walker([&](const auto& i) { check("sensor", i); });
     walker.walk(s_.sensor);
     if (wrong_.empty()) check_bsdf_nesting();
@@ -34,6 +36,7 @@ class ValueChecker {
     if (wrong_.empty()) check_groups();
     if (wrong_.empty()) check_crop();
     if (wrong_.empty()) check_labels();
+    if (wrong_.empty()) check_meters();
     if (wrong_.empty() && std::int64_t{s_.film.size.width} * s_.film.size.height > kMaxFramePixels)
       wrong_ = fmt::format("scene.film has more than {} pixels", kMaxFramePixels);
     return wrong_;
@@ -102,6 +105,41 @@ class ValueChecker {
                   outside(f.crop_offset[1], f.crop_size.height, f.size.height)))
       wrong_ = "scene.film: the crop is not within the frame";
   }
+  // Checks that each meter has points or exactly one shape, which is not in a group, and that the film is
+  // that of the meters.
+  void check_meters() {
+    std::vector<int> shapes(s_.meters.size());
+    for (const Shape& s : s_.shapes) {
+      if (s.meter && s.group) wrong_ = "scene.shapes: a shape in a group has a meter";
+      if (s.meter) ++shapes[s.meter->value];
+    }
+    for (std::size_t i = 0; i < s_.meters.size() && wrong_.empty(); ++i)
+      if (const auto problem = problem_of(s_.meters[i], shapes[i]); !problem.empty())
+        wrong_ = fmt::format("scene.meters[{}] {}", i, problem);
+    if (!wrong_.empty()) return;
+    const std::size_t count = meter_count(s_);
+    if ((count > 0) != (s_.sensor.projection == Projection::meters))
+      wrong_ = "scene.sensor is not that of meters, or there are none";
+    else if (count > kMaxMeters)
+      wrong_ = fmt::format("scene.meters measure {} numbers; at most {} are allowed", count, kMaxMeters);
+    else if (count > 0 && s_.film != film_of_meters(count))
+      wrong_ = "scene.film is not that of the scene's meters";
+  }
+  static std::string problem_of(const Meter& m, int shapes) {
+    const bool on_shape = m.points.empty();
+    if (on_shape != (shapes == 1) || shapes > 1) return "has not either points or one shape";
+    if (on_shape && m.kind != MeterKind::irradiance && m.kind != MeterKind::flux)
+      return fmt::format("is a {} in a shape", name_of(m.kind));
+    if (!on_shape && m.kind == MeterKind::flux) return "is a fluxmeter without a shape";
+    for (const MeterPoint& p : m.points) {
+      const auto& d = p.direction;
+      const double length = std::hypot(d[0], d[1], d[2]);
+      // 1e-9: the rounding of double when a direction is normalised, with a large margin
+      const bool fits = m.kind == MeterKind::fluence ? length == 0 : std::abs(length - 1) < 1e-9;
+      if (!fits) return "has a direction that is not of unit length";
+    }
+    return "";
+  }
   // Computes the nesting depths of the textures by passes over the list, until a pass changes nothing. In a
   // scene that is allowed, this takes at most kMaxReferenceDepth + 1 passes.
   void check_texture_nesting() {
@@ -153,6 +191,9 @@ class Compactor {
     to_.instances = from_.instances;
     for (Instance& i : to_.instances) move(i);
     move(to_.sensor);
+    // Shapes do not refer to meters at points, which are kept in their order.
+    for (std::size_t i = 0; i < from_.meters.size(); ++i)
+      if (!from_.meters[i].points.empty()) moved(MeterIndex{static_cast<std::uint32_t>(i)});
     return std::move(to_);
   }
 
@@ -182,11 +223,24 @@ class Compactor {
   std::tuple<std::map<AssetIndex, AssetIndex>, std::map<TextureIndex, TextureIndex>,
              std::map<BsdfIndex, BsdfIndex>, std::map<VolumeIndex, VolumeIndex>,
              std::map<PhaseIndex, PhaseIndex>, std::map<MediumIndex, MediumIndex>,
-             std::map<GroupIndex, GroupIndex>>
+             std::map<GroupIndex, GroupIndex>, std::map<MeterIndex, MeterIndex>>
       moved_;
 };
 
 }  // namespace
+
+std::size_t meter_count(const Scene& scene) {
+  std::size_t count = 0;
+  for (const Meter& m : scene.meters) count += m.count();
+  return count;
+}
+
+FilmSettings film_of_meters(std::size_t count) {
+  FilmSettings film;
+  film.size = MeterBlocks(count).frame();
+  film.filter = BoxFilter{};
+  return film;
+}
 
 std::string find_inconsistency(const Scene& s) { return ValueChecker(s).run(); }
 

@@ -48,6 +48,7 @@ ELEMENTS: dict[str, tuple[str, ...]] = {
     "field": ("integrator",),
     "flat_sensor": ("sensor",),
     "fluencemeter": ("sensor",),
+    "fluxmeter": ("sensor",),
     "gaussian": ("rfilter",),
     "goniometric": ("emitter",),
     "gridtexture": ("texture",),

@@ -160,6 +160,11 @@ class Job(JobState):
         is its verdict."""
         return self._transport.run(jobs_of.report(self.id))
 
+    def meters(self) -> list[models.Meter]:
+        """Lists what the meters of the scene have measured so far, each with its interval. Empty for a job that
+        makes an image."""
+        return self._transport.run(jobs_of.meters(self.id))
+
     def convergence(self) -> Curve:
         """Returns {column: values at each checkpoint}: seconds, core_seconds, spp, relmse, ... NaN marks missing
         values."""

@@ -135,6 +135,10 @@ def report(job: str) -> Steps[models.Report]:
     return ask_json(Call("GET", job_path(job, "/report")))  # type: ignore[return-value]
 
 
+def meters(job: str) -> Steps[list[models.Meter]]:
+    return listed(job_path(job, "/meters"), "meters")
+
+
 def tiles(job: str) -> Steps[list[models.Tile]]:
     return listed(job_path(job, "/tiles"), "tiles")
 

@@ -278,6 +278,9 @@ class Job(TypedDict):
     """[width, height] in pixels."""
     tile: NotRequired[int]
     """Side of a tile in pixels."""
+    meters: NotRequired[int]
+    """Number of values that the job measures (GET /api/v1/jobs/{id}/meters). Each has a square of 16 x 16
+    pixels of the image. 0: the job makes an image."""
     priority: NotRequired[int]
     focus: NotRequired[Union[list[int], None]]
     """[x0, y0, x1, y1]: tiles in this rectangle get the next samples first. null: all tiles are treated
@@ -544,6 +547,26 @@ class Worker(TypedDict):
     """Seconds since the worker's last message."""
 
 
+class Meter(TypedDict):
+    """What one meter has measured."""
+    name: NotRequired[str]
+    """Id of the sensor; in a list of points with the point's number, as in hall[17]."""
+    type: NotRequired[Literal["radiancemeter", "irradiancemeter", "fluxmeter", "fluencemeter"]]
+    unit: NotRequired[str]
+    """If lengths of the scene are in metres."""
+    value: NotRequired[list[float]]
+    """[R, G, B]"""
+    ci95: NotRequired[Union[list[list[float]], None]]
+    """[[low, high], ...]: the 95 % interval of each channel. null: no sample has found light."""
+    luminance: NotRequired[float]
+    luminance_ci95: NotRequired[Union[list[float], None]]
+    """[low, high]: the 95 % interval of luminance."""
+    samples: NotRequired[int]
+    """Number of paths."""
+    trusted: NotRequired[bool]
+    """False if few paths carry the value: the interval may be too narrow."""
+
+
 class Report(TypedDict):
     job: NotRequired[str]
     name: NotRequired[str]
@@ -584,6 +607,8 @@ class Report(TypedDict):
     forecast: NotRequired[Union["ReportForecast", None]]
     """Predicted cost of reaching the target (`asked` is true) or, if the target is reached or there is
     none, of halving relmse."""
+    meters: NotRequired[list["Meter"]]
+    """What the meters of the scene have measured; empty if the job makes an image."""
     spp: float
     samples: int
     load_seconds: float
@@ -802,6 +827,10 @@ class SubmitAgainAnswer(TypedDict):
     reference_same_seed: NotRequired[bool]
     """True if the reference was rendered from this scene with this seed. It then has the same noise as the
     image, so its error figures mean nothing."""
+
+
+class GetMetersAnswer(TypedDict):
+    meters: list["Meter"]
 
 
 class GetTilesAnswer(TypedDict):

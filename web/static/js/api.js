@@ -92,6 +92,7 @@ export const api = {
 export const downloads = {
   exr: (id) => `${kBase}${jobPath(id)}/image.exr`,
   png: (id, exposure, layer) => `${kBase}${jobPath(id)}/image.png?exposure=${exposure}${layer === "denoised" ? "&layer=denoised" : ""}`,
+  meters: (id) => `${kBase}${jobPath(id)}/meters`,
   report: (id) => `${kBase}${jobPath(id)}/report`,
   page: (id) => `${kBase}${jobPath(id)}/report.html`,
   csv: (id) => `${kBase}${jobPath(id)}/convergence.csv`,

@@ -45,6 +45,7 @@ bool Camera::usable() const {
   // on the positions on the film and on the lens, so testing a few extreme positions suffices. The rays of a
   // spherical camera all start at one point. An aperture map can only make the lens smaller, so the test
   // leaves it out and uses the whole lens.
+  if (projection_ == Projection::meters) return true;  // Meters::build() has tested them
   Camera whole = *this;
   whole.textures_ = nullptr;
   for (const double fx : {0., 1.})
@@ -62,6 +63,7 @@ CameraRay Camera::ray(double fx, double fy, V2 lens) const {
   if (pinhole_) return perspective_ray(origin_, {x, y, 1});
   if (projection_ == Projection::spherical) return spherical_ray(fx * per_pixel_x_, fy * per_pixel_y_);
   if (projection_ == Projection::orthographic) return orthographic_ray(x, y);
+  if (projection_ == Projection::meters) return meter_ray(fx, fy, lens);
   return lens_ray(x, y, textures_ ? aperture_at(fx * per_pixel_x_, fy * per_pixel_y_) : aperture_, lens);
 }
 
@@ -114,7 +116,7 @@ std::pair<V3d, V3d> Camera::before_near_plane(double pixels) const {
 }
 
 float Camera::near_distance(const V3& d) const {
-  if (projection_ == Projection::spherical) return 0;
+  if (projection_ == Projection::spherical || projection_ == Projection::meters) return 0;
   const double along = axis_z_.length();
   if (projection_ == Projection::orthographic) return static_cast<float>(near_ * along);
   return static_cast<float>(near_ * along / axis_z_.dot(V3d(d)));
@@ -134,6 +136,14 @@ CameraRay Camera::spherical_ray(double u, double v) const {
   const double x = std::sin(phi) * std::sin(theta), y = std::cos(theta), z = -std::cos(phi) * std::sin(theta);
   return {origin_, V3((axis_x_ * x + axis_y_ * y + axis_z_ * z).normalized()),
           std::numeric_limits<float>::infinity()};
+}
+
+[[gnu::cold, gnu::noinline]] CameraRay Camera::meter_ray(double fx, double fy, V2 lens) const {
+  const double x = std::floor(fx), y = std::floor(fy);
+  const MeterStart& start = meters_->at(static_cast<int>(x), static_cast<int>(y));
+  const Meters::Point from =
+      meters_->point(start, *world_, {static_cast<float>(fx - x), static_cast<float>(fy - y)}, lens);
+  return {from.p, start.has_plate() ? -from.d : from.d, std::numeric_limits<float>::infinity(), &start};
 }
 
 PixelFilter::PixelFilter(const ReconstructionFilter& filter) {

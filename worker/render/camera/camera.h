@@ -9,33 +9,19 @@
 
 #include "core/image/frame/frame.h"
 #include "core/scene/scene.h"
+#include "worker/render/camera/meters.h"
+#include "worker/render/math/field_of_view.h"
 #include "worker/render/math/math.h"
 #include "worker/render/texture/texture.h"
 
 namespace ls::render {
 
-// Returns the tangent of half the horizontal field of view. `fov` is the field of view in degrees along
-// `axis`; `aspect` is the width of the frame over its height.
-inline double tan_half_fov_x(double fov, FovAxis axis, double aspect) {
-  const double t = std::tan(fov * (kPiD / 360));
-  switch (axis) {
-    case FovAxis::x:
-      return t;
-    case FovAxis::y:
-      return t * aspect;
-    case FovAxis::smaller:
-      return aspect > 1 ? t * aspect : t;
-    case FovAxis::larger:
-      return aspect > 1 ? t : t * aspect;
-    case FovAxis::diagonal:
-      return t * aspect / std::sqrt(1 + aspect * aspect);
-  }
-  return t;
-}
-
 struct CameraRay {
   V3 o, d;      // d has unit length
   float t_max;  // distance along the ray at which the camera clips it; may be infinite
+  // Set if a meter measures along this ray. If the meter has a plate, o is on the plate, and the ray meets
+  // the plate at once: its normal is -d.
+  const MeterStart* meter = nullptr;
 };
 
 class Camera {
@@ -46,6 +32,9 @@ class Camera {
   // outlive the camera.
   Camera(const Sensor& sensor, FrameSize size, V3d center, double scale,
          const TextureTable* textures = nullptr);
+  // Makes what a scene of meters has instead of a camera. The arguments must outlive it.
+  Camera(const Meters& meters, const LightWorld& world)
+      : projection_(Projection::meters), pinhole_(false), meters_(&meters), world_(&world) {}
 
   // Returns the ray through the position (fx, fy) of the whole frame, in pixels from its top left corner.
   // `lens`, in [0, 1)^2, chooses the point on the lens; a camera without a lens ignores it.
@@ -67,6 +56,7 @@ class Camera {
   CameraRay lens_ray(double x, double y, float aperture, V2 lens) const;
   CameraRay orthographic_ray(double x, double y) const;
   CameraRay spherical_ray(double u, double v) const;
+  CameraRay meter_ray(double fx, double fy, V2 lens) const;
   float aperture_at(double u, double v) const;
 
   Projection projection_ = Projection::perspective;
@@ -83,6 +73,8 @@ class Camera {
   double per_pixel_x_ = 1, per_pixel_y_ = 1;  // width and height of a pixel over those of the frame
   const TextureTable* textures_ = nullptr;    // set only if the sensor has an aperture_scale
   TextureIndex aperture_scale_;
+  const Meters* meters_ = nullptr;  // with Projection::meters, as is world_
+  const LightWorld* world_ = nullptr;
 };
 
 // Applies a reconstruction filter by importance sampling. Each sample belongs to one pixel, and its position

@@ -383,12 +383,14 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
                                                  const AssetFiles& files, int threads) {
   auto world = make_world(scene, settings, files, threads);
   if (!world) return tl::unexpected(world.error());
+  // The interval of a meter's value counts on pixels whose errors do not depend on each other.
+  const bool independent = (*world)->meters.any();
   if (settings.integrator == "volpath" || settings.integrator == "path") {
     learn_portals(scene.integrator, threads, **world);
-    learn_connections(scene.integrator, threads, **world);
+    if (!independent) learn_connections(scene.integrator, threads, **world);
     learn_local_lights(scene.integrator, threads, **world);
     learn_sky_samples(scene.integrator, **world);
-    share_tails(scene.integrator, threads, **world);
+    if (!independent) share_tails(scene.integrator, threads, **world);
     if ((*world)->need.grids && !(*world)->need.connected) learn_roulette(scene.integrator, **world);
   }
   return std::shared_ptr<const World>(std::move(*world));

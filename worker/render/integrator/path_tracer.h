@@ -35,6 +35,7 @@
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/medium_stack.h"
 #include "worker/render/world/near_plane.h"
+#include "worker/render/world/overlap.h"
 #include "worker/render/world/roulette.h"
 #include "worker/render/world/world.h"
 
@@ -134,6 +135,9 @@ class PathTracer {
   static constexpr bool kFliesFirst =
       F.media && !F.aimed && !F.reuse && std::is_same_v<Light<F>, VertexNee<F>>;
 
+  // Begins the path of a meter, which sees what surfaces see: not what is hidden from cameras alone. Returns
+  // false if it ends at the meter's plate.
+  [[gnu::cold, gnu::noinline]] bool begin_at_meter(const CameraRay& ray);
   // Follows the path from its current vertex to its end. The first ray of the path ends at t_max.
   void go_on(float t_max);
   // Samples a free flight up to the surface hit at `end`, or, if `end` is null, up to the distance `reach`.
@@ -393,8 +397,39 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
   if constexpr (F.media) medium_ = start_medium(ray);
   if constexpr (F.chromatic) hero_ = std::min(2, static_cast<int>(3 * stream_.group(0, Purpose::hero).u(0)));
   if constexpr (kSplits) reference_ = world_.mean_radiance > 0 ? kNoReference : 1;
+  if constexpr (!F.reuse) {
+    if (ray.meter && !begin_at_meter(ray)) [[unlikely]]
+      return outcome_;
+  }
   go_on(ray.t_max);
   return outcome_;
+}
+
+template <Features F, template <Features> class Light>
+bool PathTracer<F, Light>::begin_at_meter(const CameraRay& ray) {
+  const MeterStart& meter = *ray.meter;
+  SurfaceHit plate;
+  plate.p = ray.o;
+  plate.ng = meter.has_plate() ? -ray.d : ray.d;
+  plate.shading = Frame(plate.ng);
+  plate.surface = world_.plate;
+  plate.reach = meter.reach;
+  if constexpr (F.media) {
+    const MediaState media =
+        meter.media ? *meter.media : media_at(world_, offset_point(plate, plate.ng), meter.ambience);
+    if constexpr (F.overlaps)
+      medium_ = media;
+    else
+      medium_.only(media.any() ? media.one() : kNone);
+  }
+  if (!meter.has_plate()) {
+    ray_.leave(plate, ray.d);
+    depth_ = 1;
+    return true;
+  }
+  last_.p = ray.o + plate.ng;  // the path comes from anywhere in front of the plate
+  const Step step = scatter_on_surface(plate);
+  return step.collision == Collision::scattered && survives(step.roulette);
 }
 
 template <Features F, template <Features> class Light>

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <memory>
 #include <span>
@@ -170,6 +171,22 @@ struct PixelSums {
   double half[2][3] = {};
 };
 
+// Multiplies the colours of a tile by the weights of its meters, within the range of float32, as the film has
+// no infinities.
+[[gnu::cold, gnu::noinline]] void weigh(const Meters& meters, PixelRect tile, std::vector<float>& sums) {
+  constexpr double kMost = std::numeric_limits<float>::max();
+  const auto pixels = static_cast<std::size_t>(tile.pixels());
+  std::size_t i = 0;
+  for (int y = tile.y0; y < tile.y1; ++y)
+    for (int x = tile.x0; x < tile.x1; ++x, ++i) {
+      const double weight = meters.at(x, y).weight;
+      for (std::size_t plane = 0; plane < 6; ++plane) {
+        float& sum = sums[plane * pixels + i];
+        sum = rounded(std::clamp(sum * weight, -kMost, kMost));
+      }
+    }
+}
+
 // The sums of a pixel besides its colour: none (NoAovs), or AOVs (AovPixel).
 struct NoAovs {
   static LightSplit* split() { return nullptr; }
@@ -219,6 +236,7 @@ TileResult render_tile_with(const World& w, const Variant& v, PixelRect tile, Sa
         for (std::size_t c = 0; c < 3; ++c) r.sums[(3 * h + c) * pixels + i] = rounded(sums.half[h][c]);
     }
   }
+  if (w.meters.any()) weigh(w.meters, tile, r.sums);
   return r;
 }
 TileResult render_tile_with(const World& w, const Variant& v, PixelRect tile, SampleRange range,
@@ -267,6 +285,10 @@ SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample
   SampleValue value{{out.radiance.x, out.radiance.y, out.radiance.z}, usable(out), {}};
   count(out, {x, y, sample}, value.health);
   return value;
+}
+
+double sample_weight(const World& world, int x, int y) {
+  return world.meters.any() ? world.meters.at(x, y).weight : 1;
 }
 
 const Health& changed_inputs(const World& world) { return world.inputs; }

@@ -1,9 +1,9 @@
 // Lights with a position but without extent.
 #pragma once
 
-#include "worker/render/camera/camera.h"
 #include "worker/render/lights/light_kind.h"
 #include "worker/render/math/equal_area.h"
+#include "worker/render/math/field_of_view.h"
 
 namespace ls::render {
 

@@ -25,7 +25,8 @@ int points_for(const IntegratorSettings& settings, const World& w) {
   if (settings.camera_points != 0) return std::max(0, settings.camera_points);
   // Points are for lights without a position (suns, the sky), because equi-angular sampling already finds the
   // other lights on every segment. Where media overlap, points are not supported.
-  if (!w.lights.any_without_place() || w.overlaps) return 0;
+  // Few paths of meters have segments that begin at a camera.
+  if (!w.lights.any_without_place() || w.overlaps || w.meters.any()) return 0;
   const float met = camera_collisions(w).met;
   return met > 0 && (met < kThin || w.need.connected) ? kPointsThatPay : 0;
 }

@@ -268,6 +268,8 @@ Result<Medium> heterogeneous(const Scene& scene, const HeterogeneousMedium& m, c
 std::vector<bool> named_media(const Scene& scene) {
   std::vector<bool> named(scene.media.size(), false);
   if (scene.sensor.medium) named[scene.sensor.medium->value] = true;
+  for (const Meter& m : scene.meters)
+    if (m.medium) named[m.medium->value] = true;
   for (const Shape& s : scene.shapes) {
     if (!s.is_medium_transition) continue;
     if (s.interior) named[s.interior->value] = true;

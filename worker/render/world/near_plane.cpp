@@ -43,7 +43,8 @@ bool any_touches(const Geometry& g, const std::vector<bool>& surfaces, const Sur
 }  // namespace
 
 bool near_plane_hides_boundaries(const World& w) {
-  if (!w.use_media || w.camera.projection() == Projection::spherical) return false;
+  const Projection projection = w.camera.projection();
+  if (!w.use_media || projection == Projection::spherical || projection == Projection::meters) return false;
   const auto boxes = surface_boxes(w.geometry, [](const SurfaceInfo& s) { return s.transition; });
   if (!boxes) return true;
   if (boxes->empty()) return false;

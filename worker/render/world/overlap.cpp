@@ -70,6 +70,7 @@ Left left_from(const World& w, const V3& o) {
 bool media_may_overlap(const World& w) {
   const Geometry& g = w.geometry;
   std::set<std::uint32_t> ambiences{w.camera_medium};
+  for (const MeterStart& m : w.meters.starts()) ambiences.insert(m.ambience);
   for (const SurfaceInfo& s : g.surfaces)
     if (s.transition) ambiences.insert(s.exterior);
   for (const std::uint32_t m : ambiences)
@@ -78,26 +79,54 @@ bool media_may_overlap(const World& w) {
   return !boxes || any_touch(std::move(*boxes));
 }
 
-MediaState camera_media(const World& w) {
+namespace {
+
+bool is_around(const Left::value_type& entry) { return entry.second >= 2; }
+
+bool holds_medium(const World& w, const Left& left, std::uint32_t medium) {
+  return std::any_of(left.begin(), left.end(), [&](const auto& e) {
+    return is_around(e) && w.geometry.surfaces[e.first.first].interior == medium;
+  });
+}
+
+// Returns `ambience` and the interiors of the boundaries that rays left.
+MediaState within(const World& w, const Left& left, std::uint32_t ambience) {
   MediaState state;
-  if (w.camera_medium == kNone) return state;
+  state.start(ambience, w.media);
+  for (const auto& e : left)
+    if (is_around(e)) state.stand(w.geometry.surfaces[e.first.first], false, true, w.media);
+  return state;
+}
+
+}  // namespace
+
+MediaState media_at(const World& w, const V3& p, std::uint32_t ambience) {
+  const Left left = left_from(w, p);
+  return within(w, left, holds_medium(w, left, ambience) ? kNone : ambience);
+}
+
+void place_meters(World& w) {
+  const bool bounded = std::ranges::any_of(w.geometry.surfaces, &SurfaceInfo::transition);
+  for (MeterStart& m : w.meters.starts()) {
+    if (m.shape == kNone || !bounded)
+      m.media = media_at(w, offset_point(m.p, m.d, m.reach, m.d), m.ambience);
+    else if (const SurfaceInfo& s = w.geometry.surfaces[w.meters.shape(m).surface()];
+             s.transition && !w.overlaps)
+      m.media.emplace().only(s.exterior);
+  }
+}
+
+MediaState camera_media(const World& w) {
+  if (w.camera_medium == kNone) return {};
   const CameraRay ray =
       w.camera.ray(w.origin_x + w.size.width / 2., w.origin_y + w.size.height / 2., {.5f, .5f});
   const V3 eye = w.hidden_boundaries ? hidden_part(w, ray).start : ray.o;
-  const auto around = [&](const auto& entry) { return entry.second >= 2; };
-  const auto holds_medium = [&](const Left& left) {
-    return std::any_of(left.begin(), left.end(), [&](const auto& e) {
-      return around(e) && w.geometry.surfaces[e.first.first].interior == w.camera_medium;
-    });
-  };
   const Left left = left_from(w, eye);
   // A camera on the face of a body, or just before it, names the medium in it too: rays enter the body before
   // the near plane, and this crossing adds the medium (for_hidden_boundaries).
-  const bool inside_of_it = holds_medium(left) || (w.hidden_boundaries && holds_medium(left_from(w, ray.o)));
-  state.start(inside_of_it ? kNone : w.camera_medium, w.media);
-  for (const auto& e : left)
-    if (around(e)) state.stand(w.geometry.surfaces[e.first.first], false, true, w.media);
-  return state;
+  const bool inside_of_it = holds_medium(w, left, w.camera_medium) ||
+                            (w.hidden_boundaries && holds_medium(w, left_from(w, ray.o), w.camera_medium));
+  return within(w, left, inside_of_it ? kNone : w.camera_medium);
 }
 
 }  // namespace ls::render

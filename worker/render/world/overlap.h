@@ -19,4 +19,13 @@ bool media_may_overlap(const World& w);
 // through the image's centre; it is the lens instead if World::hidden_boundaries is set.
 MediaState camera_media(const World& w);
 
+// Returns the media that contain p: `ambience`, the medium around everything (kNone: none), and the interiors
+// of the closed boundaries around p, which are found as for the camera. If `ambience` is also the medium of a
+// boundary around p, it counts as the interior of this boundary only.
+MediaState media_at(const World& w, const V3& p, std::uint32_t ambience);
+
+// Sets the media in which paths of the world's meters begin. Meters of which not all paths begin in the same
+// media get none.
+void place_meters(World& w);
+
 }  // namespace ls::render

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <deque>
+#include <optional>
 #include <vector>
 
 #include "core/image/aov/aov.h"
@@ -38,6 +39,11 @@ class World {
   Lights lights;
   Accel accel;
   Camera camera;
+  // If the scene has meters: these, what their points refer to, and the surface of their white plates, which
+  // no ray meets (index into geometry.surfaces)
+  Meters meters;
+  std::optional<LightWorld> meter_world;
+  std::uint32_t plate = kNone;
   PixelFilter filter;
 
   std::uint32_t camera_medium = kNone;

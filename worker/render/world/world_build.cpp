@@ -8,6 +8,7 @@
 #include "core/assets/image.h"
 #include "core/image/aov/identifiers.h"
 #include "core/scene/schema/integrators.h"
+#include "core/scene/schema/validate.h"
 #include "worker/render/base/build_stop.h"
 #include "worker/render/geometry/coincident.h"
 #include "worker/render/geometry/surface_boxes.h"
@@ -50,6 +51,7 @@ Features found_in(const World& w) {
     f.chromatic = f.chromatic || m.chromatic();
   };
   use(w.camera_medium);
+  for (const MeterStart& m : w.meters.starts()) use(m.ambience);
   for (const SurfaceInfo& s : surfaces) {
     if (!s.transition) continue;
     use(s.interior);
@@ -150,7 +152,10 @@ FrameSize place_camera(const Scene& scene, const RenderSettings& settings, World
     w.origin_x = scaled(film.crop_offset[0], kx);
     w.origin_y = scaled(film.crop_offset[1], ky);
   }
-  w.camera = Camera(scene.sensor, frame, w.geometry.center, w.geometry.scale, &w.textures);
+  if (w.meters.any())
+    w.camera = Camera(w.meters, *w.meter_world);
+  else
+    w.camera = Camera(scene.sensor, frame, w.geometry.center, w.geometry.scale, &w.textures);
   return frame;
 }
 
@@ -172,11 +177,49 @@ Result<void> check_indices(const Scene& scene) {
   return {};
 }
 
+// Returns the scene with the white material of the plates of meters, its last.
+Scene with_plates(Scene scene) {
+  scene.textures.emplace_back(ConstantTexture{{1, 1, 1}});
+  scene.bsdfs.emplace_back(DiffuseBsdf{{static_cast<std::uint32_t>(scene.textures.size() - 1)}});
+  return scene;
+}
+
+// Sets the meters of a scene that with_plates() returned. The accelerator must exist.
+Result<void> build_meters(const Scene& scene, World& w) {
+  w.meter_world.emplace(w.geometry, w.textures);
+  const BsdfIndex white{static_cast<std::uint32_t>(scene.bsdfs.size() - 1)};
+  auto meters =
+      Meters::build(scene, std::get<DiffuseBsdf>(scene.bsdfs[white.value]).reflectance, *w.meter_world);
+  if (!meters) return tl::unexpected(meters.error());
+  w.meters = std::move(*meters);
+  SurfaceInfo plate{.bsdf = white, .plain = true, .wants_uv = false, .wants_tangent = false, .diffuse = true};
+  w.plate = static_cast<std::uint32_t>(w.geometry.surfaces.size());
+  w.geometry.surfaces.push_back(plate);
+  // The way from the plate is the first segment of what a meter sees.
+  if (w.max_depth >= 0) ++w.max_depth;
+  ++w.rr_depth;
+  return {};
+}
+
+Result<void> check_meters(const Scene& scene, const RenderSettings& settings) {
+  const std::size_t meters = scene::meter_count(scene);
+  if (meters != static_cast<std::size_t>(settings.meters))
+    return fail(Errc::invalid_argument,
+                fmt::format("the scene has {} meters, and the settings have {}", meters, settings.meters));
+  if (meters > 0 && settings.size != scene.film.size)
+    return fail(Errc::invalid_argument, "the size of the image is not that of the scene's meters");
+  return {};
+}
+
 }  // namespace
 
-Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettings& settings,
+Result<std::shared_ptr<World>> make_world(const Scene& given, const RenderSettings& settings,
                                           const AssetFiles& files, int threads) {
+  const std::optional<Scene> with_meters =
+      given.meters.empty() ? std::nullopt : std::optional(with_plates(given));
+  const Scene& scene = with_meters ? *with_meters : given;
   if (auto ok = check_indices(scene); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_meters(scene, settings); !ok) return tl::unexpected(ok.error());
   if (settings.size.width < 1 || settings.size.height < 1)
     return fail(Errc::invalid_argument, "the film has no pixels");
   const auto world = std::make_shared<World>();
@@ -247,6 +290,8 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
   auto accel = Accel::build(w.geometry, threads, w.coincident);
   if (!accel) return tl::unexpected(accel.error());
   w.accel = std::move(*accel);
+  if (!scene.meters.empty())
+    if (auto ok = build_meters(scene, w); !ok) return tl::unexpected(ok.error());
   w.frame = place_camera(scene, settings, w);
   if (!w.camera.usable())
     return fail(Errc::invalid_argument,
@@ -266,6 +311,7 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
     return fail(Errc::internal, "the scene's analysis left out something that the scene has: this is a bug");
   w.overlaps = found.overlaps;
   if (w.overlaps) w.camera_media = camera_media(w);
+  if (w.need.media) place_meters(w);
   w.need.split = w.aovs.any_of(aovs_of(AovKind::light)) || w.aovs.any_of(aovs_of(AovKind::groups));
   if (w.aovs.any_of(aovs_of(AovKind::ids))) name_surfaces(scene, w);
   bool homogeneous_media = false;

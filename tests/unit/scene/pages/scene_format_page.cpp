@@ -350,6 +350,7 @@ std::string scene_format_markdown() {
   add_variant<Volume>(out, "Volumes");
   out += "## Camera and integrator\n\n";
   add_type<Sensor>(out);
+  add_type<Meter>(out);
   add_type<FilmSettings>(out);
   add_types(out, static_cast<const ReconstructionFilter*>(nullptr));
   add_type<IntegratorSettings>(out);

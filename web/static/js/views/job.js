@@ -6,6 +6,7 @@ import { downloads } from "../api.js";
 import { againButton, againForm } from "./again.js";
 import { jobActions, notice, progressBar, statePill, stateWord } from "./pieces.js";
 import { imagePanel } from "./job_image.js";
+import { meterPanel } from "./meters.js";
 import { timeSplit } from "./time_split.js";
 import { figures, inFlight } from "./job_figures.js";
 import { goOn } from "./go_on.js";
@@ -39,7 +40,7 @@ function shownJob(state, job, actions) {
   return [
     job.sequence && job.error ? h("div", { key: "frame-error" }, notice("bad", `Frame ${job.frame}`, failure(job))) : null,
     h("div", { key: "columns", class: "columns" },
-      h("div", { class: "picture" }, imagePanel(state, job, actions), started ? errorPlot(job, state.open, actions, state.narrow) : null, downloadLinks(job, state.open), logOf(job, state.open, actions)),
+      h("div", { class: "picture" }, job.meters > 0 ? meterPanel(state, job) : imagePanel(state, job, actions), started ? errorPlot(job, state.open, actions, state.narrow) : null, downloadLinks(job, state.open), logOf(job, state.open, actions)),
       h("div", { class: "facts" }, started ? figures(job, job.denoised ?? state.open.report?.denoised) : null, started ? timeSplit(job) : null, jobFacts(state, job, actions), inFlight(state, job))),
   ];
 }
@@ -113,6 +114,7 @@ function downloadLinks(job, open) {
   const link = (href, label, hint, name) => h("a", { key: hint, class: "button", href, download: name }, label, h("small", null, hint));
   const stem = jobName(job).replace(/\.xml$/i, "") + (job.sequence ? `.${job.frame}` : "");
   return h("nav", { class: "downloads", "aria-label": "Downloads" },
+    taken && job.meters > 0 ? link(downloads.meters(job.id), "Values", "JSON", `${stem}.json`) : null,
     taken ? link(downloads.exr(job.id), "EXR", "image", `${stem}.exr`) : null,
     taken ? link(downloads.png(job.id, open.exposure, shown), "PNG", shown === "denoised" ? "denoised" : "as shown", `${stem}.png`) : null,
     h("a", { key: "page", class: "button", href: downloads.page(job.id), target: "_blank", rel: "noopener" }, "Report", h("small", null, "page")),
