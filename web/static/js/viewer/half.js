@@ -22,7 +22,8 @@ export function floatsOf(buffer, format) {
   return Float32Array.from(new Uint16Array(buffer), (bits) => values[bits]);
 }
 
-const scratch = new DataView(new ArrayBuffer(4));
+const scratch = new Float32Array(1);
+const scratchBits = new Uint32Array(scratch.buffer);
 
 /** The half float nearest to a value; beyond 65504 that. */
 export function halfBits(value) {
@@ -30,7 +31,7 @@ export function halfBits(value) {
   const sign = value < 0 ? 0x8000 : 0;
   const size = Math.min(Math.abs(value), 65504);
   if (size < 2 ** -14) return sign | Math.round(size * 2 ** 24);
-  scratch.setFloat32(0, size);
-  const bits = scratch.getUint32(0) - 0x38000000;
+  scratch[0] = size;
+  const bits = scratchBits[0] - 0x38000000;
   return sign | ((bits + 0xfff + ((bits >> 13) & 1)) >> 13);
 }
