@@ -3,6 +3,23 @@
 from typing import Any, Literal, NotRequired, TypedDict, Union
 
 
+class MixError(TypedDict):
+    mix: dict[str, Any]
+    """The mix as it was read."""
+    groups: list[str]
+    """The names of the image's light groups."""
+    relmse: Union[float, None]
+    """The estimated relMSE of the mixed image. null: there are no samples yet."""
+    relmse_ci95: Union[list[float], None]
+    """[low, high]: the 95 % interval of relmse."""
+    rmse: Union[float, None]
+    """The estimated root mean squared error."""
+    trusted: bool
+    """Whether the figures can be trusted."""
+    verdict: str
+    """"trusted", or why the figures cannot be trusted."""
+
+
 class Layers(TypedDict):
     size: list[int]
     """Width and height of level 0."""
