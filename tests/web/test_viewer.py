@@ -66,8 +66,9 @@ def test_an_image_with_alpha_lies_on_a_checkerboard(farm, viewer):
 
     # The squares have the light 1/16 and 1/8; a code is 255 times the light.
     assert [colour(page, x, 2) for x in (2, 34, 42)] == [[128, 64, 0], [16] * 3, [32] * 3]
+    before = page.evaluate(f"{VIEW}.dataset.pictures")
     page.evaluate("void (location.hash = '#/view/j-1?curve=linear&ev=-1')")
-    page.wait(f"{VIEW}.dataset.painted && document.getElementById('ev').value === '-1'")
+    page.wait(f"document.getElementById('ev').value === '-1' && {VIEW}.dataset.pictures !== '{before}'")
     assert [colour(page, x, 2) for x in (2, 34, 42)] == [[64, 32, 0], [16] * 3, [32] * 3]
 
 

@@ -125,14 +125,14 @@ export function rowsOf(texts, groups) {
       if (of && !group.apart) continue;
       if (of) row.volume ??= { ...kPlainPart };
       if (what === "s" || what === "m") row[what === "s" ? "solo" : "mute"] = true;
-      else if (what) Object.assign(of ? row.volume : row.surface, told(what, value));
+      else if (what) Object.assign(of ? row.volume : row.surface, fieldOf(what, value));
     }
     rows.set(name, row);
   }
   return rows;
 }
 
-function told(what, value) {
+function fieldOf(what, value) {
   const numbers = value.split("_").map(Number);
   if (!numbers.every(Number.isFinite) || value === "") return {};
   if (what === "g") return { gain: Math.min(kMostStops, Math.max(-kMostStops, numbers[0])) };
