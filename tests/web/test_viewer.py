@@ -102,6 +102,9 @@ def test_half_floats_are_read_and_written_as_python_does(modules_page):
     between = [v * 1.0003 for v in values if 1e-4 < abs(v) < 60000]
     wanted = [struct.unpack("<H", struct.pack("<e", struct.unpack("<f", struct.pack("<f", v))[0]))[0] for v in between]
     assert modules_page.evaluate(f"import('/js/viewer/half.js').then(({{ halfBits }}) => {between}.map(halfBits))") == wanted
+    edges = [*between, *(-v for v in between), 0, 65519, 65520, 1e9, 6.1e-5, 6.2e-5, 1e-9]
+    agree = modules_page.evaluate(f"import('/js/viewer/half.js').then(({{ halfBits, halvesOf }}) => {{ const v = Float32Array.from({edges}.concat(NaN, Infinity, -Infinity)); return halvesOf(v).every((half, i) => half === halfBits(v[i])); }})")
+    assert agree
 
 
 def test_the_pixel_under_the_pointer_is_read_with_its_standard_error(viewer):

@@ -1,10 +1,11 @@
 // A picture with two layers more, which are mixed here of the layers of its light groups: the mix, and its standard
 // error. Has the interface of PixelSource. Blocks of the groups are fetched once; a mix of other factors is a sum of
 // what is there.
-import { halfBits, halfValues } from "./half.js";
+import { halfValues, halvesOf } from "./half.js";
 import { factorsOf, groupsOf, kMix, kMixError, rowsOf } from "./mix.js";
 
 const kMostMixed = 512; // blocks that are kept
+const kMostRests = 96; // 75 MB
 const kMixedLayers = [kMix, kMixError].map((name) => ({ name, channels: ["R", "G", "B"], format: "half", blocks: "mean" }));
 const kDelta = ".delta"; // kHalfDifference in final_image.h
 
@@ -13,6 +14,8 @@ export class MixedSource {
   #terms = []; // {layer, factors}: the mix is the sum of factors times layers
   #revision = 0; // of the terms
   #version = 0; // of the latest block
+  #moving = new Set(); // layers whose factors the last change has changed
+  #rests = new Map(); // key -> {sums, madeOf}: of the terms that do not move
   #mixed = new Map(); // key -> {block, made of}; the least recently used first
 
   constructor(source) {
@@ -37,6 +40,8 @@ export class MixedSource {
       return [{ layer: `RGB_${name}`, factors: surface }, { layer: `RGB_${name}.volume`, factors: volume.map((v, c) => v - surface[c]) }];
     });
     const seen = terms.filter(({ factors }) => factors.some((v) => v !== 0));
+    const before = new Map(this.#terms.map((term) => [term.layer, String(term.factors)]));
+    this.#moving = new Set(terms.filter(({ layer, factors }) => before.get(layer) !== String(factors)).map(({ layer }) => layer));
     this.#terms = seen.length > 0 ? seen : terms.slice(0, 1); // black, but where there are samples
     this.#revision += 1;
   }
@@ -55,7 +60,7 @@ export class MixedSource {
     if (!blocks.every(Boolean)) return kept && { ...kept.block, late: true };
     const madeOf = `${this.#revision} ${blocks.map(({ version }) => version)}`;
     this.#mixed.delete(key);
-    const mixed = kept?.madeOf === madeOf ? kept : { madeOf, block: this.#made(layer, blocks) };
+    const mixed = kept?.madeOf === madeOf ? kept : { madeOf, block: this.#made(layer, key, blocks) };
     this.#mixed.set(key, mixed); // at the end: used most recently
     if (this.#mixed.size > kMostMixed) this.#mixed.delete(this.#mixed.keys().next().value);
     return mixed.block;
@@ -66,12 +71,27 @@ export class MixedSource {
     return layer === kMix || layer === kMixError ? this.#terms.map((term) => term.layer + (layer === kMix ? "" : kDelta)) : null;
   }
 
-  #made(layer, blocks) {
-    const sums = summed(layer, this.#terms, blocks.map(({ buffer }) => new Uint16Array(buffer)), halfValues());
-    const halves = new Uint16Array(sums.length);
-    for (let i = 0; i < sums.length; i += 1) halves[i] = halfBits(sums[i]);
+  #made(layer, key, blocks) {
+    const parts = this.#terms.map((term, i) => ({ ...term, block: blocks[i], halves: new Uint16Array(blocks[i].buffer) }));
+    const moves = ({ layer: name }) => this.#moving.has(name);
+    const sums = this.#rest(key, parts.filter((part) => !moves(part)), parts[0].halves.length).slice();
+    for (const part of parts.filter(moves)) addHalves(sums, part.halves, part.factors);
     this.#version += 1;
-    return { buffer: halves.buffer, rect: blocks[0].rect, level: blocks[0].level, version: this.#version };
+    return { buffer: halvesOf(finished(layer, sums)).buffer, rect: blocks[0].rect, level: blocks[0].level, version: this.#version };
+  }
+
+  /** The sum of the terms that stay as they are while a slider moves, so that each frame adds one term, not all. */
+  #rest(key, parts, length) {
+    const madeOf = parts.map(({ layer, factors, block }) => `${layer} ${factors} ${block.version}`).join();
+    let rest = this.#rests.get(key);
+    if (rest?.madeOf !== madeOf) {
+      rest = { sums: new Float32Array(length), madeOf };
+      for (const { halves, factors } of parts) addHalves(rest.sums, halves, factors);
+    }
+    this.#rests.delete(key);
+    this.#rests.set(key, rest);
+    if (this.#rests.size > kMostRests) this.#rests.delete(this.#rests.keys().next().value);
+    return rest.sums;
   }
 
   want(list) {
@@ -95,23 +115,21 @@ export class MixedSource {
   /** of: the values of a layer. */
   async #whole(layer, of) {
     const terms = this.#terms; // others may come on the way
-    return summed(layer, terms, await Promise.all(this.#parts(layer).map(of)));
+    const parts = await Promise.all(this.#parts(layer).map(of));
+    return finished(layer, Float32Array.from(parts[0], (_, i) => parts.reduce((sum, part, term) => sum + terms[term].factors[i % 3] * part[i], 0)));
   }
 
   survey(name, bins) { return this.#source.survey(name, bins, this); }
 }
 
-/** parts: of each term three numbers for each pixel: values, or indices of values. */
-function summed(layer, terms, parts, values = null) {
-  const sums = new Float32Array(parts[0].length);
-  parts.forEach((part, term) => {
-    const [r, g, b] = terms[term].factors;
-    for (let i = 0; i < part.length; i += 3) {
-      sums[i] += r * (values ? values[part[i]] : part[i]);
-      sums[i + 1] += g * (values ? values[part[i + 1]] : part[i + 1]);
-      sums[i + 2] += b * (values ? values[part[i + 2]] : part[i + 2]);
-    }
-  });
-  // The difference of the halves of a mix is the mix of the differences, and its size the standard error
-  return layer === kMix ? sums : sums.map(Math.abs);
+function addHalves(sums, halves, [r, g, b]) {
+  const values = halfValues();
+  for (let i = 0; i < halves.length; i += 3) {
+    sums[i] += r * values[halves[i]];
+    sums[i + 1] += g * values[halves[i + 1]];
+    sums[i + 2] += b * values[halves[i + 2]];
+  }
 }
+
+/** The difference of the halves of a mix is the mix of the differences; its size is the standard error. */
+const finished = (layer, sums) => (layer === kMix ? sums : sums.map(Math.abs));
