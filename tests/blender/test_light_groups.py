@@ -33,7 +33,8 @@ def lit(stage, grouped):
 
     stage.plane(diffuse((0.5, 0.5, 0.5), "Floor"))
     ball = stage.ball(material("Glow", "ShaderNodeEmission", Color=(1, 0.6, 0.2), Strength=2), (1, 2, 1))
-    fire = stage.cube(fog("Fire", Density=0.2, Emission_Strength=0.5, Emission_Color=(1, 0.3, 0.1)), 2, (-1, -1, 1))
+    # Clear of the floor: which of two faces in one plane a ray hits is chance
+    fire = stage.cube(fog("Fire", Density=0.2, Emission_Strength=0.5, Emission_Color=(1, 0.3, 0.1)), 2, (-1, -1, 1.2))
     stage.sky(0.2, (0.5, 0.7, 1))
     key = stage.light("POINT", 200, (3, -2, 4), shadow_soft_size=0)
     fill = stage.light("AREA", 100, (-3, 2, 4), size=2)
@@ -66,14 +67,14 @@ def test_each_group_has_the_light_of_cycles(stage, grouped):
 
 
 def test_the_groups_are_all_of_the_light_where_each_light_has_one(stage, grouped):
-    """A pass is a half float, or a float of one: with n groups the sum is off by at most n + 1 roundings of 2^-24 each."""
+    """Each of the five is rounded to floats twice, by the worker and in the image, each time by at most 2^-24 of the whole."""
     lit(stage, grouped)
 
     stage.render(samples=4)
 
     total = sum(stage.layers[f"Combined_{name}"]["R"] for name in ("Key", "Lamps", "Sky", "Fire"))
     combined = stage.layers["Combined"]["R"]
-    assert combined.mean() > 0.01 and np.abs(total - combined).max() <= 5 * 2**-11 * combined.max()
+    assert combined.mean() > 0.01 and np.abs(total - combined).max() <= 10 * 2**-24 * combined.max()
 
 
 def exported(stage):

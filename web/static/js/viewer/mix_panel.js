@@ -53,7 +53,7 @@ function groupRow(h, { name, apart }, rows, actions) {
 function part(h, of, name, { gain, colour, kelvin }, onChange) {
   const label = (what) => `${name}${of ? `, ${of.toLowerCase()}` : ""}: ${what}`;
   const change = (more) => onChange({ gain, colour, kelvin, ...more });
-  const number = (what, value, min, max, step, set) => h("input", { key: `${what}-number`, type: "number", class: "number", "aria-label": label(what), min, max, step, ".value": value, placeholder: "–",
+  const number = (what, value, min, max, step, set) => h("input", { key: `${what}-number`, type: "number", class: "number", "aria-label": label(what), min, max, step, ".value": value, placeholder: what.endsWith("K") ? "K" : "0",
     onchange: (event) => set(event.currentTarget.value === "" ? null : Math.min(max, Math.max(min, event.currentTarget.valueAsNumber))) });
   const slider = (what, value, text, min, max, step, set, plain) => h("input", { key: what, type: "range", "aria-label": label(`${what} slider`), "aria-valuetext": text, min, max, step, ".value": String(value), oninput: (event) => set(event.currentTarget.valueAsNumber), ondblclick: () => set(plain) });
   return h("div", { key: of, class: "mix-part" },
