@@ -9,6 +9,8 @@ const kMostRests = 96; // 75 MB
 const kMixedLayers = [kMix, kMixError].map((name) => ({ name, channels: ["R", "G", "B"], format: "half", blocks: "mean" }));
 const kDelta = ".delta"; // kHalfDifference in final_image.h
 
+let scratch = new Float32Array(0); // sums of the block that is being mixed
+
 export class MixedSource {
   #source;
   #terms = []; // {layer, factors}: the mix is the sum of factors times layers
@@ -60,7 +62,7 @@ export class MixedSource {
     if (!blocks.every(Boolean)) return kept && { ...kept.block, late: true };
     const madeOf = `${this.#revision} ${blocks.map(({ version }) => version)}`;
     this.#mixed.delete(key);
-    const mixed = kept?.madeOf === madeOf ? kept : { madeOf, block: this.#made(layer, key, blocks) };
+    const mixed = kept?.madeOf === madeOf ? kept : { madeOf, block: this.#made(layer, key, blocks, kept?.block.buffer) };
     this.#mixed.set(key, mixed); // at the end: used most recently
     if (this.#mixed.size > kMostMixed) this.#mixed.delete(this.#mixed.keys().next().value);
     return mixed.block;
@@ -71,13 +73,18 @@ export class MixedSource {
     return layer === kMix || layer === kMixError ? this.#terms.map((term) => term.layer + (layer === kMix ? "" : kDelta)) : null;
   }
 
-  #made(layer, key, blocks) {
+  /** buffer: of the mix that this one replaces, or undefined. */
+  #made(layer, key, blocks, buffer = undefined) {
     const parts = this.#terms.map((term, i) => ({ ...term, block: blocks[i], halves: new Uint16Array(blocks[i].buffer) }));
     const moves = ({ layer: name }) => this.#moving.has(name);
-    const sums = this.#rest(key, parts.filter((part) => !moves(part)), parts[0].halves.length).slice();
+    const { length } = parts[0].halves;
+    if (scratch.length < length) scratch = new Float32Array(length);
+    const sums = scratch.subarray(0, length);
+    sums.set(this.#rest(key, parts.filter((part) => !moves(part)), length));
     for (const part of parts.filter(moves)) addHalves(sums, part.halves, part.factors);
     this.#version += 1;
-    return { buffer: halvesOf(finished(layer, sums)).buffer, rect: blocks[0].rect, level: blocks[0].level, version: this.#version };
+    const halves = new Uint16Array(buffer?.byteLength === 2 * length ? buffer : length);
+    return { buffer: halvesOf(finished(layer, sums), halves).buffer, rect: blocks[0].rect, level: blocks[0].level, version: this.#version };
   }
 
   /** The sum of the terms that stay as they are while a slider moves, so that each frame adds one term, not all. */
