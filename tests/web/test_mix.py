@@ -294,3 +294,17 @@ def test_the_viewer_and_fetch_give_the_same_mix(real_farm, open_page, tmp_path):
     shown = [float(v) for v in page.evaluate("[...document.querySelectorAll('.viewer-value b')].map((e) => e.innerText)")]
     assert shown == pytest.approx(seen[3 * (16 * 48 + 24):][:3], rel=5e-4), "four digits"
     assert float(strings["lightshaft:relmse"]) == pytest.approx(float(page.text(".mix-top [role=status]").split()[1]), rel=5e-3), "three digits"
+
+
+def test_a_mix_follows_a_job_that_renders(real_farm, open_page):
+    id = real_farm.submit(ROOM, spp=1 << 20, aov="light_groups")
+    page = open_page(f"{real_farm.url()}/#token={real_farm.token}")
+    page.wait("document.querySelector('.link.live')")
+    page.evaluate(f"void (location.hash = '#/view/{id}?layer=mix&mix=sky*m')")
+    page.wait(f"{MIX} && document.querySelector('.mix-top [role=status]').innerText.includes('95 %')")
+    error = page.text(".mix-top [role=status]")
+
+    page.wait(f"document.querySelector('.mix-top [role=status]').innerText !== {json.dumps(error)} && !document.querySelector('.mix-top [role=status]').innerText.includes('…')")
+    page.wait("performance.getEntriesByType('resource').filter(({ name }) => name.includes('/pixels?layer=RGB_lamp&')).length > 2")
+
+    real_farm.request("PATCH", f"/api/v1/jobs/{id}", b'{"state": "cancelled"}')
