@@ -179,6 +179,17 @@ def test_a_mix_follows_the_samples_of_a_job_that_renders(farm, lit):
     page.wait("document.querySelector('.mix-top [role=status]').innerText.startsWith('relMSE 0.0100')")
 
 
+def test_two_jobs_are_compared_in_the_same_mix(farm, lit):
+    farm.jobs["j-2"] = job("j-2", size=farm.size)
+    farm.layers_of["j-2"] = {**farm.layers, "RGB_sun": Layer(["R", "G", "B"], lambda x, y: (0.25, 0.25, 0.25))}
+    page = lit("curve=linear&layer=mix&mix=sun*g1&mix=lamp*m&with=j-2&by=b")
+
+    page.wait(f"{VIEW}.dataset.painted === 'mix b'")
+    assert colour(page, 10, 10) == [128] * 3
+    change(page, "sun: gain in stops", "0")
+    page.wait(f"{VIEW}.dataset.painted === 'mix b' && (() => {{ const v = {VIEW}, at = v.windowPoint([10.5, 10.5]).map(Math.round); return v.querySelector('canvas').getContext('2d').getImageData(at[0], at[1], 1, 1).data[0] === 64; }})()")
+
+
 def test_a_region_has_the_mean_of_the_mix_and_its_error(lit):
     page = lit("layer=mix&mix=lamp*m&region=0,0,8,8")
     reads(page, "mean R 0.5000 ± 0.0078 G 0.2500 ± 0.0039 B 0.1250 ± 0.0020")  # 64 pixels: an eighth of each pixel's error
