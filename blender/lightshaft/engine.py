@@ -11,6 +11,7 @@ import numpy as np
 from . import exr
 from .export import export
 from .farm import Farm
+from .light_groups import known_name
 from .local import LocalJob, find_program
 from .problems import ExportError
 from .settings import preferences
@@ -31,12 +32,19 @@ PASSES = {
 }
 
 
+GROUP = "Combined_"  # with the name of a light group
+WITHOUT_AOV = ("Noise", "Denoised")
+
+
 def wanted_passes(scene, view_layer):
-    return {
+    wanted = {
         name: row
         for name, row in PASSES.items()
         if getattr(view_layer, row[0], getattr(scene.lightshaft, row[0], False))
     }
+    for group in view_layer.lightgroups:
+        wanted[GROUP + group.name] = (None, "RGB", "COLOR", f"RGB_{known_name(group.name)}", "RGB")
+    return wanted
 
 
 class LightshaftEngine(bpy.types.RenderEngine):
@@ -86,7 +94,13 @@ class LightshaftEngine(bpy.types.RenderEngine):
             # Frames can be negative; a seed can't.
             "seed": (settings.seed + (scene.frame_current if settings.animate_seed else 0)) % (1 << 32),
         }
-        aov = sorted({row[3] for name, row in self.passes.items() if name not in ("Noise", "Denoised")})
+        aov = sorted(
+            {
+                "light_groups" if name.startswith(GROUP) else row[3]
+                for name, row in self.passes.items()
+                if name not in WITHOUT_AOV
+            }
+        )
         if aov:
             spec["aov"] = aov
         if settings.use_target_error:
@@ -150,6 +164,8 @@ class LightshaftEngine(bpy.types.RenderEngine):
     def planes(self, name, layers, scene):
         _, _, _, layer, channels = self.passes[name]
         planes = [layers.get(f"{layer}.{c}") for c in channels]
+        if name.startswith(GROUP) and planes[0] is None:  # no light is in this group
+            return [np.zeros_like(layers["R"])] * 3
         if any(plane is None for plane in planes):  # a denoised layer comes with the finished image
             return None
         if name == "Depth":

@@ -7,6 +7,7 @@ from mathutils.bvhtree import BVHTree
 from . import meshes
 from .camera import add_camera, may_see
 from .document import Document, element, reference
+from .light_groups import LightGroups
 from .lights import add_light, only_if_hidden
 from .materials import Materials, Owner
 from .problems import Problems
@@ -22,8 +23,9 @@ SHEET = 1e-5  # the back of a sheet that gives off light stands this share of it
 class Shape:
     """A part of a mesh that can be placed in the scene."""
 
-    def __init__(self, filenames, bsdf, emission, medium, flags):
+    def __init__(self, filenames, bsdf, emission, medium, flags, group):
         self.filenames, self.bsdf, self.emission, self.medium = filenames, bsdf, emission, medium
+        self.group = group  # light group of the emission, or None
         self.flags = flags  # parameters about what the camera sees
         self.tree = None
 
@@ -43,6 +45,7 @@ class Exporter:
         self.materials = Materials(self.document, self.problems, textures)
         self.layer = depsgraph.view_layer_eval
         self.override = self.layer.material_override
+        self.groups = LightGroups(self.problems)
         self.known, self.places, self.bodies = {}, {}, []
 
     def run(self):
@@ -51,13 +54,14 @@ class Exporter:
             self.problems.error("The scene has no camera. Add one (Shift A > Camera)")
             self.problems.raise_errors()
         self.check_collections(self.layer.layer_collection)
+        for group in self.layer.lightgroups:
+            self.groups.add(group.name)
         for instance in self.depsgraph.object_instances:
             if instance.show_self:
                 self.add(instance.object, instance.matrix_world.copy())
         self.place_meshes()
-        add_world(
-            self.document, self.problems, self.textures, self.layer.world_override or self.scene.world
-        )
+        world = self.layer.world_override or self.scene.world
+        add_world(self.document, self.problems, self.textures, world, self.groups)
         camera = camera.evaluated_get(self.depsgraph)
         eye = camera.matrix_world.translation
         around = next((medium for medium, contains in self.bodies if contains(eye)), None)
@@ -71,7 +75,8 @@ class Exporter:
             return
         self.check_visibility(item)
         if item.type == "LIGHT":
-            add_light(self.document, self.problems, item, matrix, Matrix, self.may_see)
+            group = self.groups.of(item)
+            add_light(self.document, self.problems, item, matrix, Matrix, self.may_see, group)
         elif item.type == "VOLUME":
             self.add_grid(item, matrix)
         elif item.type in MESHES:
@@ -97,6 +102,7 @@ class Exporter:
                 tuple(material_name(s) for s in item.material_slots),
                 item.visible_camera,
                 item.is_holdout,
+                item.lightgroup,
             )
             if key not in self.known:
                 self.known[key] = self.shapes_of(item)
@@ -176,7 +182,9 @@ class Exporter:
         bsdf, emission = self.materials.surface(item.name, material)
         owner = Owner(item.name, material)
         found = self.volumes.coefficients(owner, of_grid=False) if material else None
-        medium = None
+        medium, group = None, None
+        if emission is not None or (found is not None and any(found.emission)):
+            group = self.groups.of(item)
         if found is not None:
             if not part.closed:
                 self.problems.error(
@@ -186,12 +194,12 @@ class Exporter:
                 self.problems.unsupported(
                     f"{owner}: hidden from rays (camera) with a volume in it. Switch Camera on in Object properties > Visibility"
                 )
-            medium = self.volumes.homogeneous(f"{item.name}-{material.name}", found)
+            medium = self.volumes.homogeneous(f"{item.name}-{material.name}", found, group)
         sides = [part.front()]
         if emission is not None and not part.closed:  # Blender's sheets give off light on both sides
             sides.append(part.back(SHEET * extent))
         flags = {"visible_camera": only_if_hidden(item), "holdout": True if item.is_holdout else None}
-        return Shape([self.document.write(side, ".ply") for side in sides], bsdf, emission, medium, flags)
+        return Shape([self.document.write(side, ".ply") for side in sides], bsdf, emission, medium, flags, group)
 
     def place_meshes(self):
         for key, places in self.places.items():
@@ -221,7 +229,9 @@ class Exporter:
         inside_medium = reference(shape.medium, "interior") if shape.medium else None
         emitter = None
         if shape.emission is not None:
-            emitter = element("emitter", "area", None, radiance=shape.emission)
+            emitter = element(
+                "emitter", "area", None, radiance=shape.emission, light_group=shape.group
+            )
         return element(
             "shape",
             "ply",

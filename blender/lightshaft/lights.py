@@ -11,8 +11,8 @@ FLIP = ((1, 0, 0, 0), (0, -1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1))  # Blender's l
 PROFILE = 512  # pixels of the image that a spot light throws
 
 
-def add_light(document, problems, item, matrix, matrix_class, may_see):
-    """Adds a light object at `matrix`. Its power is in W, as in the Light properties. `may_see`: a function of a
+def add_light(document, problems, item, matrix, matrix_class, may_see, group):
+    """Adds a light object at `matrix`, in a light group or None. Its power is in W, as in the Light properties. `may_see`: a function of a
     centre and a radius, False if the camera does not see the ball."""
     data, name = item.data, item.name
     colour = light_colour(data)
@@ -50,6 +50,7 @@ def add_light(document, problems, item, matrix, matrix_class, may_see):
             irradiance=colour,
             angular_radius=math.degrees(data.angle / 2),
             visible_camera=only_if_hidden(item),
+            light_group=group,
         )
         sun.append(vector("direction", direction))
         document.add(sun)
@@ -58,15 +59,16 @@ def add_light(document, problems, item, matrix, matrix_class, may_see):
         if radius > 0:
             ball = matrix_class.Translation(matrix.translation) @ matrix_class.Scale(radius, 4)
             radiance = [c / (4 * math.pi**2 * radius**2) for c in colour]
-            document.add(lamp("sphere", ball, radiance, item, may_see))
+            document.add(lamp("sphere", ball, radiance, item, may_see, group))
         else:
-            point = element("emitter", "point", None, intensity=[c / (4 * math.pi) for c in colour])
+            intensity = [c / (4 * math.pi) for c in colour]
+            point = element("emitter", "point", None, intensity=intensity, light_group=group)
             point.append(vector("position", matrix.translation, "point"))
             document.add(point)
     elif data.type == "SPOT":
-        add_spot(document, problems, data, name, colour, rigid @ matrix_class(FLIP))
+        add_spot(document, problems, data, name, colour, rigid @ matrix_class(FLIP), group)
     else:
-        add_area(document, problems, item, colour, matrix @ matrix_class(FLIP), matrix_class, may_see)
+        add_area(document, problems, item, colour, matrix @ matrix_class(FLIP), matrix_class, may_see, group)
 
 
 def light_colour(data):
@@ -89,12 +91,12 @@ def only_if_hidden(item):
     return None if item.visible_camera else False
 
 
-def lamp(shape, to_world, radiance, item, may_see):
+def lamp(shape, to_world, radiance, item, may_see, group):
     """Makes a shape that emits light and lets the light of others pass, like Blender's lamps. They are hidden from the
     camera by default; a lamp that is out of sight anyway is not marked, because marked shapes cost render time."""
     radius = to_world.col[0].xyz.length + to_world.col[1].xyz.length
     hidden = only_if_hidden(item) if may_see(to_world.translation, radius) else None
-    emitter = element("emitter", "area", None, radiance=radiance)
+    emitter = element("emitter", "area", None, radiance=radiance, light_group=group)
     return element(
         "shape",
         shape,
@@ -106,7 +108,7 @@ def lamp(shape, to_world, radiance, item, may_see):
     )
 
 
-def add_spot(document, problems, data, name, colour, to_world):
+def add_spot(document, problems, data, name, colour, to_world, group):
     if data.shadow_soft_size > 0:
         problems.unsupported(f"light '{name}': a spot's Radius. Lightshaft's spots are points: set it to 0")
     half = data.spot_size / 2
@@ -135,6 +137,7 @@ def add_spot(document, problems, data, name, colour, to_world):
             cutoff_angle=angle,
             beam_width=angle * 0.9999,
             texture=texture,
+            light_group=group,
         )
     )
 
@@ -150,7 +153,7 @@ def spot_profile(half, blend):
     return step * step * (3 - 2 * step)
 
 
-def add_area(document, problems, item, colour, to_world, matrix_class, may_see):
+def add_area(document, problems, item, colour, to_world, matrix_class, may_see, group):
     data, name = item.data, item.name
     if data.spread < math.pi - 1e-4:
         problems.unsupported(
@@ -166,4 +169,4 @@ def add_area(document, problems, item, colour, to_world, matrix_class, may_see):
         problems.error(f"light '{name}': its size is 0. Give it a size, or make it a point light")
         return
     radiance = [c / (math.pi * area) for c in colour]
-    document.add(lamp("disk" if round_one else "rectangle", placed, radiance, item, may_see))
+    document.add(lamp("disk" if round_one else "rectangle", placed, radiance, item, may_see, group))

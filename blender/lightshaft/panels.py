@@ -64,6 +64,54 @@ class LIGHTSHAFT_PT_object(LightshaftPanel):
         return context.object
 
 
+class LightGroupPanel(LightshaftPanel):
+    bl_label = "Light Group"
+    rows = ("lightgroup",)
+
+    def draw(self, context):
+        self.layout.use_property_split = True
+        self.layout.prop_search(
+            self.owner(context), "lightgroup", context.view_layer, "lightgroups", text="Light Group"
+        )
+
+
+class LIGHTSHAFT_PT_object_light_group(LightGroupPanel):
+    bl_context = "object"
+
+    @staticmethod
+    def owner(context):
+        return context.object
+
+
+class LIGHTSHAFT_PT_world_light_group(LightGroupPanel):
+    bl_context = "world"
+
+    @staticmethod
+    def owner(context):
+        return context.scene.world
+
+
+class LIGHTSHAFT_PT_light_groups(LightshaftPanel):
+    bl_label = "Light Groups"
+    bl_context = "view_layer"
+    rows = ("lightgroups",)
+
+    @staticmethod
+    def owner(context):
+        return context.view_layer
+
+    def draw(self, context):
+        layer = context.view_layer
+        row = self.layout.row()
+        row.template_list(
+            "UI_UL_list", "lightgroups", layer, "lightgroups", layer, "active_lightgroup_index", rows=3
+        )
+        buttons = row.column(align=True)
+        buttons.operator("scene.view_layer_add_lightgroup", icon="ADD", text="")
+        buttons.operator("scene.view_layer_remove_lightgroup", icon="REMOVE", text="")
+        self.layout.operator("scene.view_layer_add_used_lightgroups")
+
+
 class LIGHTSHAFT_PT_world(LightshaftPanel):
     bl_label = "Ray Visibility"
     bl_context = "world"
@@ -90,8 +138,11 @@ CLASSES = (
     LIGHTSHAFT_PT_render,
     LIGHTSHAFT_PT_film,
     LIGHTSHAFT_PT_object,
+    LIGHTSHAFT_PT_object_light_group,
     LIGHTSHAFT_PT_world,
+    LIGHTSHAFT_PT_world_light_group,
     LIGHTSHAFT_PT_passes,
+    LIGHTSHAFT_PT_light_groups,
 )
 
 

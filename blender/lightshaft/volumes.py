@@ -132,8 +132,10 @@ class Volumes:
             one.grid,
         )
 
-    def homogeneous(self, name, found):
-        return self.document.define(name, medium("homogeneous", found, total(found), any(found.emission)))
+    def homogeneous(self, name, found, group):
+        return self.document.define(
+            name, medium("homogeneous", found, total(found), any(found.emission), group)
+        )
 
     def grid(self, item, owner, found, path, matrix, box):
         """Makes a medium of a grid's file in the box (in object space). Returns its id, and the position of its
@@ -180,7 +182,7 @@ def total(found):
     return [s + a for s, a in zip(found.scattering, found.absorption)]
 
 
-def medium(plugin, found, sigma_t, glows):
+def medium(plugin, found, sigma_t, glows, group=None):
     albedo = [s / (s + a) if s + a > 0 else 0.0 for s, a in zip(found.scattering, found.absorption)]
     phase = element("phase", "hg", None, g=found.g) if found.g else element("phase", "isotropic")
     return element(
@@ -191,6 +193,7 @@ def medium(plugin, found, sigma_t, glows):
         sigma_t=sigma_t,
         albedo=albedo,
         emission=list(found.emission) if glows else None,
+        light_group=group if glows else None,
     )
 
 

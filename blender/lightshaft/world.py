@@ -11,7 +11,7 @@ AXES = np.array([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]], float)
 RAYS = ("diffuse", "glossy", "transmission", "scatter")
 
 
-def add_world(document, problems, textures, world):
+def add_world(document, problems, textures, world, groups):
     if world is None:
         return
     owner = WorldOwner(world)
@@ -23,6 +23,7 @@ def add_world(document, problems, textures, world):
         problems.unsupported(
             f"{owner}: hidden from rays ({', '.join(hidden)}). Switch all on in World properties > Settings > Ray Visibility"
         )
+    group = groups.of(world)
     seen = None if world.cycles_visibility.camera else False
     output = Place(node)
     if output.source(output.input("Volume"))[0]:
@@ -45,7 +46,11 @@ def add_world(document, problems, textures, world):
     if colour is not None:
         radiance = [strength * c for c in colour]
         if any(radiance):
-            document.add(element("emitter", "constant", None, radiance=radiance, visible_camera=seen))
+            document.add(
+                element(
+                    "emitter", "constant", None, radiance=radiance, visible_camera=seen, light_group=group
+                )
+            )
         return
     source, _ = background.source(background.input("Color"))
     where = f"{owner}, node '{source.title}'"
@@ -69,6 +74,7 @@ def add_world(document, problems, textures, world):
                 scale=strength,
                 to_world=np.linalg.inv(turn) @ AXES,
                 visible_camera=seen,
+                light_group=group,
             )
         )
 

@@ -66,13 +66,12 @@ int wait_and_fetch(const std::string& id, const SubmitFlags& flags) {
   if (code != kOk && done_frames(*end) == 0) return code;
   if (code == kOk && !flags.quiet) print_denoised(*api, *end);
   // One frame that has failed does not keep the others from being written.
-  const int fetched =
-      fetch_results(*api, id,
-                    {.image = flags.out,
-                     .report = flags.report,
-                     .html = flags.html,
-                     .patient = true,
-                     .done_only = code != kOk});
+  const int fetched = fetch_results(*api, id,
+                                    {.image = flags.out,
+                                     .report = flags.report,
+                                     .html = flags.html,
+                                     .patient = true,
+                                     .done_only = code != kOk});
   return code == kOk ? fetched : code;
 }
 

@@ -88,6 +88,7 @@ class StubFarm:
         self.layers = {"rgb": Layer(["R", "G", "B"], gradient), "stderr": Layer(["R", "G", "B"], lambda x, y: (0.25, 0.125, 0.0625)),
                        "error": Layer(["Y"], lambda x, y: (0.03,)), "spp": Layer(["Y"], lambda x, y: (64,))}
         self.layers_of = {}  # by job, before `layers`
+        self.mix = {"relmse": 0.02, "relmse_ci95": [0.018, 0.022], "trusted": True, "verdict": "trusted"}  # of every mix; or why there is none
         self.video = {"state": "none", "fps": None, "exposure": None, "layer": None, "frames": 0, "frames_done": 0, "bytes": None, "error": None}
         self.no_video = None  # why none is made
         self.log = ""  # of every job
@@ -267,6 +268,8 @@ def _handler(farm):
                 asked = dict(urllib.parse.parse_qsl(self.path.split("?")[1]))
                 rect = [int(v) for v in asked["rect"].split(",")]
                 return self._send(200, layers[asked["layer"]].bytes(int(asked["level"]), rect), "application/octet-stream")
+            if what == "mix":
+                return self._problem(409, farm.mix) if isinstance(farm.mix, str) else self._send(200, farm.mix)
             if what == "log":
                 return self._send(200, farm.log.encode(), "text/plain")
             if what == "video":

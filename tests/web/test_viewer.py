@@ -66,8 +66,9 @@ def test_an_image_with_alpha_lies_on_a_checkerboard(farm, viewer):
 
     # The squares have the light 1/16 and 1/8; a code is 255 times the light.
     assert [colour(page, x, 2) for x in (2, 34, 42)] == [[128, 64, 0], [16] * 3, [32] * 3]
+    before = page.evaluate(f"{VIEW}.dataset.pictures")
     page.evaluate("void (location.hash = '#/view/j-1?curve=linear&ev=-1')")
-    page.wait(f"{VIEW}.dataset.painted && document.getElementById('ev').value === '-1'")
+    page.wait(f"document.getElementById('ev').value === '-1' && {VIEW}.dataset.pictures !== '{before}'")
     assert [colour(page, x, 2) for x in (2, 34, 42)] == [[64, 32, 0], [16] * 3, [32] * 3]
 
 
@@ -101,6 +102,9 @@ def test_half_floats_are_read_and_written_as_python_does(modules_page):
     between = [v * 1.0003 for v in values if 1e-4 < abs(v) < 60000]
     wanted = [struct.unpack("<H", struct.pack("<e", struct.unpack("<f", struct.pack("<f", v))[0]))[0] for v in between]
     assert modules_page.evaluate(f"import('/js/viewer/half.js').then(({{ halfBits }}) => {between}.map(halfBits))") == wanted
+    edges = [*between, *(-v for v in between), 0, 65519, 65520, 1e9, 6.1e-5, 6.2e-5, 1e-9]
+    agree = modules_page.evaluate(f"import('/js/viewer/half.js').then(({{ halfBits, halvesOf }}) => {{ const v = Float32Array.from({edges}.concat(NaN, Infinity, -Infinity)); return halvesOf(v).every((half, i) => half === halfBits(v[i])); }})")
+    assert agree
 
 
 def test_the_pixel_under_the_pointer_is_read_with_its_standard_error(viewer):

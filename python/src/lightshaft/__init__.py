@@ -30,6 +30,7 @@ from .errors import (
 )
 from .farm import Farm, Job
 from .job import Verdict
+from .light_groups import mix
 from .scene_dict import scene_of_dict
 from .snapshot import Snapshot
 
@@ -59,6 +60,7 @@ __all__ = [
     "Unauthorised",
     "Verdict",
     "WaitTimeout",
+    "mix",
     "models",
     "scene_of_dict",
 ]

@@ -13,6 +13,7 @@ from . import models, snapshot, steps, submission, watching
 from .errors import SceneWarning
 from .images import Array
 from .job import JobState
+from .light_groups import Mix
 from .scene_files import PathLike
 from .snapshot import Curve, Snapshot
 from .submission import Scene
@@ -137,23 +138,31 @@ class AsyncJob(JobState):
         self._keep(await self._transport.run(watching.live(self.id, interval)))
         return self
 
-    async def image(self, layer: str = "color") -> Array:
+    async def image(self, layer: str = "color", mix: Mix | None = None) -> Array:
         """Returns the image, or another layer ('denoised'), as an array (height, width, 3) of linear RGB in
-        float32. Works while the job renders."""
-        return await self._transport.run(jobs_of.image(self.id, layer))
+        float32. Works while the job renders. `mix`: {light group: factor}, of the image in which the light of the
+        groups is multiplied by these factors."""
+        return await self._transport.run(jobs_of.image(self.id, layer, mix))
 
     async def layers(self) -> dict[str, Array]:
         """Returns all layers of the image by name: 'color', 'stderr', 'spp', the layers requested by `aov`, and
         'denoised'."""
         return await self._transport.run(jobs_of.layers(self.id))
 
-    async def png(self, exposure: float = 0, denoised: bool = False) -> bytes:
-        """Returns the image as a PNG file, brightened by `exposure` stops. `denoised`: use the denoised layers."""
-        return await self._transport.run(jobs_of.png(self.id, exposure, denoised))
+    async def png(self, exposure: float = 0, denoised: bool = False, mix: Mix | None = None) -> bytes:
+        """Returns the image as a PNG file, brightened by `exposure` stops. `denoised`: use the denoised layers.
+        `mix`: as of image()."""
+        return await self._transport.run(jobs_of.png(self.id, exposure, denoised, mix))
 
-    async def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the image as OpenEXR, with all layers and with a header that describes its origin."""
-        await self._transport.run(jobs_of.save(self.id, path))
+    async def save(self, path: str | os.PathLike[str], mix: Mix | None = None) -> None:
+        """Writes the image as OpenEXR, with all layers and with a header that describes its origin. `mix`: as of
+        image(); the file has no layers of light groups then."""
+        await self._transport.run(jobs_of.save(self.id, path, mix))
+
+    async def mix(self, factors: Mix) -> models.MixError:
+        """Returns the error of a mix of the image's light groups: relmse with its interval relmse_ci95, rmse, and
+        whether they can be trusted. image(mix=factors) is the mixed image."""
+        return await self._transport.run(jobs_of.mix(self.id, factors))
 
     async def report(self) -> models.Report:
         """Returns the report: how the image was made, what it cost and how large its error is. Verdict.of(report)

@@ -13,6 +13,7 @@ from . import models, snapshot, steps, submission, watching
 from .errors import SceneWarning
 from .images import Array
 from .job import JobState
+from .light_groups import Mix
 from .scene_files import PathLike
 from .snapshot import Curve, Snapshot
 from .submission import Scene
@@ -137,23 +138,31 @@ class Job(JobState):
         self._keep(self._transport.run(watching.live(self.id, interval)))
         return self
 
-    def image(self, layer: str = "color") -> Array:
+    def image(self, layer: str = "color", mix: Mix | None = None) -> Array:
         """Returns the image, or another layer ('denoised'), as an array (height, width, 3) of linear RGB in
-        float32. Works while the job renders."""
-        return self._transport.run(jobs_of.image(self.id, layer))
+        float32. Works while the job renders. `mix`: {light group: factor}, of the image in which the light of the
+        groups is multiplied by these factors."""
+        return self._transport.run(jobs_of.image(self.id, layer, mix))
 
     def layers(self) -> dict[str, Array]:
         """Returns all layers of the image by name: 'color', 'stderr', 'spp', the layers requested by `aov`, and
         'denoised'."""
         return self._transport.run(jobs_of.layers(self.id))
 
-    def png(self, exposure: float = 0, denoised: bool = False) -> bytes:
-        """Returns the image as a PNG file, brightened by `exposure` stops. `denoised`: use the denoised layers."""
-        return self._transport.run(jobs_of.png(self.id, exposure, denoised))
+    def png(self, exposure: float = 0, denoised: bool = False, mix: Mix | None = None) -> bytes:
+        """Returns the image as a PNG file, brightened by `exposure` stops. `denoised`: use the denoised layers.
+        `mix`: as of image()."""
+        return self._transport.run(jobs_of.png(self.id, exposure, denoised, mix))
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the image as OpenEXR, with all layers and with a header that describes its origin."""
-        self._transport.run(jobs_of.save(self.id, path))
+    def save(self, path: str | os.PathLike[str], mix: Mix | None = None) -> None:
+        """Writes the image as OpenEXR, with all layers and with a header that describes its origin. `mix`: as of
+        image(); the file has no layers of light groups then."""
+        self._transport.run(jobs_of.save(self.id, path, mix))
+
+    def mix(self, factors: Mix) -> models.MixError:
+        """Returns the error of a mix of the image's light groups: relmse with its interval relmse_ci95, rmse, and
+        whether they can be trusted. image(mix=factors) is the mixed image."""
+        return self._transport.run(jobs_of.mix(self.id, factors))
 
     def report(self) -> models.Report:
         """Returns the report: how the image was made, what it cost and how large its error is. Verdict.of(report)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
 import pathlib
 import tempfile
@@ -13,6 +14,7 @@ from urllib.parse import urlencode
 from . import models
 from .errors import NotFound, RequestRejected
 from .images import Array, decode_layers, layer_of
+from .light_groups import Mix
 from .steps import Call, Steps, ask_json, change_job, fetch, get_job, job_path, listed, succeed, work
 
 
@@ -90,17 +92,29 @@ class JobState:
         return f"<{type(self).__name__} {self.id}{name}: {self.state}, {100 * self.progress:.0f} %>"
 
 
-def layers(job: str) -> Steps[dict[str, Array]]:
-    data = yield from fetch(job_path(job, "/image.exr"))
+def layers(job: str, mix: Mix | None = None) -> Steps[dict[str, Array]]:
+    data = yield from fetch(_path(job, "/image.exr", _query(mix)))
     return (yield from work(lambda: decode_layers(data)))
 
 
-def image(job: str, layer: str) -> Steps[Array]:
-    return layer_of((yield from layers(job)), layer)
+def image(job: str, layer: str, mix: Mix | None) -> Steps[Array]:
+    return layer_of((yield from layers(job, mix)), layer)
 
 
-def save(job: str, path: str | os.PathLike[str]) -> Steps[None]:
-    data = yield from fetch(job_path(job, "/image.exr"))
+def mix(job: str, factors: Mix) -> Steps[models.MixError]:
+    return ask_json(Call("GET", _path(job, "/mix", _query(factors))))  # type: ignore[return-value]
+
+
+def _query(mix: Mix | None) -> dict[str, str]:
+    return {} if mix is None else {"mix": json.dumps(mix)}
+
+
+def _path(job: str, what: str, query: Mapping[str, str]) -> str:
+    return job_path(job, what) + (f"?{urlencode(query)}" if query else "")
+
+
+def save(job: str, path: str | os.PathLike[str], mix: Mix | None) -> Steps[None]:
+    data = yield from fetch(_path(job, "/image.exr", _query(mix)))
     yield from work(lambda: _write(pathlib.Path(path), data))
 
 
@@ -123,12 +137,13 @@ def _umask() -> int:
     return mask
 
 
-def png(job: str, exposure: float, denoised: bool) -> Steps[bytes]:
+def png(job: str, exposure: float, denoised: bool, mix: Mix | None) -> Steps[bytes]:
     query = {
         **({"exposure": repr(float(exposure))} if exposure else {}),
         **({"layer": "denoised"} if denoised else {}),
+        **_query(mix),
     }
-    return fetch(job_path(job, "/image.png") + (f"?{urlencode(query)}" if query else ""))
+    return fetch(_path(job, "/image.png", query))
 
 
 def report(job: str) -> Steps[models.Report]:

@@ -25,9 +25,16 @@ function layers(noise) {
   };
 }
 
-/** noise: of each pixel, relative to it. */
-export function numbers(noise) {
-  const made = layers(noise);
+/** Two thirds of the light are of the lamp, half of them scattered in fog; the rest is of the sky. */
+function groupLayers(noise) {
+  const part = (share) => ({ channels: ["R", "G", "B"], value: (x, y) => radiance(x / kSize[0], y / kSize[1]).map((v, c) => share * v * (1 + noise * (2 * hash(x, y, c) - 1))) });
+  const shares = { RGB_lamp: 2 / 3, "RGB_lamp.volume": 1 / 3, RGB_sky: 1 / 3, "RGB_sky.volume": 0 };
+  return Object.fromEntries(Object.entries(shares).flatMap(([name, share]) => [[name, part(share)], [`${name}.delta`, part(0.5 * noise * share)]]));
+}
+
+/** noise: of each pixel, relative to it. grouped: with light groups. */
+export function numbers(noise, grouped = false) {
+  const made = { ...layers(noise), ...(grouped ? groupLayers(noise) : {}) };
   const blocks = new Map();
   const rows = Object.entries(made).map(([name, { value, ...row }]) => ({ name, format: "half", blocks: "mean", ...row }));
   const layer = (name) => rows.find((row) => row.name === name) ?? rows[0];

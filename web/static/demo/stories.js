@@ -2,6 +2,8 @@
 // live page.
 import * as data from "./data.js";
 import { kPlain } from "../js/viewer/address.js";
+import { MixedSource, makeMixing } from "../js/viewer/mixing.js";
+import { h } from "../js/dom.js";
 import { numbers } from "./numbers.js";
 import { kWholeList } from "../js/job_list.js";
 import { initialState, openJob, withEvent, withJobs, withList, withListed, withOpen, withSubmit, withTiles, withUi, withWorkers } from "../js/state.js";
@@ -23,6 +25,16 @@ function viewing(view, more = {}) {
   const id = "j-91d2c3f4";
   const state = farm({ view: "view", id, frame: null });
   return { ...state, viewer: { id, view: { ...kPlain, ...view }, a: numbers(0.05), b: null, file: null, tool: "pan", probe: null, figures: null, flip: null, problem: null, changed: 0, ...more } };
+}
+
+function mixing(mix) {
+  const source = new MixedSource(numbers(0.05, true));
+  source.mix(mix);
+  const error = { relmse: 0.00231, relmse_ci95: [0.0021, 0.00254], trusted: true, verdict: "trusted" };
+  const state = viewing({ layer: "mix", mix }, { a: source, mixError: error });
+  const nothing = () => {};
+  state.viewer.mixing = makeMixing({ h, layers: source.layers, get: () => state.viewer, show: nothing, look: nothing, settled: nothing, job: { exr: () => "#" } });
+  return state;
 }
 
 const file = (path, bytes) => ({ path, file: { name: path.split("/").pop(), size: bytes } });
@@ -67,6 +79,7 @@ export const stories = {
     figures: { level: 0, mean: [0.2113, 0.1672, 0.1104], error: [0.0004, 0.0003, 0.0002], relmse: null } }),
   "viewer-compare": () => viewing({ other: "j-0a4417bb", by: "wipe", split: 0.45, exposure: 1 }, { b: numbers(0.7) }),
   "viewer-error": () => viewing({ layer: "error" }),
+  "viewer-mix": () => mixing(["lamp*g-1*k3200*v*vg1.5", "sky*c0.3_0.6_1"]),
   "viewer-objects": () => viewing({ layer: "crypto_object", matte: ["lamp"] }),
   workers: () => farm({ view: "workers", id: null }),
   "workers-empty": () => withWorkers(withJobs(signedIn({ view: "workers", id: null }), []), []),

@@ -73,6 +73,8 @@ export const api = {
   /** The numbers of a rectangle of a mip level, as an ArrayBuffer. */
   pixels: async (id, layer, level, rect) =>
     (await call("GET", `${jobPath(id)}/pixels?layer=${encodeURIComponent(layer)}&level=${level}&rect=${rect.join()}`)).arrayBuffer(),
+  /** {relmse, relmse_ci95, trusted, verdict} of a mix of light groups. */
+  mix: async (id, mix) => (await call("GET", `${jobPath(id)}/mix?mix=${encodeURIComponent(mix)}`)).json(),
   /** {state, frames, frames_done, fps, exposure, bytes, error}. */
   video: async (id) => (await call("GET", `${jobPath(id)}/video`)).json(),
   makeVideo: async (id, asked) => (await call("POST", `${jobPath(id)}/video`, json(asked))).json(),
@@ -90,7 +92,8 @@ export const api = {
 
 /** Addresses of files that the browser downloads by itself. */
 export const downloads = {
-  exr: (id) => `${kBase}${jobPath(id)}/image.exr`,
+  /** mix: of light groups; without one the image itself. */
+  exr: (id, mix = null) => `${kBase}${jobPath(id)}/image.exr${mix === null ? "" : `?mix=${encodeURIComponent(mix)}`}`,
   png: (id, exposure, layer) => `${kBase}${jobPath(id)}/image.png?exposure=${exposure}${layer === "denoised" ? "&layer=denoised" : ""}`,
   meters: (id) => `${kBase}${jobPath(id)}/meters`,
   report: (id) => `${kBase}${jobPath(id)}/report`,

@@ -6,6 +6,8 @@ import { openFile } from "./viewer/file_source.js";
 import { PixelSource } from "./viewer/source.js";
 import { kindOf } from "./viewer/paint.js";
 import { regionFigures } from "./viewer/region.js";
+import { downloads } from "./api.js";
+import { h } from "./dom.js";
 import { viewHref } from "./route.js";
 import { isOver, mayChange, withJob, withViewer } from "./state.js";
 
@@ -17,6 +19,7 @@ const next = (list, value, by) => list[(list.indexOf(value) + by + list.length) 
 
 export function makeViewerActions({ get, set, attempt, api, snapshot }) {
   const sources = { a: null, b: null };
+  let mixing = null; // of the first picture, if it has light groups
   let pointing = 0;
 
   function change(more) {
@@ -30,10 +33,31 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
     const before = get().viewer?.view;
     if (!before) return;
     change({ view: { ...before, ...more } });
+    if (more.mix) remix();
     if ((more.layer ?? before.layer) !== before.layer) {
       probeAgain();
       survey();
+      refreshFigures();
     }
+  }
+
+  /** Mixes light groups as the address says. */
+  function remix() {
+    for (const which of ["a", "b"]) sources[which]?.mix?.(get().viewer.view.mix);
+    mixing?.changed();
+    probeAgain();
+  }
+
+  /** What mixes light groups, which is loaded for the first picture that has some. */
+  function mixingOf(layers) {
+    return layers.some(({ name }) => name.startsWith("RGB_")) ? import(new URL("./viewer/mixing.js", import.meta.url)) : null;
+  }
+
+  function closeSources() {
+    for (const which of ["a", "b"]) sources[which]?.close();
+    sources.a = sources.b = null;
+    mixing?.close();
+    mixing = null;
   }
 
   /** What is read from the pixel under the pointer stays when another layer or picture comes. */
@@ -60,9 +84,11 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
   async function openJob(which, id) {
     const { viewer: opened } = get();
     let meta;
+    let light; // the module
     let plain = opened?.plain;
     try {
       meta = await api.layers(id);
+      light = await mixingOf(meta.layers);
       if (which === "a") plain = await bestLayer(id, meta);
     } catch (error) {
       if (error.status === 401) await attempt(() => Promise.reject(error));
@@ -71,9 +97,18 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
     }
     if (get().viewer === null || get().viewer.id !== opened.id) return;
     sources[which]?.close();
-    sources[which] = new PixelSource(meta, (layer, level, rect) => api.pixels(id, layer, level, rect), came);
+    const plainSource = new PixelSource(meta, (layer, level, rect) => api.pixels(id, layer, level, rect), came);
+    sources[which] = light ? new light.MixedSource(plainSource) : plainSource;
+    if (which === "a" && light) {
+      mixing = light.makeMixing({
+        h, layers: meta.layers, look, get: () => get().viewer, show: (more) => set(withViewer(get(), more)),
+        settled: () => { refreshFigures(); survey(); },
+        job: { error: (mix) => api.mix(id, mix), exr: (mix) => downloads.exr(id, mix) },
+      });
+    }
     const { view } = get().viewer;
-    set(withViewer(get(), { [which]: sources[which], plain, ...(which === "a" ? { view: { ...view, layer: view.layer ?? plain } } : {}) }));
+    set(withViewer(get(), { [which]: sources[which], plain, ...(which === "a" ? { mixing, view: { ...view, layer: view.layer ?? plain } } : {}) }));
+    if (light) remix();
     refreshFigures();
     probeAgain();
     if (which === "a") survey();
@@ -133,7 +168,8 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
       return;
     }
     const of = (source, name) => (source?.layer(name).name === name ? source.pixel(source.layer(name), ...pixel).catch(() => null) : null);
-    const [values, error, samples, second] = await Promise.all([of(a, view.layer), view.layer === "rgb" ? of(a, "stderr") : null, of(a, "spp"), of(b, view.layer)]);
+    const errors = { rgb: "stderr", mix: "mix.stderr" };
+    const [values, error, samples, second] = await Promise.all([of(a, view.layer), errors[view.layer] ? of(a, errors[view.layer]) : null, of(a, "spp"), of(b, view.layer)]);
     if (mine === pointing && get().viewer) set(withViewer(get(), { probe: { pixel, layer: view.layer, values, error, samples: samples?.[0], second } }));
   }
 
@@ -153,7 +189,7 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
   async function refreshFigures() {
     const { a, b, view } = get().viewer;
     if (!view.region || !a) return;
-    const figures = await regionFigures(a, b, view.region).catch(() => null);
+    const figures = await regionFigures(a, b, view.region, a.layer(view.layer).name === "mix" ? ["mix", "mix.stderr"] : ["rgb", "stderr"]).catch(() => null);
     if (get().viewer?.view.region === view.region) set(withViewer(get(), { figures }));
   }
 
@@ -220,12 +256,12 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
         set(withViewer(get(), { view: { ...view, layer: view.layer ?? (before.a ? before.plain : null) } }));
         probeAgain();
         survey();
+        if (String(view.mix) !== String(before.view.mix)) remix();
         if (view.other !== before.view.other) compare(view.other);
         return;
       }
-      for (const which of ["a", "b"]) sources[which]?.close();
-      sources.a = sources.b = null;
-      set({ ...get(), viewer: { id, view, a: null, b: null, plain: "rgb", report: null, survey: null, histogram: false, file: null, others: null, tool: "pan", probe: null, figures: null, flip: null, problem: null, refused: null, changed: 0 } });
+      closeSources();
+      set({ ...get(), viewer: { id, view, a: null, b: null, plain: "rgb", report: null, survey: null, histogram: false, file: null, others: null, tool: "pan", probe: null, figures: null, flip: null, problem: null, refused: null, changed: 0, mixing: null, mixError: null, mixWaits: false, mixRefused: null } });
       openJob("a", id);
       // if this fails, the viewer says so for the layers
       snapshot(`job ${id}`, () => api.job(id), (now, job) => (now.viewer?.id === id ? withJob(now, job) : now)).catch(() => {});
@@ -234,8 +270,7 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
       if (view.other) openJob("b", view.other);
     },
     closeViewer: () => {
-      for (const which of ["a", "b"]) sources[which]?.close();
-      sources.a = sources.b = null;
+      closeSources();
       if (get().viewer) set({ ...get(), viewer: null });
     },
     /** An event of the stream, or null: any may have been missed. */
@@ -246,6 +281,7 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
         if (type === null) sources[which]?.touch(null);
         else if (type === "tile" && data.job === id && data.state === "folded") sources[which]?.touch(data.rect);
       }
+      if (type === null || (type === "tile" && data.job === viewer.id && data.state === "folded")) mixing?.touched();
     },
     look,
     point,

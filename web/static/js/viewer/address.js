@@ -1,6 +1,6 @@
 // The viewer's state in the address bar, so that a link opens the same view:
-// #/view/ID?layer=depth&ev=1.5&zoom=2&x=10&y=20 &with=ID&by=wipe&split=0.4&region=0,0,10,10&matte=name.
-// Values that equal their defaults are left out.
+// #/view/ID?layer=depth&ev=1.5&zoom=2&x=10&y=20 &with=ID&by=wipe&split=0.4&region=0,0,10,10&matte=name
+// &mix=sun*g1.5 (viewer/mix.js). Values that equal their defaults are left out.
 import { kCurves } from "./tone.js";
 
 export const kCompared = [["wipe", "Wipe"], ["a", "First"], ["b", "Second"], ["difference", "Difference"], ["relmse", "relMSE"], ["flip", "FLIP"]];
@@ -8,7 +8,7 @@ export const kOverlays = [["", "None"], ["error", "Error"], ["spp", "Samples"]];
 export const kMostExposure = 16;
 
 export const kPlain = {
-  layer: "rgb", channel: null, exposure: 0, curve: "srgb", falseColour: false, overlay: "", zoom: null, x: 0, y: 0, other: null, by: "wipe", split: 0.5, region: null, matte: [],
+  layer: "rgb", channel: null, exposure: 0, curve: "srgb", falseColour: false, overlay: "", zoom: null, x: 0, y: 0, other: null, by: "wipe", split: 0.5, region: null, matte: [], mix: [],
 };
 
 const one = (options, value, otherwise) => (options.some(([name]) => name === value) ? value : otherwise);
@@ -35,6 +35,7 @@ export function viewOf(query) {
     split: number(of.get("split"), 0, 1, kPlain.split),
     region: inOrder ? region : null,
     matte: of.getAll("matte").slice(0, 64),
+    mix: of.getAll("mix").slice(0, 32), // the most light groups of an image
   };
 }
 
@@ -58,5 +59,6 @@ export function queryOf(view, plain = kPlain.layer) {
   }
   put("region", view.region?.join(",") ?? null, null);
   for (const name of view.matte) of.append("matte", name);
+  for (const text of view.mix) of.append("mix", text);
   return of.toString();
 }

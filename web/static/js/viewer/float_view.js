@@ -8,7 +8,7 @@ import { flipCanvas } from "./flip_canvas.js";
 import { drawValues, kValuesFrom } from "./values.js";
 
 const kCoarser = 4; // up to this many levels coarser than wanted are drawn until the wanted level arrives
-const kOverChecks = ["rgb", "denoised"]; // layers that are shown over a checkerboard if the image has alpha
+const kOverChecks = ["rgb", "denoised", "mix"]; // layers that are shown over a checkerboard if the image has alpha
 const kMostPainted = 384; // most painted blocks that are kept
 const kOverlayOpacity = 0.6;
 const kWheelStep = 1.0015; // zoom factor per unit of a wheel's movement
@@ -132,11 +132,13 @@ class FloatView extends HTMLElement {
   /** True if every block at the wanted level was there. */
   #drawPicture(context, level, ratio, which, source) {
     const layer = source.layer(this.#model.layer);
-    const there = seenBlocks(this.#view, this.#size, this.#window, level).every(([bx, by]) => source.block(layer.name, level, bx, by));
+    const seen = seenBlocks(this.#view, this.#size, this.#window, level).map(([bx, by]) => source.block(layer.name, level, bx, by));
+    const there = seen.every(Boolean);
     for (let coarse = Math.min(source.maxLevel, level + kCoarser); !there && coarse > level; coarse -= 1) {
       this.#drawBlocks(context, coarse, ratio, (bx, by) => this.#block(which, source, layer, coarse, bx, by));
     }
-    const complete = this.#drawBlocks(context, level, ratio, (bx, by) => this.#block(which, source, layer, level, bx, by));
+    const drawn = this.#drawBlocks(context, level, ratio, (bx, by) => this.#block(which, source, layer, level, bx, by));
+    const complete = drawn && !seen.some((block) => block.late); // of an earlier mix, see mixed_source.js
     if (!this.#model.overlay) return complete;
     context.globalAlpha = kOverlayOpacity;
     const over = this.#drawBlocks(context, level, ratio, (bx, by) => this.#block(which, source, source.layer(this.#model.overlay), level, bx, by));

@@ -22,7 +22,19 @@ export function floatsOf(buffer, format) {
   return Float32Array.from(new Uint16Array(buffer), (bits) => values[bits]);
 }
 
-const scratch = new DataView(new ArrayBuffer(4));
+const scratch = new Float32Array(1);
+const scratchBits = new Uint32Array(scratch.buffer);
+
+/** The half floats nearest to values, as halfBits() gives them, but sooner; into `halves`. */
+export function halvesOf(floats, halves = new Uint16Array(floats.length)) {
+  const bits = new Uint32Array(floats.buffer, floats.byteOffset, floats.length);
+  for (let i = 0; i < halves.length; i += 1) {
+    const size = bits[i] & 0x7fffffff;
+    const usual = size >= 0x38800000 && size < 0x477ff000; // 2^-14 to where halves end
+    halves[i] = usual ? ((bits[i] >>> 16) & 0x8000) | ((size - 0x38000000 + 0xfff + ((size >> 13) & 1)) >> 13) : halfBits(floats[i]);
+  }
+  return halves;
+}
 
 /** The half float nearest to a value; beyond 65504 that. */
 export function halfBits(value) {
@@ -30,7 +42,7 @@ export function halfBits(value) {
   const sign = value < 0 ? 0x8000 : 0;
   const size = Math.min(Math.abs(value), 65504);
   if (size < 2 ** -14) return sign | Math.round(size * 2 ** 24);
-  scratch.setFloat32(0, size);
-  const bits = scratch.getUint32(0) - 0x38000000;
+  scratch[0] = size;
+  const bits = scratchBits[0] - 0x38000000;
   return sign | ((bits + 0xfff + ((bits >> 13) & 1)) >> 13);
 }

@@ -19,13 +19,14 @@ export function pieces(size, [x0, y0, x1, y1], level) {
 
 /**
  * {level, mean, error, relmse}: the mean of each channel with the standard error of that mean, as far as pixels have
- * samples; relmse of `a` against `b`, or null. Above level 0 blocks of pixels stand for the pixels.
+ * samples; relmse of `a` against `b`, or null. Above level 0 blocks of pixels stand for the pixels. colour, stderr: the
+ * layers of `a`; `b` has the first, or "rgb".
  */
-export async function regionFigures(a, b, region) {
+export async function regionFigures(a, b, region, [colour, stderr] = ["rgb", "stderr"]) {
   const level = regionLevel(region);
   const sums = { mean: [0, 0, 0], error: [0, 0, 0], relmse: 0, pixels: 0 };
   for (const rect of pieces(a.size, region, level)) {
-    const [x, d, y] = await Promise.all([a.values("rgb", level, rect), a.values("stderr", level, rect), b ? b.values("rgb", level, rect) : null]);
+    const [x, d, y] = await Promise.all([a.values(colour, level, rect), a.values(stderr, level, rect), b ? b.values(b.layer(colour).name, level, rect) : null]);
     for (let from = 0; from < x.length; from += 3) {
       if (Number.isNaN(x[from]) || (y && Number.isNaN(y[from]))) continue;
       sums.pixels += 1;

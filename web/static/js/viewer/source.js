@@ -12,7 +12,7 @@ const kFirstRetryMs = 500;
 const kLongestRetryMs = 15_000;
 const kSurveySide = 256;
 const kProbeSide = 16;
-const kMostProbes = 256;
+const kMostProbes = 2048;
 
 export class PixelSource {
   #fetch;
@@ -107,10 +107,13 @@ export class PixelSource {
     this.#pump();
   }
 
+  /** What is wanted now stays, however much it is: a mix of many light groups needs all of them at once. */
   #forget() {
+    if (this.#bytes <= kMostBytes) return;
+    const wanted = new Set(this.#wanted.map((parts) => parts.join(" ")));
     for (const [key, block] of this.#blocks) {
       if (this.#bytes <= kMostBytes) return;
-      if (block.running) continue;
+      if (block.running || wanted.has(key)) continue;
       this.#bytes -= block.buffer?.byteLength ?? 0;
       this.#blocks.delete(key);
     }
@@ -138,11 +141,11 @@ export class PixelSource {
     return floatsOf(await this.#fetch(name, level, rect), this.layer(name).format);
   }
 
-  /** {least, most, counts}: the ends of all finite values of a layer, and how many lie in each of `bins` equal parts between them (of positive values by their logarithms). Of a picture reduced to kSurveySide pixels. */
-  async survey(name, bins) {
-    const layer = this.layer(name);
+  /** {least, most, counts}: the ends of all finite values of a layer, and how many lie in each of `bins` equal parts between them (of positive values by their logarithms). Of a picture reduced to kSurveySide pixels. of: the source that has the layer. */
+  async survey(name, bins, of = this) {
+    const layer = of.layer(name);
     const level = Math.min(this.maxLevel, Math.max(0, Math.ceil(Math.log2(Math.max(...this.size) / kSurveySide))));
-    const parts = await Promise.all(pieces(this.size, [0, 0, ...this.size], level).map((rect) => this.values(layer.name, level, rect)));
+    const parts = await Promise.all(pieces(this.size, [0, 0, ...this.size], level).map((rect) => of.values(layer.name, level, rect)));
     return surveyed(parts.flatMap((part) => [...part]), layer.channels.length, bins);
   }
 

@@ -11,7 +11,7 @@ import { comparable, identifiersOf, nameOf } from "../viewer_actions.js";
 import { legend } from "./job_image.js";
 import { choice, notice } from "./pieces.js";
 
-const kLayerNames = { rgb: "Picture", denoised: "Denoised", stderr: "Standard error", error: "Relative error", spp: "Samples", crypto_object: "Objects", crypto_material: "Materials" };
+const kLayerNames = { rgb: "Picture", denoised: "Denoised", stderr: "Standard error", error: "Relative error", spp: "Samples", mix: "Mix of light groups", "mix.stderr": "Standard error of the mix", crypto_object: "Objects", crypto_material: "Materials" };
 const kKeys = [
   ["arrows", "move; with Shift by one pixel"], ["+ −", "zoom"], ["0", "fit"], ["z", "one to one"], ["1 – 9", "first picture, others of the list to compare"], ["k", "single channels"], ["h", "histogram"], ["e E", "brighter, darker"], ["c", "tone curve"], ["l L", "layer"],
   ["o", "overlay"], ["f", "false colours"], ["r", "region: what is seen, or none"], ["p", "render the region first, or none first"], ["Enter", "select the object in the middle"], ["b", "way to compare"], ["x", "first, second"], ["[ ]", "wipe"],
@@ -30,10 +30,11 @@ export function viewerView(state, actions) {
   const second = fits && b.layer(layer.name).name === layer.name ? b : null;
   const parts = [tools(viewer, layer, actions), compareTools(state, viewer, fits, second, actions)];
   // What comes and goes stands below the picture: it must not move while somebody drags in it.
+  const mix = viewer.mixing?.panel(viewer) ?? null;
   const picture = [
-    stage(state, viewer, layer, second, job ?? { id: viewer.id }, actions),
+    h("div", { key: "side", class: "viewer-side" }, stage(state, viewer, layer, second, job ?? { id: viewer.id }, actions), state.narrow ? null : mix),
     viewer.problem || viewer.refused ? h("p", { key: "problem", class: "toast", role: "alert" }, viewer.problem || viewer.refused) : null,
-    focusTools(state, viewer, job, actions), reading(viewer, layer, second), viewer.histogram ? histogram(viewer.survey, layer) : null];
+    focusTools(state, viewer, job, actions), reading(viewer, layer, second), viewer.histogram ? histogram(viewer.survey, layer) : null, state.narrow ? mix : null];
   return h("article", { key: "viewer", class: "viewer" },
     h("div", { class: "viewer-head" },
       h("h1", null, jobName(job ?? { id: viewer.id })),
@@ -60,7 +61,8 @@ function stage(state, viewer, layer, second, job, actions) {
   const { a, view } = viewer;
   const name = jobName(job);
   const focus = job.focus && !isOver(job) ? job.focus : null;
-  const { exposure, curve, falseColour, channel, by, split, overlay, region } = view;
+  const { exposure, curve, falseColour, channel, by, split, region } = view;
+  const overlay = overlaysOf(layer).some(([name]) => name === view.overlay) ? view.overlay : "";
   const range = viewer.survey?.layer === layer.name ? [viewer.survey.least, viewer.survey.most] : null;
   const other = viewer.file ? { name: viewer.file } : [...(viewer.others ?? []), ...(state.jobs?.values() ?? [])].find(({ id }) => id === view.other) ?? { id: view.other ?? "" };
   const sides = [`First: ${describe(job)}`, `Second: ${describe(other)}`];
@@ -72,6 +74,9 @@ function stage(state, viewer, layer, second, job, actions) {
     onframed: (event) => actions.frame(event.detail), onsplit: (event) => actions.look({ split: event.detail }), onflipped: (event) => actions.flipped(event.detail), oncommand: (event) => actions.command(event.detail),
   }));
 }
+
+/** The error that lies over a picture is that of the image itself. */
+const overlaysOf = (layer) => (layer.name === "mix" ? kOverlays.filter(([name]) => name !== "error") : kOverlays);
 
 function tools(viewer, layer, actions) {
   const { a, view } = viewer;
@@ -85,7 +90,7 @@ function tools(viewer, layer, actions) {
     pick("curve", "Curve", kCurves, view.curve, (curve) => actions.look({ curve }), !coloured || view.falseColour),
     h("label", { key: "false", class: "check" }, h("input", { type: "checkbox", id: "false", disabled: !coloured && kindOf(layer) !== "measure", ".checked": view.falseColour, onchange: () => actions.look({ falseColour: !view.falseColour }) }), "False colours"),
     layer.channels.length > 1 && kindOf(layer) !== "matte" ? pick("channel", "Channels", [["", "all"], ...layer.channels.slice(0, 3).map((name, i) => [String(i), name])], view.channel === null ? "" : String(view.channel), (value) => actions.look({ channel: value === "" ? null : Number(value) })) : null,
-    pick("overlay", "Overlay", kOverlays, view.overlay, (overlay) => actions.look({ overlay })),
+    pick("overlay", "Overlay", overlaysOf(layer), view.overlay, (overlay) => actions.look({ overlay })),
     choice("tool", "What dragging does", [["pan", "Move"], ["region", "Region"]], viewer.tool, actions.setTool),
     h("span", { key: "zoom", class: "viewer-zoom" },
       zoomButton("−", "Zoom out", "-"), zoomButton("+", "Zoom in", "+"), zoomButton("Fit", "Fit into the window", "0"), zoomButton("1:1", "1:1, one pixel to one", "z")),
@@ -158,7 +163,7 @@ function histogram(survey, layer) {
 function coloursOf(view, layer, second) {
   if (second && (view.by === "relmse" || view.by === "flip")) return view.by;
   if (kindOf(layer) === "ramp") return layer.name;
-  if (view.overlay) return view.overlay;
+  if (view.overlay && overlaysOf(layer).some(([name]) => name === view.overlay)) return view.overlay;
   return view.falseColour && kindOf(layer) === "colour" ? "false" : null;
 }
 
