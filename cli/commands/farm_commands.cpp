@@ -222,8 +222,9 @@ int fetch(FarmApi& api, const FarmFlags& flags) {
       return usage_error("--mix: an image can be mixed, the values of meters cannot");
     mix = canonical_json(*read);
   }
-  return fetch_results(api, flags.id,
-                       {.image = out, .report = flags.report, .html = flags.html, .mix = mix, .json = flags.farm.json});
+  return fetch_results(
+      api, flags.id,
+      {.image = out, .report = flags.report, .html = flags.html, .mix = mix, .json = flags.farm.json});
 }
 
 // With --frame, replaces the id of a sequence (a job with several frames) in `flags` by the id of that frame,
@@ -335,9 +336,10 @@ void add_farm_commands(CLI::App& app, Action& action) {
       *fetch_command, "-o,--output", fetching->out, "OUT.exr",
       "file of the image, .exr or .png, or of the values of meters, .json; for a sequence with # for the "
       "frame number, for example out_####.exr; default: the scene's name in this folder");
-  add_option(*fetch_command, "--mix", fetching->mix, "GROUP=FACTOR,...",
-             "multiply the light of light groups: key=2,fill=0.5:0.4:0.3 (R:G:B), fog.volume=4 for the light of "
-             "media alone; or a file MIX.json that the dashboard has saved. The job must have --aov light_groups");
+  add_option(
+      *fetch_command, "--mix", fetching->mix, "GROUP=FACTOR,...",
+      "multiply the light of light groups: key=2,fill=0.5:0.4:0.3 (R:G:B), fog.volume=4 for the light of "
+      "media alone; or a file MIX.json that the dashboard has saved. The job must have --aov light_groups");
   add_option(*fetch_command, "--report", fetching->report, "REPORT.json",
              "also write the report as JSON; with # in the name, one for each frame");
   add_option(*fetch_command, "--html", fetching->html, "REPORT.html",

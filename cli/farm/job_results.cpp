@@ -40,8 +40,8 @@ struct Plan {
 };
 
 // Returns the part of the result's URL that follows the path of the job: "/image.exr", "/meters" or
-// "/image.png", of an image with a query for the mix of light groups and, for a PNG, for the denoised image if
-// the job requests denoising.
+// "/image.png", of an image with a query for the mix of light groups and, for a PNG, for the denoised image
+// if the job requests denoising.
 std::string image_of(const json& job, const Results& wanted) {
   const auto format = image_format(wanted.image);
   if (format == ImageFormat::json) return "/meters";
@@ -101,9 +101,10 @@ void print_mix_error(FarmApi& api, const std::string& id, const std::string& mix
   const auto relmse = number_field(*error, "relmse");
   const auto interval = error->find("relmse_ci95");
   if (!relmse || interval == error->end() || !interval->is_array() || interval->size() != 2) return;
-  print_note(fmt::format("relMSE of the mix: {:.3g} (95 %: {:.3g} to {:.3g}){}", *relmse,
-                         (*interval)[0].get<double>(), (*interval)[1].get<double>(),
-                         flag_field(*error, "trusted") ? "" : "; " + plain_text(text_field(*error, "verdict"))));
+  print_note(
+      fmt::format("relMSE of the mix: {:.3g} (95 %: {:.3g} to {:.3g}){}", *relmse,
+                  (*interval)[0].get<double>(), (*interval)[1].get<double>(),
+                  flag_field(*error, "trusted") ? "" : "; " + plain_text(text_field(*error, "verdict"))));
 }
 
 // Returns the command by which a person downloads the same results.
@@ -245,7 +246,8 @@ int fetch_results(FarmApi& api, const std::string& id, const Results& wanted) {
       return print_rejected(got.error());
     if (wanted.json) print(dump(json{{"file", d.file}}, -1));
   }
-  if (!wanted.mix.empty() && !wanted.image.empty() && !frames && !wanted.json) print_mix_error(api, id, wanted.mix);
+  if (!wanted.mix.empty() && !wanted.image.empty() && !frames && !wanted.json)
+    print_mix_error(api, id, wanted.mix);
   const std::vector<std::uint32_t>& left_out = plan->left_out;
   if (left_out.empty()) return kOk;
   constexpr std::size_t kShown = 20;

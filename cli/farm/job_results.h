@@ -41,7 +41,7 @@ struct Results {
   // Names of the files to write; empty: this result is not wanted. A run of # in the last component is
   // replaced by the frame number.
   std::string image, report, html;
-  std::string mix;  // JSON of the mix of light groups to fetch instead of the image; empty: none
+  std::string mix;       // JSON of the mix of light groups to fetch instead of the image; empty: none
   bool json = false;     // print each file as a line of JSON on stdout
   bool patient = false;  // keep trying for a while if the coordinator is unreachable
   // Of a sequence, only the frames that are done; without it, all that have data.

@@ -10,8 +10,8 @@
 #include <ranges>
 #include <set>
 
-#include "coordinator/admission/layer_names.h"
 #include "coordinator/admission/decoded_reference.h"
+#include "coordinator/admission/layer_names.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/store/jobs/job_store.h"
 #include "core/base/file_form.h"
@@ -367,17 +367,17 @@ Result<Admission> admit_again(const StoredJob& before, const JobSpec& changes, c
   Admission admission;
   StoredJob& job = admission.job;
   job = {.name = before.name,
-                .scene_name = before.scene_name,
-                .scene = before.scene,
-                .settings = before.settings,
-                .spec = before.spec,
-                .spp = before.spp,
-                .assets = before.assets,
-                .meters = before.meters,
-                .warnings = before.warnings,
-                .features_used = before.features_used,
-                .features_left_out = before.features_left_out,
-                .needs = before.needs,
+         .scene_name = before.scene_name,
+         .scene = before.scene,
+         .settings = before.settings,
+         .spec = before.spec,
+         .spp = before.spp,
+         .assets = before.assets,
+         .meters = before.meters,
+         .warnings = before.warnings,
+         .features_used = before.features_used,
+         .features_left_out = before.features_left_out,
+         .needs = before.needs,
          .analysis = before.analysis};
   if (!frame) job.spec.frames = {};  // a single image, even if the old job was a frame of a sequence
   if (changes.spp || changes.target_error || changes.time) {

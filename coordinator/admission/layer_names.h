@@ -16,8 +16,7 @@ inline bool wants_labels(const RenderSettings& settings) {
   return aovs_of(settings).any_of(aovs_of(AovKind::ids));
 }
 
-inline LayerNames layer_names_of(const Scene& scene, AovSet aovs,
-                                 std::vector<std::string> light_groups) {
+inline LayerNames layer_names_of(const Scene& scene, AovSet aovs, std::vector<std::string> light_groups) {
   LayerNames out{.light_groups = std::move(light_groups)};
   std::vector<std::string> shapes, materials;
   for (std::size_t i = 0; i < scene.shape_labels.size(); ++i) {

@@ -269,7 +269,7 @@ std::optional<trace::SpanContext> Coordinator::trace_of(const JobId& id) const {
 // Images and reports
 
 Result<std::vector<std::byte>> Coordinator::image_exr(const JobId& id,
-                                                     const std::optional<LightMix>& mix) const {
+                                                      const std::optional<LightMix>& mix) const {
   return parts_->pictures.image_exr(id, mix);
 }
 
@@ -278,7 +278,7 @@ Result<std::string> Coordinator::mix_json(const JobId& id, const LightMix& mix) 
 }
 
 Result<std::vector<std::byte>> Coordinator::image_png(const JobId& id, double exposure, bool denoised,
-                                                     const std::optional<LightMix>& mix) const {
+                                                      const std::optional<LightMix>& mix) const {
   return parts_->pictures.image_png(id, exposure, denoised, mix);
 }
 

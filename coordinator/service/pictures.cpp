@@ -40,8 +40,7 @@ Result<Pictures::Picture> Pictures::picture(const JobId& id, const std::optional
   if (mix) {
     auto plain = picture(id);
     if (!plain) return plain;
-    const auto factors =
-        factors_of(*mix, plain->film.aovs(), plain->facts.job.settings.light_groups);
+    const auto factors = factors_of(*mix, plain->film.aovs(), plain->facts.job.settings.light_groups);
     if (!factors) return tl::unexpected(factors.error());
     const ImageError colour = image_error(plain->film.error());
     plain->film = plain->film.mixed(*factors);
@@ -68,7 +67,7 @@ std::filesystem::path Pictures::final_file(const JobId& id, const std::string& n
 }
 
 Result<std::vector<std::byte>> Pictures::image_exr(const JobId& id,
-                                                  const std::optional<LightMix>& mix) const {
+                                                   const std::optional<LightMix>& mix) const {
   if (const auto file = mix ? std::filesystem::path() : final_file(id, "image.exr"); !file.empty())
     return read_file(file, std::uint64_t{1} << 33);
   auto shown = picture(id, mix);
@@ -117,7 +116,7 @@ Result<std::string> Pictures::mix_json(const JobId& id, const LightMix& mix) con
 }
 
 Result<std::vector<std::byte>> Pictures::image_png(const JobId& id, double exposure, bool denoised,
-                                                  const std::optional<LightMix>& mix) const {
+                                                   const std::optional<LightMix>& mix) const {
   auto shown = picture(id, mix);
   if (!shown) return tl::unexpected(shown.error());
   if (!denoised) return preview_png(shown->film, exposure);

@@ -130,7 +130,8 @@ Result<std::vector<std::byte>> Pictures::pixels(const JobId& id, const PixelsAsk
   const TileGrid grid = (*entry)->grid;
   const StoredJob& job = (*entry)->stored;
   const bool denoised = job.spec.denoise && asked.layer == denoised_layer().name;
-  const auto layer = denoised ? denoised_layer() : pixel_layer(aovs_of(job.settings), asked.layer, job.settings.light_groups);
+  const auto layer = denoised ? denoised_layer()
+                              : pixel_layer(aovs_of(job.settings), asked.layer, job.settings.light_groups);
   if (!layer) return tl::unexpected(layer.error());
   if (auto fits = check_layer_rect(grid.frame, asked.level, asked.rect); !fits)
     return tl::unexpected(fits.error());

@@ -41,10 +41,10 @@ Result<LightMix> parse_json(std::string_view text) {
     if (const std::string wrong = wrong_light_group(group); !wrong.empty()) return bad_argument(wrong);
     GroupFactors& of = mix.groups[group];
     const auto refuse = [&, name = group] {
-      return bad_argument(
-          fmt::format("the factor of the light group \"{}\" must be a number from 0 to {}, a list of three, or "
-                      "an object of \"surface\" and \"volume\" with such values",
-                      name, kMostMixFactor));
+      return bad_argument(fmt::format(
+          "the factor of the light group \"{}\" must be a number from 0 to {}, a list of three, or "
+          "an object of \"surface\" and \"volume\" with such values",
+          name, kMostMixFactor));
     };
     if (!value.is_object()) {
       const auto both = factors(value);
@@ -67,10 +67,11 @@ Result<LightMix> parse_option(std::string_view text) {
     const std::string_view item = rest.substr(0, rest.find(','));
     rest.remove_prefix(std::min(item.size() + 1, rest.size()));
     const auto refuse = [&] {
-      return bad_argument(fmt::format(
-          "'{}' is no factor of a light group: give GROUP=FACTOR or GROUP=R:G:B, for the light of surfaces or "
-          "media alone GROUP.surface or GROUP.volume",
-          plain_text(item)));
+      return bad_argument(
+          fmt::format("'{}' is no factor of a light group: give GROUP=FACTOR or GROUP=R:G:B, for the light "
+                      "of surfaces or "
+                      "media alone GROUP.surface or GROUP.volume",
+                      plain_text(item)));
     };
     const std::size_t equals = item.find('=');
     if (equals == std::string_view::npos) return refuse();
@@ -88,7 +89,8 @@ Result<LightMix> parse_option(std::string_view text) {
     if (value.size() == 1) value = json(value[0]);
     json& of = groups[std::string(group)];
     if (group == name) {
-      if (!of.is_null()) return bad_argument(fmt::format("the light group '{}' is given twice", plain_text(group)));
+      if (!of.is_null())
+        return bad_argument(fmt::format("the light group '{}' is given twice", plain_text(group)));
       of = std::move(value);
       continue;
     }
@@ -127,9 +129,8 @@ std::string to_string(const LightMix& mix) {
 std::string canonical_json(const LightMix& mix) {
   json out = json::object();
   for (const auto& [group, f] : mix.groups)
-    out[group] = f.surface == f.volume
-                     ? written(f.surface)
-                     : json{{"surface", written(f.surface)}, {"volume", written(f.volume)}};
+    out[group] = f.surface == f.volume ? written(f.surface)
+                                       : json{{"surface", written(f.surface)}, {"volume", written(f.volume)}};
   return out.dump();
 }
 

@@ -14,8 +14,8 @@ namespace ls {
 // The largest factor of a mix. Factors are finite and not negative.
 inline constexpr double kMostMixFactor = 1e6;
 
-// Factors of a light group's light, R G B: of the light that was last scattered in a medium (`volume`), and of
-// all other light.
+// Factors of a light group's light, R G B: of the light that was last scattered in a medium (`volume`), and
+// of all other light.
 struct GroupFactors {
   std::array<double, 3> surface{1, 1, 1}, volume{1, 1, 1};
   bool operator==(const GroupFactors&) const = default;
@@ -28,8 +28,10 @@ struct LightMix {
 };
 
 // Parses a mix in one of two notations.
-// - "key=2,fill=0.5:0.4:0.3,fog.volume=4": one factor or three (R, G, B), for a group or for its `.surface` or
-//   `.volume` alone. `volume` is for light that was last scattered in a medium, `surface` for all other light.
+// - "key=2,fill=0.5:0.4:0.3,fog.volume=4": one factor or three (R, G, B), for a group or for its `.surface`
+// or
+//   `.volume` alone. `volume` is for light that was last scattered in a medium, `surface` for all other
+//   light.
 // - A JSON object whose keys are names of groups. A value is a number, a list of three, or an object with the
 //   keys `surface` and `volume`, each with such a value.
 Result<LightMix> parse_light_mix(std::string_view text);

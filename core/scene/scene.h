@@ -270,7 +270,7 @@ struct HomogeneousMedium {
   Rgb emission{0, 0, 0};         // radiance per scene unit, independent of extinction
   Rgb source_radiance{0, 0, 0};  // radiance of an infinitely deep medium without scattering
   int priority = 0;              // where media overlap, only the media of the highest priority exist
-  std::string light_group;  // of the light that the medium gives off (Emitter)
+  std::string light_group;       // of the light that the medium gives off (Emitter)
   bool operator==(const HomogeneousMedium&) const = default;
 };
 // A medium whose properties vary in space. The extinction is sigma_t * scale * tint. At most one of emission,
@@ -290,7 +290,7 @@ struct HeterogeneousMedium {
   double temperature_scale = 1, temperature_offset = 0;
   bool peak_one = false;  // true: the spectrum of a black body is divided by its largest value
   std::optional<VolumeIndex> emission_weight;  // factor on the black-body emission
-  int priority = 0;  // where media overlap, only the media of the highest priority exist
+  int priority = 0;         // where media overlap, only the media of the highest priority exist
   std::string light_group;  // of the light that the medium gives off (Emitter)
   bool operator==(const HeterogeneousMedium&) const = default;
 };

@@ -95,8 +95,7 @@ struct GroupMoments {
       for (std::size_t g = 0; g < groups; ++g)
         for (std::size_t i = 0; i < values; ++i) {
           sum[g][i] += image.means[g][i];
-          for (std::size_t h = 0; h < groups; ++h)
-            product[g][h][i] += image.means[g][i] * image.means[h][i];
+          for (std::size_t h = 0; h < groups; ++h) product[g][h][i] += image.means[g][i] * image.means[h][i];
         }
   }
 };
@@ -119,7 +118,7 @@ struct MixLook {
 };
 
 MixLook look_at(const GroupsImage& image, const GroupMoments& all, std::size_t images,
-             const std::vector<GroupFactors>& factors) {
+                const std::vector<GroupFactors>& factors) {
   const ImageError colour = image_error(image.film.error());
   const ImageError e = mixed_error(image.film.mixed(factors).error(), colour);
   MixLook look{.estimated = e.relmse, .trusted = e.trusted};
@@ -134,8 +133,7 @@ MixLook look_at(const GroupsImage& image, const GroupMoments& all, std::size_t i
       mixed += f * image.means[g][i];
       mean += f * (all.sum[g][i] - image.means[g][i]) / others;
       for (std::size_t h = 0; h < factors.size(); ++h) {
-        const double covariance =
-            (all.product[g][h][i] - all.sum[g][i] * all.sum[h][i] / n) / (n - 1);
+        const double covariance = (all.product[g][h][i] - all.sum[g][i] * all.sum[h][i] / n) / (n - 1);
         variance += f * factors[h].surface[c] * covariance;
         if (g == h) apart += f * f * covariance;
       }
@@ -180,10 +178,11 @@ MixCoverage measure_mixes(const MixJobs& jobs) {
 }
 
 std::string mix_line(const MixJobs& jobs, const MixCoverage& c) {
-  return fmt::format("{} x {}, {} spp: {} mixes, {} trusted, {:.1f} % held ({:.1f} % without covariances), "
-                     "estimated / true relMSE {:.3f} +- {:.3f}",
-                     jobs.size.width, jobs.size.height, jobs.spp, c.mixes, c.trusted, 100 * c.held,
-                     100 * c.held_ignoring, c.relmse_ratio.value, c.relmse_ratio.sigma);
+  return fmt::format(
+      "{} x {}, {} spp: {} mixes, {} trusted, {:.1f} % held ({:.1f} % without covariances), "
+      "estimated / true relMSE {:.3f} +- {:.3f}",
+      jobs.size.width, jobs.size.height, jobs.spp, c.mixes, c.trusted, 100 * c.held, 100 * c.held_ignoring,
+      c.relmse_ratio.value, c.relmse_ratio.sigma);
 }
 
 }  // namespace ls::test

@@ -18,8 +18,8 @@ struct MixJobs {
   std::string scene;  // path of a scene file with light groups
   FrameSize size{32, 32};
   std::uint64_t spp = 32;
-  int images = 200;   // number of renders, at least 3
-  int mixes = 10;     // of each image
+  int images = 200;  // number of renders, at least 3
+  int mixes = 10;    // of each image
   int threads = 2;
   std::uint64_t first_seed = 1;
 };
@@ -27,9 +27,9 @@ struct MixJobs {
 struct MixCoverage {
   int mixes = 0;
   int trusted = 0;
-  double held = 0;            // share of the trusted mixes whose interval of relMSE holds the true one
-  double held_ignoring = 0;   // the same if errors are added without the covariances of the groups
-  Ratio relmse_ratio;         // mean estimated / mean true, over all mixes
+  double held = 0;           // share of the trusted mixes whose interval of relMSE holds the true one
+  double held_ignoring = 0;  // the same if errors are added without the covariances of the groups
+  Ratio relmse_ratio;        // mean estimated / mean true, over all mixes
 };
 
 // Throws std::runtime_error if the scene cannot be read or rendered.

@@ -1,4 +1,5 @@
-// Light groups: they add up to the colour, leave its bits as they are, and each is what its lights alone bring.
+// Light groups: they add up to the colour, leave its bits as they are, and each is what its lights alone
+// bring.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -39,7 +40,9 @@ void group_lights(Scene& scene) {
 
 // Removes the lights that are not in the group.
 Scene alone(Scene scene, const std::string& group) {
-  const auto is_in = [&](const std::string& name) { return (name.empty() ? kOtherLightGroup : name) == group; };
+  const auto is_in = [&](const std::string& name) {
+    return (name.empty() ? kOtherLightGroup : name) == group;
+  };
   for (Shape& s : scene.shapes)
     if (s.emitter && !is_in(s.emitter->light_group)) s.emitter.reset();
   std::erase_if(scene.emitters, [&](const Emitter& e) {
@@ -134,9 +137,9 @@ TEST(LightGroups, AddUpToTheColourAndLeaveItsBits) {
     const Picture plain = picture(s.builder, {}, 16, 1),
                   apart = picture(s.builder, {"light_groups", "volume_light_groups", "volume"}, 16, 1);
     variants.insert(apart.variant);
-    const std::vector<float> colour(apart.sums.begin(),
-                                    apart.sums.begin() +
-                                        static_cast<std::ptrdiff_t>(kPartialChannels * apart.pixels));
+    const std::vector<float> colour(
+        apart.sums.begin(),
+        apart.sums.begin() + static_cast<std::ptrdiff_t>(kPartialChannels * apart.pixels));
     EXPECT_EQ(colour, plain.sums) << s.name;
     double wrong = 0, in_volume = 0;
     for (int half = 0; half < 2; ++half)
@@ -267,8 +270,8 @@ TEST(LightGroups, MixedAreTheImageOfTheMixedScene) {
       Picture sum = apart;  // with the mix in the place of group 0
       for (int half = 0; half < 2; ++half)
         for (int c = 0; c < 3; ++c) {
-          const auto to = sum.sums.begin() + (sum.plane(plane_of("light_groups", 0, half, c)).data() -
-                                              sum.sums.data());
+          const auto to =
+              sum.sums.begin() + (sum.plane(plane_of("light_groups", 0, half, c)).data() - sum.sums.data());
           for (std::size_t i = 0; i < sum.pixels; ++i) {
             double value = 0;
             for (std::size_t g = 0; g < groups.size(); ++g)

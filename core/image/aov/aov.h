@@ -59,7 +59,7 @@ enum class AovKind {
   guide,    // for a denoiser: sums over all samples, separately for the two halves of the samples
   opacity,  // sums over all samples, separately for the two halves of the samples
   groups,   // like `opacity`, and separately for each light group
-  ids          // identifiers, each with the number of samples that hit it
+  ids       // identifiers, each with the number of samples that hit it
 };
 constexpr bool has_halves(AovKind kind) {
   return kind == AovKind::guide || kind == AovKind::opacity || kind == AovKind::groups;

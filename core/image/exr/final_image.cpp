@@ -100,10 +100,9 @@ class Layers {
       const bool halves = row.half && !float_output;
       if (row.kind == AovKind::groups) {
         const std::string layer = layer_of_group(row.aov, plane.group, names.light_groups);
-        clamped +=
-            add_layer(picture, fmt::format("{}.{}", layer, component), std::move(sums_[p]), halves) +
-            add_layer(picture, fmt::format("{}{}.{}", layer, kHalfDifference, component),
-                      std::move(differences_[p]), halves);
+        clamped += add_layer(picture, fmt::format("{}.{}", layer, component), std::move(sums_[p]), halves) +
+                   add_layer(picture, fmt::format("{}{}.{}", layer, kHalfDifference, component),
+                             std::move(differences_[p]), halves);
         continue;
       }
       // Alpha belongs to R, G and B, which have no layer's name either.
@@ -119,8 +118,8 @@ class Layers {
       for (std::size_t c = 0; c < 2 * kCryptomatteRanks; ++c)
         picture.channels[fmt::format("{}{:02}.{}", layer, c / 4, "RGBA"[c % 4])] =
             ExrFloat{std::move(ids_[i * 2 * kCryptomatteRanks + c])};
-      picture.strings.merge(cryptomatte_header(
-          layer, planes_.ids[i] == Aov::shape_id ? names.shapes : names.materials));
+      picture.strings.merge(
+          cryptomatte_header(layer, planes_.ids[i] == Aov::shape_id ? names.shapes : names.materials));
     }
     return clamped;
   }
@@ -337,8 +336,7 @@ Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& from, 
                          // each band is requested in two passes, so the count of clamped values restarts at
                          // the first band
                          if (row == 0) clamped = 0;
-                         ExrPicture band =
-                             final_layers(film.row(row), from.names, float_output, &clamped);
+                         ExrPicture band = final_layers(film.row(row), from.names, float_output, &clamped);
                          if (!denoised.empty())
                            clamped += add_denoised(denoised, film.grid(), row, float_output, band);
                          return band;

@@ -88,9 +88,10 @@ std::string layer_of_group(Aov aov, std::size_t group, std::span<const std::stri
 inline constexpr std::string_view kHalfDifference = ".delta";
 
 // Adds the film's AOVs to `picture`: channels NAME.R, NAME.X, ...; for alpha A, and its standard error
-// stderr.A (FLOAT); for light groups RGB_NAME.R, ... and RGB_NAME.delta.R, ...; for identifiers NAME00.R to NAME02.A with their header strings. Pixels without a surface
-// are 0 in the AOVs of surfaces (AovKind::of_hits, of_all and ids). Returns the number of values that were
-// clamped because their magnitude exceeded 65504, the largest half.
+// stderr.A (FLOAT); for light groups RGB_NAME.R, ... and RGB_NAME.delta.R, ...; for identifiers NAME00.R to
+// NAME02.A with their header strings. Pixels without a surface are 0 in the AOVs of surfaces
+// (AovKind::of_hits, of_all and ids). Returns the number of values that were clamped because their magnitude
+// exceeded 65504, the largest half.
 std::uint64_t add_aov_layers(const Film& film, const LayerNames& names, bool float_output,
                              ExrPicture& picture);
 

@@ -49,8 +49,8 @@ std::vector<float> relative_errors(const TilePixels& tile) {
   return out;
 }
 
-// Returns the means of a layer of an AOV or, if layer.difference, half the differences between the means of the
-// two halves of the samples.
+// Returns the means of a layer of an AOV or, if layer.difference, half the differences between the means of
+// the two halves of the samples.
 std::vector<float> means(const TileAovs& tile, const AovPlanes& planes, const PixelLayer& layer) {
   const AovRow& row = row_of(*layer.aov);
   const auto n = static_cast<std::size_t>(tile.rect.pixels()), channels = row.components.size();

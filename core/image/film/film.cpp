@@ -256,10 +256,10 @@ Film Film::mixed(std::span<const GroupFactors> factors) const {
       const auto c = static_cast<std::size_t>(plane.component);
       const GroupFactors& f = factors[plane.group];
       // The plane of a group has the light of its media, too.
-      const double factor =
-          plane.aov == Aov::light_groups ? f.surface[c] : f.volume[c] - f.surface[c];
+      const double factor = plane.aov == Aov::light_groups ? f.surface[c] : f.volume[c] - f.surface[c];
       double* to = &colour[(3 * static_cast<std::size_t>(plane.half) + c) * pixels];
-      for (std::size_t i = 0; i < pixels; ++i) to[i] += factor * double{begin[static_cast<std::ptrdiff_t>(i)]};
+      for (std::size_t i = 0; i < pixels; ++i)
+        to[i] += factor * double{begin[static_cast<std::ptrdiff_t>(i)]};
     }
     std::vector<Value> out(colour.begin(), colour.end());
     out.insert(out.end(), kept.begin(), kept.end());

@@ -16,8 +16,8 @@ Result<std::vector<GroupFactors>> factors_of(const LightMix& mix, AovSet aovs,
   for (const auto& [group, of] : mix.groups) {
     const auto at = std::ranges::find(groups, group);
     if (at == groups.end())
-      return bad_argument(fmt::format("the image has no light group \"{}\"; it has {}", group,
-                                      fmt::join(groups, ", ")));
+      return bad_argument(
+          fmt::format("the image has no light group \"{}\"; it has {}", group, fmt::join(groups, ", ")));
     if (of.surface != of.volume && !aovs.has(Aov::volume_light_groups))
       return fail(Errc::failed_precondition,
                   "the image does not have the light of media apart: render it with --aov "

@@ -59,14 +59,16 @@ class Multiplier {
     if (at == mix_.groups.end()) return nullptr;
     if (at->second.surface != at->second.volume)
       wrong_ = fmt::format(
-          "the light group \"{}\" has other factors for media than for surfaces: only a finished image can be "
+          "the light group \"{}\" has other factors for media than for surfaces: only a finished image can "
+          "be "
           "mixed so",
           at->first);
     return &at->second.surface;
   }
   void scale(double& value, const Rgb& f, const std::string& group, std::string_view what) {
     if (f[0] != f[1] || f[1] != f[2])
-      wrong_ = fmt::format("the light group \"{}\" has {}, which takes one factor, not a colour", group, what);
+      wrong_ =
+          fmt::format("the light group \"{}\" has {}, which takes one factor, not a colour", group, what);
     value *= f[0];
   }
   void multiply(AreaEmitter& light) {
@@ -88,7 +90,8 @@ class Multiplier {
   void multiply(SpotEmitter& light) { multiply(light.light_group, light.intensity); }
   void multiply(GoniometricEmitter& light) { multiply(light.light_group, light.intensity); }
   void multiply(EnvmapEmitter& light) {
-    if (const Rgb* f = factor(light.light_group)) scale(light.scale, *f, light.light_group, "an environment map");
+    if (const Rgb* f = factor(light.light_group))
+      scale(light.scale, *f, light.light_group, "an environment map");
   }
   void multiply(ProjectorEmitter& light) {
     if (const Rgb* f = factor(light.light_group)) scale(light.scale, *f, light.light_group, "a projector");
@@ -116,8 +119,8 @@ Result<void> multiply_light(const LightMix& mix, Scene& scene) {
   const std::vector<std::string> known = light_groups_of(scene);
   for (const auto& [group, factors] : mix.groups)
     if (!std::ranges::binary_search(known, group))
-      return bad_argument(fmt::format("mix: the scene has no light group \"{}\"; it has {}", group,
-                                      fmt::join(known, ", ")));
+      return bad_argument(
+          fmt::format("mix: the scene has no light group \"{}\"; it has {}", group, fmt::join(known, ", ")));
   if (const std::string wrong = Multiplier(mix, scene).run(); !wrong.empty())
     return bad_argument("mix: " + wrong);
   return {};

@@ -10,8 +10,8 @@
 
 namespace ls::scene {
 
-// Returns the names of the groups of all emitters and of all media that give off light, sorted, each once. The
-// lights without a group are in the group `other`. A scene without light has the group `other` alone.
+// Returns the names of the groups of all emitters and of all media that give off light, sorted, each once.
+// The lights without a group are in the group `other`. A scene without light has the group `other` alone.
 std::vector<std::string> light_groups_of(const Scene& scene);
 
 // Returns whether the medium gives off light.

@@ -62,7 +62,7 @@ struct Field {
   // For a number or colour that Mitsuba does not have: if the field has this value, it is not written in
   // files. NaN: there is no such value.
   double unwritten = std::numeric_limits<double>::quiet_NaN();
-  bool number = false;  // true: the field is a texture that is read as a scalar, not as a colour
+  bool number = false;       // true: the field is a texture that is read as a scalar, not as a colour
   bool light_group = false;  // true: the text must be the name of a light group (wrong_light_group())
   // True for fields that Mitsuba does not have or that older scenes lack. If such a field has its default
   // value, it is written neither in files nor in JSON, so that the files and digests of scenes that do not
@@ -99,8 +99,9 @@ inline Field on_unless_given(std::string_view name, std::string_view doc) {
 // The field of the light group of an emitter or a medium.
 inline constexpr Field kLightGroup{
     .name = "light_group",
-    .doc = "the light group whose layer of the AOV `light_groups` has this light; letters, digits, `_` and `-`; "
-           "if not given, the group is `other`. Not in Mitsuba",
+    .doc =
+        "the light group whose layer of the AOV `light_groups` has this light; letters, digits, `_` and `-`; "
+        "if not given, the group is `other`. Not in Mitsuba",
     .light_group = true,
     .elided = true};
 // Returns the field of a texture that is read as a scalar. `fallback` replaces a missing texture.

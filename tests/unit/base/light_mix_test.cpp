@@ -32,9 +32,9 @@ TEST(LightMix, BothNotationsMeanTheSame) {
 TEST(LightMix, WrongTextIsRefusedWithTheGroup) {
   for (const char* text : {"key", "key=", "key=x", "key=1:2", "key=1:2:3:4", "key=1:", "=2x"})
     EXPECT_THAT(error(text), HasSubstr("is no factor of a light group: give GROUP=FACTOR")) << text;
-  for (const char* text : {"key=-1", "key=1e7", "key=nan", "key=inf", "key.depth=2", R"({"key":-1})",
-                           R"({"key":"2"})", R"({"key":[1,2]})", R"({"key":null})", R"({"key":{"depth":1}})",
-                           R"({"key":{"surface":-1}})"})
+  for (const char* text :
+       {"key=-1", "key=1e7", "key=nan", "key=inf", "key.depth=2", R"({"key":-1})", R"({"key":"2"})",
+        R"({"key":[1,2]})", R"({"key":null})", R"({"key":{"depth":1}})", R"({"key":{"surface":-1}})"})
     EXPECT_THAT(error(text), HasSubstr("\"key\"")) << text;
   EXPECT_THAT(error("key=1,key=2"), HasSubstr("'key' is given twice"));
   EXPECT_THAT(error("key=1,key.volume=2"), HasSubstr("'key' is given twice"));

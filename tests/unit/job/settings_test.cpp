@@ -88,7 +88,8 @@ TEST(RenderSettings, HaveLightGroupsWithTheirLayersOnly) {
   };
   EXPECT_EQ(error({"depth", "light_groups"}, {"fill", "key", "other"}), "");
   EXPECT_EQ(aovs_of(s).groups(), 3u);
-  EXPECT_THAT(error({"light_groups"}, {}), HasSubstr("'light_groups' must be given with AOVs of light groups"));
+  EXPECT_THAT(error({"light_groups"}, {}),
+              HasSubstr("'light_groups' must be given with AOVs of light groups"));
   EXPECT_THAT(error({"depth"}, {"key"}), HasSubstr("and only then"));
   EXPECT_THAT(error({"light_groups"}, {"key", "fill"}), HasSubstr("must be sorted"));
   EXPECT_THAT(error({"light_groups"}, {"key", "key"}), HasSubstr("each name once"));

@@ -57,10 +57,11 @@ TEST_F(LightGroupJobs, HaveTheWholeOfAGroupWithItsVolumes) {
 
 TEST_F(LightGroupJobs, OfMediaCountWhereTheyGlow) {
   const auto fog = [](const std::string& light) {
-    return scene_of(lamp("key") +
-                    "<shape type=\"cube\"><bsdf type=\"null\"/><medium name=\"interior\" type=\"homogeneous\">"
-                    "<string name=\"light_group\" value=\"fire\"/>" +
-                    light + "</medium></shape>");
+    return scene_of(
+        lamp("key") +
+        "<shape type=\"cube\"><bsdf type=\"null\"/><medium name=\"interior\" type=\"homogeneous\">"
+        "<string name=\"light_group\" value=\"fire\"/>" +
+        light + "</medium></shape>");
   };
   EXPECT_THAT(settings("", {"light_groups"}, fog(""))->light_groups, ElementsAre("key"));
   EXPECT_THAT(settings("", {"light_groups"}, fog("<rgb name=\"emission\" value=\"1\"/>"))->light_groups,

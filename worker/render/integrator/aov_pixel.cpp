@@ -174,8 +174,8 @@ void AovPixel::store(float* planes, std::size_t pixels, std::size_t i) const {
     const AovPlane& plane = planes_.sums[p];
     const auto half = static_cast<std::size_t>(plane.half), aov = static_cast<std::size_t>(plane.aov);
     const bool by_group = row_of(plane.aov).kind == AovKind::groups;
-    const Sums& of_aov = by_group ? group_sums_[plane.aov == Aov::volume_light_groups][half][plane.group]
-                                  : sums_[half][aov];
+    const Sums& of_aov =
+        by_group ? group_sums_[plane.aov == Aov::volume_light_groups][half][plane.group] : sums_[half][aov];
     planes[p * pixels + i] = rounded(plane.hits ? hits_ : of_aov[static_cast<std::size_t>(plane.component)]);
   }
   float* ids = planes + planes_.sums.size() * pixels + i;

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "core/image/film/health.h"
+#include "worker/render/base/light_group.h"
 #include "worker/render/bsdf/bsdf.h"
 #include "worker/render/geometry/geometry.h"
-#include "worker/render/base/light_group.h"
 #include "worker/render/math/math.h"
 #include "worker/render/media/medium.h"
 #include "worker/render/media/medium_stack.h"

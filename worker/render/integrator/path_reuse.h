@@ -110,8 +110,8 @@ void PathTracer<F, Light>::go_on_as_tail(const V3& w, const C3& weight) {
   beta_ = C3(1);
 }
 
-// Stores the light of a light source, of this light group, that the ray from the path's second vertex hit. Next-event estimation
-// would find this light with the density `pdf`.
+// Stores the light of a light source, of this light group, that the ray from the path's second vertex hit.
+// Next-event estimation would find this light with the density `pdf`.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::keep_emitted(const C3& emitted, float pdf, LightGroup group) {
   sharing_.tail.emitted = beta_ * emitted;

@@ -245,8 +245,7 @@ C3 Lights::environment_seen(const V3& direction) const {
 
 C3 Lights::suns(const V3& direction, float pdf, const LightPlace& place) const {
   C3 sum(0);
-  for (const std::uint32_t i : suns_)
-    sum += sun(i).found(direction, pdf, probability_at(i, place));
+  for (const std::uint32_t i : suns_) sum += sun(i).found(direction, pdf, probability_at(i, place));
   return sum;
 }
 

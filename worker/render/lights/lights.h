@@ -15,9 +15,9 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "worker/render/base/light_group.h"
 #include "worker/render/lights/area.h"
 #include "worker/render/lights/distant.h"
-#include "worker/render/base/light_group.h"
 #include "worker/render/lights/local_lights.h"
 #include "worker/render/lights/punctual.h"
 

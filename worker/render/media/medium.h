@@ -15,9 +15,9 @@
 #include <vector>
 
 #include "worker/render/base/features.h"
+#include "worker/render/base/light_group.h"
 #include "worker/render/base/work_counters.h"
 #include "worker/render/geometry/clear_region.h"
-#include "worker/render/base/light_group.h"
 #include "worker/render/math/math.h"
 #include "worker/render/math/random.h"
 #include "worker/render/math/sampler.h"

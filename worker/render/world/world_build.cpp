@@ -271,12 +271,15 @@ Result<std::shared_ptr<World>> make_world(const Scene& given, const RenderSettin
   if (auto ok = BuildStop::go_on(); !ok) return tl::unexpected(ok.error());
   w.coincident = find_coincident(w.geometry).any;
   if (auto ok = BuildStop::go_on(); !ok) return tl::unexpected(ok.error());
-  auto lights = Lights::build(scene, w.geometry, w.textures, [&](const Asset& a) {
-    auto image = load(a, kMaxEnvironmentPixels);
-    if (!image && image.error().code == Errc::resource_exhausted)
-      image.error().message += "; scale the environment map down to 8192 x 4096 pixels or less";
-    return image;
-  }, settings.light_groups);
+  auto lights = Lights::build(
+      scene, w.geometry, w.textures,
+      [&](const Asset& a) {
+        auto image = load(a, kMaxEnvironmentPixels);
+        if (!image && image.error().code == Errc::resource_exhausted)
+          image.error().message += "; scale the environment map down to 8192 x 4096 pixels or less";
+        return image;
+      },
+      settings.light_groups);
   if (!lights) return tl::unexpected(lights.error());
   w.lights = std::move(*lights);
   w.hide_environment = w.hide_emitters || w.transparent || w.lights.hides_environment();

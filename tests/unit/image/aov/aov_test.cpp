@@ -90,7 +90,8 @@ TEST(Aovs, PlanesAreInTheOrderOfTheFile) {
 }
 
 TEST(Partial, WithAovsSurvivesEncodingBitForBit) {
-  for (const AovSet aovs : {kSome, AovSet(~0u, 1), AovSet(~0u, kMostLightGroups), AovSet{}.with(Aov::coverage)}) {
+  for (const AovSet aovs :
+       {kSome, AovSet(~0u, 1), AovSet(~0u, kMostLightGroups), AovSet{}.with(Aov::coverage)}) {
     const Partial partial = with_aovs(4, {4, 8}, aovs);
     const auto exr = encoded(partial);
 
@@ -128,9 +129,8 @@ TEST(PartialGate, CountsLightGroups) {
 TEST(LightGroupName, HasLettersDigitsAndLinesOnly) {
   for (const std::string& good : {std::string("key"), std::string("Key_2-b"), std::string(63, 'a')})
     EXPECT_EQ(wrong_light_group(good), "");
-  for (const std::string& bad :
-       {std::string(), std::string(64, 'a'), std::string("a.b"), std::string("a b"), std::string("\xc3\xa9"),
-        std::string("a\0b", 3), std::string("a\n")})
+  for (const std::string& bad : {std::string(), std::string(64, 'a'), std::string("a.b"), std::string("a b"),
+                                 std::string("\xc3\xa9"), std::string("a\0b", 3), std::string("a\n")})
     EXPECT_THAT(wrong_light_group(bad), HasSubstr("a light group's name has 1 to 63")) << bad;
 }
 
