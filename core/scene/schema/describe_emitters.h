@@ -101,6 +101,7 @@ void describe(V& v, T& e) {
           e.mapping);
   v.field(on_unless_given("visible_camera", "whether the camera sees the light itself. Not in Mitsuba"),
           e.visible_camera);
+  v.field(image_colours_field(), e.colours);
 }
 
 LS_TYPE(ProjectorEmitter, "emitter", "projector", "",
