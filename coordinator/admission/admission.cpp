@@ -18,6 +18,7 @@
 #include "core/base/text/name_forms.h"
 #include "core/job/health_notes.h"
 #include "core/job/spec_draft.h"
+#include "core/scene/analysis/camera_view.h"
 #include "core/scene/analysis/needs.h"
 #include "core/scene/analysis/prune.h"
 #include "core/scene/json/serialize.h"
@@ -306,6 +307,7 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
          fmt::format("the scene uses {} files; a message to a worker holds {}: merge some of its meshes",
                      job.assets.size(), ls::limits::kAssetsPerJob)});
   note_analysis(*pruned, job.settings, job);
+  job.camera = scene::camera_matrices(scene.sensor, scene.film, job.settings.size);
   admission.text_bytes = request.scene_text.size() + read->text_bytes;
   admission.scene_json = serialize(scene);
   job.scene = sha256(admission.scene_json);
@@ -327,6 +329,7 @@ Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, c
                 .features_used = before.features_used,
                 .features_left_out = before.features_left_out,
                 .needs = before.needs,
+                .camera = before.camera,
                 .analysis = before.analysis};
   if (!frame) job.spec.frames = {};  // a single image, even if the old job was a frame of a sequence
   if (changes.spp || changes.target_error || changes.time) {

@@ -62,7 +62,7 @@ Result<std::vector<std::byte>> Pictures::image_exr(const JobId& id) const {
   auto shown = picture(id);
   if (!shown) return tl::unexpected(shown.error());
   const auto made = denoising_.of_job(shown->film, shown->facts);
-  auto image = final_exr(shown->film, provenance_of(shown->facts, blobs_), shown->facts.job.spec.float_output,
+  auto image = final_exr(shown->film, provenance_of(shown->facts, blobs_), form_of(shown->facts.job.spec),
                          made ? std::span(made->image.rgb) : std::span<const float>());
   if (!image) return tl::unexpected(image.error());
   return std::move(image->exr);
@@ -136,7 +136,8 @@ Result<std::string> Pictures::report_json(const JobId& id) const {
   facts.pixels = pixels_sha256(shown->film);
   // The report of a running job is requested often and must not wait for the denoiser.
   if (is_terminal(facts.job.state)) denoising_.of_job(shown->film, facts);
-  if (!facts.job.spec.float_output) facts.clamped_values = values_above_half(shown->film);
+  if (!facts.job.spec.float_output)
+    facts.clamped_values = values_above_half(shown->film, facts.job.spec.colour_space);
   return coordinator::report_json(facts);
 }
 

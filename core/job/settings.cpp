@@ -76,6 +76,10 @@ Result<Json> parse_object(std::string_view text, std::string_view what) {
 
 }  // namespace
 
+ImageForm form_of(const JobSpec& s) {
+  return {s.float_output, s.colour_space, s.exr_compression, s.exr_parts};
+}
+
 std::string canonical_json(const RenderSettings& s) { return dump(job::write_object(s)); }
 
 std::string_view to_string(TargetLayer layer) { return layer == TargetLayer::raw ? "raw" : "denoised"; }

@@ -57,6 +57,8 @@ enum class AovKind {
   opacity,  // sums over all samples, separately for the two halves of the samples
   ids       // identifiers, each with the number of samples that hit it
 };
+// True for an AOV whose R, G, B are those of a colour, as that of light or of a surface.
+bool is_colour(Aov aov);
 constexpr bool has_halves(AovKind kind) { return kind == AovKind::guide || kind == AovKind::opacity; }
 
 struct AovRow {
