@@ -15,6 +15,7 @@
 #include "coordinator/store/files.h"
 #include "core/image/exr/final_image.h"
 #include "core/image/film/merge.h"
+#include "core/scene/analysis/camera_view.h"
 #include "core/scene/analysis/light_groups.h"
 #include "core/scene/analysis/prune.h"
 #include "core/scene/json/serialize.h"
@@ -30,7 +31,7 @@ struct MergeFlags {
   std::string out, report, scene;
   SceneChanges changes;
   std::optional<std::uint32_t> frame;
-  bool float_output = false;
+  JobOptions image;
 };
 
 // Returns the given files and, for each given folder, all EXR files in it, sorted by name. (A folder may hold
@@ -95,14 +96,13 @@ bool is_of(const Scene& scene, const Digest& digest) {
       });
 }
 
-// Returns the names of identifiers and light groups. They come from the scene, because partials have only the
-// identifiers and the numbers of the groups.
-tl::expected<LayerNames, coordinator::Rejected> layer_names(const MergeFlags& flags, const Merged& merged) {
-  const AovSet aovs = merged.film.aovs();
+// Reads the scene of the partials, for what they do not contain: the names of identifiers and light groups,
+// and the camera.
+tl::expected<Scene, coordinator::Rejected> scene_of(const MergeFlags& flags, const Merged& merged) {
   const auto defines = parse_defines(flags.defines);
   if (!defines) return coordinator::rejected(defines.error());
-  auto scene =
-      read_local_scene(flags.scene, *defines, false, flags.frame, aovs.any_of(aovs_of(AovKind::ids)));
+  auto scene = read_local_scene(flags.scene, *defines, false, flags.frame,
+                                merged.film.aovs().any_of(aovs_of(AovKind::ids)));
   if (!scene) return tl::unexpected(scene.error());
   if (const auto ok = change_scene(flags.changes, scene->scene); !ok)
     return coordinator::rejected(ok.error());
@@ -112,8 +112,7 @@ tl::expected<LayerNames, coordinator::Rejected> layer_names(const MergeFlags& fl
          fmt::format("the partial images were rendered from scene {}, and {} is another scene: give the same "
                      "scene file, with the same -D, --techniques, --mix and --frame",
                      merged.scene.hex(), flags.scene)});
-  auto groups = aovs.groups() > 0 ? scene::light_groups_of(scene->scene) : std::vector<std::string>();
-  return coordinator::layer_names_of(scene->scene, aovs, std::move(groups));
+  return std::move(scene->scene);
 }
 
 int run(const MergeFlags& flags) {
@@ -122,6 +121,8 @@ int run(const MergeFlags& flags) {
     return usage_error(fmt::format("-o {}: partials become an image, .exr or .png", flags.out));
   if (!flags.report.empty())
     if (const auto ok = check_output("--report", flags.report); !ok) return print_error(ok.error());
+  const auto spec = flags.image.parse();
+  if (!spec) return print_error(spec.error());
   const auto files = files_of(flags.partials);
   if (!files) return print_error(files.error());
   std::vector<PartialSource> sources;
@@ -137,11 +138,14 @@ int run(const MergeFlags& flags) {
   provenance.build = LIGHTSHAFT_VERSION;
   provenance.numeric_class = merged->numeric_class;
   if (!flags.scene.empty()) {
-    auto names = layer_names(flags, *merged);
-    if (!names) return print_rejected(names.error());
-    provenance.names = std::move(*names);
+    const auto scene = scene_of(flags, *merged);
+    if (!scene) return print_rejected(scene.error());
+    const AovSet aovs = merged->film.aovs();
+    provenance.names = coordinator::layer_names_of(
+        *scene, aovs, aovs.groups() > 0 ? scene::light_groups_of(*scene) : std::vector<std::string>());
+    provenance.camera = scene::camera_matrices(scene->sensor, scene->film, merged->film.grid().frame);
   }
-  const auto image = final_exr(merged->film, provenance, flags.float_output);
+  const auto image = final_exr(merged->film, provenance, form_of(*spec));
   if (!image) return print_error(image.error());
   const bool png = image_format(flags.out) == ImageFormat::png;
   const auto shown = png ? preview_png(merged->film, 0) : Result<std::vector<std::byte>>();
@@ -167,11 +171,11 @@ void add_merge(CLI::App& app, Action& action) {
   add_option(*merge, "-o,--output", flags->out, "OUT.exr", "the image, .exr or .png")->required();
   add_option(*merge, "--report", flags->report, "REPORT.json", "write the digest and the error as JSON");
   add_option(*merge, "--scene", flags->scene, "SCENE",
-             "the scene that was rendered; cryptomattes get their names from it");
+             "the scene that was rendered; names of cryptomattes and the camera come from it");
   add_defines(*merge, flags->defines);
   add_scene_changes(*merge, flags->changes);
   add_option(*merge, "--frame", flags->frame, "N", "for a sequence: only this frame");
-  merge->add_flag("--float", flags->float_output, "write 32-bit pixels instead of half");
+  flags->image.add_to(*merge, JobOptions::Command::merge);
 }
 
 }  // namespace ls::cli

@@ -137,7 +137,7 @@ VerifiedTile verify_tile(const render::World& world, const SealedImage& image, T
 // protects them.
 std::vector<std::string> wrong_headers(const SealedImage& image, const LayerNames& names,
                                        const std::vector<VerifiedTile>& tiles) {
-  auto expected = final_layers(Film(image.grid(), aovs_of(image.settings)).row(0), names, true).strings;
+  auto expected = final_layers(Film(image.grid(), aovs_of(image.settings)).row(0), names, image.form).strings;
   expected["lightshaft:seed"] = fmt::format("{}", image.settings.seed);
   const bool all = tiles.size() == image.grid().count() &&
                    std::none_of(tiles.begin(), tiles.end(), [](const auto& t) { return t.stopped; });

@@ -29,8 +29,17 @@ Result<T> parse_as(const Setting& setting, std::string_view text, T value = {}) 
 
 bool has(JobOptions::Command command, const Setting& s) {
   if (s.option.empty()) return false;
-  return command == JobOptions::Command::submit ||
-         (command == JobOptions::Command::render ? s.render : s.again);
+  switch (command) {
+    case JobOptions::Command::submit:
+      return true;
+    case JobOptions::Command::render:
+      return s.render;
+    case JobOptions::Command::again:
+      return s.again;
+    case JobOptions::Command::merge:
+      return s.merge;
+  }
+  return false;
 }
 
 // Returns the sentence about the setting as help texts are written: without a capital and a full stop.
@@ -131,7 +140,8 @@ void JobOptions::add_to(CLI::App& app, Command command) {
     else
       add_option(app, option, given.text, placeholder, help)->default_str(default_of(command, s, value));
   });
-  if (command != Command::again) app.add_flag("--strict", strict, "warnings of the scene are errors");
+  if (command == Command::render || command == Command::submit)
+    app.add_flag("--strict", strict, "warnings of the scene are errors");
 }
 
 std::set<std::string_view> JobOptions::given() const {

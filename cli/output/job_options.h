@@ -25,7 +25,7 @@ CLI::Option* add_option(CLI::App& app, const std::string& name, T& value, const 
 // core/job/describe.h.
 class JobOptions {
  public:
-  enum class Command { render, submit, again };
+  enum class Command { render, submit, again, merge };
 
   void add_to(CLI::App& app, Command command);
   // invalid_argument: the message has the option, the given text and the allowed values.

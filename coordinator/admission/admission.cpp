@@ -18,6 +18,7 @@
 #include "core/base/text/name_forms.h"
 #include "core/job/health_notes.h"
 #include "core/job/spec_draft.h"
+#include "core/scene/analysis/camera_view.h"
 #include "core/scene/analysis/light_groups.h"
 #include "core/scene/analysis/needs.h"
 #include "core/scene/analysis/prune.h"
@@ -326,6 +327,8 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
                      job.assets.size(), ls::limits::kAssetsPerJob)});
   job.meters = meter_groups(scene);
   note_analysis(*pruned, job.settings, job);
+  if (job.settings.meters == 0)
+    job.camera = scene::camera_matrices(scene.sensor, scene.film, job.settings.size);
   admission.text_bytes = request.scene_text.size() + read->text_bytes;
   admission.scene_json = serialize(scene);
   job.scene = sha256(admission.scene_json);
@@ -378,6 +381,7 @@ Result<Admission> admit_again(const StoredJob& before, const JobSpec& changes, c
          .features_used = before.features_used,
          .features_left_out = before.features_left_out,
          .needs = before.needs,
+         .camera = before.camera,
          .analysis = before.analysis};
   if (!frame) job.spec.frames = {};  // a single image, even if the old job was a frame of a sequence
   if (changes.spp || changes.target_error || changes.time) {

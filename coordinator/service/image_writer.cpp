@@ -43,7 +43,7 @@ Result<std::uint64_t> write_image(const std::filesystem::path& path, const Film&
   auto file = AtomicFile::create(path);
   if (!file) return tl::unexpected(file.error());
   ImageFile sink(*file);
-  const auto clamped = write_final_exr(film, provenance_of(facts, blobs), facts.job.spec.float_output, sink,
+  const auto clamped = write_final_exr(film, provenance_of(facts, blobs), form_of(facts.job.spec), sink,
                                        denoised ? std::span(denoised->image.rgb) : std::span<const float>());
   if (!clamped) return clamped;
   if (auto done = file->commit(); !done) return tl::unexpected(done.error());
@@ -329,7 +329,10 @@ Provenance provenance_of(const ReportFacts& facts, const BlobStore& blobs) {
           std::move(stopped),
           convergence_status_of(facts),
           header_figures(facts),
-          header_notes(facts)};
+          header_notes(facts),
+          job.camera,
+          job.spec.fps,
+          job.owner};
 }
 
 }  // namespace ls::coordinator

@@ -82,7 +82,7 @@ Result<std::vector<std::byte>> Pictures::image_exr(const JobId& id,
     provenance.figures.clear();
     provenance.notes["mix"] = canonical_json(*mix);
   }
-  auto image = final_exr(shown->film, provenance, shown->facts.job.spec.float_output,
+  auto image = final_exr(shown->film, provenance, form_of(shown->facts.job.spec),
                          made ? std::span(made->image.rgb) : std::span<const float>());
   if (!image) return tl::unexpected(image.error());
   return std::move(image->exr);
@@ -186,7 +186,8 @@ Result<std::string> Pictures::report_json(const JobId& id) const {
   facts.meters = meter_values(shown->film, facts.job.meters);
   // The report of a running job is requested often and must not wait for the denoiser.
   if (is_terminal(facts.job.state)) denoising_.of_job(shown->film, facts);
-  if (!facts.job.spec.float_output) facts.clamped_values = values_above_half(shown->film);
+  if (!facts.job.spec.float_output)
+    facts.clamped_values = values_above_half(shown->film, facts.job.spec.colour_space);
   return coordinator::report_json(facts);
 }
 

@@ -8,12 +8,20 @@
 #include "core/job/limits.h"
 #include "core/job/setting.h"
 #include "core/job/settings.h"
+#include "core/job/values.h"
 
 namespace ls::job {
 
 template <class T, class U>
 concept Of = std::same_as<std::remove_const_t<T>, U>;
 
+// Returns the names of the values of an enumeration: "rec709, rec2020, ...".
+template <class E>
+std::string names_of_choices() {
+  std::string names;
+  for (const E one : offered(E{})) names += (names.empty() ? "" : ", ") + std::string(to_string(one));
+  return names;
+}
 std::string integrator_names();  // returns "volpath, volpath_distant_mis, ..."
 
 // Rows of settings that can also be changed later (coordinator/views/describe_change.h).
@@ -104,6 +112,12 @@ void describe(V& v, T& s) {
        .placeholder = "A-B",
        .render = true},
       s.frames);
+  v.setting({.name = "fps",
+             .doc = "Frames of the sequence per second, for the attribute framesPerSecond of the image.",
+             .range = {0, static_cast<std::uint64_t>(kMaxFps)},
+             .option = "--fps",
+             .render = true},
+            s.fps);
   v.setting({.name = "size",
              .doc = "Size of the image in pixels, instead of the size in the scene.",
              .option = "--size",
@@ -163,8 +177,38 @@ void describe(V& v, T& s) {
              .doc = "The image has 32-bit numbers instead of 16-bit numbers.",
              .option = "--float",
              .render = true,
+             .merge = true,
              .always = true},
             s.float_output);
+  v.setting(
+      {.name = "color_space",
+       .doc = "Colour space of the image, to which its colours are converted when it is written.",
+       .more = "The scene is rendered in Rec. 709 in any case, and PNGs, videos and the dashboard stay sRGB "
+               "(docs/reference/image-file.md).",
+       .option = "--color-space",
+       .placeholder = "NAME",
+       .choices = names_of_choices<ColourSpace>,
+       .render = true,
+       .merge = true},
+      s.colour_space);
+  v.setting(
+      {.name = "exr_compression",
+       .doc = "How the image is packed.",
+       .more = "dwaa and dwab change the colours (lossy). They need exr_parts \"layers\", which keeps them "
+               "away from the other layers, and such an image has no seal: `lightshaft verify` refuses it.",
+       .option = "--exr-compression",
+       .placeholder = "NAME",
+       .choices = names_of_choices<ExrCompression>,
+       .render = true,
+       .merge = true},
+      s.exr_compression);
+  v.setting({.name = "exr_parts",
+             .doc = "Parts of the image: one for all layers, or one for each of the layers.",
+             .option = "--exr-parts",
+             .placeholder = "one|layers",
+             .render = true,
+             .merge = true},
+            s.exr_parts);
   v.setting(
       {.name = "denoise",
        .doc = "The image also has the layers denoised.R, denoised.G and denoised.B, whose error is in "

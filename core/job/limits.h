@@ -18,6 +18,7 @@ inline constexpr std::uint64_t kMaxUnits = std::uint64_t{1} << 26;
 inline constexpr std::uint64_t kMaxFilmBytes = std::uint64_t{8} << 30;
 inline constexpr double kMaxSeconds = 365.0 * 86400;  // longest time budget: a year
 inline constexpr double kMaxTargetError = 1e6;
+inline constexpr double kMaxFps = 1000;         // frames per second of a sequence
 inline constexpr int kMaxPriority = 1'000'000;  // largest absolute value of a priority
 // Largest size, in bytes, of the JSON text of a JobSpec or of RenderSettings (settings.h).
 inline constexpr std::size_t kMaxSpecBytes = std::size_t{1} << 20;

@@ -50,6 +50,19 @@ Result<void> read_settings(SealedImage& image, const std::string& name) {
   return check_job_size(image.settings, 2);
 }
 
+Result<void> read_form(SealedImage& image, const std::string& name) {
+  image.form.float_output = !image.picture.half;
+  const auto text = image.picture.strings.find(kColourSpaceName);
+  if (text == image.picture.strings.end()) return {};
+  for (const ColourSpace space : colour_spaces())
+    if (to_string(space) == text->second) {
+      image.form.colour_space = space;
+      return {};
+    }
+  return bad(name,
+             fmt::format("its header \"{}\" names no colour space that is known here", kColourSpaceName));
+}
+
 Result<void> read_tiles(SealedImage& image, const std::string& name) {
   const auto text = text_of(image.picture, "lightshaft:tiles", name);
   if (!text) return tl::unexpected(text.error());
@@ -82,6 +95,11 @@ std::uint32_t stored(const std::variant<ExrHalf, ExrFloat, ExrUint>& channel, st
 }  // namespace
 
 Result<SealedImage> read_sealed_image(FinalPicture picture, const std::string& name) {
+  if (picture.lossy)
+    return bad(
+        name,
+        "it is packed with a lossy compression, which changes the colours, so that they can't be verified: "
+        "render it with the exr_compression zip or piz");
   SealedImage image;
   image.picture = std::move(picture);
   const auto scene = digest_of_header(image.picture, "lightshaft:scene", name);
@@ -93,6 +111,7 @@ Result<SealedImage> read_sealed_image(FinalPicture picture, const std::string& n
   image.scene = *scene;
   image.numeric_class = *numeric_class;
   image.build = std::move(*build);
+  if (const auto ok = read_form(image, name); !ok) return tl::unexpected(ok.error());
   if (const auto ok = read_settings(image, name); !ok) return tl::unexpected(ok.error());
   if (image.picture.strings.contains("lightshaft:mix"))
     return bad(name, "it is a mix of light groups; only the image that it was mixed from can be verified");
@@ -120,7 +139,7 @@ std::optional<PixelDifference> first_difference(const SealedImage& image, const 
   const int row = static_cast<int>(tile) / film.grid().columns();
   const PixelRect rect = film.grid().rect(tile);
   const LayerNames names{.light_groups = image.settings.light_groups};
-  for (const auto& [name, ours] : final_layers(film.row(row), names, !image.picture.half).channels) {
+  for (const auto& [name, ours] : final_layers(film.row(row), names, image.form).channels) {
     const auto theirs = image.picture.channels.find(name);
     if (theirs == image.picture.channels.end() || theirs->second.index() != ours.index())
       return PixelDifference{rect.x0, rect.y0, name};

@@ -23,6 +23,7 @@ struct SealedImage {
   FinalPicture picture;
   Digest scene, numeric_class;
   RenderSettings settings;
+  ImageForm form;  // number format and colour space; compression and parts do not matter here
   std::string build;
   // One per tile: Film::tile_digest(), a digest of the results that were added to the tile.
   std::vector<Digest> tiles;

@@ -33,10 +33,11 @@ struct Setting {
   std::string_view absent = {};        // the value of a new job for which an optional setting is not given
   std::string_view who = {};           // who may set it; empty: everyone who may submit or change the job
   std::string (*choices)() = nullptr;  // returns the values that are possible, as a list for the help
-  // Commands that have the option: `submit` always, `render` and `again` as these members say. A request to
-  // submit a job again also accepts only the settings with `again`.
+  // Commands that have the option: `submit` always, `render`, `again` and `merge` as these members say. A
+  // request to submit a job again also accepts only the settings with `again`.
   bool render = false;
   bool again = false;
+  bool merge = false;
   // Sentences that replace `doc` and `more` in a request to submit a job again; empty: these apply there, too
   std::string_view again_doc = {};
   bool pixels = false;  // the command that renders one sample again needs this setting

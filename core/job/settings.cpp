@@ -104,6 +104,10 @@ Result<void> check_light_groups(const RenderSettings& settings, AovSet aovs) {
 
 }  // namespace
 
+ImageForm form_of(const JobSpec& s) {
+  return {s.float_output, s.colour_space, s.exr_compression, s.exr_parts};
+}
+
 std::string canonical_json(const RenderSettings& s) { return dump(job::write_object(s)); }
 
 std::string_view to_string(TargetLayer layer) { return layer == TargetLayer::raw ? "raw" : "denoised"; }

@@ -17,6 +17,7 @@
 #include "core/base/frame_range.h"
 #include "core/base/light_mix.h"
 #include "core/image/aov/aov.h"
+#include "core/image/exr/final_image.h"
 #include "core/image/frame/frame.h"
 #include "core/job/techniques.h"
 
@@ -63,12 +64,16 @@ struct JobSpec {
   std::map<std::string, std::string> defines;  // values of the $name parameters in Mitsuba scenes, by name
   int priority = 0;
   bool float_output = false;
+  ColourSpace colour_space = ColourSpace::rec709;  // of the image
+  ExrCompression exr_compression = ExrCompression::zip;
+  ExrParts exr_parts = ExrParts::one;
   // True: the image also has denoised layers (util/denoise/denoised_image.h). The coordinator computes them
   // from the film, to which it adds the AOVs that the denoiser needs.
   bool denoise = false;
   std::vector<std::string> tags;
   // The frame numbers of a sequence. Each frame is an image of its own. nullopt: the job is a single image.
   std::optional<FrameRange> frames;
+  std::optional<double> fps;                 // frames of the sequence per second
   std::optional<std::uint32_t> max_workers;  // maximum number of workers at the same time
   std::optional<std::uint32_t> max_units;    // maximum number of units assigned to workers at the same time
   // Memory, in bytes, that a worker must have to get units of the job. If the job's files are larger than
@@ -84,6 +89,8 @@ struct JobSpec {
   std::optional<Digest> reference;  // digest of the reference image, an EXR of the job's size
   bool operator==(const JobSpec&) const = default;
 };
+
+ImageForm form_of(const JobSpec& spec);
 
 std::string canonical_json(const RenderSettings& settings);
 Result<RenderSettings> parse_render_settings(std::string_view json);

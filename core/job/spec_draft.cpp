@@ -81,6 +81,11 @@ Result<void> check_spec(const JobSpec& spec, Form form) {
   if (spec.target_layer == TargetLayer::denoised && !spec.target_error)
     return wrong("target_layer", form,
                  "says which error the target error means, and there is no target error: give that, too");
+  if (is_lossy(spec.exr_compression) && spec.exr_parts != ExrParts::layers)
+    return wrong("exr_compression", form,
+                 fmt::format("is {}, which in one part would also change standard errors, positions and "
+                             "identifiers: give exr_parts \"layers\", too, or choose a lossless one (zip)",
+                             to_string(spec.exr_compression)));
   if (const auto aovs = parse_aovs(spec.aov); !aovs)
     return wrong("aov", form, "is not possible: " + aovs.error().message);
   return {};

@@ -34,6 +34,10 @@ namespace ls {
 inline constexpr std::array kTargetLayers{TargetLayer::raw, TargetLayer::denoised};
 constexpr std::span<const TargetLayer> offered(TargetLayer) { return kTargetLayers; }
 
+inline std::span<const ColourSpace> offered(ColourSpace) { return colour_spaces(); }
+inline std::span<const ExrCompression> offered(ExrCompression) { return exr_compressions(); }
+inline std::span<const ExrParts> offered(ExrParts) { return exr_parts(); }
+
 namespace job {
 
 using Json = nlohmann::json;

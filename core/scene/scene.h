@@ -20,6 +20,10 @@ namespace ls {
 enum class TextureFilter { nearest, bilinear };
 enum class Wrap { repeat, mirror, clamp };
 enum class Channel { all, red, green, blue, alpha };
+// What an image's stored colours are. automatic: as the file says: values of 8 and 16 bits are sRGB, encoded
+// by its curve, and others are linear sRGB, or linear with the primaries in the file's header. srgb: encoded
+// by that curve. The others are linear, in the ColourSpace of that name.
+enum class ImageColours { automatic, srgb, rec709, rec2020, p3_d65, acescg, aces2065_1, xyz };
 
 struct ConstantTexture {
   Rgb value{.5, .5, .5};
@@ -31,7 +35,7 @@ struct BitmapTexture {
   AssetIndex file;
   TextureFilter filter = TextureFilter::bilinear;
   Wrap wrap = Wrap::repeat;
-  bool raw = false;  // true: 8- and 16-bit values are not decoded from sRGB
+  bool raw = false;  // true: 8- and 16-bit values are not decoded from sRGB, and `colours` has no effect
   UvTransform to_uv;
   // True for a texture that is used as an opacity. Its value is then the image's alpha channel if any pixel
   // of the image has an alpha below 1/2, otherwise the image's colour.
@@ -39,6 +43,7 @@ struct BitmapTexture {
   // Which channels are looked up. `all`: the colour. A single channel: the texture is grey, and its value is
   // the number stored in this channel, without sRGB decoding; if the image has no alpha channel, alpha is 1.
   Channel channel = Channel::all;
+  ImageColours colours = ImageColours::automatic;
   bool operator==(const BitmapTexture&) const = default;
 };
 // A checkerboard: color0 where floor(2 u') + floor(2 v') is even, otherwise color1 (Mitsuba's
@@ -353,6 +358,7 @@ struct EnvmapEmitter {
   SkyMapping mapping = SkyMapping::latlong;
   bool visible_camera = true;
   std::string light_group;
+  ImageColours colours = ImageColours::automatic;
   bool operator==(const EnvmapEmitter&) const = default;
 };
 

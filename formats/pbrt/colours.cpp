@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/colour_space.h"
 #include "core/base/file_form.h"
 #include "core/scene/spectrum.h"
 #include "formats/pbrt/object_translation.h"
@@ -30,74 +31,6 @@ double luminance(const Rgb& c) {
     return w;
   }();
   return weights[0] * c[0] + weights[1] * c[1] + weights[2] * c[2];
-}
-
-using Matrix3 = std::array<Vec3, 3>;  // its rows
-
-Vec3 product(const Matrix3& m, const Vec3& v) { return {dot(m[0], v), dot(m[1], v), dot(m[2], v)}; }
-Matrix3 product(const Matrix3& a, const Matrix3& b) {
-  Matrix3 out;
-  for (std::size_t i = 0; i < 3; ++i)
-    for (std::size_t k = 0; k < 3; ++k) out[i][k] = dot(a[i], Vec3{{b[0][k], b[1][k], b[2][k]}});
-  return out;
-}
-Matrix3 inverse(const Matrix3& m) {
-  const Vec3 a = cross(m[1], m[2]), b = cross(m[2], m[0]), c = cross(m[0], m[1]);
-  const double det = dot(m[0], a);
-  Matrix3 out;
-  for (std::size_t i = 0; i < 3; ++i) out[i] = Vec3{{a[i] / det, b[i] / det, c[i] / det}};
-  return out;
-}
-
-// The primaries and the white of a colour space, as chromaticities (x, y).
-struct Space {
-  ColourSpace space;
-  std::array<double, 2> red, green, blue, white;
-};
-constexpr std::array<double, 2> kD65{.3127, .3290};
-// From ITU-R BT.709 and BT.2020, SMPTE RP 431-2 and ST 2065-1. The green of DCI-P3 is (.265, .690), and its
-// white D65, in pbrt-v4 (src/pbrt/util/colorspace.cpp), too.
-constexpr Space kSpaces[] = {
-    {ColourSpace::srgb, {.64, .33}, {.3, .6}, {.15, .06}, kD65},
-    {ColourSpace::dci_p3, {.68, .32}, {.265, .690}, {.15, .06}, kD65},
-    {ColourSpace::rec2020, {.708, .292}, {.170, .797}, {.131, .046}, kD65},
-    {ColourSpace::aces2065_1, {.7347, .2653}, {0, 1}, {.0001, -.077}, {.32168, .33767}},
-};
-const Space& row_of(ColourSpace space) {
-  return *std::find_if(std::begin(kSpaces), std::end(kSpaces),
-                       [&](const Space& row) { return row.space == space; });
-}
-
-Vec3 xyz_of(const std::array<double, 2>& xy) { return {xy[0] / xy[1], 1, (1 - xy[0] - xy[1]) / xy[1]}; }
-
-// Returns the matrix that converts a colour of the space to X, Y, Z: its columns are those of the primaries,
-// scaled so that (1, 1, 1) is the white, of luminance 1.
-Matrix3 to_xyz(const Space& s) {
-  // A chromaticity (x, y) has the direction (x, y, 1 - x - y); the green of ACES has a y of 1, its blue one
-  // below 0.
-  Matrix3 m;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const std::array<double, 2> xy = std::array{s.red, s.green, s.blue}[k];
-    m[0][k] = xy[0];
-    m[1][k] = xy[1];
-    m[2][k] = 1 - xy[0] - xy[1];
-  }
-  const Vec3 scale = product(inverse(m), xyz_of(s.white));
-  for (Vec3& row : m)
-    for (std::size_t k = 0; k < 3; ++k) row[k] *= scale[k];
-  return m;
-}
-
-// Returns the matrix that converts X, Y, Z seen under one white to those that look alike under another:
-// Bradford's (K. M. Lam, Metamerism and Colour Constancy, 1985), as ICC profiles have it.
-Matrix3 adapted(const std::array<double, 2>& from, const std::array<double, 2>& to) {
-  const Matrix3 cones{Vec3{{.8951, .2664, -.1614}}, Vec3{{-.7502, 1.7135, .0367}},
-                      Vec3{{.0389, -.0685, 1.0296}}};
-  const Vec3 one = product(cones, xyz_of(from)), other = product(cones, xyz_of(to));
-  Matrix3 scaled = cones;
-  for (std::size_t i = 0; i < 3; ++i)
-    for (double& x : scaled[i]) x *= other[i] / one[i];
-  return product(inverse(cones), scaled);
 }
 
 // Sets negative channels to 0, with a warning: sRGB cannot represent such a colour.
@@ -178,8 +111,8 @@ std::optional<ColourSpace> colour_space(std::string_view name) {
   std::string lower(name);
   std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) { return std::tolower(c); });
   static constexpr std::pair<std::string_view, ColourSpace> kNames[] = {
-      {"srgb", ColourSpace::srgb},
-      {"dci-p3", ColourSpace::dci_p3},
+      {"srgb", ColourSpace::rec709},
+      {"dci-p3", ColourSpace::p3_d65},  // pbrt-v4's, whose white is D65
       {"rec2020", ColourSpace::rec2020},
       {"aces2065-1", ColourSpace::aces2065_1}};
   for (const auto& [known, space] : kNames)
@@ -188,21 +121,20 @@ std::optional<ColourSpace> colour_space(std::string_view name) {
 }
 
 std::vector<double> srgb_numbers(Translation& t, const Param& p, RgbOf meaning) {
-  if (p.space == ColourSpace::srgb) return p.numbers;
-  const Space &from = row_of(p.space), &to = row_of(ColourSpace::srgb);
+  if (p.space == ColourSpace::rec709) return p.numbers;
+  const Chromaticities &from = chromaticities_of(p.space), &to = chromaticities_of(ColourSpace::rec709);
   const bool as_seen = meaning == RgbOf::light || from.white == to.white;
-  Matrix3 m = to_xyz(from);
-  if (!as_seen) m = product(adapted(from.white, to.white), m);
-  m = product(inverse(to_xyz(to)), m);
+  ColourMatrix m = to_xyz(from);
+  if (!as_seen) m = adaptation(from.white, to.white) * m;
+  m = inverse(to_xyz(to)) * m;
   std::vector<double> out = p.numbers;
   bool is_cut = false;
   for (std::size_t i = 0; i + 2 < out.size(); i += 3) {
-    const Vec3 given{{out[i], out[i + 1], out[i + 2]}};
+    const Tristimulus given{out[i], out[i + 1], out[i + 2]};
     // The whites stand for each other, so that a grey stays exactly grey; only light keeps a white of its
     // own.
-    if (is_grey({given[0], given[1], given[2]}) && (from.white == to.white || meaning != RgbOf::light))
-      continue;
-    const Vec3 seen = product(m, given);
+    if (is_grey(given) && (from.white == to.white || meaning != RgbOf::light)) continue;
+    const Tristimulus seen = m * given;
     const bool at_most_one = meaning == RgbOf::surface && std::max({given[0], given[1], given[2]}) <= 1;
     for (std::size_t k = 0; k < 3; ++k) {
       out[i + k] = std::clamp(seen[k], 0., at_most_one ? 1. : std::numeric_limits<double>::max());

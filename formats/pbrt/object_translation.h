@@ -61,7 +61,7 @@ struct Attributes {
   // False if transforms that follow are those of the time at which the shutter closes (ActiveTransform).
   bool at_start = true;
   bool reversed = false;
-  ColourSpace space = ColourSpace::srgb;
+  ColourSpace space = ColourSpace::rec709;
   Material material;
   std::optional<AreaLight> light;
   std::string inside, outside;  // media on the surface's two sides, by name; empty: none

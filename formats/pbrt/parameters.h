@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/colour_space.h"
 #include "core/scene/scene_values.h"
 #include "formats/pbrt/vocabulary.h"
 #include "formats/xml/source_text.h"
@@ -40,13 +41,10 @@ class Tokens {
   std::optional<Token> next_;
 };
 
-// The colour space that a directive ColorSpace names, in which the values of type rgb after it are given.
-enum class ColourSpace { srgb, dci_p3, rec2020, aces2065_1 };
-
 struct Param {
-  std::string type, name;  // for example "rgb" and "reflectance"
-  Span at;                 // place of the declaration
-  ColourSpace space = ColourSpace::srgb;
+  std::string type, name;                   // for example "rgb" and "reflectance"
+  Span at;                                  // place of the declaration
+  ColourSpace space = ColourSpace::rec709;  // of values of type rgb, as the last directive ColorSpace says
   std::vector<double> numbers;
   std::vector<std::string> texts;  // values that are quoted texts, and the words true and false
 };

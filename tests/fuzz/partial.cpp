@@ -39,7 +39,7 @@ void partial(Bytes input) {
   const auto merged = merge_partials(sources);
   if (!merged || !small) return;
   for (const bool as_float : {false, true}) {
-    const auto image = final_exr(merged->film, {}, as_float);
+    const auto image = final_exr(merged->film, {}, {.float_output = as_float});
     must(image && read_exr_rgb(image->exr, "final").has_value(), "a final image can be written and read");
     const auto back = read_final_exr(image->exr, "final");
     must(back && back->half == !as_float && back->size == merged->film.grid().frame,
@@ -55,10 +55,13 @@ Seeds partial_seeds() {
   };
   Film film({{4, 3}, 4});
   (void)film.fold(0, 0, fake_partial({{}, {}, {}, {0, 0, 4, 3}, {0, 2}}));
-  const auto whole = final_exr(film, {{}, "{}", "b", {}, 1, 2, "clean"}, false).value().exr;
+  const auto whole = [&](const ImageForm& form) {
+    const auto bytes = final_exr(film, {{}, "{}", "b", {}, 1, 2, "clean"}, form).value().exr;
+    return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  };
   const std::string one = exr({0, 0, 4, 3}, {0, 2}, {4, 3});
   return {
-      one, std::string(reinterpret_cast<const char*>(whole.data()), whole.size()),
+      one, whole({}), whole({.compression = ExrCompression::dwaa, .parts = ExrParts::layers}),
       with_length(exr({0, 0, 4, 3}, {0, 2}, {6, 3})) + exr({4, 0, 6, 3}, {0, 2}, {6, 3}),
       with_length(one) + with_length(exr({0, 0, 4, 3}, {2, 4}, {4, 3})) + exr({0, 0, 4, 3}, {4, 6}, {4, 3})};
 }

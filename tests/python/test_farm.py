@@ -131,6 +131,15 @@ def test_layers_are_those_of_the_file(farm, fog, tmp_path):
         job.image("denoised")
 
 
+def test_layers_in_parts_are_the_same_layers(farm, fog):
+    settings = {"spp": 2, "aov": ["depth", "shape_id"]}
+    whole = farm.submit(fog, **settings).wait().layers()
+    parts = farm.submit(fog, **settings, exr_parts="layers", exr_compression="piz").wait().layers()
+
+    assert list(parts) == list(whole)
+    assert all(np.array_equal(parts[name], whole[name]) for name in whole)
+
+
 def test_a_denoised_job_has_the_denoised_image(tmp_path):
     library = bin_dir().parent / "fake_oidn" / "blurs.so"
     with LocalFarm(tmp_path / "farm", environment={"LIGHTSHAFT_OIDN": str(library)}) as local:

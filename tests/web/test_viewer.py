@@ -327,13 +327,18 @@ def test_pictures_of_other_sizes_are_not_compared(farm, viewer, compared):
     page.wait("document.querySelector('.field-error')?.innerText.includes('32 × 32')")
 
 
-def exr(width, height, value):
+REC709 = (.64, .33, .3, .6, .15, .06, .3127, .329)
+REC2020 = (.708, .292, .17, .797, .131, .046, .3127, .329)
+
+
+def exr(width, height, value, primaries=REC709):
     """A picture of one colour as an OpenEXR file with ZIP compression, as the specification lays it out."""
     def attribute(name, kind, body):
         return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(body)) + body
     channels = b"".join(name + b"\0" + struct.pack("<iiii", 1, 0, 1, 1) for name in (b"B", b"G", b"R")) + b"\0"
     box = struct.pack("<iiii", 0, 0, width - 1, height - 1)
-    head = (struct.pack("<ii", 20000630, 2) + attribute("channels", "chlist", channels) + attribute("compression", "compression", b"\3")
+    head = (struct.pack("<ii", 20000630, 2) + attribute("channels", "chlist", channels)
+            + attribute("chromaticities", "chromaticities", struct.pack("<8f", *primaries)) + attribute("compression", "compression", b"\3")
             + attribute("dataWindow", "box2i", box) + attribute("displayWindow", "box2i", box) + attribute("lineOrder", "lineOrder", b"\0")
             + attribute("pixelAspectRatio", "float", struct.pack("<f", 1)) + attribute("screenWindowCenter", "v2f", struct.pack("<ff", 0, 0))
             + attribute("screenWindowWidth", "float", struct.pack("<f", 1)) + b"\0")
@@ -366,7 +371,8 @@ def test_a_job_is_compared_with_a_file_that_stays_on_this_machine(farm, viewer, 
     assert not any(method in ("POST", "PUT") and "session" not in path for method, path in farm.requests)
 
 
-@pytest.mark.parametrize("broken, words", [(b"\x89PNG", "no OpenEXR file"), (exr(96, 64, (1, 1, 1))[:400], "damaged"), (b"\x76\x2f\x31\x01", "damaged")])
+@pytest.mark.parametrize("broken, words", [(b"\x89PNG", "no OpenEXR file"), (exr(96, 64, (1, 1, 1))[:400], "damaged"), (b"\x76\x2f\x31\x01", "damaged"),
+                                           (exr(96, 64, (1, 1, 1), REC2020), "not those of Rec. 709")])
 def test_a_file_that_is_no_picture_is_refused_with_words(viewer, tmp_path, broken, words):
     file = tmp_path / "broken.exr"
     file.write_bytes(broken)

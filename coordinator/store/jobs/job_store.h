@@ -20,6 +20,7 @@
 #include "core/base/error.h"
 #include "core/base/id.h"
 #include "core/job/meter_group.h"
+#include "core/image/frame/camera_matrices.h"
 #include "core/job/settings.h"
 #include "core/job/techniques.h"
 #include "util/protocol/messages.h"
@@ -85,6 +86,9 @@ struct StoredJob {
   bool reference_same_seed = false;  // true: its reference image was rendered with this scene and seed
   std::vector<std::string> features_used, features_left_out;
   std::string needs;  // what the scene needs, as canonical JSON (core/scene/analysis/needs.h)
+  // The camera of the image, for the header of the final EXR. nullopt: it has no such matrices, or an older
+  // version stored the job.
+  std::optional<CameraMatrices> camera = {};
   // JSON for the report: which features of the renderer the scene needs and why, and which parts of the scene
   // are not rendered and why
   std::string analysis;

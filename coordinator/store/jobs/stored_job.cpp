@@ -156,6 +156,17 @@ MeterKind meter_kind_of(const json& name) {
   throw std::invalid_argument("the kind of a meter");
 }
 
+CameraMatrices camera_of(const json& j) {
+  const auto matrix = [](const json& from) {
+    RowMatrix m{};
+    for (std::size_t i = 0; i < m.size(); ++i) m[i] = from.at(i).get<double>();
+    return m;
+  };
+  CameraMatrices camera{matrix(j.at(0)), std::nullopt};
+  if (j.size() > 1) camera.world_to_ndc = matrix(j.at(1));
+  return camera;
+}
+
 StoredJob stored_from(const json& j) {
   StoredJob job;
   job.id.value = j.at("id");
@@ -178,6 +189,7 @@ StoredJob stored_from(const json& j) {
   job.features_left_out = j.at("features_left_out");
   job.needs = j.at("needs");
   job.analysis = j.at("analysis");
+  if (const auto camera = j.find("camera"); camera != j.end()) job.camera = camera_of(*camera);
   job.state = enum_from(j.at("state"), {JobState::queued, JobState::running, JobState::paused, JobState::done,
                                         JobState::failed, JobState::cancelled});
   if (!j.at("stopped").is_null())
@@ -280,6 +292,10 @@ std::string to_json(const StoredJob& job) {
   if (!job.platform.empty()) j["platform"] = job.platform;
   if (job.fake) j["fake"] = true;
   if (!job.traceparent.empty()) j["traceparent"] = job.traceparent;
+  if (job.camera) {
+    j["camera"] = json::array({job.camera->world_to_camera});
+    if (job.camera->world_to_ndc) j["camera"].push_back(*job.camera->world_to_ndc);
+  }
   if (job.focus) j["focus"] = {job.focus->x0, job.focus->y0, job.focus->x1, job.focus->y1};
   if (job.revision != 0) j["revision"] = job.revision;
   if (job.fence != 0) j["fence"] = job.fence;

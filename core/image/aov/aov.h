@@ -61,6 +61,8 @@ enum class AovKind {
   groups,   // like `opacity`, and separately for each light group
   ids       // identifiers, each with the number of samples that hit it
 };
+// True for an AOV whose R, G, B are those of a colour, as that of light or of a surface.
+bool is_colour(Aov aov);
 constexpr bool has_halves(AovKind kind) {
   return kind == AovKind::guide || kind == AovKind::opacity || kind == AovKind::groups;
 }

@@ -10,13 +10,17 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "core/base/colour_space.h"
 #include "core/base/error.h"
+#include "core/image/frame/camera_matrices.h"
 #include "core/image/frame/frame.h"
 
 namespace ls {
@@ -86,6 +90,12 @@ struct ExrFloat {
 struct ExrUint {
   std::vector<std::uint32_t> values;
 };
+// Standard attributes of OpenEXR that are no strings (ImfStandardAttributes.h).
+struct StandardAttributes {
+  std::optional<Chromaticities> chromaticities = {};
+  std::optional<CameraMatrices> camera = {};     // worldToCamera and worldToNDC
+  std::optional<double> frames_per_second = {};  // of the sequence to which the image belongs
+};
 struct ExrPicture {
   FrameSize size;
   // The planes, by the names of their channels: "R", "stderr.R", "spp", ...
@@ -94,6 +104,20 @@ struct ExrPicture {
 };
 // Encodes an image as a scanline EXR with ZIP compression. The bytes depend only on the image.
 Result<std::vector<std::byte>> write_exr(const ExrPicture& picture);
+
+// How the pixels of an EXR are packed. dwaa and dwab are lossy: they change values of channels R, G, B and Y,
+// also of layers ("stderr.R").
+enum class ExrCompression { zip, zips, piz, rle, none, dwaa, dwab };
+std::span<const ExrCompression> exr_compressions();
+std::string_view to_string(ExrCompression compression);
+constexpr bool is_lossy(ExrCompression c) { return c == ExrCompression::dwaa || c == ExrCompression::dwab; }
+// one: all channels are in one part. layers: each layer is in a part with its name, and its channels have
+// their full names ("stderr.R"). The first part is "rgba", with the channels R, G, B and A; it has all header
+// strings.
+enum class ExrParts { one, layers };
+inline constexpr const char* kColourPart = "rgba";
+std::span<const ExrParts> exr_parts();
+std::string_view to_string(ExrParts parts);
 
 // The destination of a file that is too large for memory. write() writes bytes at the offset `at` of the
 // file.
@@ -110,9 +134,16 @@ struct ExrBands {
   // Returns the band with this number, counted from 0. The bands are requested in order until they contain
   // all rows. The image is written in two passes, so each band is requested twice.
   std::function<ExrPicture(int band)> band;
+  StandardAttributes standard = {};
+  ExrCompression compression = ExrCompression::zip;
+  ExrParts parts = ExrParts::one;
+  // The parts that a lossy compression may change; the others are then packed with ZIP. Such an image must
+  // have a part for each layer, and it gets no seal, because its colours are no longer those that were
+  // sealed.
+  std::set<std::string> lossy_parts = {};
 };
-// Writes the image to `sink` as one EXR file with a seal (digests of all layers and headers, seal.h) in its
-// header.
+// Writes the image to `sink` as one EXR file. Unless its compression is lossy, its header has a seal (digests
+// of all layers and headers, seal.h).
 Result<void> write_sealed_exr(const ExrBands& bands, ByteSink& sink);
 
 }  // namespace ls

@@ -17,12 +17,26 @@ namespace {
 // Adding 0 turns -0 into +0 and changes no other value (in the rounding mode to nearest).
 float pixel_value(double mean) { return static_cast<float>(mean) + 0.0f; }
 
+// Returns the matrix from the film's colours to those of the space; nullopt: they are the same.
+std::optional<ColourMatrix> matrix_to(ColourSpace space) {
+  if (space == ColourSpace::rec709) return std::nullopt;
+  return from_rec709(space);
+}
+
+// Converts the planes R, G, B.
+void convert(const ColourMatrix& m, const std::array<std::vector<float>*, 3>& planes) {
+  for (std::size_t i = 0; i < planes[0]->size(); ++i) {
+    const Tristimulus c = m * Tristimulus{(*planes[0])[i], (*planes[1])[i], (*planes[2])[i]};
+    for (std::size_t k = 0; k < 3; ++k) (*planes[k])[i] = pixel_value(c[k]);
+  }
+}
+
 struct Gathered {
   std::vector<float> rgb[3], standard_error[3];
   std::vector<std::uint32_t> spp;
 };
 
-Gathered gather(const Film& film) {
+Gathered gather(const Film& film, const std::optional<ColourMatrix>& matrix) {
   const FrameSize frame = film.grid().frame;
   const std::size_t pixels = frame.pixels();
   Gathered out{{}, {}, std::vector<std::uint32_t>(pixels)};
@@ -41,7 +55,20 @@ Gathered gather(const Film& film) {
       }
       out.spp[to] = spp;
     });
+    if (!matrix) continue;
+    // A standard error is half the difference of the two halves' colours (Film::pixels()), which the matrix
+    // converts like a colour.
+    const auto halves = film.half_means(t);
+    const auto n = static_cast<std::size_t>(tile.rect.pixels());
+    each_pixel(tile.rect, frame, [&](std::size_t to, std::size_t from) {
+      Tristimulus difference;
+      for (std::size_t c = 0; c < 3; ++c) difference[c] = halves[0][c * n + from] - halves[1][c * n + from];
+      const Tristimulus converted = *matrix * difference;
+      for (std::size_t c = 0; c < 3; ++c)
+        out.standard_error[c][to] = static_cast<float>(.5 * std::abs(converted[c]));
+    });
   }
+  if (matrix) convert(*matrix, {&out.rgb[0], &out.rgb[1], &out.rgb[2]});
   return out;
 }
 
@@ -90,14 +117,15 @@ class Layers {
     }
   }
 
-  std::uint64_t move_to(ExrPicture& picture, const LayerNames& names, bool float_output) {
+  std::uint64_t move_to(ExrPicture& picture, const LayerNames& names, const ImageForm& form) {
     std::uint64_t clamped = 0;
+    if (const auto matrix = matrix_to(form.colour_space)) convert_colours(*matrix);
     for (std::size_t p = 0; p < sums_.size(); ++p) {
       if (sums_[p].empty()) continue;
       const AovPlane& plane = planes_.sums[p];
       const AovRow& row = row_of(plane.aov);
       const char component = row.components[static_cast<std::size_t>(plane.component)];
-      const bool halves = row.half && !float_output;
+      const bool halves = row.half && !form.float_output;
       if (row.kind == AovKind::groups) {
         const std::string layer = layer_of_group(row.aov, plane.group, names.light_groups);
         clamped += add_layer(picture, fmt::format("{}.{}", layer, component), std::move(sums_[p]), halves) +
@@ -126,6 +154,25 @@ class Layers {
 
  private:
   static bool keeps_difference(Aov aov) { return aov == Aov::alpha || row_of(aov).kind == AovKind::groups; }
+  // Converts the planes of one colour, of a light group if it has groups, and those of its differences.
+  void convert_colour(const ColourMatrix& matrix, Aov aov, std::size_t group) {
+    for (auto* planes : {&sums_, &differences_}) {
+      std::array<std::vector<float>*, 3> rgb{};
+      for (std::size_t p = 0; p < planes->size(); ++p)
+        if (const AovPlane& plane = planes_.sums[p];
+            !(*planes)[p].empty() && plane.aov == aov && plane.group == group)
+          rgb[static_cast<std::size_t>(plane.component)] = &(*planes)[p];
+      if (rgb[0]) convert(matrix, rgb);
+    }
+  }
+  void convert_colours(const ColourMatrix& matrix) {
+    for (const AovRow& row : aov_rows()) {
+      if (!film_.aovs().has(row.aov) || !is_colour(row.aov)) continue;
+      const std::size_t groups = row.kind == AovKind::groups ? film_.aovs().groups() : 1;
+      for (std::size_t g = 0; g < groups; ++g) convert_colour(matrix, row.aov, g);
+    }
+  }
+
   void gather_means(const TileAovs& tile) {
     const auto n = static_cast<std::size_t>(tile.rect.pixels());
     const double* hits = planes_.hits == SIZE_MAX ? nullptr : &tile.sums[planes_.hits * n];
@@ -201,12 +248,12 @@ Digest pixels_sha256(const Film& film) {
   return hash.finish();
 }
 
-std::uint64_t values_above_half(const Film& film) {
+std::uint64_t values_above_half(const Film& film, ColourSpace space) {
   std::uint64_t above = 0;
-  for (TileIndex t = 0; t < film.grid().count(); ++t) {
-    if (film.spp(t) == 0) continue;
-    for (const double mean : film.pixels(t).mean) above += !(std::abs(pixel_value(mean)) <= kLargestHalf);
-  }
+  for (int row = 0; row < film.grid().rows(); ++row)
+    for (const auto& plane : gather(film.row(row), matrix_to(space)).rgb)
+      above += static_cast<std::uint64_t>(
+          std::ranges::count_if(plane, [](float v) { return !(std::abs(v) <= kLargestHalf); }));
   return above;
 }
 
@@ -221,27 +268,27 @@ std::string layer_of_group(Aov aov, std::size_t group, std::span<const std::stri
                      aov == Aov::volume_light_groups ? ".volume" : "");
 }
 
-std::uint64_t add_aov_layers(const Film& film, const LayerNames& names, bool float_output,
+std::uint64_t add_aov_layers(const Film& film, const LayerNames& names, const ImageForm& form,
                              ExrPicture& picture) {
   if (film.aovs().empty()) return 0;
   Layers layers(film);
   layers.gather();
-  return layers.move_to(picture, names, float_output);
+  return layers.move_to(picture, names, form);
 }
 
-ExrPicture final_layers(const Film& film, const LayerNames& names, bool float_output,
+ExrPicture final_layers(const Film& film, const LayerNames& names, const ImageForm& form,
                         std::uint64_t* clamped) {
-  Gathered planes = gather(film);
+  Gathered planes = gather(film, matrix_to(form.colour_space));
   ExrPicture picture{film.grid().frame, {}, {}};
   constexpr const char* kRgb[3] = {"R", "G", "B"};
   std::uint64_t above = 0;
   for (int c = 0; c < 3; ++c) {
     const std::string layer = fmt::format("stderr.{}", kRgb[c]);
-    above += add_layer(picture, kRgb[c], std::move(planes.rgb[c]), !float_output);
+    above += add_layer(picture, kRgb[c], std::move(planes.rgb[c]), !form.float_output);
     picture.channels[layer] = ExrFloat{std::move(planes.standard_error[c])};
   }
   picture.channels["spp"] = ExrUint{std::move(planes.spp)};
-  above += add_aov_layers(film, names, float_output, picture);
+  above += add_aov_layers(film, names, form, picture);
   if (clamped) *clamped += above;
   return picture;
 }
@@ -291,6 +338,7 @@ std::map<std::string, std::string> strings_of(const Film& film, const Provenance
       verdict != strings.end() && verdict->second == "trusted" && from.convergence_status &&
       !from.convergence_status->trusted)
     verdict->second = from.convergence_status->words;
+  if (!from.owner.empty()) strings["owner"] = from.owner;
   if (from.seed) strings["lightshaft:seed"] = fmt::format("{}", *from.seed);
   if (from.seconds) strings["lightshaft:seconds"] = fmt::format("{:.3f}", *from.seconds);
   if (!from.health.empty()) strings["lightshaft:health"] = from.health;
@@ -302,17 +350,23 @@ std::map<std::string, std::string> strings_of(const Film& film, const Provenance
 }
 
 // Adds the layers of the denoised image in one row of tiles. Returns the number of clamped values.
-std::uint64_t add_denoised(std::span<const float> denoised, const TileGrid& grid, int row, bool float_output,
-                           ExrPicture& band) {
+std::uint64_t add_denoised(std::span<const float> denoised, const TileGrid& grid, int row,
+                           const ImageForm& form, ExrPicture& band) {
   const auto width = static_cast<std::size_t>(grid.frame.width);
   const auto first = static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.tile) * width;
   const std::size_t pixels = static_cast<std::size_t>(band.size.height) * width;
   std::uint64_t clamped = 0;
+  std::array<std::vector<float>, 3> planes;
   for (std::size_t c = 0; c < 3; ++c) {
-    std::vector<float> plane(pixels);
-    for (std::size_t i = 0; i < pixels; ++i) plane[i] = pixel_value(double{denoised[3 * (first + i) + c]});
-    clamped += add_layer(band, fmt::format("denoised.{}", "RGB"[c]), std::move(plane), !float_output);
+    planes[c].resize(pixels);
+    for (std::size_t i = 0; i < pixels; ++i)
+      planes[c][i] = pixel_value(double{denoised[3 * (first + i) + c]});
   }
+  if (const auto matrix = matrix_to(form.colour_space))
+    convert(*matrix, {&planes[0], &planes[1], &planes[2]});
+  for (std::size_t c = 0; c < 3; ++c)
+    clamped +=
+        add_layer(band, fmt::format("denoised.{}", "RGB"[c]), std::move(planes[c]), !form.float_output);
   return clamped;
 }
 
@@ -327,28 +381,44 @@ class MemorySink final : public ByteSink {
   std::vector<std::byte> bytes;
 };
 
+// Returns the parts of an image that a lossy compression may change: those of colours.
+std::set<std::string> parts_of_colours() {
+  std::set<std::string> parts{kColourPart, "denoised"};
+  for (const AovRow& row : aov_rows())
+    if (is_colour(row.aov)) parts.insert(layer_of(row.aov));
+  return parts;
+}
+
 }  // namespace
 
-Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& from, bool float_output,
+Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& from, const ImageForm& form,
                                       ByteSink& sink, std::span<const float> denoised) {
   std::uint64_t clamped = 0;
-  const ExrBands bands{film.grid().frame, strings_of(film, from), [&](int row) {
-                         // each band is requested in two passes, so the count of clamped values restarts at
-                         // the first band
-                         if (row == 0) clamped = 0;
-                         ExrPicture band = final_layers(film.row(row), from.names, float_output, &clamped);
-                         if (!denoised.empty())
-                           clamped += add_denoised(denoised, film.grid(), row, float_output, band);
-                         return band;
-                       }};
+  const auto band = [&](int row) {
+    // each band may be requested in two passes, so the count of clamped values restarts at the first band
+    if (row == 0) clamped = 0;
+    ExrPicture layers = final_layers(film.row(row), from.names, form, &clamped);
+    if (!denoised.empty()) clamped += add_denoised(denoised, film.grid(), row, form, layers);
+    return layers;
+  };
+  auto strings = strings_of(film, from);
+  if (form.colour_space != ColourSpace::rec709)
+    strings[kColourSpaceName] = std::string(to_string(form.colour_space));
+  const ExrBands bands{film.grid().frame,
+                       std::move(strings),
+                       band,
+                       {chromaticities_of(form.colour_space), from.camera, from.frames_per_second},
+                       form.compression,
+                       form.parts,
+                       parts_of_colours()};
   if (auto written = write_sealed_exr(bands, sink); !written) return tl::unexpected(written.error());
   return clamped;
 }
 
-Result<FinalImage> final_exr(const Film& film, const Provenance& from, bool float_output,
+Result<FinalImage> final_exr(const Film& film, const Provenance& from, const ImageForm& form,
                              std::span<const float> denoised) {
   MemorySink sink;
-  const auto clamped = write_final_exr(film, from, float_output, sink, denoised);
+  const auto clamped = write_final_exr(film, from, form, sink, denoised);
   if (!clamped) return tl::unexpected(clamped.error());
   return FinalImage{std::move(sink.bytes), *clamped};
 }

@@ -64,9 +64,29 @@ struct Provenance {
   std::map<std::string, double> figures = {};
   // further header strings that are texts; the keys are their names without "lightshaft:"
   std::map<std::string, std::string> notes = {};
+  // The standard attributes `worldToCamera` and `worldToNDC`, `framesPerSecond`, and `owner`, the name of the
+  // user whose image it is (empty: not written).
+  std::optional<CameraMatrices> camera = {};
+  std::optional<double> frames_per_second = {};
+  std::string owner = {};
   // Set for a mix of light groups: its error, instead of that of the film. The header then does not name the
   // tiles, since no tile can be verified against a mix.
   std::optional<ImageError> error_of_mix = {};
+};
+  std::optional<double> frames_per_second = {};
+  std::string owner = {};
+};
+// The header string with the name of the image's colour space; without it, that is Rec. 709.
+inline constexpr const char* kColourSpaceName = "lightshaft:color_space";
+
+// How a film is stored as a final EXR. The colours are converted from Rec. 709 to `colour_space`: R, G, B,
+// the denoised ones and the AOVs that are colours (is_colour() in aov.h); their standard errors are those of
+// the converted colours, from the converted halves. Preview and pixel digest are those of Rec. 709.
+struct ImageForm {
+  bool float_output = false;
+  ColourSpace colour_space = ColourSpace::rec709;
+  ExrCompression compression = ExrCompression::zip;
+  ExrParts parts = ExrParts::one;
 };
 struct FinalImage {
   std::vector<std::byte> exr;
@@ -75,7 +95,7 @@ struct FinalImage {
 };
 // Returns the layers of the final EXR with their header strings. `film` is a whole film or one row of its
 // tiles. Adds the number of clamped values to `clamped` unless it is null.
-ExrPicture final_layers(const Film& film, const LayerNames& names, bool float_output,
+ExrPicture final_layers(const Film& film, const LayerNames& names, const ImageForm& form,
                         std::uint64_t* clamped = nullptr);
 // Returns the name of the layer of an AOV: the AOV's name, or for identifiers "crypto_object" or
 // "crypto_material". Not for AOVs of AovKind::groups, which have a layer for each group.
@@ -92,18 +112,19 @@ inline constexpr std::string_view kHalfDifference = ".delta";
 // NAME02.A with their header strings. Pixels without a surface are 0 in the AOVs of surfaces
 // (AovKind::of_hits, of_all and ids). Returns the number of values that were clamped because their magnitude
 // exceeded 65504, the largest half.
-std::uint64_t add_aov_layers(const Film& film, const LayerNames& names, bool float_output,
+std::uint64_t add_aov_layers(const Film& film, const LayerNames& names, const ImageForm& form,
                              ExrPicture& picture);
 
-// Makes the final EXR; the film may be unfinished. The layers are R, G, B (half, or float if `float_output`),
-// stderr.R, stderr.G, stderr.B (FLOAT), spp (UINT), the film's AOVs, and denoised.R, denoised.G, denoised.B
-// if `denoised` is not empty. `denoised` has R, G, B of each pixel of the whole denoised image, row by row.
-// The header string `lightshaft:seal` has digests of all layers (seal.h).
-Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output,
+// Makes the final EXR; the film may be unfinished. The layers are R, G, B (half, or float if
+// form.float_output), stderr.R, stderr.G, stderr.B (FLOAT), spp (UINT), the film's AOVs, and denoised.R,
+// denoised.G, denoised.B if `denoised` is not empty. `denoised` has R, G, B of each pixel of the whole
+// denoised image, row by row. The header string `lightshaft:seal` has digests of all layers (seal.h), unless
+// the compression is lossy.
+Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, const ImageForm& form,
                              std::span<const float> denoised = {});
 // Writes the bytes that final_exr() returns to `sink`, one row of tiles at a time, so that a large image is
 // never in memory as a whole. Returns the number of clamped values.
-Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& provenance, bool float_output,
+Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& provenance, const ImageForm& form,
                                       ByteSink& sink, std::span<const float> denoised = {});
 
 // Returns the header strings about the error of an image; the keys are their full names. `sums` are the sums
@@ -113,13 +134,14 @@ Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& proven
 std::map<std::string, std::string> error_strings(const TileError& sums, std::uint64_t pixels_without_samples);
 
 // Returns the number of values of R, G and B that would be clamped in an image of half floats.
-std::uint64_t values_above_half(const Film& film);
+std::uint64_t values_above_half(const Film& film, ColourSpace space);
 
 // The content of a final EXR, read from an untrusted file: all layers and header strings. The layers that
 // every final EXR has are required. Sizes are limited.
 inline constexpr std::uint64_t kMaxFinalBytes = std::uint64_t{1} << 32;
 struct FinalPicture : ExrPicture {
-  bool half = false;  // true if R, G and B are stored as half floats
+  bool half = false;   // true if R, G and B are stored as half floats
+  bool lossy = false;  // true if a part is packed with a lossy compression
   // names of the layers and header attributes that do not match the seal ("layer depth.Z"); nullopt: there is
   // no seal
   std::optional<std::vector<std::string>> changed;

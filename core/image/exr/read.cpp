@@ -3,7 +3,6 @@
 #include <ImfChromaticities.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
-#include <ImfInputFile.h>
 #include <ImfInputPart.h>
 #include <ImfMultiPartInputFile.h>
 #include <ImfPartType.h>
@@ -81,44 +80,9 @@ Result<Source> find_colour(const Imf::MultiPartInputFile& file, const std::strin
       "{}: no flat part with channels R, G, B or Y (deep and luminance/chroma images are not read)", name));
 }
 
-using ColourMatrix = std::array<double, 9>;  // row by row
-
-ColourMatrix matrix_product(const ColourMatrix& a, const ColourMatrix& b) {
-  ColourMatrix m{};
-  for (std::size_t r = 0; r < 3; ++r)
-    for (std::size_t c = 0; c < 3; ++c)
-      for (std::size_t k = 0; k < 3; ++k) m[3 * r + c] += a[3 * r + k] * b[3 * k + c];
-  return m;
-}
-
-// Returns the inverse by the adjugate; its entries are not finite if m cannot be inverted.
-ColourMatrix matrix_inverse(const ColourMatrix& m) {
-  const auto cofactor = [&](std::size_t r, std::size_t c) {
-    const std::size_t r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
-    return m[3 * r1 + c1] * m[3 * r2 + c2] - m[3 * r1 + c2] * m[3 * r2 + c1];
-  };
-  const double det = m[0] * cofactor(0, 0) + m[1] * cofactor(0, 1) + m[2] * cofactor(0, 2);
-  ColourMatrix out{};
-  for (std::size_t r = 0; r < 3; ++r)
-    for (std::size_t c = 0; c < 3; ++c) out[3 * r + c] = cofactor(c, r) / det;
-  return out;
-}
-
-// Returns the matrix from R, G, B of these primaries to CIE XYZ, in which white has Y = 1: the columns are
-// the XYZ of the primaries, scaled so that their sum is the white point (SMPTE RP 177-1993).
-ColourMatrix to_xyz(const Imf::Chromaticities& c) {
-  const auto xyz = [](const Imath::V2f& p) {
-    return std::array<double, 3>{p.x, p.y, 1 - double{p.x} - double{p.y}};
-  };
-  const std::array<double, 3> r = xyz(c.red), g = xyz(c.green), b = xyz(c.blue), w = xyz(c.white);
-  ColourMatrix m{r[0], g[0], b[0], r[1], g[1], b[1], r[2], g[2], b[2]};
-  const ColourMatrix back = matrix_inverse(m);
-  for (std::size_t k = 0; k < 3; ++k) {
-    double scale = 0;
-    for (std::size_t i = 0; i < 3; ++i) scale += back[3 * k + i] * w[i] / w[1];
-    for (std::size_t row = 0; row < 3; ++row) m[3 * row + k] *= scale;
-  }
-  return m;
+Chromaticities chromaticities_of(const Imf::Chromaticities& c) {
+  const auto xy = [](const Imath::V2f& p) { return Chromaticity{p.x, p.y}; };
+  return {xy(c.red), xy(c.green), xy(c.blue), xy(c.white)};
 }
 
 bool is_rec709(const Imf::Chromaticities& c) {
@@ -132,15 +96,15 @@ bool is_rec709(const Imf::Chromaticities& c) {
 }
 
 std::optional<std::array<float, 9>> srgb_matrix(const Imf::Header& header, const Source& source) {
-  ColourMatrix m = matrix_inverse(to_xyz(Imf::Chromaticities()));
+  ColourMatrix m = inverse(to_xyz(chromaticities_of(Imf::Chromaticities())));
   if (source.channels[0] != std::string_view("X")) {
     if (source.channels[0] != std::string_view("R") || !Imf::hasChromaticities(header) ||
         is_rec709(Imf::chromaticities(header)))
       return std::nullopt;
-    m = matrix_product(m, to_xyz(Imf::chromaticities(header)));
+    m = m * to_xyz(chromaticities_of(Imf::chromaticities(header)));
   }
   std::array<float, 9> out{};
-  for (std::size_t i = 0; i < 9; ++i) out[i] = static_cast<float>(m[i]);
+  for (std::size_t i = 0; i < 9; ++i) out[i] = static_cast<float>(m(i / 3, i % 3));
   return out;
 }
 
@@ -188,13 +152,20 @@ const Imf::Channel* channel_of(const Imf::ChannelList& list, const char* name,
   return found ? c : nullptr;
 }
 
-// Returns the three layers of standard errors in the part that has the colours; nullopt: one or more are
-// missing.
+// Returns the three layers of standard errors, which are in one part of the size of the colours; nullopt: one
+// or more are missing.
 std::optional<Source> find_error(const Imf::MultiPartInputFile& file, const Source& colour) {
-  const Imf::ChannelList& list = file.header(colour.part).channels();
-  for (const char* c : kErrors)
-    if (!channel_of(list, c, {Imf::HALF, Imf::FLOAT})) return std::nullopt;
-  return Source{colour.part, {std::begin(kErrors), std::end(kErrors)}, {0, 1, 2}};
+  for (int p = 0; p < file.parts(); ++p) {
+    const Imf::Header& header = file.header(p);
+    if ((header.hasType() && !Imf::isImage(header.type())) ||
+        header.dataWindow() != file.header(colour.part).dataWindow())
+      continue;
+    if (std::ranges::all_of(kErrors, [&](const char* c) {
+          return channel_of(header.channels(), c, {Imf::HALF, Imf::FLOAT}) != nullptr;
+        }))
+      return Source{p, {std::begin(kErrors), std::end(kErrors)}, {0, 1, 2}};
+  }
+  return std::nullopt;
 }
 
 std::map<std::string, std::string> strings_of(const Imf::Header& header) {
@@ -227,6 +198,11 @@ Result<RgbWithError> read_colour(std::span<const std::byte> bytes, const std::st
         const auto source = find_colour(file, name, Wanted::rgb);
         if (!source) return tl::unexpected(source.error());
         const Imf::Header& header = file.header(source->part);
+        if (Imf::hasChromaticities(header) && !is_rec709(Imf::chromaticities(header)))
+          return bad_argument(fmt::format(
+              "{}: its colours are not those of Rec. 709, by the `chromaticities` in its header: convert it, "
+              "or write it with the color_space rec709",
+              name));
         RgbWithError out{{size_of(header.dataWindow()), read_part(file, *source)}, {}, strings_of(header)};
         if (const auto layers = with_error ? find_error(file, *source) : std::nullopt)
           out.error = read_part(file, *layers);
@@ -315,22 +291,25 @@ std::variant<ExrHalf, ExrFloat, ExrUint> empty_channel(Imf::PixelType type, std:
 }
 
 // Reads the rows y0 to y0 + rows - 1 of every layer.
-ExrPicture read_rows(Imf::InputFile& file, int width, int y0, int rows) {
+ExrPicture read_rows(Imf::MultiPartInputFile& file, int width, int y0, int rows) {
   ExrPicture band{{width, rows}, {}, {}};
-  Imf::FrameBuffer buffer;
-  const Imf::ChannelList& list = file.header().channels();
-  for (auto at = list.begin(); at != list.end(); ++at) {
-    auto& channel = band.channels[at.name()] =
-        empty_channel(at.channel().type, static_cast<std::size_t>(width) * static_cast<std::size_t>(rows));
-    const Imf::PixelType type = at.channel().type == Imf::UINT ? Imf::UINT : Imf::FLOAT;
-    std::visit(
-        [&](auto& c) {
-          buffer.insert(at.name(), Imf::Slice::Make(type, c.values.data(), {0, y0}, width, rows));
-        },
-        channel);
+  for (int p = 0; p < file.parts(); ++p) {
+    Imf::FrameBuffer buffer;
+    const Imf::ChannelList& list = file.header(p).channels();
+    for (auto at = list.begin(); at != list.end(); ++at) {
+      auto& channel = band.channels[at.name()] =
+          empty_channel(at.channel().type, static_cast<std::size_t>(width) * static_cast<std::size_t>(rows));
+      const Imf::PixelType type = at.channel().type == Imf::UINT ? Imf::UINT : Imf::FLOAT;
+      std::visit(
+          [&](auto& c) {
+            buffer.insert(at.name(), Imf::Slice::Make(type, c.values.data(), {0, y0}, width, rows));
+          },
+          channel);
+    }
+    Imf::InputPart part(file, p);
+    part.setFrameBuffer(buffer);
+    part.readPixels(y0, y0 + rows - 1);
   }
-  file.setFrameBuffer(buffer);
-  file.readPixels(y0, y0 + rows - 1);
   return band;
 }
 
@@ -345,7 +324,7 @@ void append(const ExrPicture& band, FinalPicture& image) {
 }
 
 // Reads one band of rows after the other, so that a small file that claims a large size costs little memory.
-void read_pixels(Imf::InputFile& file, FinalPicture& image) {
+void read_pixels(Imf::MultiPartInputFile& file, FinalPicture& image) {
   constexpr int kBand = 64;
   exr::Seal seal;
   for (int y0 = 0; y0 < image.size.height; y0 += kBand) {
@@ -353,30 +332,32 @@ void read_pixels(Imf::InputFile& file, FinalPicture& image) {
     seal.add(band);
     append(band, image);
   }
-  seal.add(file.header());
+  for (int p = 0; p < file.parts(); ++p) seal.add(file.header(p));
   if (const auto sealed = image.strings.find(exr::kSealName); sealed != image.strings.end())
     image.changed = exr::differences(sealed->second, seal.text());
 }
 
-Result<FinalPicture> read(std::span<const std::byte> exr, const std::string& name) {
-  const ExrLimits limits{.max_bytes = kMaxFinalBytes,
-                         .max_pixels = static_cast<std::uint64_t>(kMaxFramePixels),
-                         .max_side = kMaxFrameSide};
-  if (exr.size() > limits.max_bytes) return bad(name, "the file is larger than any image of ours");
-  if (const auto ok = exr::check_headers(exr, name, limits); !ok) return tl::unexpected(ok.error());
-  exr::MemoryReader in(exr, name);
-  Imf::InputFile file(in, /*numThreads=*/0);
-  const Imf::Header& header = file.header();
-  const Imath::Box2i data = header.dataWindow();
-  if ((header.hasType() && header.type() != Imf::SCANLINEIMAGE) || data != header.displayWindow() ||
-      data.min != Imath::V2i(0, 0))
-    return bad(name, "it is no scanline image whose windows begin at 0, 0");
-  FinalPicture image;
-  image.size = {data.max.x + 1, data.max.y + 1};
-  if (const auto ok = check_layers(header.channels(), name, image); !ok) return tl::unexpected(ok.error());
-  image.strings = strings_of(header);
-  read_pixels(file, image);
-  return image;
+// Returns the layers of all parts, which must have one size.
+Result<Imf::ChannelList> layers_of(const Imf::MultiPartInputFile& file, const std::string& name) {
+  Imf::ChannelList all;
+  for (int p = 0; p < file.parts(); ++p) {
+    const Imf::Header& header = file.header(p);
+    const Imath::Box2i data = header.dataWindow();
+    if ((header.hasType() && header.type() != Imf::SCANLINEIMAGE) || data != header.displayWindow() ||
+        data.min != Imath::V2i(0, 0) || data != file.header(0).dataWindow())
+      return bad(name, "it is no scanline image whose windows begin at 0, 0");
+    for (auto at = header.channels().begin(); at != header.channels().end(); ++at) {
+      if (all.findChannel(at.name())) return bad(name, fmt::format("it has two layers {}", at.name()));
+      all.insert(at.name(), at.channel());
+    }
+  }
+  return all;
+}
+
+bool is_lossy(const Imf::Header& header) {
+  constexpr Imf::Compression kLossless[] = {Imf::NO_COMPRESSION, Imf::RLE_COMPRESSION, Imf::ZIPS_COMPRESSION,
+                                            Imf::ZIP_COMPRESSION, Imf::PIZ_COMPRESSION};
+  return std::ranges::find(kLossless, header.compression()) == std::end(kLossless);
 }
 
 }  // namespace
@@ -384,8 +365,21 @@ Result<FinalPicture> read(std::span<const std::byte> exr, const std::string& nam
 float as_half(float value) { return half(value); }
 
 Result<FinalPicture> read_final_exr(std::span<const std::byte> exr, const std::string& name) {
-  return exr::guarded(Errc::invalid_argument, fmt::format("{}: cannot read this EXR", name),
-                      [&] { return read(exr, name); });
+  const ExrLimits limits{.max_bytes = kMaxFinalBytes,
+                         .max_pixels = static_cast<std::uint64_t>(kMaxFramePixels),
+                         .max_side = kMaxFrameSide};
+  if (exr.size() > limits.max_bytes) return bad(name, "the file is larger than any image of ours");
+  return opened<FinalPicture>(exr, name, limits, [&](Imf::MultiPartInputFile& file) -> Result<FinalPicture> {
+    const auto layers = layers_of(file, name);
+    if (!layers) return tl::unexpected(layers.error());
+    FinalPicture image;
+    image.size = size_of(file.header(0).dataWindow());
+    if (const auto ok = check_layers(*layers, name, image); !ok) return tl::unexpected(ok.error());
+    for (int p = 0; p < file.parts(); ++p) image.lossy |= is_lossy(file.header(p));
+    image.strings = strings_of(file.header(0));
+    read_pixels(file, image);
+    return image;
+  });
 }
 
 }  // namespace ls

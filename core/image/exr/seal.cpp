@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 #include <string_view>
+#include <utility>
 
 #include "core/base/overloaded.h"
 #include "core/image/exr/final_image.h"
@@ -16,8 +17,10 @@
 namespace ls::exr {
 namespace {
 
-// Attributes that the seal does not cover: two that describe how the pixels are stored, and the seal itself.
-constexpr std::array<std::string_view, 3> kLeftOut = {"compression", "lineOrder", kSealName};
+// Attributes that the seal does not cover: those that describe how the pixels are stored, and the seal
+// itself.
+constexpr std::array<std::string_view, 5> kLeftOut = {"compression", "lineOrder", "chunkCount", "type",
+                                                      kSealName};
 
 // Parses a seal. Returns the digest of each line by the name of what it covers, such as "layer R". A line
 // that is too short to have a digest and a name is stored with the whole line as its name.
@@ -47,6 +50,7 @@ void Seal::add(const ExrPicture& rows) {
 }
 
 void Seal::add(const Imf::Header& header) {
+  const std::string prefix = std::exchange(first_part_, false) ? "" : header.name() + ":";
   for (auto at = header.begin(); at != header.end(); ++at) {
     if (std::find(kLeftOut.begin(), kLeftOut.end(), at.name()) != kLeftOut.end()) continue;
     MemoryWriter value;
@@ -55,7 +59,7 @@ void Seal::add(const Imf::Header& header) {
     hash.update(std::string_view(at.attribute().typeName()));
     hash.update(std::string_view("\0", 1));
     hash.update(value.take());
-    attributes_[at.name()] = hash.finish();
+    attributes_[prefix + at.name()] = hash.finish();
   }
 }
 

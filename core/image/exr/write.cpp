@@ -1,10 +1,17 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
+#include <ImfFramesPerSecond.h>
 #include <ImfHeader.h>
+#include <ImfMultiPartOutputFile.h>
 #include <ImfOutputFile.h>
+#include <ImfOutputPart.h>
+#include <ImfPartType.h>
+#include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 #include <half.h>
 
+#include <algorithm>
+#include <array>
 #include <optional>
 
 #include "core/base/overloaded.h"
@@ -41,8 +48,17 @@ Result<void> check(const ExrPicture& picture) {
   return {};
 }
 
-// Writes rows to the file; the first of them is the file's row y0.
-void write_rows(Imf::OutputFile& file, const ExrPicture& rows, int y0) {
+// Returns the name of the part of a channel in a file with a part for each layer.
+std::string part_of(const std::string& channel) {
+  const std::size_t dot = channel.rfind('.');
+  if (dot != channel.npos) return channel.substr(0, dot);
+  return channel.size() == 1 ? kColourPart : channel;
+}
+
+// Writes those channels of some rows that the file has; the first row is the file's row y0. `file` is an
+// OutputFile or an OutputPart.
+template <class File>
+void write_rows(File& file, const Imf::ChannelList& channels, const ExrPicture& rows, int y0) {
   Imf::FrameBuffer buffer;
   // The values of the half layers, to which slices of the frame buffer point. When the outer vector grows, it
   // moves the inner vectors without copying their values, so the pointers stay valid.
@@ -52,6 +68,7 @@ void write_rows(Imf::OutputFile& file, const ExrPicture& rows, int y0) {
   };
   for (const auto& entry : rows.channels) {
     const std::string& name = entry.first;
+    if (!channels.findChannel(name)) continue;
     std::visit(overloaded{[&](const ExrHalf& c) {
                             add(name, Imf::HALF, halves.emplace_back(to_half(c.values)).data());
                           },
@@ -63,14 +80,85 @@ void write_rows(Imf::OutputFile& file, const ExrPicture& rows, int y0) {
   file.writePixels(rows.size.height);
 }
 
-Imf::Header header_of(FrameSize size, const ExrPicture& like,
-                      const std::map<std::string, std::string>& strings) {
-  Imf::Header header(size.width, size.height, 1, {0, 0}, 1, Imf::INCREASING_Y, Imf::ZIP_COMPRESSION);
+Imath::M44f matrix_of(const RowMatrix& m) {
+  Imath::M44f out;
+  for (std::size_t i = 0; i < m.size(); ++i)
+    out[static_cast<int>(i / 4)][static_cast<int>(i % 4)] = static_cast<float>(m[i]);
+  return out;
+}
+
+void add_standard(const StandardAttributes& from, Imf::Header& header) {
+  if (from.chromaticities) {
+    const auto xy = [](const Chromaticity& c) {
+      return Imath::V2f(static_cast<float>(c[0]), static_cast<float>(c[1]));
+    };
+    const Chromaticities& c = *from.chromaticities;
+    Imf::addChromaticities(header, {xy(c.red), xy(c.green), xy(c.blue), xy(c.white)});
+  }
+  if (from.camera) Imf::addWorldToCamera(header, matrix_of(from.camera->world_to_camera));
+  if (from.camera && from.camera->world_to_ndc)
+    Imf::addWorldToNDC(header, matrix_of(*from.camera->world_to_ndc));
+  // NTSC's rates, such as 23.976, become their exact fractions.
+  if (from.frames_per_second) Imf::addFramesPerSecond(header, Imf::guessExactFps(*from.frames_per_second));
+}
+
+Imf::Compression compression_of(ExrCompression c) {
+  switch (c) {
+    case ExrCompression::none:
+      return Imf::NO_COMPRESSION;
+    case ExrCompression::rle:
+      return Imf::RLE_COMPRESSION;
+    case ExrCompression::zips:
+      return Imf::ZIPS_COMPRESSION;
+    case ExrCompression::zip:
+      return Imf::ZIP_COMPRESSION;
+    case ExrCompression::piz:
+      return Imf::PIZ_COMPRESSION;
+    case ExrCompression::dwaa:
+      return Imf::DWAA_COMPRESSION;
+    case ExrCompression::dwab:
+      return Imf::DWAB_COMPRESSION;
+  }
+  return Imf::ZIP_COMPRESSION;
+}
+
+Imf::Header header_of(FrameSize size, ExrCompression compression = ExrCompression::zip) {
+  Imf::Header header(size.width, size.height, 1, {0, 0}, 1, Imf::INCREASING_Y, compression_of(compression));
   header.zipCompressionLevel() = kZipLevel;
-  for (const auto& [name, text] : strings) header.insert(name, Imf::StringAttribute(text));
-  for (const auto& [name, channel] : like.channels)
-    header.channels().insert(name, Imf::Channel(type_of(channel)));
   return header;
+}
+
+void add_strings(const std::map<std::string, std::string>& strings, Imf::Header& header) {
+  for (const auto& [name, text] : strings) header.insert(name, Imf::StringAttribute(text));
+}
+
+// Returns the headers of the file's parts. All header strings are in the first one; those that programs look
+// for beside a Cryptomatte are beside it, too.
+std::vector<Imf::Header> headers_of(const ExrBands& bands, const ExrPicture& first) {
+  std::vector<Imf::Header> headers;
+  std::vector<std::string> names;
+  const auto part = [&](const std::string& name) -> Imf::Header& {
+    if (const auto found = std::ranges::find(names, name); found != names.end())
+      return headers[static_cast<std::size_t>(found - names.begin())];
+    const bool lossless = is_lossy(bands.compression) && !bands.lossy_parts.contains(name);
+    Imf::Header& header =
+        headers.emplace_back(header_of(bands.size, lossless ? ExrCompression::zip : bands.compression));
+    names.push_back(name);
+    add_standard(bands.standard, header);
+    if (bands.parts == ExrParts::one) return header;
+    header.setName(name);
+    header.setType(Imf::SCANLINEIMAGE);
+    if (name.starts_with("crypto_")) add_strings(first.strings, header);
+    return header;
+  };
+  part(kColourPart);
+  for (const auto& [name, channel] : first.channels)
+    part(bands.parts == ExrParts::one ? kColourPart : part_of(name))
+        .channels()
+        .insert(name, Imf::Channel(type_of(channel)));
+  add_strings(first.strings, headers[0]);
+  add_strings(bands.strings, headers[0]);
+  return headers;
 }
 
 // Calls take(rows, y) for each band, where y is the band's first row in the file.
@@ -93,19 +181,32 @@ Result<void> each_band(const ExrBands& bands, Take take) {
 Result<void> write_bands(Imf::OStream& out, const ExrBands& bands) {
   if (bands.size.width < 1 || bands.size.height < 1)
     return bad_argument("writing an EXR: the image is empty");
-  std::optional<Imf::Header> header;
+  if (is_lossy(bands.compression) && bands.parts == ExrParts::one)
+    return bad_argument("writing an EXR: a lossy compression needs a part for each layer");
+  std::vector<Imf::Header> headers;
   exr::Seal seal;
   const auto read = each_band(bands, [&](const ExrPicture& rows, int) {
-    auto strings = rows.strings;
-    strings.insert(bands.strings.begin(), bands.strings.end());
-    if (!header) header = header_of(bands.size, rows, strings);
+    if (headers.empty()) headers = headers_of(bands, rows);
     seal.add(rows);
   });
   if (!read) return read;
-  seal.add(*header);
-  header->insert(exr::kSealName, Imf::StringAttribute(seal.text()));
-  Imf::OutputFile file(out, *header, /*numThreads=*/0);
-  return each_band(bands, [&](const ExrPicture& rows, int y) { write_rows(file, rows, y); });
+  if (!is_lossy(bands.compression)) {
+    for (const Imf::Header& header : headers) seal.add(header);
+    headers[0].insert(exr::kSealName, Imf::StringAttribute(seal.text()));
+  }
+  if (bands.parts == ExrParts::one) {
+    Imf::OutputFile file(out, headers[0], /*numThreads=*/0);
+    return each_band(
+        bands, [&](const ExrPicture& rows, int y) { write_rows(file, headers[0].channels(), rows, y); });
+  }
+  Imf::MultiPartOutputFile file(out, headers.data(), static_cast<int>(headers.size()),
+                                /*overrideSharedAttributes=*/false, /*numThreads=*/0);
+  return each_band(bands, [&](const ExrPicture& rows, int y) {
+    for (std::size_t p = 0; p < headers.size(); ++p) {
+      Imf::OutputPart part(file, static_cast<int>(p));
+      write_rows(part, headers[p].channels(), rows, y);
+    }
+  });
 }
 
 // A stream that writes to a sink. It can report an error to the library only by an exception, so it keeps the
@@ -130,15 +231,35 @@ class SinkStream final : public Imf::OStream {
   std::uint64_t position_ = 0;
 };
 
+constexpr std::array kCompressions{ExrCompression::zip, ExrCompression::zips, ExrCompression::piz,
+                                   ExrCompression::rle, ExrCompression::none, ExrCompression::dwaa,
+                                   ExrCompression::dwab};
+constexpr std::array kParts{ExrParts::one, ExrParts::layers};
+
 }  // namespace
+
+std::span<const ExrCompression> exr_compressions() { return kCompressions; }
+
+std::string_view to_string(ExrCompression c) {
+  static constexpr std::string_view kNames[] = {"zip", "zips", "piz", "rle", "none", "dwaa", "dwab"};
+  return kNames[static_cast<std::size_t>(c)];
+}
+
+std::span<const ExrParts> exr_parts() { return kParts; }
+
+std::string_view to_string(ExrParts parts) { return parts == ExrParts::one ? "one" : "layers"; }
 
 Result<std::vector<std::byte>> write_exr(const ExrPicture& picture) {
   if (auto sound = check(picture); !sound) return tl::unexpected(sound.error());
   return exr::guarded(Errc::internal, "writing an EXR", [&]() -> Result<std::vector<std::byte>> {
     exr::MemoryWriter out;
     {
-      Imf::OutputFile file(out, header_of(picture.size, picture, picture.strings), /*numThreads=*/0);
-      write_rows(file, picture, 0);
+      Imf::Header header = header_of(picture.size);
+      add_strings(picture.strings, header);
+      for (const auto& [name, channel] : picture.channels)
+        header.channels().insert(name, Imf::Channel(type_of(channel)));
+      Imf::OutputFile file(out, header, /*numThreads=*/0);
+      write_rows(file, header.channels(), picture, 0);
     }
     return out.take();
   });

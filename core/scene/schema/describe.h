@@ -114,6 +114,16 @@ inline Field quantity(std::string_view name, std::string_view doc, std::string_v
   return {.name = name, .doc = doc, .unit = unit, .range = range};
 }
 
+inline Field image_colours_field() {
+  return {
+      .name = "color_space",
+      .doc =
+          "of the image: `auto` is as the file says (sRGB in 8- and 16-bit files; otherwise linear, with the "
+          "primaries in its header), `srgb` is encoded by the curve of sRGB, the others are linear, and a "
+          "white of theirs becomes white. No effect on `raw` values. Not in Mitsuba",
+      .elided = true};
+}
+
 struct TypeInfo {
   std::string_view kind;     // tag of the XML element: bsdf, shape, ...
   std::string_view name;     // name of the plugin, and "type" in JSON
@@ -174,6 +184,8 @@ struct NamesOf;
 LS_NAMES(TextureFilter, {"nearest", nearest}, {"bilinear", bilinear})
 LS_NAMES(Wrap, {"repeat", repeat}, {"mirror", mirror}, {"clamp", clamp})
 LS_NAMES(Channel, {"all", all}, {"red", red}, {"green", green}, {"blue", blue}, {"alpha", alpha})
+LS_NAMES(ImageColours, {"auto", automatic}, {"srgb", srgb}, {"rec709", rec709}, {"rec2020", rec2020},
+         {"p3-d65", p3_d65}, {"acescg", acescg}, {"aces2065-1", aces2065_1}, {"xyz", xyz})
 LS_NAMES(Microfacet, {"beckmann", beckmann}, {"ggx", ggx})
 LS_NAMES(VolumeFilter, {"nearest", nearest}, {"trilinear", trilinear})
 LS_NAMES(GridOrder, {"x_fastest", x_fastest}, {"z_fastest", z_fastest})

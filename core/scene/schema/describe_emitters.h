@@ -107,6 +107,7 @@ void describe(V& v, T& e) {
   v.field(on_unless_given("visible_camera", "whether the camera sees the light itself. Not in Mitsuba"),
           e.visible_camera);
   v.field(kLightGroup, e.light_group);
+  v.field(image_colours_field(), e.colours);
 }
 
 LS_TYPE(ProjectorEmitter, "emitter", "projector", "",

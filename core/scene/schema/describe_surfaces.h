@@ -29,6 +29,7 @@ void describe(V& v, T& t) {
        .doc = "one channel as a number, without sRGB decoding; 1 where the image lacks it. Not in Mitsuba",
        .elided = true},
       t.channel);
+  v.field(image_colours_field(), t.colours);
 }
 
 LS_TYPE(CheckerboardTexture, "texture", "checkerboard", "", "two colours in alternation")

@@ -23,9 +23,10 @@ def decode_layers(data: bytes) -> dict[str, Array]:
     """Returns {layer: values}, with shape (h, w) for one channel and (h, w, n) for more. Channels are in the order
     R G B A, X Y Z or U V. Halves become float32 without loss; counts stay integers. The colour is called 'color'."""
     try:
-        _check_size(OpenEXR.File(io.BytesIO(data), header_only=True).header())
-        channels = OpenEXR.File(io.BytesIO(data), separate_channels=True).channels()
-        pixels = {name: channel.pixels for name, channel in channels.items()}
+        for part in OpenEXR.File(io.BytesIO(data), header_only=True).parts:
+            _check_size(part.header)
+        parts = OpenEXR.File(io.BytesIO(data), separate_channels=True).parts
+        pixels = {name: channel.pixels for part in parts for name, channel in part.channels.items()}
     except BadAnswer:
         raise
     except Exception as error:  # the library's errors have no common class

@@ -102,6 +102,8 @@ class JobSpec(TypedDict):
     at most 10000 frames. A run of # is replaced by the number with as many digits. Frame N has the seed
     `seed` + N. `time` and `target_error` apply to each frame. All frames are read, and all files checked,
     before the job is accepted."""
+    fps: NotRequired[float]
+    """Frames of the sequence per second, for the attribute framesPerSecond of the image."""
     size: NotRequired[Union[tuple[int, int], list[int]]]
     """Size of the image in pixels, instead of the size in the scene."""
     integrator: NotRequired[str]
@@ -127,6 +129,16 @@ class JobSpec(TypedDict):
     of the coordinator's option `--user-priority`."""
     float: NotRequired[bool]
     """The image has 32-bit numbers instead of 16-bit numbers."""
+    color_space: NotRequired[Literal["rec709", "rec2020", "p3-d65", "acescg", "aces2065-1", "xyz"]]
+    """Colour space of the image, to which its colours are converted when it is written. Possible are
+    rec709, rec2020, p3-d65, acescg, aces2065-1, xyz. The scene is rendered in Rec. 709 in any case, and
+    PNGs, videos and the dashboard stay sRGB (docs/reference/image-file.md)."""
+    exr_compression: NotRequired[Literal["zip", "zips", "piz", "rle", "none", "dwaa", "dwab"]]
+    """How the image is packed. Possible are zip, zips, piz, rle, none, dwaa, dwab. dwaa and dwab change the
+    colours (lossy). They need exr_parts "layers", which keeps them away from the other layers, and such an
+    image has no seal: `lightshaft verify` refuses it."""
+    exr_parts: NotRequired[Literal["one", "layers"]]
+    """Parts of the image: one for all layers, or one for each of the layers."""
     denoise: NotRequired[bool]
     """The image also has the layers denoised.R, denoised.G and denoised.B, whose error is in the report.
     Needs Open Image Denoise (deploy/install-denoiser.sh); 409 if the coordinator does not have it."""

@@ -278,6 +278,30 @@ TEST(Bitmap, ColoursOfOtherPrimariesBecomeLinearSrgb) {
   }
 }
 
+C3 seen_as(ImageColours colours, const ImageData& image, bool raw = false) {
+  Scene s = with(BitmapTexture{.file = {0}, .raw = raw, .colours = colours});
+  s.bsdfs.emplace_back(DiffuseBsdf{{0}});
+  return table(s, image).eval({0}, {.5f, .5f});
+}
+
+TEST(Bitmap, ColourSpaceOfTheSceneReplacesThatOfTheFile) {
+  const ImageData plain{1, 1, 3, {}, {.25f, .5f, .25f}, false}, white{1, 1, 3, {}, {1, 1, 1}, false},
+      codes{1, 1, 3, {51, 102, 51}, {}, true};
+  EXPECT_EQ(seen_as(ImageColours::rec709, wide_colour()), C3(.25f, .5f, .25f));
+  EXPECT_EQ(seen_as(ImageColours::rec709, codes), C3(.2f, .4f, .2f)) << "linear, without the curve";
+  for (const auto& [image, factor] : {std::pair(plain, 1.f), std::pair(codes, .8f)}) {
+    const C3 c = seen_as(ImageColours::rec2020, image);
+    // ITU-R BT.2087 has the inverse of this matrix with four digits.
+    EXPECT_NEAR(c.x, factor * .10309f, 1e-4f);
+    EXPECT_NEAR(c.y, factor * .533225f, 1e-4f);
+    EXPECT_NEAR(c.z, factor * .224855f, 1e-4f);
+  }
+  EXPECT_NEAR(seen_as(ImageColours::srgb, plain).y, .214041f, 1e-6f) << "IEC 61966-2-1 at .5";
+  const C3 c = seen_as(ImageColours::acescg, white);
+  for (const float v : {c.x, c.y, c.z}) EXPECT_NEAR(v, 1, 1e-6f) << "a white of D60 becomes one of D65";
+  EXPECT_EQ(seen_as(ImageColours::acescg, codes, true), C3(.2f, .4f, .2f)) << "`raw` values are no colours";
+}
+
 TEST(Bitmap, NumbersAndNormalsAreNotColourConverted) {
   Scene normals = with(BitmapTexture{.file = {0}});
   normals.textures.push_back(ConstantTexture{{.5, .5, .5}});

@@ -218,8 +218,8 @@ void expect_committed(const std::string& name, const std::string& text) {
 
 std::string commands_with(const Setting& s) {
   if (s.option.empty()) return "";
-  return fmt::format("`{}` of `submit`{}{}", s.option, s.render ? ", `render`" : "",
-                     s.again ? ", `again`" : "");
+  return fmt::format("`{}` of `submit`{}{}{}", s.option, s.render ? ", `render`" : "",
+                     s.again ? ", `again`" : "", s.merge ? ", `merge`" : "");
 }
 
 template <class M>

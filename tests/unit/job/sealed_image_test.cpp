@@ -29,7 +29,7 @@ RenderSettings settings() {
 
 std::vector<std::byte> sealed(const Film& film, bool float_output, const RenderSettings& s = settings()) {
   const Provenance from{test::name_of("scene"), canonical_json(s), "build 1", test::name_of("class"), 7, 1};
-  auto image = final_exr(film, from, float_output);
+  auto image = final_exr(film, from, {.float_output = float_output});
   if (!image) throw std::runtime_error(image.error().message);
   return std::move(image->exr);
 }

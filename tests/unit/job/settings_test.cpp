@@ -99,12 +99,22 @@ TEST(RenderSettings, HaveLightGroupsWithTheirLayersOnly) {
   EXPECT_THAT(error({"light_groups"}, many), HasSubstr("at most 32 names"));
 }
 
+TEST(JobSpec, RefusesALossyCompressionOfAllLayersTogether) {
+  for (const ExrCompression c : exr_compressions()) {
+    EXPECT_EQ(job::check_spec({.exr_compression = c}).has_value(), !is_lossy(c)) << to_string(c);
+    EXPECT_TRUE(job::check_spec({.exr_compression = c, .exr_parts = ExrParts::layers})) << to_string(c);
+  }
+  EXPECT_THAT(job::check_spec({.exr_compression = ExrCompression::dwaa}).error().message,
+              HasSubstr("'exr_compression' is dwaa, which in one part would also change standard errors"));
+}
+
 TEST(JobSpec, EmptyObjectRequestsNothing) { EXPECT_EQ(parse_job_spec("{}").value(), JobSpec{}); }
 
 TEST(JobSpec, ReadsEveryKeyOfTheContract) {
   const auto spec =
       parse_job_spec(R"({"spp": 128, "target_error": 0.001, "time": 60, "seed": 7, "size": [320, 200],
     "integrator": "volpath", "aov": ["depth"], "defines": {"density": "2.5", "n": 3, "on": true}, "priority": -2, "float": true,
+    "color_space": "aces2065-1", "exr_compression": "dwab", "exr_parts": "layers", "fps": 23.976,
     "tags": ["gpu", "big-memory"], "max_workers": 4, "max_units": 100, "memory": 8589934592, "numeric_class": "armv8-a",
     "after": ["j-1", "j-2-frame3"]})");
 
@@ -119,7 +129,11 @@ TEST(JobSpec, ReadsEveryKeyOfTheContract) {
                             .defines = {{"density", "2.5"}, {"n", "3"}, {"on", "true"}},
                             .priority = -2,
                             .float_output = true,
+                            .colour_space = ColourSpace::aces2065_1,
+                            .exr_compression = ExrCompression::dwab,
+                            .exr_parts = ExrParts::layers,
                             .tags = {"gpu", "big-memory"},
+                            .fps = 23.976,
                             .max_workers = 4,
                             .max_units = 100,
                             .memory = 8589934592,

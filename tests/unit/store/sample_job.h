@@ -26,6 +26,7 @@ inline StoredJob sample_job(std::string id) {
   job.denoised = DenoisedFigure{2e-4, std::pair(1e-4, 3e-4)};
   job.denoised_checks = {{64, -1e-5, std::nullopt}, {90.5, 2e-4, 3e-4}};
   job.features_used = {"volume grids"};
+  job.camera = CameraMatrices{{-1, 0, 0, .1}, RowMatrix{.25}};
   job.state = JobState::running;
   job.stopped = StopReason::error;
   job.failure =

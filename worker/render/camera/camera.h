@@ -8,13 +8,15 @@
 #include <vector>
 
 #include "core/image/frame/frame.h"
+#include "core/scene/analysis/camera_view.h"
 #include "core/scene/scene.h"
 #include "worker/render/camera/meters.h"
-#include "worker/render/math/field_of_view.h"
 #include "worker/render/math/math.h"
 #include "worker/render/texture/texture.h"
 
 namespace ls::render {
+
+using scene::tan_half_fov_x;
 
 struct CameraRay {
   V3 o, d;      // d has unit length

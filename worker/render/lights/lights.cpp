@@ -52,8 +52,8 @@ Result<void> Lights::add_map(const Scene& scene, const EnvmapEmitter& emitter, c
   const Asset& asset = scene.assets[emitter.file.value];
   auto image = images(asset);
   if (!image) return tl::unexpected(image.error());
-  auto map =
-      EnvironmentMap::build(asset.name, std::move(*image), emitter.scale, emitter.to_world, emitter.mapping);
+  auto map = EnvironmentMap::build(asset.name, with_colours(std::move(*image), emitter.colours),
+                                   emitter.scale, emitter.to_world, emitter.mapping);
   if (!map) return tl::unexpected(map.error());
   clamped_ += map->clamped();
   if (map->black()) {

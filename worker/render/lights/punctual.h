@@ -3,7 +3,7 @@
 
 #include "worker/render/lights/light_kind.h"
 #include "worker/render/math/equal_area.h"
-#include "worker/render/math/field_of_view.h"
+#include "core/scene/analysis/camera_view.h"
 
 namespace ls::render {
 
@@ -187,7 +187,7 @@ inline ProjectorLight make_light(const ProjectorEmitter& e, const LightWorld& wo
   l.value = C3(static_cast<float>((e.as_intensity ? 1 : kPiD) * e.scale * s * s));
   l.even = e.as_intensity;
   const double aspect = world.textures.aspect(e.irradiance),
-               tan_x = tan_half_fov_x(e.fov, e.fov_axis, aspect);
+               tan_x = scene::tan_half_fov_x(e.fov, e.fov_axis, aspect);
   l.tan_x = static_cast<float>(tan_x);
   l.tan_y = static_cast<float>(tan_x / aspect);
   return l;

@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
+#include "core/base/colour_space.h"
+#include "core/scene/schema/describe.h"
 #include "worker/render/base/work_counters.h"
 
 namespace ls::render {
@@ -141,6 +144,24 @@ Result<void> check_texels(std::string_view name, Texels& t, bool signed_values) 
 }
 
 }  // namespace
+
+ImageData with_colours(ImageData image, ImageColours colours) {
+  if (colours == ImageColours::automatic) return image;
+  image.srgb = colours == ImageColours::srgb;
+  image.to_srgb.reset();
+  const std::string_view name = scene::name_of(colours);
+  const auto spaces = colour_spaces();
+  const auto space = std::ranges::find(spaces, name, [](ColourSpace s) { return to_string(s); });
+  if (space == spaces.end() || *space == ColourSpace::rec709) return image;
+  const ColourMatrix m = inverse(from_rec709(*space));
+  auto& matrix = image.to_srgb.emplace();
+  for (std::size_t i = 0; i < 9; ++i) matrix[i] = static_cast<float>(m(i / 3, i % 3));
+  image.f32.insert(image.f32.end(), image.u8.begin(), image.u8.end());
+  if (!image.u8.empty())
+    for (float& v : image.f32) v /= 255;
+  image.u8.clear();
+  return image;
+}
 
 C3 Texels::lookup(const V2& uv, TextureFilter filter, Wrap wrap) const {
   LS_COUNT(texels);

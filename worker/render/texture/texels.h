@@ -43,6 +43,9 @@ struct Texels {
   V2 slope(const V2& uv, Wrap wrap) const;
 };
 
+// Returns the image with these colours instead of those that its file says (ImageColours).
+ImageData with_colours(ImageData image, ImageColours colours);
+
 // Makes texels of `image`; `name` is for messages. Drops the alpha channel, decodes sRGB unless `raw` is set,
 // converts other colours by ImageData::to_srgb (whatever `raw` says, as Mitsuba does), and fails on NaN and
 // infinity with a message that names the texel. Negative values become 0 unless they are heights. If `alpha`

@@ -96,10 +96,10 @@ class TexelsLoader {
   }
 
  private:
-  // Index of the asset, then raw, alpha and channel of the bitmap, and as what it is read
-  using Way = std::tuple<std::uint32_t, bool, bool, Channel, Content>;
+  // Index of the asset, then raw, alpha, channel and colours of the bitmap, and as what it is read
+  using Way = std::tuple<std::uint32_t, bool, bool, Channel, ImageColours, Content>;
   static Way way_of(const BitmapTexture& b, Content content) {
-    return {b.file.value, b.raw, b.alpha, b.channel, content};
+    return {b.file.value, b.raw, b.alpha, b.channel, b.colours, content};
   }
 
   // Returns as what texture i is read: by lookups and, if a bump map reads it too, as heights.
@@ -119,6 +119,7 @@ class TexelsLoader {
     const Asset& asset = scene_.assets[b.file.value];
     auto image = image_of(b.file.value, asset);
     if (!image) return tl::unexpected(image.error());
+    if (!b.raw) *image = with_colours(std::move(*image), b.colours);
     const bool is_bytes = image->f32.empty();
     auto texels = make_texels(asset.name, std::move(*image), b.raw, b.alpha, b.channel, content);
     if (!texels) return tl::unexpected(texels.error());

@@ -7,6 +7,7 @@
 
 #include "core/assets/image.h"
 #include "core/image/aov/identifiers.h"
+#include "core/scene/analysis/camera_view.h"
 #include "core/scene/schema/integrators.h"
 #include "core/scene/schema/validate.h"
 #include "worker/render/base/build_stop.h"
@@ -139,24 +140,16 @@ void find_clear_regions(World& w) {
 
 // Sets the camera and the position of the image in the full frame; returns the size of the full frame. If the
 // scene has a crop, the image is that part of the full frame, with the same pixel values, bit for bit, as in
-// an image of the full frame. If the size requested for the image is not that of the crop, the full frame is
-// scaled accordingly.
+// an image of the full frame.
 FrameSize place_camera(const Scene& scene, const RenderSettings& settings, World& w) {
-  const FilmSettings& film = scene.film;
-  FrameSize frame = settings.size;
-  if (film.has_crop()) {
-    const double kx = static_cast<double>(settings.size.width) / film.crop_size.width,
-                 ky = static_cast<double>(settings.size.height) / film.crop_size.height;
-    const auto scaled = [](int pixels, double k) { return static_cast<int>(std::lround(pixels * k)); };
-    frame = {std::max(1, scaled(film.size.width, kx)), std::max(1, scaled(film.size.height, ky))};
-    w.origin_x = scaled(film.crop_offset[0], kx);
-    w.origin_y = scaled(film.crop_offset[1], ky);
-  }
+  const scene::FramePart part = scene::frame_part(scene.film, settings.size);
+  w.origin_x = part.x0;
+  w.origin_y = part.y0;
   if (w.meters.any())
     w.camera = Camera(w.meters, *w.meter_world);
   else
-    w.camera = Camera(scene.sensor, frame, w.geometry.center, w.geometry.scale, &w.textures);
-  return frame;
+    w.camera = Camera(scene.sensor, part.frame, w.geometry.center, w.geometry.scale, &w.textures);
+  return part.frame;
 }
 
 Result<void> check_indices(const Scene& scene) {

@@ -115,7 +115,7 @@ TEST(FinalImage, HasTheRequestedLayers) {
     ASSERT_TRUE(film.fold(t, 0, fake_partial(make_partial(grid, t, {0, 2}).header, aovs)));
   ExrPicture picture{grid.frame, {}, {}};
 
-  add_aov_layers(film, {.shapes = R"({"a":"3f800000"})"}, false, picture);
+  add_aov_layers(film, {.shapes = R"({"a":"3f800000"})"}, {}, picture);
 
   std::vector<std::string> names;
   for (const auto& [name, channel] : picture.channels) names.push_back(name);
@@ -141,7 +141,7 @@ TEST(FinalImage, WithoutAovsHasNoExtraBytes) {
   Provenance plain, named;
   named.names = {.shapes = "{}", .materials = "{}"};
 
-  EXPECT_EQ(final_exr(film, plain, false)->exr, final_exr(film, named, false)->exr);
+  EXPECT_EQ(final_exr(film, plain, {})->exr, final_exr(film, named, {})->exr);
 }
 
 }  // namespace

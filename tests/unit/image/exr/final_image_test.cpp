@@ -1,5 +1,8 @@
 #include "core/image/exr/final_image.h"
 
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+#include <ImfStandardAttributes.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,6 +13,7 @@
 #include <limits>
 
 #include "core/image/exr/exr_file.h"
+#include "core/image/exr/memory.h"
 #include "tests/unit/image/support.h"
 
 namespace ls {
@@ -69,7 +73,7 @@ Provenance some_provenance() {
 TEST(FinalExr, HoldsMeansErrorsSamplesAndProvenance) {
   const Film film = make_film(kFinalGrid, 6);
 
-  const auto image = final_exr(film, some_provenance(), true);
+  const auto image = final_exr(film, some_provenance(), {.float_output = true});
   ASSERT_TRUE(image) << image.error().message;
   const auto back = read_exr_rgb(image->exr, "final");
 
@@ -90,9 +94,105 @@ TEST(FinalExr, HoldsMeansErrorsSamplesAndProvenance) {
   for (TileIndex t = 0; t < kFinalGrid.count(); ++t) EXPECT_THAT(text, HasSubstr(film.tile_digest(t).hex()));
 }
 
+TEST(FinalExr, HasStandardAttributesForOtherPrograms) {
+  Provenance from = some_provenance();
+  from.camera = CameraMatrices{{1, 2, 3, 0, 5, 6, 7, 0, 9, 10, 11, 0, 13, 14, 15, 1}, RowMatrix{.5}};
+  from.frames_per_second = 23.976;
+  from.owner = "anna";
+  const auto exr = final_exr(make_film(kFinalGrid, 2), from, {}).value().exr;
+
+  exr::MemoryReader in(exr, "standard");
+  const Imf::Header header = Imf::InputFile(in).header();
+
+  const Imf::Chromaticities rec709;  // the library's default
+  EXPECT_EQ(Imf::chromaticities(header).red, rec709.red);
+  EXPECT_EQ(Imf::chromaticities(header).green, rec709.green);
+  EXPECT_EQ(Imf::chromaticities(header).blue, rec709.blue);
+  EXPECT_EQ(Imf::chromaticities(header).white, rec709.white);
+  EXPECT_EQ(header.pixelAspectRatio(), 1);
+  EXPECT_EQ(Imf::worldToCamera(header)[3][1], 14);  // the translation is in the last row
+  EXPECT_EQ(Imf::worldToCamera(header)[1][3], 0);
+  EXPECT_EQ(Imf::worldToNDC(header)[0][0], .5f);
+  EXPECT_EQ(Imf::framesPerSecond(header), Imf::Rational(24000, 1001));
+  EXPECT_EQ(Imf::owner(header), "anna");
+  EXPECT_TRUE(read_final_exr(exr, "standard")->changed.value().empty()) << "they are part of the seal";
+}
+
+const std::vector<float>& floats_of(const FinalPicture& image, const std::string& layer) {
+  return std::get<ExrFloat>(image.channels.at(layer)).values;
+}
+
+TEST(FinalExr, ColoursAndTheirStandardErrorsAreThoseOfTheSpace) {
+  const Film film = make_film(kFinalGrid, 6);
+  const ColourMatrix m = from_rec709(ColourSpace::acescg);
+
+  const auto image = read_final_exr(
+      final_exr(film, some_provenance(), {.float_output = true, .colour_space = ColourSpace::acescg})->exr,
+      "acescg");
+
+  ASSERT_TRUE(image) << image.error().message;
+  EXPECT_EQ(image->strings.at("lightshaft:color_space"), "acescg");
+  EXPECT_TRUE(image->changed.value().empty());
+  for (TileIndex t = 0; t < kFinalGrid.count(); ++t) {
+    const TilePixels tile = film.pixels(t);
+    const auto halves = film.half_means(t);
+    const auto n = static_cast<std::size_t>(tile.rect.pixels());
+    each_pixel(tile.rect, kFinalGrid.frame, [&](std::size_t to, std::size_t from) {
+      // The two halves as images of their own, converted
+      Tristimulus a, b;
+      for (std::size_t c = 0; c < 3; ++c) a[c] = halves[0][c * n + from], b[c] = halves[1][c * n + from];
+      a = m * a, b = m * b;
+      for (std::size_t c = 0; c < 3; ++c) {
+        // Two roundings to float of the mean, and one of the error; the sums in double are exact by
+        // comparison but for the cancellation of a - b, which is off by a few 2^-53 of a.
+        EXPECT_NEAR(floats_of(*image, std::string(1, "RGB"[c]))[to], (a[c] + b[c]) / 2,
+                    2 * 0x1p-24 * std::abs(a[c] + b[c]));
+        EXPECT_NEAR(floats_of(*image, fmt::format("stderr.{}", "RGB"[c]))[to], std::abs(a[c] - b[c]) / 2,
+                    0x1p-24 * std::abs(a[c] - b[c]) + 0x1p-48 * std::abs(a[c]));
+      }
+    });
+  }
+}
+
+TEST(FinalExr, LayersInPartsAreTheSameLayers) {
+  const Film film = make_film(kFinalGrid, 6);
+  const auto one = read_final_exr(final_exr(film, some_provenance(), {})->exr, "one").value();
+  for (const ExrCompression compression : exr_compressions()) {
+    const ImageForm form{.compression = compression, .parts = ExrParts::layers};
+
+    const auto image = read_final_exr(final_exr(film, some_provenance(), form)->exr, "parts");
+
+    ASSERT_TRUE(image) << image.error().message;
+    EXPECT_EQ(image->lossy, is_lossy(compression)) << to_string(compression);
+    EXPECT_EQ(image->strings.at("lightshaft:scene"), one.strings.at("lightshaft:scene"));
+    for (const char* layer : {"stderr.R", "stderr.G", "stderr.B"})
+      EXPECT_EQ(floats_of(*image, layer), floats_of(one, layer));
+    EXPECT_EQ(std::get<ExrUint>(image->channels.at("spp")).values,
+              std::get<ExrUint>(one.channels.at("spp")).values);
+    if (!is_lossy(compression))
+      EXPECT_EQ(std::get<ExrHalf>(image->channels.at("R")).values,
+                std::get<ExrHalf>(one.channels.at("R")).values);
+    EXPECT_EQ(image->changed.has_value(), !is_lossy(compression));
+    if (image->changed) EXPECT_TRUE(image->changed->empty()) << to_string(compression);
+  }
+  EXPECT_FALSE(final_exr(film, some_provenance(), {.compression = ExrCompression::dwaa}));
+}
+
+TEST(FinalExr, SealOfPartsFindsAChangedValue) {
+  const auto exr =
+      final_exr(make_film(kFinalGrid, 6), some_provenance(),
+                {.float_output = true, .compression = ExrCompression::none, .parts = ExrParts::layers});
+  std::vector<std::byte> forged = exr->exr;
+  forged.back() ^= std::byte{1};  // a value of the last chunk
+
+  const auto image = read_final_exr(forged, "forged");
+  ASSERT_TRUE(image) << image.error().message;
+  EXPECT_EQ(image->changed.value().size(), 1u);
+}
+
 TEST(FinalExr, DependsOnlyOnFilmAndProvenance) {
-  EXPECT_EQ(final_exr(make_film(kFinalGrid, 6), some_provenance(), false)->exr,
-            final_exr(make_film(kFinalGrid, 6), some_provenance(), false)->exr);
+  EXPECT_EQ(final_exr(make_film(kFinalGrid, 6), some_provenance(), {})->exr,
+            final_exr(make_film(kFinalGrid, 6), some_provenance(), {})->exr);
 }
 
 TEST(FinalExr, ClampsToTheLargestHalfAndCounts) {
@@ -100,8 +200,8 @@ TEST(FinalExr, ClampsToTheLargestHalfAndCounts) {
   Film film(grid);
   ASSERT_TRUE(film.fold(0, 0, flat(grid, 0, {1e6f, -1e30f, 65504.0f})));
 
-  const auto half = final_exr(film, some_provenance(), false),
-             full = final_exr(film, some_provenance(), true);
+  const auto half = final_exr(film, some_provenance(), {}),
+             full = final_exr(film, some_provenance(), {.float_output = true});
 
   EXPECT_EQ(half->clamped, 128u);
   EXPECT_EQ(full->clamped, 0u);
@@ -115,7 +215,7 @@ TEST(FinalExr, RoundsToTheNearestHalf) {
   Film film(grid);
   ASSERT_TRUE(film.fold(0, 0, flat(grid, 0, {0.1f, 1.0f, 3e-8f})));
 
-  const auto rgb = read_exr_rgb(final_exr(film, some_provenance(), false)->exr, "half")->rgb;
+  const auto rgb = read_exr_rgb(final_exr(film, some_provenance(), {})->exr, "half")->rgb;
 
   // Half a unit of the 10-bit mantissa.
   EXPECT_NEAR(rgb[0], 0.1f, 0.1f * 0x1p-11f);
@@ -128,7 +228,7 @@ TEST(FinalExr, UnfinishedFilmHasZerosWithoutSamples) {
   Film film = make_film(kFinalGrid, 4);
   film.discard(0);
 
-  const auto rgb = read_exr_rgb(final_exr(film, some_provenance(), true)->exr, "part")->rgb;
+  const auto rgb = read_exr_rgb(final_exr(film, some_provenance(), {.float_output = true})->exr, "part")->rgb;
 
   EXPECT_EQ(rgb[0], 0);
   EXPECT_NE(rgb[3 * 8], 0);
@@ -136,7 +236,9 @@ TEST(FinalExr, UnfinishedFilmHasZerosWithoutSamples) {
 
 TEST(FinalExr, HasNoErrorOfMissingPixels) {
   const auto strings = [](const Film& film) {
-    return read_final_exr(final_exr(film, some_provenance(), true)->exr, "part").value().strings;
+    return read_final_exr(final_exr(film, some_provenance(), {.float_output = true})->exr, "part")
+        .value()
+        .strings;
   };
   Film film = make_film(kFinalGrid, 4);
   const std::string whole = strings(film).at("lightshaft:relmse");
@@ -163,7 +265,8 @@ TEST(FinalExr, IsUntrustedIfItsCurveIs) {
   from.seed.reset();
   from.seconds.reset();
 
-  const auto strings = read_final_exr(final_exr(film, from, true)->exr, "a tail").value().strings;
+  const auto strings =
+      read_final_exr(final_exr(film, from, {.float_output = true})->exr, "a tail").value().strings;
 
   EXPECT_NE(strings.at("lightshaft:verdict"), "trusted");
   EXPECT_EQ(strings.at("lightshaft:slope"), "-0.5");
@@ -184,7 +287,7 @@ TEST(FinalExr, HasAlphaWithItsStandardError) {
   Film film(kFinalGrid, AovSet{}.with(Aov::alpha));
   ASSERT_TRUE(film.fold(0, 0, with_alpha(flat(kFinalGrid, 0, {1, 1, 1}), .25f, .75f)));
 
-  const auto image = read_final_exr(final_exr(film, some_provenance(), false)->exr, "alpha").value();
+  const auto image = read_final_exr(final_exr(film, some_provenance(), {})->exr, "alpha").value();
 
   EXPECT_EQ(std::get<ExrHalf>(image.channels.at("A")).values[0], .5f);
   EXPECT_EQ(std::get<ExrFloat>(image.channels.at("stderr.A")).values[0], .25f);  // half of the difference

@@ -98,7 +98,7 @@ TEST(PixelLayers, AovLayersAreNamedAsInTheExr) {
                           cut_range(0, 16)};
   ASSERT_TRUE(film.fold(0, 0, fake_partial(header, aovs)));
   ExrPicture exr{kLayerGrid.frame, {}, {}};
-  add_aov_layers(film, {}, false, exr);
+  add_aov_layers(film, {}, {}, exr);
   const auto channel = [&](const char* name) {
     const auto& planes = exr.channels.at(name);
     if (const auto* half = std::get_if<ExrHalf>(&planes)) return half->values;

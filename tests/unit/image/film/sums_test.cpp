@@ -91,7 +91,7 @@ TEST(Sums, MoreSamplesThanAnIntHoldsKeepTheirCountInTheImage) {
 
   fold_tenths(film, 1);
 
-  const auto image = final_exr(film, {}, true);
+  const auto image = final_exr(film, {}, {.float_output = true});
   ASSERT_TRUE(image) << image.error().message;
   const auto read = read_final_exr(image->exr, "own");
   ASSERT_TRUE(read) << read.error().message;

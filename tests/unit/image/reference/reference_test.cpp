@@ -108,16 +108,24 @@ TEST(Reference, RefusesUnusableFiles) {
 
 TEST(Reference, ReadsAFinalImageWithItsErrorLayers) {
   const Film film = test::make_film({kSize, 8}, 8);
-  const auto exr = final_exr(film, {}, true);
-  ASSERT_TRUE(exr);
+  for (const ExrParts parts : exr_parts()) {
+    const auto exr = final_exr(film, {}, {.float_output = true, .parts = parts});
+    ASSERT_TRUE(exr);
 
-  const auto reference = read_reference(exr->exr, "ours", kSize);
+    const auto reference = read_reference(exr->exr, "ours", kSize);
 
-  ASSERT_TRUE(reference) << reference.error().message;
-  ASSERT_EQ(reference->error.size(), kReferenceValues);
-  const TilePixels tile = film.pixels(0);
-  EXPECT_EQ(reference->error[3], static_cast<float>(tile.standard_error[3]));
-  EXPECT_EQ(reference->rgb[4], static_cast<float>(tile.mean[4]));
+    ASSERT_TRUE(reference) << reference.error().message;
+    ASSERT_EQ(reference->error.size(), kReferenceValues);
+    const TilePixels tile = film.pixels(0);
+    EXPECT_EQ(reference->error[3], static_cast<float>(tile.standard_error[3]));
+    EXPECT_EQ(reference->rgb[4], static_cast<float>(tile.mean[4]));
+  }
+}
+
+TEST(Reference, RefusesAnImageOfAnotherColourSpace) {
+  const auto exr = final_exr(test::make_film({kSize, 8}, 8), {}, {.colour_space = ColourSpace::rec2020});
+  EXPECT_THAT(read_reference(exr->exr, "wide.exr", kSize).error().message,
+              HasSubstr("wide.exr: its colours are not those of Rec. 709"));
 }
 
 // ---- maps ----

@@ -1,10 +1,12 @@
-// Tests the camera and the pixel filters.
+// Tests the camera, its matrices in the header of images, and the pixel filters.
 #include "worker/render/camera/camera.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "core/scene/analysis/camera_view.h"
+#include "core/scene/transform.h"
 #include "tests/support/render_check.h"
 #include "worker/render/math/random.h"
 #include "worker/render/world/world.h"
@@ -351,6 +353,72 @@ TEST(PixelFilter, GaussianIsCutAtFourDeviationsAndShiftedToReachZero) {
   EXPECT_NEAR(m.variance / (deviation * deviation), second / mass + 1.02e-5, 1e-6);
   EXPECT_LE(PixelFilter(GaussianFilter{deviation}).offset(1 - 0x1p-24f), 4 * deviation);
   EXPECT_GE(PixelFilter(GaussianFilter{deviation}).offset(0), -4 * deviation);
+}
+
+// Returns p M, divided by its fourth component.
+V3d transformed(const RowMatrix& m, const V3d& p) {
+  double out[4];
+  for (std::size_t c = 0; c < 4; ++c) out[c] = p.x * m[c] + p.y * m[4 + c] + p.z * m[8 + c] + m[12 + c];
+  return {out[0] / out[3], out[1] / out[3], out[2] / out[3]};
+}
+
+// Of all cameras that have a matrix, with a crop that is enlarged, and turned, moved and scaled in the world.
+TEST(CameraMatrices, PointOnTheRayOfAPixelIsAtThatPixel) {
+  FilmSettings film;
+  film.size = {200, 100};
+  film.crop_offset = {30, 20};
+  film.crop_size = {80, 50};
+  const FrameSize image{160, 100};
+  Sensor s;
+  s.to_world = scene::of_columns({0, 0, -2}, {0, 2, 0}, {2, 0, 0}, {5, -3, 1});
+  s.fov = 60;
+  s.near_clip = .5;
+  s.far_clip = 8;
+  for (const Projection projection : {Projection::perspective, Projection::orthographic})
+    for (const double offset : {0., .1}) {
+      s.projection = projection;
+      s.principal_point_offset = {offset, -2 * offset};
+      if (projection == Projection::orthographic && offset != 0) continue;
+      const scene::FramePart part = scene::frame_part(film, image);
+      const Camera c = camera(s, part.frame);
+      const auto matrices = scene::camera_matrices(s, film, image);
+      ASSERT_TRUE(matrices && matrices->world_to_ndc);
+
+      for (const V2& pixel : {V2(0, 0), V2(160, 100), V2(16, 75)})
+        for (const float t : {0.f, .25f, 1.f}) {
+          const CameraRay ray = c.ray(part.x0 + double{pixel.x}, part.y0 + double{pixel.y}, {});
+          const V3d point = V3d(ray.o) + V3d(ray.d) * double{t * ray.t_max};
+          const V3d at = transformed(*matrices->world_to_ndc, point);
+          // The ray's origin, direction and length are floats: up to 40 units from the origin the point is
+          // off by some 40 * 2^-24 * 3 = 7e-6, at a depth of 1 or more, where the image is 1.1 units wide or
+          // more.
+          EXPECT_NEAR(at.x, pixel.x / 160, 1e-5);
+          EXPECT_NEAR(at.y, pixel.y / 100, 1e-5);
+          // The depth changes fastest at the near plane, by 2.2 per unit of the world or less.
+          if (t != .25f) EXPECT_NEAR(at.z, t, 2e-5);
+        }
+    }
+}
+
+TEST(CameraMatrices, CameraSpaceIsThatOfOpenExr) {
+  const Sensor s{.to_world = scene::of_columns({1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 2, 3})};
+
+  const auto matrices = scene::camera_matrices(s, {}, {20, 10});
+
+  ASSERT_TRUE(matrices);
+  // The camera looks along +z, with -x to the right of the image.
+  const V3d at = transformed(matrices->world_to_camera, {1 - 4, 2 + 5, 3 + 6});
+  EXPECT_EQ(at, V3d(4, 5, 6));
+}
+
+TEST(CameraMatrices, AreLeftOutWhereThereAreNone) {
+  const auto spherical = scene::camera_matrices({.projection = Projection::spherical}, {}, {20, 10});
+  ASSERT_TRUE(spherical);
+  EXPECT_FALSE(spherical->world_to_ndc);
+  const Sensor flat{.to_world = scene::of_columns({1, 0, 0}, {0, 0, 0}, {0, 0, 1}, {0, 0, 0})};
+  EXPECT_FALSE(scene::camera_matrices(flat, {}, {20, 10}));
+  const Sensor far{.to_world = scene::of_columns({1e-30, 0, 0}, {0, 1e-30, 0}, {0, 0, 1e-30}, {1e20, 0, 0})};
+  EXPECT_FALSE(scene::camera_matrices(far, {}, {20, 10}));
 }
 
 TEST(PixelFilter, OffsetsIncreaseWithTheRandomNumber) {

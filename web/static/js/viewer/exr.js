@@ -7,6 +7,7 @@ const kMagic = 20000630;
 const kLines = { 0: 1, 2: 1, 3: 16 }; // rows per chunk for each compression: none, ZIPS, ZIP
 const kBytes = { 0: 4, 1: 2, 2: 4 }; // bytes per value: UINT, HALF, FLOAT
 const kMostPixels = 2 ** 27;
+const kRec709 = [0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329]; // x, y of red, green, blue and white
 
 class Reader {
   constructor(buffer) {
@@ -71,11 +72,15 @@ function headerOf(reader) {
     if (name === "compression") header.compression = reader.view.getUint8(reader.at);
     if (name === "dataWindow") header.window = [reader.int(), reader.int(), reader.int(), reader.int()];
     if (name === "channels") header.channels = channelsOf(reader);
+    if (name === "chromaticities" && !isRec709(reader.view, reader.at)) throw new Error("The colours are not those of Rec. 709, by the file's chromaticities: write it with the color_space rec709.");
     reader.at = end;
   }
   if (!header.channels || header.compression === null || !header.window) throw new Error("The header lacks channels, compression or size.");
   return header;
 }
+
+// Primaries that differ by less than this are the same, written with fewer digits (core/image/exr/read.cpp).
+const isRec709 = (view, at) => kRec709.reduce((sum, value, i) => sum + (view.getFloat32(at + 4 * i, true) - value) ** 2, 0) < 1e-6;
 
 function channelsOf(reader) {
   const channels = [];
