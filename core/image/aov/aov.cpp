@@ -85,7 +85,8 @@ std::string shown(std::string_view name) {
 std::span<const AovRow> aov_rows() { return kAovRows; }
 bool is_colour(Aov aov) {
   const AovKind kind = row_of(aov).kind;
-  return kind == AovKind::light || kind == AovKind::groups || aov == Aov::albedo || aov == Aov::denoising_albedo;
+  return kind == AovKind::light || kind == AovKind::groups || aov == Aov::albedo ||
+         aov == Aov::denoising_albedo;
 }
 
 const AovRow& row_of(Aov aov) { return kAovRows[static_cast<std::size_t>(aov)]; }

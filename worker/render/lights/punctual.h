@@ -1,9 +1,9 @@
 // Lights with a position but without extent.
 #pragma once
 
+#include "core/scene/analysis/camera_view.h"
 #include "worker/render/lights/light_kind.h"
 #include "worker/render/math/equal_area.h"
-#include "core/scene/analysis/camera_view.h"
 
 namespace ls::render {
 
