@@ -73,9 +73,6 @@ struct Provenance {
   // tiles, since no tile can be verified against a mix.
   std::optional<ImageError> error_of_mix = {};
 };
-std::optional<double> frames_per_second = {};
-std::string owner = {};
-};
 // The header string with the name of the image's colour space; without it, that is Rec. 709.
 inline constexpr const char* kColourSpaceName = "lightshaft:color_space";
 

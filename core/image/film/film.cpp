@@ -280,7 +280,7 @@ Film Film::mixed(std::span<const GroupFactors> factors) const {
                   tail->sums.end());
       next->tail = Tail{tail->samples, tail->digest, std::move(sums)};
     }
-    next->error = estimate(*next, nullptr, grid_.rect(t));
+    next->error = estimate(*next, nullptr, grid_.rect(t), grid_.meters);
     out.tiles_[t] = std::move(next);
   }
   return out;
