@@ -19,7 +19,7 @@
 #include "coordinator/views/worker_session.h"
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "core/base/light_mix.h"
+#include "core/base/light/light_mix.h"
 #include "util/reading/scene_process.h"
 #include "util/trace/tracer.h"
 

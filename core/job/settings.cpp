@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "core/base/light_group.h"
+#include "core/base/light/light_group.h"
 #include "core/image/frame/rounds.h"
 #include "core/job/describe.h"
 #include "core/job/spec_draft.h"

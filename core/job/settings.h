@@ -15,7 +15,7 @@
 #include "core/base/digest.h"
 #include "core/base/error.h"
 #include "core/base/frame_range.h"
-#include "core/base/light_mix.h"
+#include "core/base/light/light_mix.h"
 #include "core/image/aov/aov.h"
 #include "core/image/exr/final_image.h"
 #include "core/image/frame/frame.h"

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "core/base/colour_space.h"
 #include "core/base/file_form.h"
+#include "core/base/light/colour_space.h"
 #include "core/scene/spectrum.h"
 #include "formats/pbrt/object_translation.h"
 #include "formats/xml/transform_element.h"

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/base/colour_space.h"
+#include "core/base/light/colour_space.h"
 #include "core/scene/scene_values.h"
 #include "formats/pbrt/vocabulary.h"
 #include "formats/xml/source_text.h"

@@ -5,7 +5,7 @@
 #include <map>
 #include <utility>
 
-#include "core/base/light_group.h"
+#include "core/base/light/light_group.h"
 #include "core/base/text/suggest.h"
 #include "core/scene/schema/materials.h"
 #include "formats/reader/reader.h"

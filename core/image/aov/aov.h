@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/base/light_group.h"
+#include "core/base/light/light_group.h"
 
 namespace ls {
 

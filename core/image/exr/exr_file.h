@@ -18,8 +18,8 @@
 #include <variant>
 #include <vector>
 
-#include "core/base/colour_space.h"
 #include "core/base/error.h"
+#include "core/base/light/colour_space.h"
 #include "core/image/frame/camera_matrices.h"
 #include "core/image/frame/frame.h"
 

@@ -26,7 +26,7 @@
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
-#include "core/base/light_mix.h"
+#include "core/base/light/light_mix.h"
 #include "core/image/error/error_estimate.h"
 #include "core/image/film/partial.h"
 #include "core/image/frame/frame.h"

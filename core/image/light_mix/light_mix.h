@@ -1,6 +1,6 @@
-// Mixes of an image's light groups (core/base/light_mix.h). Light adds up, so a mix is the image of the scene
-// with such lamps, and the difference between its two halves of samples has the error that belongs to it,
-// with the covariances of the groups.
+// Mixes of an image's light groups (core/base/light/light_mix.h). Light adds up, so a mix is the image of the
+// scene with such lamps, and the difference between its two halves of samples has the error that belongs to
+// it, with the covariances of the groups.
 #pragma once
 
 #include <span>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/base/light_mix.h"
+#include "core/base/light/light_mix.h"
 #include "core/image/film/film.h"
 
 namespace ls {

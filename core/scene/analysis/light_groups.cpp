@@ -8,7 +8,7 @@
 #include <string_view>
 #include <variant>
 
-#include "core/base/light_group.h"
+#include "core/base/light/light_group.h"
 
 namespace ls::scene {
 

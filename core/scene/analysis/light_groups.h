@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/base/light_mix.h"
+#include "core/base/light/light_mix.h"
 #include "core/scene/scene.h"
 
 namespace ls::scene {

@@ -11,7 +11,7 @@
 #include <variant>
 
 #include "core/base/check.h"
-#include "core/base/light_group.h"
+#include "core/base/light/light_group.h"
 #include "core/scene/schema/describe_fields.h"
 #include "core/scene/schema/validate.h"
 

@@ -1,4 +1,4 @@
-#include "core/base/light_mix.h"
+#include "core/base/light/light_mix.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

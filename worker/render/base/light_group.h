@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "core/base/light_group.h"
+#include "core/base/light/light_group.h"
 
 namespace ls::render {
 

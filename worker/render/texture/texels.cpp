@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/base/colour_space.h"
+#include "core/base/light/colour_space.h"
 #include "core/scene/schema/describe.h"
 #include "worker/render/base/work_counters.h"
 

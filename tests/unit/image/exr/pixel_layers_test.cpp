@@ -130,7 +130,7 @@ TEST(PixelLayers, LightGroupsHaveMeansAndHalfDifferences) {
   ASSERT_TRUE(film.fold(0, 0, partial));
   const auto spp = static_cast<double>(film.spp(0));
   ExrPicture exr{kLayerGrid.frame, {}, {}};
-  add_aov_layers(film, {.light_groups = groups}, true, exr);
+  add_aov_layers(film, {.light_groups = groups}, {.float_output = true}, exr);
   std::vector<std::string> names;
   for (const PixelLayer& layer : pixel_layers(aovs, groups)) names.push_back(layer.name);
   EXPECT_THAT(names, testing::ElementsAre("rgb", "stderr", "error", "spp", "RGB_fill", "RGB_fill.delta",
@@ -161,7 +161,7 @@ TEST(PixelLayers, LightGroupsHaveMeansAndHalfDifferences) {
     EXPECT_NE(a, b) << "the test needs halves that differ";
   }
   ExrPicture unnamed{kLayerGrid.frame, {}, {}};
-  add_aov_layers(film, {}, true, unnamed);
+  add_aov_layers(film, {}, {.float_output = true}, unnamed);
   EXPECT_TRUE(unnamed.channels.contains("RGB_1.delta.B")) << "groups without names have numbers";
 }
 

@@ -1,4 +1,4 @@
-#include "core/base/light_mix.h"
+#include "core/base/light/light_mix.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "core/base/light_group.h"
+#include "core/base/light/light_group.h"
 #include "core/base/parse_number.h"
 #include "core/base/safe_text.h"
 

@@ -1,4 +1,4 @@
-#include "core/base/light_group.h"
+#include "core/base/light/light_group.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "core/base/colour_space.h"
+#include "core/base/light/colour_space.h"
 
 namespace ls {
 namespace {
