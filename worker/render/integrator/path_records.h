@@ -180,6 +180,20 @@ struct SharedTail {
   bool brings_light() const { return light_pdf > 0 || !is_black(emitted) || !is_black(scattered); }
 };
 
+// SharedTail::scattered by light groups, for paths with Features::split.
+struct TailByGroup {
+  std::size_t groups = 0;  // number of elements of `scattered` that are set
+  std::array<C3, kMostLightGroups> scattered;
+
+  void clear(std::size_t light_groups) {
+    groups = light_groups;
+    std::fill_n(scattered.begin(), groups, C3(0));
+  }
+  void add(LightGroup group, const C3& light) {
+    if (group < groups) scattered[group] += light;
+  }
+};
+
 // The state of a path that records its first vertex and its tail.
 struct SharingPath {
   enum class Part : std::uint8_t {

@@ -374,18 +374,6 @@ class PathTracer {
   float aim_ = 1;
   struct Nothing {};
   std::conditional_t<F.reuse, SharingPath, Nothing> sharing_;
-  // With F.reuse and F.split: SharedTail::scattered by light groups.
-  struct TailByGroup {
-    std::size_t groups = 0;
-    std::array<C3, kMostLightGroups> scattered;
-    void clear(std::size_t light_groups) {
-      groups = light_groups;
-      std::fill_n(scattered.begin(), groups, C3(0));
-    }
-    void add(LightGroup group, const C3& light) {
-      if (group < groups) scattered[group] += light;
-    }
-  };
   std::conditional_t<F.reuse && F.split, TailByGroup, Nothing> tail_by_group_;
 };
 
