@@ -42,9 +42,9 @@ Result<Pictures::Picture> Pictures::picture(const JobId& id, const std::optional
     if (!plain) return plain;
     const auto factors = factors_of(*mix, plain->film.aovs(), plain->facts.job.settings.light_groups);
     if (!factors) return tl::unexpected(factors.error());
-    const ImageError colour = image_error(plain->film.error());
-    plain->film = plain->film.mixed(*factors);
-    plain->error_of_mix = mixed_error(plain->film.error(), colour);
+    Film mixed = plain->film.mixed(*factors);
+    plain->error_of_mix = mixed_error(plain->film, mixed.error());
+    plain->film = std::move(mixed);
     return plain;
   }
   auto core = core_.lock();
@@ -97,7 +97,7 @@ Result<std::string> Pictures::mix_json(const JobId& id, const LightMix& mix) con
   // Row by row, because a mix of the whole film would take as much memory as the film's colour once more
   for (int row = 0; row < shown->film.grid().rows(); ++row)
     sums.add(shown->film.row(row).mixed(*factors).error());
-  const ImageError error = mixed_error(sums, image_error(shown->film.error()));
+  const ImageError error = mixed_error(shown->film, sums);
   json out{{"mix", json::parse(canonical_json(mix))},
            {"groups", shown->facts.job.settings.light_groups},
            {"relmse", nullptr},

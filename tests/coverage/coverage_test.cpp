@@ -110,7 +110,6 @@ TEST(ShortCoverage, HoldsForImagesOfFewSamplesWithPathReuse) {
 
 // 2,000 random mixes of 200 images. Mixes of one image are not independent; as if only the images were, a
 // share of 200 that is .95 is known to .015, and the bound is .95 - (.02 + .07) at the level of one figure.
-// An estimate that adds the errors of groups as if they were independent covers far less.
 TEST(ShortCoverage, HoldsForRandomMixesOfLightGroups) {
   const double level = Tests("coverage/mixes").level(4);
   for (const bool fog : {false, true}) {

@@ -27,9 +27,8 @@ struct MixJobs {
 struct MixCoverage {
   int mixes = 0;
   int trusted = 0;
-  double held = 0;           // share of the trusted mixes whose interval of relMSE holds the true one
-  double held_ignoring = 0;  // the same if errors are added without the covariances of the groups
-  Ratio relmse_ratio;        // mean estimated / mean true, over all mixes
+  double held = 0;     // share of the trusted mixes whose interval of relMSE holds the true one
+  Ratio relmse_ratio;  // mean estimated / mean true, over all mixes
 };
 
 // Throws std::runtime_error if the scene cannot be read or rendered.

@@ -266,10 +266,6 @@ Film Film::mixed(std::span<const GroupFactors> factors) const {
     return out;
   };
   Film out(grid_, rest);
-  // The sum of the groups is the colour up to rounding: then the error is that of the colour, which was
-  // estimated with the sums of earlier rounds, too
-  const bool as_it_is =
-      std::ranges::all_of(factors, [](const GroupFactors& f) { return f == GroupFactors{}; });
   for (TileIndex t = 0; t < tiles_.size(); ++t) {
     if (!tiles_[t]) continue;
     const auto pixels = static_cast<std::size_t>(grid_.rect(t).pixels());
@@ -284,7 +280,7 @@ Film Film::mixed(std::span<const GroupFactors> factors) const {
                   tail->sums.end());
       next->tail = Tail{tail->samples, tail->digest, std::move(sums)};
     }
-    next->error = as_it_is ? tiles_[t]->error : estimate(*next, nullptr, grid_.rect(t), grid_.meters);
+    next->error = estimate(*next, nullptr, grid_.rect(t), grid_.meters);
     out.tiles_[t] = std::move(next);
   }
   return out;

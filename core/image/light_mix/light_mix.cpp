@@ -27,13 +27,36 @@ Result<std::vector<GroupFactors>> factors_of(const LightMix& mix, AovSet aovs,
   return out;
 }
 
-ImageError mixed_error(const TileError& mixed, const ImageError& colour) {
+namespace {
+
+// The error of the film's colour, estimated from its halves alone.
+ImageError error_of_halves(const Film& film) {
+  TileError sums;
+  for (TileIndex t = 0; t < film.grid().count(); ++t) {
+    if (film.spp(t) == 0) continue;
+    const auto halves = film.half_means(t);
+    const PixelRect rect = film.grid().rect(t);
+    sums.add(estimate_error({rect.width(), rect.height(), halves[0], halves[1]}, film.spp(t)));
+  }
+  return image_error(sums);
+}
+
+// Makes the interval [low, high] of `value` at least as wide, in proportion, as that of `of`.
+void widen(double value, double& low, double& high, double of, double of_low, double of_high) {
+  if (!(of > 0) || !(of_high > 0)) return;
+  low = std::min(low, value * of_low / of);
+  high = std::max(high, value * of_high / of);
+}
+
+}  // namespace
+
+ImageError mixed_error(const Film& film, const TileError& mixed) {
+  const ImageError colour = image_error(film.error()), halves = error_of_halves(film);
   ImageError error = image_error(mixed);
-  const auto widen = [](double value, double& low, double& high, double of, double of_low, double of_high) {
-    if (!(of > 0) || !(of_high > 0)) return;
-    low = std::min(low, value * of_low / of);
-    high = std::max(high, value * of_high / of);
-  };
+  if (colour.relmse > 0 && halves.relmse > 0) {
+    const double skew = colour.relmse / halves.relmse;
+    for (double* figure : {&error.relmse, &error.relmse_lo, &error.relmse_hi}) *figure *= skew;
+  }
   widen(error.relmse, error.relmse_lo, error.relmse_hi, colour.relmse, colour.relmse_lo, colour.relmse_hi);
   widen(error.rmse, error.rmse_lo, error.rmse_hi, colour.rmse, colour.rmse_lo, colour.rmse_hi);
   return error;

@@ -19,10 +19,10 @@ namespace ls {
 Result<std::vector<GroupFactors>> factors_of(const LightMix& mix, AovSet aovs,
                                              std::span<const std::string> groups);
 
-// Returns the error of a mixed image (Film::mixed()) with this sum of the errors of its tiles. `colour` is
-// the error of the image before mixing. The relative width of the mix's interval is at least that of the
-// colour's: only of the colour the film knows earlier sums, by which the interval takes account of skewed
-// noise.
-ImageError mixed_error(const TileError& mixed, const ImageError& colour);
+// Returns the error of a mix of `film` whose tiles have this sum of errors. Earlier sums, by which the
+// estimate takes account of skewed noise, are known of the film's colour only. So the relative error is
+// multiplied by what they change of the colour's, and the interval is, in proportion, at least as wide as the
+// colour's.
+ImageError mixed_error(const Film& film, const TileError& mixed);
 
 }  // namespace ls
