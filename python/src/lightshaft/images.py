@@ -23,10 +23,15 @@ def decode_layers(data: bytes) -> dict[str, Array]:
     """Returns {layer: values}, with shape (h, w) for one channel and (h, w, n) for more. Channels are in the order
     R G B A, X Y Z or U V. Halves become float32 without loss; counts stay integers. The colour is called 'color'."""
     try:
+        named = set()
         for part in OpenEXR.File(io.BytesIO(data), header_only=True).parts:
             _check_size(part.header)
+            named |= {channel.name for channel in part.header["channels"]}
         parts = OpenEXR.File(io.BytesIO(data), separate_channels=True).parts
         pixels = {name: channel.pixels for part in parts for name, channel in part.channels.items()}
+        # The library leaves out, with a warning, the parts that it cannot read.
+        if any(pixels.get(name) is None for name in named):
+            raise BadAnswer("the farm's image is cut off or damaged: some of its layers have no pixels")
     except BadAnswer:
         raise
     except Exception as error:  # the library's errors have no common class
