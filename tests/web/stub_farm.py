@@ -94,6 +94,7 @@ class StubFarm:
         self.log = ""  # of every job
         self.blobs = {}
         self.submitted = []
+        self.refuse_again = None  # why no job is rendered again
         self.refusal = None  # problem details for the next POST /jobs
         self.requests = []  # (method, path)
         self.role, self.user = "admin", ""  # of the token
@@ -291,6 +292,8 @@ def _handler(farm):
 
         def _post_jobs(self, parts, body):
             if parts[1:] == ["again"]:
+                if farm.refuse_again:
+                    return self._problem(400, farm.refuse_again)
                 farm.submitted.append((parts[0], json.loads(body)))
                 farm.jobs["j-again"] = {**farm.jobs[parts[0]], "id": "j-again", "state": "queued", "progress": 0, "units_done": 0}
                 return self._send(201, {"id": "j-again", "url": "/api/v1/jobs/j-again", "warnings": []})

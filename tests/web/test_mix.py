@@ -35,6 +35,10 @@ def press(page, label):
     page.click(f"[aria-label={json.dumps(label)}]")
 
 
+def press_button(page, name):
+    page.evaluate(f"[...document.querySelectorAll('button')].find((b) => b.innerText === {json.dumps(name)}).click()")
+
+
 def point_at(page, x, y):
     at = page.evaluate(f"(() => {{ const b = {VIEW}.getBoundingClientRect(), w = {VIEW}.windowPoint([{x} + 0.5, {y} + 0.5]); return [b.left + w[0], b.top + w[1]]; }})()")
     page.call("Input.dispatchMouseEvent", {"type": "mouseMoved", "x": at[0], "y": at[1]})
@@ -319,3 +323,38 @@ def test_a_mix_follows_a_job_that_renders(real_farm, open_page):
     page.wait("performance.getEntriesByType('resource').filter(({ name }) => name.includes('/pixels?layer=RGB_lamp&')).length > 2")
 
     real_farm.request("PATCH", f"/api/v1/jobs/{id}", b'{"state": "cancelled"}')
+
+
+def test_a_mix_is_rendered_as_a_job(real_farm, open_page, tmp_path):
+    id = real_farm.submit(ROOM, spp=4, aov="light_groups", float="true")
+    real_farm.wait_for_job(id)
+    page = open_page(f"{real_farm.url()}/#token={real_farm.token}")
+    page.wait("document.querySelector('.link.live')")
+    page.evaluate(f"void (location.hash = '#/view/{id}?layer=mix&mix=sky*g1&mix=lamp*g1')")
+    page.wait(MIX)
+
+    press_button(page, "Render as job")
+
+    page.wait(f"location.hash.startsWith('#/jobs/') && !location.hash.includes({json.dumps(id)})")
+    made = page.evaluate("location.hash").removeprefix("#/jobs/")
+    real_farm.wait_for_job(made)
+    images = [tmp_path / f"{job}.exr" for job in (id, made)]
+    for job_id, path in zip((id, made), images):
+        path.write_bytes(real_farm.request("GET", f"/api/v1/jobs/{job_id}/image.exr"))
+    one, two = (read(path)[0]["G"] for path in images)
+    assert [[2 * v for v in row] for row in one] == [list(row) for row in two], "twice the light changes no bit but the exponent"
+
+
+def test_a_mix_that_cannot_be_rendered_is_refused_with_the_reason(farm, lit):
+    page = lit("curve=linear&mix=lamp*g1*v*vg2")
+    farm.refuse_again = 'mix: the light group "lamp" has other factors for media than for surfaces'
+    page.wait("document.querySelector('.viewer-mix')")
+    press_button(page, "Render as job")
+    page.wait("document.querySelector('.viewer-mix [role=alert]')?.innerText.includes('other factors for media')")
+
+
+def test_who_may_only_look_is_not_offered_to_render_a_mix(farm, lit):
+    farm.role = "read"
+    page = lit("curve=linear&mix=lamp*g1")
+    page.wait("document.querySelector('.viewer-mix')")
+    assert "Render as job" not in page.text(".viewer-mix")

@@ -103,7 +103,11 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
       mixing = light.makeMixing({
         h, layers: meta.layers, look, get: () => get().viewer, show: (more) => set(withViewer(get(), more)),
         settled: () => { refreshFigures(); survey(); },
-        job: { error: (mix) => api.mix(id, mix), exr: (mix) => downloads.exr(id, mix) },
+        job: {
+          error: (mix) => api.mix(id, mix),
+          exr: (mix) => downloads.exr(id, mix),
+          again: mayChange(get()) ? async (mix) => { location.hash = `#/jobs/${(await api.again(id, { mix })).id}`; } : null,
+        },
       });
     }
     const { view } = get().viewer;

@@ -13,7 +13,7 @@ function loadStyle() {
   if (![...document.querySelectorAll("link")].some((link) => link.href === href)) document.head.append(Object.assign(document.createElement("link"), { rel: "stylesheet", href }));
 }
 
-/** panel: {groups, rows, json, error, waits, refused, exr}. */
+/** panel: {groups, rows, json, error, waits, refused, exr, renders}; renders: the mix may be rendered as a job. */
 export function mixPanel(h, panel, actions) {
   const { groups, rows } = panel;
   const neutral = panel.json === "{}";
@@ -29,7 +29,8 @@ export function mixPanel(h, panel, actions) {
           if (file) actions.load(file);
           event.currentTarget.value = ""; // the same file can be loaded again
         } })),
-      h("a", { key: "exr", class: "button small", href: panel.exr, download: true }, "Download EXR")),
+      h("a", { key: "exr", class: "button small", href: panel.exr, download: true }, "Download EXR"),
+      panel.renders ? h("button", { key: "render", type: "button", class: "small", disabled: neutral, onclick: actions.render }, "Render as job") : null),
     panel.refused ? h("p", { key: "refused", class: "field-error", role: "alert" }, panel.refused) : null);
 }
 

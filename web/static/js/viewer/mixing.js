@@ -10,8 +10,9 @@ const kFreshPauseMs = 2000; // between two questions for the error of a mix of a
 
 /**
  * What the panel of a job's picture shows and does. show(more): `more` is in the viewer's state now; look(more): in
- * its view; settled(): the mix has been as it is for a while; job: {error(json), exr(json)}, the figures of a mix, as
- * a promise, and the address of its image.
+ * its view; settled(): the mix has been as it is for a while; job: {error(json), exr(json), again(json)}, the figures of a mix, as
+ * a promise, and the address of its image; again(json) renders the scene with the mix as a new job, and shows it; null:
+ * the caller may not.
  */
 export function makeMixing({ h, layers, get, show, look, settled, job }) {
   const groups = groupsOf(layers);
@@ -48,6 +49,14 @@ export function makeMixing({ h, layers, get, show, look, settled, job }) {
     /** rows: of mix.js. Shows the mix, if a picture without it is shown. */
     set: (next) => change(textsOf(next), get().view.layer.startsWith(kMix) ? {} : { layer: kMix }),
     reset: () => change([], { layer: get().plain }),
+    async render() {
+      show({ mixRefused: null });
+      try {
+        await job.again(json());
+      } catch (error) {
+        show({ mixRefused: error.message });
+      }
+    },
     async load(file) {
       try {
         const next = rowsOfMix(JSON.parse(await file.text()), groups);
@@ -73,6 +82,6 @@ export function makeMixing({ h, layers, get, show, look, settled, job }) {
       clearTimeout(timer);
       asked += 1;
     },
-    panel: (viewer) => mixPanel(h, { groups, rows: rows(), json: json(), error: viewer.mixError, waits: viewer.mixWaits, refused: viewer.mixRefused, exr: job.exr(json()) }, actions),
+    panel: (viewer) => mixPanel(h, { groups, rows: rows(), json: json(), error: viewer.mixError, waits: viewer.mixWaits, refused: viewer.mixRefused, exr: job.exr(json()), renders: job.again !== null }, actions),
   };
 }
