@@ -16,6 +16,7 @@
 #include "coordinator/store/jobs/job_store.h"
 #include "core/base/file_form.h"
 #include "core/base/text/name_forms.h"
+#include "core/image/film/partial_size.h"
 #include "core/job/health_notes.h"
 #include "core/job/spec_draft.h"
 #include "core/scene/analysis/camera_view.h"
@@ -76,6 +77,20 @@ void note_analysis(const scene::Pruned& pruned, const RenderSettings& settings, 
       -1, ' ', false, json::error_handler_t::replace);
 }
 
+// Gives the job this scene: its text and digest, the files that it uses, and what it needs.
+void set_scene(const scene::Pruned& pruned, Admission& admission) {
+  StoredJob& job = admission.job;
+  job.assets.clear();
+  for (const Asset& a : pruned.scene.assets)
+    if (std::ranges::find(job.assets, a.digest, &BlobRef::digest) == job.assets.end())
+      job.assets.push_back({a.digest, a.bytes, a.name});
+  job.features_used.clear();
+  job.features_left_out.clear();
+  note_analysis(pruned, job.settings, job);
+  admission.scene_json = serialize(pruned.scene);
+  job.scene = sha256(admission.scene_json);
+}
+
 tl::unexpected<Error> invalid(std::string text) { return fail(Errc::invalid_argument, std::move(text)); }
 
 // Sets the integrator. The job's choice takes precedence over the scene's.
@@ -98,6 +113,18 @@ Result<void> choose_integrator(const Scene& scene, const JobSpec& spec, RenderSe
   return {};
 }
 
+// Makes tiles smaller until the result of a unit fits into one message of a worker. Pixels do not depend on
+// the tiles. Tiles keep multiples of 16 pixels, which is the side of the blocks that share paths.
+void shrink_tiles(RenderSettings& settings) {
+  constexpr int kSmallest = 16;
+  const AovSet aovs = aovs_of(settings);
+  const auto too_large = [&](int tile) {
+    return most_partial_file_bytes(static_cast<std::uint64_t>(tile) * static_cast<std::uint64_t>(tile),
+                                   aovs) > ls::limits::kPartialBytes;
+  };
+  while (settings.tile > kSmallest && too_large(settings.tile)) settings.tile /= 2;
+}
+
 // Sets the AOVs: those of these names, and those that the denoiser needs. `light_groups` are the groups of
 // the scene's lights.
 Result<void> set_aovs(std::vector<std::string> names, bool denoise,
@@ -114,6 +141,7 @@ Result<void> set_aovs(std::vector<std::string> names, bool denoise,
     return invalid(fmt::format("the scene has {} light groups; layers can have at most {}",
                                light_groups.size(), kMostLightGroups));
   settings.light_groups = light_groups;
+  shrink_tiles(settings);
   return {};
 }
 
@@ -317,21 +345,16 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
   const auto pruned = needed_part(request, blobs, read_scene, frame, *read, job.settings);
   if (!pruned) return tl::unexpected(pruned.error());
   const Scene& scene = pruned->scene;
-  for (const Asset& a : scene.assets)
-    if (std::ranges::find(job.assets, a.digest, &BlobRef::digest) == job.assets.end())
-      job.assets.push_back({a.digest, a.bytes, a.name});
+  set_scene(*pruned, admission);
   if (job.assets.size() > ls::limits::kAssetsPerJob)
     return rejected(
         {Errc::invalid_argument,
          fmt::format("the scene uses {} files; a message to a worker holds {}: merge some of its meshes",
                      job.assets.size(), ls::limits::kAssetsPerJob)});
   job.meters = meter_groups(scene);
-  note_analysis(*pruned, job.settings, job);
   if (job.settings.meters == 0)
     job.camera = scene::camera_matrices(scene.sensor, scene.film, job.settings.size);
   admission.text_bytes = request.scene_text.size() + read->text_bytes;
-  admission.scene_json = serialize(scene);
-  job.scene = sha256(admission.scene_json);
   job.reference_same_seed = same_noise(origin, job.scene, job.settings.seed);
   if (auto ok = check_job(job); !ok) return rejected(ok.error());
   return admission;
@@ -348,18 +371,9 @@ Result<void> mix_again(const LightMix& mix, const BlobStore& blobs, Admission& a
   auto scene = deserialize_scene({reinterpret_cast<const char*>(json->data()), json->size()});
   if (!scene) return tl::unexpected(scene.error());
   if (auto ok = scene::multiply_light(mix, *scene); !ok) return ok;
-  const scene::Pruned pruned =
-      scene::pruned(*scene, scene::pruned_for(job.settings.integrator, job.settings.max_depth));
-  job.assets.clear();
-  for (const Asset& a : pruned.scene.assets)
-    if (std::ranges::find(job.assets, a.digest, &BlobRef::digest) == job.assets.end())
-      job.assets.push_back({a.digest, a.bytes, a.name});
-  job.features_used.clear();
-  job.features_left_out.clear();
-  note_analysis(pruned, job.settings, job);
+  set_scene(scene::pruned(*scene, scene::pruned_for(job.settings.integrator, job.settings.max_depth)),
+            admission);
   job.spec.mix = job.spec.mix ? product(*job.spec.mix, mix) : mix;
-  admission.scene_json = serialize(pruned.scene);
-  job.scene = sha256(admission.scene_json);
   return {};
 }
 

@@ -98,8 +98,8 @@ class Coordinator {
 
   // Images and reports
 
-  // The final image if there is one, else the current image;
-  // or, with `mix`, that image with other factors of its light groups.
+  // The final image if there is one, else the current image. With `mix`, that image with other factors of its
+  // light groups.
   Result<std::vector<std::byte>> image_exr(const JobId& id, const std::optional<LightMix>& mix = {}) const;
   // Returns the error of a mix of light groups as JSON.
   Result<std::string> mix_json(const JobId& id, const LightMix& mix) const;

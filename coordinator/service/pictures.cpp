@@ -42,9 +42,9 @@ Result<Pictures::Picture> Pictures::picture(const JobId& id, const std::optional
     if (!plain) return plain;
     const auto factors = factors_of(*mix, plain->film.aovs(), plain->facts.job.settings.light_groups);
     if (!factors) return tl::unexpected(factors.error());
-    Film mixed = plain->film.mixed(*factors);
-    plain->error_of_mix = mixed_error(plain->film, mixed.error());
-    plain->film = std::move(mixed);
+    MixedError error;
+    plain->film = error.mix(plain->film, *factors);
+    plain->error_of_mix = error.error();
     return plain;
   }
   auto core = core_.lock();
@@ -89,23 +89,35 @@ Result<std::vector<std::byte>> Pictures::image_exr(const JobId& id,
 }
 
 Result<std::string> Pictures::mix_json(const JobId& id, const LightMix& mix) const {
-  const auto shown = picture(id);
-  if (!shown) return tl::unexpected(shown.error());
-  const auto factors = factors_of(mix, shown->film.aovs(), shown->facts.job.settings.light_groups);
+  auto core = core_.lock();
+  const auto entry = core->jobs.usable(id);
+  if (!entry) return tl::unexpected(entry.error());
+  const StoredJob job = (*entry)->stored;
+  const TileGrid grid = (*entry)->grid;
+  const auto film = (*entry)->assembly ? std::optional((*entry)->assembly->film()) : std::nullopt;
+  core.unlock();
+  const auto factors = factors_of(mix, aovs_of(job.settings), job.settings.light_groups);
   if (!factors) return tl::unexpected(factors.error());
-  TileError sums;
-  // Row by row, because a mix of the whole film would take as much memory as the film's colour once more
-  for (int row = 0; row < shown->film.grid().rows(); ++row)
-    sums.add(shown->film.row(row).mixed(*factors).error());
-  const ImageError error = mixed_error(shown->film, sums);
+  MixedError sum;
+  if (film) {
+    for (int row = 0; row < grid.rows(); ++row) sum.mix(film->row(row), *factors);
+  } else if (const auto tiles = files_.tiles_of_image(job, grid)) {
+    Film part(grid, aovs_of(job.settings));
+    for (TileIndex t = 0; t < grid.count(); ++t) {
+      if (auto loaded = tiles->load(t, part); !loaded) return tl::unexpected(loaded.error());
+      sum.mix(part, *factors);
+      part.discard(t);
+    }
+  }
   json out{{"mix", json::parse(canonical_json(mix))},
-           {"groups", shown->facts.job.settings.light_groups},
+           {"groups", job.settings.light_groups},
            {"relmse", nullptr},
            {"relmse_ci95", nullptr},
            {"rmse", nullptr},
            {"trusted", false},
            {"verdict", "no samples yet"}};
-  if (sums.samples > 0) {
+  if (sum.any()) {
+    const ImageError error = sum.error();
     out["relmse"] = error.relmse;
     out["relmse_ci95"] = {error.relmse_lo, error.relmse_hi};
     out["rmse"] = error.rmse;

@@ -1,4 +1,4 @@
-// What a job measures, as far as a coordinator must know it: the meters of a scene without their places.
+// The meters of a scene without their places, which the coordinator does not need.
 #pragma once
 
 #include <cstdint>

@@ -20,9 +20,9 @@ namespace ls {
 enum class TextureFilter { nearest, bilinear };
 enum class Wrap { repeat, mirror, clamp };
 enum class Channel { all, red, green, blue, alpha };
-// What an image's stored colours are. automatic: as the file says: values of 8 and 16 bits are sRGB, encoded
-// by its curve, and others are linear sRGB, or linear with the primaries in the file's header. srgb: encoded
-// by that curve. The others are linear, in the ColourSpace of that name.
+// The colour space of an image's stored values. automatic: the file's type decides. Values of 8 and 16 bits
+// are encoded by the curve of sRGB; others are linear, with the primaries in the file's header or, without
+// those, of sRGB. srgb: encoded by the curve of sRGB. The others are linear, in the ColourSpace of that name.
 enum class ImageColours { automatic, srgb, rec709, rec2020, p3_d65, acescg, aces2065_1, xyz };
 
 struct ConstantTexture {

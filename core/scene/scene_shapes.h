@@ -114,10 +114,10 @@ struct Sensor {  // looks along the +z axis of to_world, with +y up and +x to th
   bool operator==(const Sensor&) const = default;
 };
 
-// What a meter measures, per colour channel. radiance: the radiance that arrives along a ray that starts at a
-// point. irradiance: the integral of radiance times cosine over the hemisphere of the normal, at a point, or
-// the mean over a shape. flux: the irradiance of a shape times its area. fluence: the integral of radiance
-// over all directions, at a point.
+// The quantity that a meter measures, per colour channel. radiance: the radiance that arrives along a ray
+// that starts at a point. irradiance: the integral of radiance times cosine over the hemisphere of the
+// normal, at a point, or the mean over a shape. flux: the irradiance of a shape times its area. fluence: the
+// integral of radiance over all directions, at a point.
 enum class MeterKind { radiance, irradiance, flux, fluence };
 // A point of the scene, and the unit normal of the plane through which irradiance arrives, or the direction
 // into which a meter of radiance looks; 0 for fluence.

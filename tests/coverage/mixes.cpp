@@ -119,7 +119,9 @@ struct MixLook {
 
 MixLook look_at(const GroupsImage& image, const GroupMoments& all, std::size_t images,
                 const std::vector<GroupFactors>& factors) {
-  const ImageError e = mixed_error(image.film, image.film.mixed(factors).error());
+  MixedError sum;
+  sum.mix(image.film, factors);
+  const ImageError e = sum.error();
   MixLook look{.estimated = e.relmse, .trusted = e.trusted};
   const auto n = static_cast<double>(images), others = n - 1;
   const std::size_t values = all.sum.front().size();

@@ -169,6 +169,21 @@ def test_a_mix_is_rendered_as_a_job(farm, scene, tmp_path):
     assert np.array_equal(layers(two)["RGB_key.R"], 2 * layers(one)["RGB_key.R"])
 
 
+def test_as_many_groups_as_there_may_be_are_rendered_by_a_farm_and_here(farm, scene, tmp_path):
+    many = scene.with_name("many.xml")
+    lamps = "".join(lamp(f"g{i:02}", (i / 8 - 2, 2, 2), "1 1 1") for i in range(31))
+    many.write_text(scene.read_text().replace("</scene>", lamps + "</scene>").replace('value="key"', 'value="g00"').replace('value="fill"', 'value="g01"'))
+    here = digest(render(many, tmp_path / "here.exr", "--aov", LAYERS))
+    farm.add_worker(fake=False)
+
+    job = submit(farm, many, "--aov", LAYERS)
+
+    assert farm.pixels(job) == here
+    (tmp_path / "farm.exr").write_bytes(farm.request("GET", f"/api/v1/jobs/{job}/image.exr"))
+    assert read(tmp_path / "farm.exr")[0] == read(tmp_path / "here.exr")[0]
+    assert len([name for name in layers(tmp_path / "here.exr") if name.endswith(".volume.delta.G")]) == 32
+
+
 def test_a_job_without_groups_cannot_be_mixed(farm, scene, tmp_path):
     farm.add_worker(fake=False)
     job = submit(farm, scene)

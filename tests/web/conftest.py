@@ -1,5 +1,6 @@
 import pytest
 from devtools import Browser, chromium_path
+from local_farm import bin_dir
 from stub_farm import StubFarm, TOKEN
 
 
@@ -9,6 +10,15 @@ def browser():
         pytest.skip("Chromium is not installed (apt-get install chromium)")
     with Browser() as browser:
         yield browser
+
+
+@pytest.fixture
+def programs():
+    """The folder of the programs, for a real farm."""
+    try:
+        return bin_dir()
+    except FileNotFoundError as missing:
+        pytest.skip(str(missing))
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import struct
 import urllib.parse
 
 import pytest
-from local_farm import SCENE, LocalFarm, bin_dir
+from local_farm import SCENE, LocalFarm
 
 QUAD = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n"
 WITH_MESH = SCENE.replace('<shape type="sphere">', '<shape type="obj"><string name="filename" value="meshes/quad.obj"/>')
@@ -12,15 +12,11 @@ SLOW = ("--fake-delay", 150)  # milliseconds a unit: long enough to be seen in f
 
 
 @pytest.fixture
-def real_farm(tmp_path):
-    try:
-        bin = bin_dir()
-    except FileNotFoundError as missing:
-        pytest.skip(str(missing))
+def real_farm(tmp_path, programs):
     folder = tmp_path / "farm"
     folder.mkdir()
-    stand_in = bin.parent / "fake_oidn" / "blurs.so"  # for Open Image Denoise
-    with LocalFarm(folder, bin, environment={"LIGHTSHAFT_OIDN": str(stand_in)}) as farm:
+    stand_in = programs.parent / "fake_oidn" / "blurs.so"  # for Open Image Denoise
+    with LocalFarm(folder, programs, environment={"LIGHTSHAFT_OIDN": str(stand_in)}) as farm:
         yield farm
 
 

@@ -1,6 +1,6 @@
 """What the dashboard costs a slow link: requests and bytes of the real coordinator, not times."""
 import pytest
-from local_farm import SCENE, LocalFarm, bin_dir
+from local_farm import SCENE, LocalFarm
 
 # The page, its two scripts, its style and the icon; then who is signed in, the session, who is signed in now, the list, the workers,
 # the event stream, the list again when that stream opens, a small picture. Served module by module it would be some 80.
@@ -9,12 +9,8 @@ MOST_BYTES = 100_000  # of which the scripts in gzip are 73,000; without compres
 
 
 @pytest.fixture
-def real_farm(tmp_path):
-    try:
-        bin = bin_dir()
-    except FileNotFoundError as missing:
-        pytest.skip(str(missing))
-    with LocalFarm(tmp_path, bin) as farm:
+def real_farm(tmp_path, programs):
+    with LocalFarm(tmp_path, programs) as farm:
         farm.submit(SCENE, spp=4)
         yield farm
 

@@ -266,12 +266,8 @@ ROOM = """<scene version="3.0.0">
 
 
 @pytest.fixture
-def real_farm(tmp_path):
-    try:
-        bin = bin_dir()
-    except FileNotFoundError as missing:
-        pytest.skip(str(missing))
-    with LocalFarm(tmp_path / "farm", bin) as farm:
+def real_farm(tmp_path, programs):
+    with LocalFarm(tmp_path / "farm", programs) as farm:
         farm.add_worker(fake=False)
         farm.wait_for_workers(1)
         yield farm

@@ -6,7 +6,7 @@ import signal
 
 import pytest
 
-from local_farm import SCENE, LocalFarm, bin_dir, wait_until
+from local_farm import SCENE, LocalFarm, wait_until
 from stub_farm import worker
 
 NAMES = "[...document.querySelectorAll('.worker-list .worker-name')].map(e => e.innerText)"
@@ -115,12 +115,8 @@ def test_the_address_by_which_a_page_was_opened_is_the_workers_too(farm, open_pa
     assert command == "lightshaft-worker --coordinator farm.example:50051 --token-file join-token"
 
 
-def test_a_real_worker_ends_when_it_is_sent_away_and_the_command_is_right(tmp_path, open_page):
-    try:
-        bin = bin_dir()
-    except FileNotFoundError as missing:
-        pytest.skip(str(missing))
-    with LocalFarm(tmp_path, bin) as farm:
+def test_a_real_worker_ends_when_it_is_sent_away_and_the_command_is_right(tmp_path, open_page, programs):
+    with LocalFarm(tmp_path, programs) as farm:
         page = open_page(f"{farm.url()}/#token={farm.token}")
         page.wait("document.querySelector('.link.live')")
         page.evaluate("void (location.hash = '#/workers')")
@@ -137,12 +133,8 @@ def test_a_real_worker_ends_when_it_is_sent_away_and_the_command_is_right(tmp_pa
         page.wait("!document.querySelector('[data-worker].is-connected')")
 
 
-def test_a_real_worker_that_drains_is_kept_and_renders_on(tmp_path, open_page):
-    try:
-        bin = bin_dir()
-    except FileNotFoundError as missing:
-        pytest.skip(str(missing))
-    with LocalFarm(tmp_path, bin) as farm:
+def test_a_real_worker_that_drains_is_kept_and_renders_on(tmp_path, open_page, programs):
+    with LocalFarm(tmp_path, programs) as farm:
         worker = farm.add_worker(fake=False)
         job = farm.submit(SCENE, spp=4096)
         wait_until(lambda: farm.job(job)["units_done"] > 0, "it renders")

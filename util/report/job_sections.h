@@ -39,7 +39,7 @@ bool denoised_target(const Json& report);  // true if the target error applies t
 std::string curves(const Json& report);
 std::string outlook(const Json& report);  // how much more core time a smaller error needs; empty: unknown
 
-// What the scene's meters have measured, key numbers of the job, and where its time was spent
+// The values of the scene's meters, key numbers of the job, and where its time was spent
 // (job_figures.cpp).
 std::string meters(const Json& report);
 std::string figures(const Json& report);

@@ -8,20 +8,19 @@
 #include <utility>
 
 #include "core/base/failpoint.h"
+#include "core/image/film/partial_size.h"
 #include "util/protocol/limits.h"
 #include "worker/agent/agent_impl.h"
 
 namespace ls::worker {
 namespace {
 
-constexpr std::int64_t kExrOverhead = 16 << 10;  // allowance for an EXR's header and line offsets, in bytes
-
 // Returns a failure if the result of this unit would not fit into a message; otherwise nullopt. The check is
 // made before rendering, so that no unit is rendered in vain.
 std::optional<UnitFailure> too_large(const LocalJob& job, const LeaseUnit& unit) {
-  const auto per_pixel = static_cast<std::int64_t>(partial_bytes_per_pixel(aovs_of(job.brief.settings)));
-  const std::int64_t bytes = unit.rect.pixels() * per_pixel + kExrOverhead;
-  if (bytes <= static_cast<std::int64_t>(limits::kPartialBytes)) return std::nullopt;
+  const std::uint64_t bytes =
+      most_partial_file_bytes(static_cast<std::uint64_t>(unit.rect.pixels()), aovs_of(job.brief.settings));
+  if (bytes <= limits::kPartialBytes) return std::nullopt;
   return UnitFailure{
       .scene_at_fault = true,
       .reason = fmt::format("a tile of {} x {} pixels makes a result of {} bytes, more than the {} that "

@@ -327,11 +327,11 @@ std::map<std::string, std::string> strings_of(const Film& film, const Provenance
                                                 {"lightshaft:job", from.settings_json},
                                                 {"lightshaft:build", from.build},
                                                 {"lightshaft:class", from.numeric_class.hex()}};
-  if (from.error_of_mix)
-    strings.merge(error_strings(*from.error_of_mix));
-  else
-    strings["lightshaft:tiles"] = tile_digests(film);
   strings.merge(error_strings(film.error(), film.pixels_without_samples()));
+  if (!from.error_of_mix)
+    strings["lightshaft:tiles"] = tile_digests(film);
+  else if (film.samples() > 0)
+    for (auto& [name, text] : error_strings(*from.error_of_mix)) strings[name] = text;
   // The error over time (`convergence_status`) may show problems that the film alone does not show. Then its
   // text replaces the verdict "trusted".
   if (auto verdict = strings.find("lightshaft:verdict");

@@ -29,31 +29,32 @@ Result<std::vector<GroupFactors>> factors_of(const LightMix& mix, AovSet aovs,
 
 namespace {
 
-// The error of the film's colour, estimated from its halves alone.
-ImageError error_of_halves(const Film& film) {
-  TileError sums;
-  for (TileIndex t = 0; t < film.grid().count(); ++t) {
-    if (film.spp(t) == 0) continue;
-    const auto halves = film.half_means(t);
-    const PixelRect rect = film.grid().rect(t);
-    sums.add(estimate_error({rect.width(), rect.height(), halves[0], halves[1]}, film.spp(t)));
-  }
-  return image_error(sums);
-}
-
 // Makes the interval [low, high] of `value` at least as wide, in proportion, as that of `of`.
 void widen(double value, double& low, double& high, double of, double of_low, double of_high) {
-  if (!(of > 0) || !(of_high > 0)) return;
+  if (!(high > 0) || !(of > 0) || !(of_high > 0)) return;  // one of the intervals is unknown
   low = std::min(low, value * of_low / of);
   high = std::max(high, value * of_high / of);
 }
 
 }  // namespace
 
-ImageError mixed_error(const Film& film, const TileError& mixed) {
-  const ImageError colour = image_error(film.error()), halves = error_of_halves(film);
-  ImageError error = image_error(mixed);
-  if (colour.relmse > 0 && halves.relmse > 0) {
+Film MixedError::mix(const Film& part, std::span<const GroupFactors> factors) {
+  colour_.add(part.error());
+  for (TileIndex t = 0; t < part.grid().count(); ++t) {
+    if (part.spp(t) == 0) continue;
+    const auto halves = part.half_means(t);
+    const PixelRect rect = part.grid().rect(t);
+    halves_.add(estimate_error({rect.width(), rect.height(), halves[0], halves[1]}, part.spp(t)));
+  }
+  Film mixed = part.mixed(factors);
+  mixed_.add(mixed.error());
+  return mixed;
+}
+
+ImageError MixedError::error() const {
+  const ImageError colour = image_error(colour_), halves = image_error(halves_);
+  ImageError error = image_error(mixed_);
+  if (colour.trusted && halves.relmse > 0) {
     const double skew = colour.relmse / halves.relmse;
     for (double* figure : {&error.relmse, &error.relmse_lo, &error.relmse_hi}) *figure *= skew;
   }

@@ -19,10 +19,21 @@ namespace ls {
 Result<std::vector<GroupFactors>> factors_of(const LightMix& mix, AovSet aovs,
                                              std::span<const std::string> groups);
 
-// Returns the error of a mix of `film` whose tiles have this sum of errors. Earlier sums, by which the
-// estimate takes account of skewed noise, are known of the film's colour only. So the relative error is
-// multiplied by what they change of the colour's, and the interval is, in proportion, at least as wide as the
-// colour's.
-ImageError mixed_error(const Film& film, const TileError& mixed);
+// Sums up the error of a mix over the parts of an image, so that the whole film need not be in memory.
+//
+// Earlier sums, by which the estimate takes account of skewed noise, are known of the image's colour only. So
+// if the colour's error is trusted, the relative error is multiplied by what they change of it. The interval
+// is, in proportion, at least as wide as the colour's; an unknown interval stays unknown.
+class MixedError {
+ public:
+  // Returns the mix of `part`, and adds its tiles. Each tile of the image must be added once.
+  Film mix(const Film& part, std::span<const GroupFactors> factors);
+  bool any() const { return mixed_.samples > 0; }  // false: there are no samples
+  ImageError error() const;
+
+ private:
+  // errors of the tiles: of the mix, of the colour, and of the colour estimated from its halves alone
+  TileError mixed_, colour_, halves_;
+};
 
 }  // namespace ls

@@ -1,5 +1,4 @@
-// What a scene's camera sees in an image: the part of the frame, and the matrices from the world to the
-// image.
+// Computes the part of the frame that an image shows, and the matrices from the world to the image.
 #pragma once
 
 #include <cmath>

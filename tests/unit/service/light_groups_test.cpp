@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 
 #include "coordinator/admission/admission.h"
+#include "core/image/film/partial_size.h"
 #include "core/scene/json/serialize.h"
 #include "formats/read.h"
 #include "tests/unit/service/fake_farm.h"
+#include "util/protocol/limits.h"
 
 namespace ls::coordinator {
 namespace {
@@ -66,6 +68,23 @@ TEST_F(LightGroupJobs, OfMediaCountWhereTheyGlow) {
   EXPECT_THAT(settings("", {"light_groups"}, fog(""))->light_groups, ElementsAre("key"));
   EXPECT_THAT(settings("", {"light_groups"}, fog("<rgb name=\"emission\" value=\"1\"/>"))->light_groups,
               ElementsAre("fire", "key"));
+}
+
+TEST_F(LightGroupJobs, WithLargeResultsHaveSmallerTiles) {
+  std::string lights;
+  for (std::size_t i = 0; i < kMostLightGroups; ++i) lights += lamp("g" + std::to_string(i));
+  std::vector<std::string> all;
+  for (const AovRow& row : aov_rows()) all.emplace_back(row.name);
+  const auto fits = [](const RenderSettings& s) {
+    return most_partial_file_bytes(static_cast<std::uint64_t>(s.tile * s.tile), aovs_of(s)) <=
+           ls::limits::kPartialBytes;
+  };
+  EXPECT_EQ(settings(lights, {"light_groups"})->tile, 32) << "as of jobs without groups";
+  for (const auto& aov : {std::vector<std::string>{"volume_light_groups"}, all}) {
+    const RenderSettings large = settings(lights, aov).value();
+    EXPECT_EQ(large.tile, 16);
+    EXPECT_TRUE(fits(large));
+  }
 }
 
 TEST_F(LightGroupJobs, AreRefusedBeyondTheLimit) {

@@ -362,7 +362,7 @@ V3d transformed(const RowMatrix& m, const V3d& p) {
   return {out[0] / out[3], out[1] / out[3], out[2] / out[3]};
 }
 
-// Of all cameras that have a matrix, with a crop that is enlarged, and turned, moved and scaled in the world.
+// The test tries every kind of camera that has a matrix: turned, moved and scaled, with an enlarged crop.
 TEST(CameraMatrices, PointOnTheRayOfAPixelIsAtThatPixel) {
   FilmSettings film;
   film.size = {200, 100};

@@ -257,7 +257,7 @@ TEST(Meters, NothingIsMeasuredInTheDark) {
   EXPECT_EQ(measure(builder, 16)[0].value, 0);
 }
 
-// What is hidden from cameras lights meters all the same.
+// A lamp that is hidden from cameras still lights meters.
 TEST(Meters, SeeWhatIsHiddenFromCameras) {
   SceneBuilder builder;
   builder.lamp(SphereShape{}, translate({0, 0, 5}), {7, 7, 7}).visible_camera = false;

@@ -1,5 +1,5 @@
 // A mix of light groups as the panel sets it: for each group a gain, a colour and a colour temperature, of all its
-// light or of surfaces and media apart; muted, or heard alone. Its texts are in the address, its factors in the
+// light or of surfaces and media apart, mute and solo. Its texts are in the address, its factors in the
 // files that `lightshaft fetch --mix` reads. Pure functions.
 
 export const kMix = "mix"; // the layers that are mixed here
