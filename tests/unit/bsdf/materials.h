@@ -10,9 +10,9 @@
 #include <random>
 #include <string>
 
-#include "core/base/clock.h"
 #include "core/scene/schema/traits.h"
 #include "worker/render/bsdf/bsdf.h"
+#include "worker/render/bsdf/material_builder.h"
 
 namespace ls::render::test {
 
@@ -67,13 +67,14 @@ inline Scene with_compensation(Scene s) {
   return s;
 }
 
-// CPU time of this thread for building `count` materials like the one of `scene`. Tests compare it with that
-// of one material, so that neither the machine nor its load matters.
-inline double seconds_to_build(Scene scene, int count) {
-  scene.bsdfs.resize(static_cast<std::size_t>(count), scene.bsdfs[0]);
-  const double start = thread_cpu_seconds();
-  bench(std::move(scene));
-  return thread_cpu_seconds() - start;
+// More materials like that of `scene` than a scene may have tables (MaterialBuilder::kMostTables): they are
+// accepted because equal materials share theirs, and refused if each had its own.
+inline void expect_equal_ones_share_tables(Scene scene) {
+  scene.bsdfs.resize(render::MaterialBuilder::kMostTables + 1, scene.bsdfs[0]);
+  const auto textures = TextureTable::build(scene, {});
+  ASSERT_TRUE(textures);
+  const auto table = BsdfTable::build(scene, *textures);
+  EXPECT_TRUE(table) << table.error().message;
 }
 
 // True if light may pass straight through, so that shadow rays must ask the material.
