@@ -33,6 +33,7 @@
 #include "core/base/clock.h"
 #include "core/base/digest.h"
 #include "core/base/log.h"
+#include "util/display/display_views.h"
 #include "util/trace/tracer.h"
 
 namespace {
@@ -121,6 +122,18 @@ Result<std::optional<ls::tls::Texts>> tls_of(const Flags& flags) {
                                              ls::http::system_unix_clock()());
   if (!texts) return tl::unexpected(texts.error());
   return std::move(*texts);
+}
+
+// Returns the views of --ocio; without it those of the environment variable OCIO, which is often set for
+// other programs: if they cannot be used, the built-in views.
+Result<std::shared_ptr<const ls::DisplayViews>> views_of(const Flags& flags) {
+  auto views = flags.ocio.empty() ? ls::DisplayViews::of_environment() : ls::DisplayViews::read(flags.ocio);
+  if (!views && flags.ocio.empty()) {
+    ls::log_warn("", fmt::format("the built-in views are used instead of $OCIO: {}", views.error().message));
+    views = ls::DisplayViews::built_in();
+  }
+  if (!views) return tl::unexpected(views.error());
+  return std::make_shared<const ls::DisplayViews>(std::move(*views));
 }
 
 // Warns if an address on the network is served without encryption: others could read and change the traffic,
@@ -242,6 +255,9 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   options.clock = std::make_shared<ls::SystemClock>();
   options.tick = std::chrono::milliseconds(100);
   options.tracer = *tracer;
+  auto views = views_of(flags);
+  if (!views) return tl::unexpected(views.error());
+  options.views = *views;
   const auto stopping = std::make_shared<std::atomic<bool>>(false);
   const fs::path reader = ls::program_beside_us("lightshaft-scene");
   if (!fs::exists(reader, ignored))

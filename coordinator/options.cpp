@@ -66,6 +66,10 @@ void add_shares(CLI::App& app, Flags& flags) {
                  "percentage of results that another worker renders again, to find workers with wrong pixels")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
+  app.add_option("--ocio", flags.ocio,
+                 "OpenColorIO configuration with the views in which images can be shown; default: the file "
+                 "that the environment variable OCIO names, or built-in views of ACES")
+      ->type_name("CONFIG.ocio");
   app.add_flag("--allow-fake", flags.allow_fake,
                "for tests: let workers join that were started with --fake and invent their pixels");
 }

@@ -31,7 +31,7 @@ using nlohmann::json;
 
 struct FarmFlags {
   FarmOptions farm;
-  std::string id, frame, spp, target_error, out, report, html, region, fps, exposure, role, user, mix;
+  std::string id, frame, spp, target_error, out, report, html, region, fps, exposure, role, user, mix, view;
   std::string state, search, owner, sort, limit, offset, priority, name;
   std::vector<std::string> after;
   JobOptions job;
@@ -63,6 +63,16 @@ int jobs(FarmApi& api, const FarmFlags& flags) {
 }
 int workers(FarmApi& api, const FarmFlags& flags) {
   return show_answer(api.get("/api/v1/workers"), flags, workers_table);
+}
+int views(FarmApi& api, const FarmFlags& flags) {
+  const auto answer = api.get("/api/v1/views");
+  return show_answer(answer, flags, [](const json& all) {
+    std::string text;
+    if (const auto list = all.find("views"); list != all.end() && list->is_array())
+      for (const json& name : *list)
+        if (name.is_string()) text += (text.empty() ? "" : "\n") + plain_text(name.get<std::string>());
+    return text;
+  });
 }
 int show(FarmApi& api, const FarmFlags& flags) {
   const auto job = api.get(job_path(flags.id));
@@ -167,6 +177,7 @@ int video(FarmApi& api, const FarmFlags& flags) {
     asked["exposure"] = *stops;
   }
   if (flags.denoised) asked["layer"] = "denoised";
+  if (!flags.view.empty()) asked["view"] = flags.view;
   auto made = api.post(job_path(flags.id) + "/video", asked);
   for (; made; made = with_retries([&] { return api.get(job_path(flags.id) + "/video"); })) {
     const std::string state = text_field(*made, "state");
@@ -214,6 +225,7 @@ int fetch(FarmApi& api, const FarmFlags& flags) {
     out = default_image(*job);
     if (!flags.farm.json) print_note("writes " + out);
   }
+  if (const auto ok = check_view(flags.view, out); !ok) return print_error(ok.error());
   std::string mix;
   if (!flags.mix.empty()) {
     const auto read = mix_of(flags.mix);
@@ -222,9 +234,13 @@ int fetch(FarmApi& api, const FarmFlags& flags) {
       return usage_error("--mix: an image can be mixed, the values of meters cannot");
     mix = canonical_json(*read);
   }
-  return fetch_results(
-      api, flags.id,
-      {.image = out, .report = flags.report, .html = flags.html, .mix = mix, .json = flags.farm.json});
+  return fetch_results(api, flags.id,
+                       {.image = out,
+                        .report = flags.report,
+                        .html = flags.html,
+                        .mix = mix,
+                        .view = flags.view,
+                        .json = flags.farm.json});
 }
 
 // With --frame, replaces the id of a sequence (a job with several frames) in `flags` by the id of that frame,
@@ -340,6 +356,7 @@ void add_farm_commands(CLI::App& app, Action& action) {
       *fetch_command, "--mix", fetching->mix, "GROUP=FACTOR,...",
       "multiply the light of light groups: key=2,fill=0.5:0.4:0.3 (R:G:B), fog.volume=4 for the light of "
       "media alone; or a file MIX.json that the dashboard has saved. The job must have --aov light_groups");
+  add_view(*fetch_command, fetching->view);
   add_option(*fetch_command, "--report", fetching->report, "REPORT.json",
              "also write the report as JSON; with # in the name, one for each frame");
   add_option(*fetch_command, "--html", fetching->html, "REPORT.html",
@@ -352,10 +369,13 @@ void add_farm_commands(CLI::App& app, Action& action) {
   const auto [video_command, filming] =
       add(app, action, "video", "make a video of the finished frames of a sequence", video, true);
   add_option(*video_command, "-o,--output", filming->out, "OUT.mp4", "the video")->required();
-  add_option(*video_command, "--fps", filming->fps, "N", "frames per second; default: 24");
+  add_option(*video_command, "--fps", filming->fps, "N",
+             "frames per second; default: --fps of the job, or 24");
   add_option(*video_command, "--exposure", filming->exposure, "STOPS", "exposure in stops; default: 0");
+  add_view(*video_command, filming->view);
   video_command->add_flag("--denoised", filming->denoised, "show the denoised images");
   add(app, action, "workers", "list the workers of a farm", workers);
+  add(app, action, "views", "list the views in which a farm can show colours", views);
 }
 
 void add_tokens(CLI::App& app, Action& action) {

@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 
 struct MergeFlags {
   std::vector<std::string> partials, defines;
-  std::string out, report, scene;
+  std::string out, report, scene, view;
   SceneChanges changes;
   std::optional<std::uint32_t> frame;
   JobOptions image;
@@ -121,6 +121,8 @@ int run(const MergeFlags& flags) {
     return usage_error(fmt::format("-o {}: partials become an image, .exr or .png", flags.out));
   if (!flags.report.empty())
     if (const auto ok = check_output("--report", flags.report); !ok) return print_error(ok.error());
+  const auto views = views_for(flags.view, flags.out);
+  if (!views) return print_error(views.error());
   const auto spec = flags.image.parse();
   if (!spec) return print_error(spec.error());
   const auto files = files_of(flags.partials);
@@ -148,7 +150,12 @@ int run(const MergeFlags& flags) {
   const auto image = final_exr(merged->film, provenance, form_of(*spec));
   if (!image) return print_error(image.error());
   const bool png = image_format(flags.out) == ImageFormat::png;
-  const auto shown = png ? preview_png(merged->film, 0) : Result<std::vector<std::byte>>();
+  ToCodes to_codes = srgb_codes;
+  if (*views)
+    to_codes = [view = (*views)->view(flags.view).value()](std::span<const double> rgb) {
+      return view.codes(rgb);
+    };
+  const auto shown = png ? preview_png(merged->film, 0, {}, to_codes) : Result<std::vector<std::byte>>();
   if (!shown) return print_error(shown.error());
   if (const auto saved = save_result(flags.out, png ? *shown : image->exr); !saved)
     return print_error(saved.error());
@@ -169,6 +176,7 @@ void add_merge(CLI::App& app, Action& action) {
   add_option(*merge, "partials", flags->partials, "PARTIAL.exr...", "partial images, or folders of them")
       ->required();
   add_option(*merge, "-o,--output", flags->out, "OUT.exr", "the image, .exr or .png")->required();
+  add_view(*merge, flags->view);
   add_option(*merge, "--report", flags->report, "REPORT.json", "write the digest and the error as JSON");
   add_option(*merge, "--scene", flags->scene, "SCENE",
              "the scene that was rendered; names of cryptomattes and the camera come from it");

@@ -19,7 +19,7 @@ namespace ls::cli {
 namespace {
 
 struct RenderFlags {
-  std::string scene, out, threads, pixel, sample, reference, report, html, partial_dir;
+  std::string scene, out, view, threads, pixel, sample, reference, report, html, partial_dir;
   JobOptions job;
   bool isolate = false, quiet = false, progress = false;
 };
@@ -52,6 +52,10 @@ Result<LocalRenderOptions> options_of(const RenderFlags& flags) {
   options.html = path_of(flags.html);
   options.partial_dir = path_of(flags.partial_dir);
   options.reference = path_of(flags.reference);
+  options.view = flags.view;
+  auto views = views_for(flags.view, flags.out);
+  if (!views) return tl::unexpected(views.error());
+  options.views = std::move(*views);
   return options;
 }
 
@@ -164,6 +168,7 @@ void add_render(CLI::App& app, Action& action) {
       "sequence with # for the frame number, for example out_####.exr; default: the scene's name with "
       ".exr or .json, in this folder");
   flags->job.add_to(*render, JobOptions::Command::render);
+  add_view(*render, flags->view);
   add_option(*render, "--threads", flags->threads, "N", "default: all");
   add_option(*render, "--pixel", flags->pixel, "X,Y",
              "with --sample: print the value of one sample of this pixel");

@@ -18,7 +18,7 @@ namespace ls::cli {
 namespace {
 
 struct SubmitFlags {
-  std::string scene, name, out, report, html, reference;
+  std::string scene, name, out, view, report, html, reference;
   JobOptions job;
   FarmOptions farm;
   bool wait = false, quiet = false;
@@ -70,6 +70,7 @@ int wait_and_fetch(const std::string& id, const SubmitFlags& flags) {
                                     {.image = flags.out,
                                      .report = flags.report,
                                      .html = flags.html,
+                                     .view = flags.view,
                                      .patient = true,
                                      .done_only = code != kOk});
   return code == kOk ? fetched : code;
@@ -98,6 +99,7 @@ int run(const SubmitFlags& flags) {
        {std::pair("-o", flags.out), std::pair("--report", flags.report), std::pair("--html", flags.html)})
     if (!file.empty())
       if (const auto ok = check_outputs(option, file, spec->frames); !ok) return print_error(ok.error());
+  if (const auto ok = check_view(flags.view, flags.out); !ok) return print_error(ok.error());
   if (!flags.reference.empty())
     if (const auto sent = send_reference(flags, *spec); !sent) return print_rejected(sent.error());
   const auto type = bundle_type(flags.scene);
@@ -132,6 +134,7 @@ void add_submit(CLI::App& app, Action& action) {
   add_option(*submit, "--name", flags->name, "NAME", "name of the job in lists; default: the scene's file");
   add_option(*submit, "--reference", flags->reference, "REF.exr",
              "the true image, rendered with another seed: every checkpoint is compared with it");
+  add_view(*submit, flags->view);
   submit->add_flag("--wait", flags->wait, "wait until the job is done");
   add_option(
       *submit, "-o,--output", flags->out, "OUT.exr",

@@ -47,7 +47,9 @@ std::string image_of(const json& job, const Results& wanted) {
   if (format == ImageFormat::json) return "/meters";
   const bool png = format == ImageFormat::png;
   return (png ? "/image.png" : "/image.exr") +
-         query_of({{"layer", png && flag_field(job, "denoise") ? "denoised" : ""}, {"mix", wanted.mix}});
+         query_of({{"layer", png && flag_field(job, "denoise") ? "denoised" : ""},
+                   {"mix", wanted.mix},
+                   {"view", png ? wanted.view : ""}});
 }
 
 Result<Plan> plan_sequence(const std::string& id, const json& job, const json& frames,

@@ -42,6 +42,7 @@ struct Results {
   // replaced by the frame number.
   std::string image, report, html;
   std::string mix;       // JSON of the mix of light groups to fetch instead of the image; empty: none
+  std::string view;      // the view of a PNG; empty: sRGB
   bool json = false;     // print each file as a line of JSON on stdout
   bool patient = false;  // keep trying for a while if the coordinator is unreachable
   // Of a sequence, only the frames that are done; without it, all that have data.

@@ -153,6 +153,7 @@ Result<std::unique_ptr<LocalFarm>> LocalFarm::open(Options options) {
   o.denoise_threads = options.threads;
   o.scenes = scenes_in_this_process;
   o.tick = std::chrono::milliseconds(100);
+  o.views = options.views;
   auto opened = coordinator::Coordinator::open(std::move(o));
   if (!opened) return tl::unexpected(opened.error());
   farm->coordinator_ = std::move(*opened);

@@ -59,7 +59,8 @@ class LocalFarm {
  public:
   struct Options {
     int threads = 1;
-    bool isolate = false;  // true: render in a child process
+    bool isolate = false;                       // true: render in a child process
+    std::shared_ptr<const DisplayViews> views;  // as Coordinator::Options::views
   };
   static Result<std::unique_ptr<LocalFarm>> open(Options options);
   ~LocalFarm();

@@ -36,7 +36,7 @@ using nlohmann::json;
 // Writes the report as an HTML page to `file`. `report` is the JSON report of this job.
 Result<void> save_html_report(const std::filesystem::path& file, const coordinator::Coordinator& coordinator,
                               const JobId& job, const std::string& report) {
-  auto image = coordinator.image_png(job, 0);
+  auto image = coordinator.image_png(job);
   if (!image) return tl::unexpected(image.error());
   const auto page = report::job_page({report, std::move(*image),
                                       coordinator.error_png(job).value_or(std::vector<std::byte>{}),
@@ -128,7 +128,7 @@ class LocalRender {
 
   int run() {
     const auto limit = render::limit_threads(options_.threads);
-    auto farm = LocalFarm::open({options_.threads, options_.isolate});
+    auto farm = LocalFarm::open({options_.threads, options_.isolate, options_.views});
     if (!farm) return print_error(farm.error());
     farm_ = std::move(*farm);
     JobSpec spec = options_.spec;
@@ -209,8 +209,9 @@ class LocalRender {
       if (!meters) return tl::unexpected(meters.error());
       saved = save_result(options_.out, *meters + "\n");
     } else {
-      const auto image = format == ImageFormat::png ? coordinator.image_png(job_, 0, options_.spec.denoise)
-                                                    : coordinator.image_exr(job_);
+      const coordinator::Look look{.denoised = options_.spec.denoise, .view = options_.view};
+      const auto image =
+          format == ImageFormat::png ? coordinator.image_png(job_, look) : coordinator.image_exr(job_);
       if (!image) return tl::unexpected(image.error());
       saved = save_result(options_.out, *image);
     }

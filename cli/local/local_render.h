@@ -20,6 +20,8 @@ struct LocalRenderOptions {
   std::filesystem::path out;
   bool out_by_default = false;  // true: the user has not named `out`, which is for an image
   std::optional<std::filesystem::path> report, html, partial_dir, reference;
+  std::string view;                           // of a PNG; empty: sRGB
+  std::shared_ptr<const DisplayViews> views;  // has `view`; null if that is empty
 };
 // Renders the scene, and writes the output files; returns the exit code.
 int render_locally(const LocalScene& scene, const LocalRenderOptions& options);

@@ -20,6 +20,13 @@ CLI::Option* add_option(CLI::App& app, const std::string& name, T& value, const 
                         const std::string& help) {
   return app.add_option(name, value, help)->type_name(type);
 }
+// Adds --view of the commands that write an image or a video.
+inline void add_view(CLI::App& app, std::string& view) {
+  add_option(
+      app, "--view", view, "VIEW",
+      "show the colours of a PNG or video in a view of OpenColorIO, for example \"sRGB - Display/ACES 1.0 - "
+      "SDR Video\"; default: sRGB");
+}
 
 // The options of a job's settings. Their names, help, ranges and the commands that have them are in
 // core/job/describe.h.

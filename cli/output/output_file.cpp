@@ -48,6 +48,23 @@ Result<ImageFormat> image_format(const fs::path& file) {
                   file.string()));
 }
 
+Result<void> check_view(const std::string& view, const std::string& out) {
+  if (!view.empty() && image_format(out) != ImageFormat::png)
+    return bad_argument(
+        "--view: it is for images that are written as PNG, such as -o image.png; an EXR has linear "
+        "colours");
+  return {};
+}
+
+Result<std::shared_ptr<const DisplayViews>> views_for(const std::string& view, const std::string& out) {
+  if (view.empty()) return nullptr;
+  if (const auto ok = check_view(view, out); !ok) return tl::unexpected(ok.error());
+  auto views = DisplayViews::of_environment();
+  if (!views) return tl::unexpected(views.error());
+  if (const auto found = views->view(view); !found) return bad_argument("--view: " + found.error().message);
+  return std::make_shared<const DisplayViews>(std::move(*views));
+}
+
 Result<void> check_folder(const std::string& option, const fs::path& folder) {
   std::string trial = (folder / ".lightshaft-XXXXXX").string();
   const coordinator::File made(::mkostemp(trial.data(), O_CLOEXEC));

@@ -11,6 +11,7 @@
 
 #include "core/base/error.h"
 #include "core/base/frame_range.h"
+#include "util/display/display_views.h"
 #include "util/protocol/messages.h"
 
 namespace ls::cli {
@@ -25,6 +26,11 @@ enum class ImageFormat { exr, png, json };
 // Returns the format from the file name's extension, in upper or lower case; EXR if it has none.
 // invalid_argument: it has the extension of another format.
 Result<ImageFormat> image_format(const std::filesystem::path& file);
+// Reads the views of this machine for --view `view`, an option for images that are written as PNG to `out`.
+// null: `view` is empty. invalid_argument: `out` is no PNG, or there is no such view.
+Result<std::shared_ptr<const DisplayViews>> views_for(const std::string& view, const std::string& out);
+// Checks that --view may be given for `out`.
+Result<void> check_view(const std::string& view, const std::string& out);
 Result<void> check_folder(const std::string& option, const std::filesystem::path& folder);
 // Checks the name of an output file that is written once per frame. invalid_argument: there are several
 // frames, and the name has no # to distinguish their files.

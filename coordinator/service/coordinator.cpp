@@ -93,7 +93,7 @@ struct Coordinator::Parts {
                      tracing};
   ReferenceComparer comparer{core, blobs};
   ImageWriter images{core, files, blobs, denoising, comparer, writes, clock};
-  Pictures pictures{core, *store, files, blobs, denoising, clock};
+  Pictures pictures{core, *store, files, blobs, denoising, options.views.get(), clock};
   Videos videos{core, files, pictures, clock};
   Submission submission{core, *store, files, blobs, options.scenes, denoising, clock, options.film_bytes};
   const Restore restore{*store, files, blobs, clock};
@@ -277,10 +277,11 @@ Result<std::string> Coordinator::mix_json(const JobId& id, const LightMix& mix) 
   return parts_->pictures.mix_json(id, mix);
 }
 
-Result<std::vector<std::byte>> Coordinator::image_png(const JobId& id, double exposure, bool denoised,
+Result<std::vector<std::byte>> Coordinator::image_png(const JobId& id, const Look& look,
                                                       const std::optional<LightMix>& mix) const {
-  return parts_->pictures.image_png(id, exposure, denoised, mix);
+  return parts_->pictures.image_png(id, look, mix);
 }
+const DisplayViews* Coordinator::display_views() const { return parts_->options.views.get(); }
 
 Result<std::vector<std::byte>> Coordinator::thumbnail_png(const JobId& id) const {
   return parts_->pictures.thumbnail_png(id);

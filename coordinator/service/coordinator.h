@@ -20,6 +20,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/light/light_mix.h"
+#include "util/display/display_views.h"
 #include "util/reading/scene_process.h"
 #include "util/trace/tracer.h"
 
@@ -61,7 +62,8 @@ class Coordinator {
     // Time between two Tick events, which a thread of the coordinator raises. nullopt: no such thread; the
     // caller calls tick()
     std::optional<Duration> tick;
-    std::shared_ptr<trace::Tracer> tracer;  // records the spans of jobs; null: nothing is traced
+    std::shared_ptr<const DisplayViews> views;  // how colours may be shown; null: as sRGB
+    std::shared_ptr<trace::Tracer> tracer;      // records the spans of jobs; null: nothing is traced
   };
   static Result<std::unique_ptr<Coordinator>> open(Options options);
   ~Coordinator();
@@ -103,10 +105,12 @@ class Coordinator {
   Result<std::vector<std::byte>> image_exr(const JobId& id, const std::optional<LightMix>& mix = {}) const;
   // Returns the error of a mix of light groups as JSON.
   Result<std::string> mix_json(const JobId& id, const LightMix& mix) const;
-  // The image as an 8-bit PNG. With `denoised`, returns the denoised image of a job with JobSpec::denoise,
-  // even while the job renders. One image is denoised at a time, which takes seconds.
-  Result<std::vector<std::byte>> image_png(const JobId& id, double exposure, bool denoised = false,
+  // The image as an 8-bit PNG, also while the job renders. One image is denoised at a time, which takes
+  // seconds.
+  Result<std::vector<std::byte>> image_png(const JobId& id, const Look& look = {},
                                            const std::optional<LightMix>& mix = {}) const;
+  // The views that a Look may name; null: only sRGB.
+  const DisplayViews* display_views() const;
   // A small picture of the final or the current image, for lists
   Result<std::vector<std::byte>> thumbnail_png(const JobId& id) const;
   // Videos of sequences (service/videos.h)

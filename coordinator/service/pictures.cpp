@@ -127,19 +127,31 @@ Result<std::string> Pictures::mix_json(const JobId& id, const LightMix& mix) con
   return out.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
-Result<std::vector<std::byte>> Pictures::image_png(const JobId& id, double exposure, bool denoised,
+Result<ToCodes> Pictures::codes_of(const std::string& view) const {
+  if (view.empty() || view == kPlainView) return srgb_codes;
+  if (views_ == nullptr)
+    return bad_argument(fmt::format("there is no view '{}' here but {}", view, kPlainView));
+  auto shown = views_->view(view);
+  if (!shown) return tl::unexpected(shown.error());
+  return [shown = std::move(*shown)](std::span<const double> rgb) { return shown.codes(rgb); };
+}
+
+Result<std::vector<std::byte>> Pictures::image_png(const JobId& id, const Look& look,
                                                    const std::optional<LightMix>& mix) const {
+  const auto to_codes = codes_of(look.view);
+  if (!to_codes) return tl::unexpected(to_codes.error());
   auto shown = picture(id, mix);
   if (!shown) return tl::unexpected(shown.error());
-  if (!denoised) return preview_png(shown->film, exposure);
+  if (!look.denoised) return preview_png(shown->film, look.exposure, {}, *to_codes);
   if (!shown->facts.job.spec.denoise)
     return fail(Errc::failed_precondition,
                 fmt::format("job {} was submitted without \"denoise\": it has no denoised image", id.value));
   if (mix) shown->facts.job.spec.reference.reset();
   const auto made = denoising_.of_job(shown->film, shown->facts);
-  if (!made) return preview_png(shown->film, exposure);  // without samples there is nothing to denoise
+  if (!made)  // without samples there is nothing to denoise
+    return preview_png(shown->film, look.exposure, {}, *to_codes);
   if (made->image.rgb.empty()) return fail(Errc::unavailable, made->figures.trouble);
-  return preview_png(shown->film, exposure, made->image.rgb);
+  return preview_png(shown->film, look.exposure, made->image.rgb, *to_codes);
 }
 
 Result<std::vector<std::byte>> Pictures::error_png(const JobId& id) const {

@@ -14,7 +14,9 @@
 #include "coordinator/service/state/job_files.h"
 #include "coordinator/service/state/job_table.h"
 #include "core/base/guarded.h"
+#include "core/image/exr/final_image.h"
 #include "core/image/light_mix/light_mix.h"
+#include "util/display/display_views.h"
 
 namespace ls::coordinator {
 
@@ -23,12 +25,18 @@ struct Core;
 class Pictures {
  public:
   Pictures(Guarded<Core>& core, const JobStore& store, const JobFiles& files, const BlobStore& blobs,
-           Denoising& denoising, const Clock& clock)
-      : core_(core), store_(store), files_(files), blobs_(blobs), denoising_(denoising), clock_(clock) {}
+           Denoising& denoising, const DisplayViews* views, const Clock& clock)
+      : core_(core),
+        store_(store),
+        files_(files),
+        blobs_(blobs),
+        denoising_(denoising),
+        views_(views),
+        clock_(clock) {}
 
   // `mix`: the image with other factors of its light groups, instead of the image itself.
   Result<std::vector<std::byte>> image_exr(const JobId& id, const std::optional<LightMix>& mix) const;
-  Result<std::vector<std::byte>> image_png(const JobId& id, double exposure, bool denoised,
+  Result<std::vector<std::byte>> image_png(const JobId& id, const Look& look,
                                            const std::optional<LightMix>& mix) const;
   Result<std::string> mix_json(const JobId& id, const LightMix& mix) const;  // the error of a mix
   Result<std::vector<std::byte>> thumbnail_png(const JobId& id) const;
@@ -39,7 +47,9 @@ class Pictures {
     FrameSize size;
     std::vector<std::uint8_t> rgb;
   };
-  Result<Shown> shown(const JobId& id, const VideoAsked& asked, int most_side) const;
+  Result<Shown> shown(const JobId& id, const Look& look, int most_side) const;
+  // Returns the transform of a Look's view. Error: there is no such view.
+  Result<ToCodes> codes_of(const std::string& view) const;
   Result<std::vector<std::byte>> error_png(const JobId& id) const;
   Result<std::vector<std::byte>> samples_png(const JobId& id) const;
   // The layers of an image, and their pixels as numbers (pictures_pixels.cpp)
@@ -81,6 +91,7 @@ class Pictures {
   const JobFiles& files_;
   const BlobStore& blobs_;
   Denoising& denoising_;
+  const DisplayViews* const views_;  // null: only sRGB
   const Clock& clock_;
   mutable StoredImages stored_images_;
   mutable std::mutex denoised_mutex_;  // held while an image is denoised

@@ -66,15 +66,15 @@ PixelLayer denoised_layer() {
 // A running job's denoised image is reused until its age is this many times the duration of denoising.
 constexpr int kDenoisedAge = 4;
 
-std::vector<std::uint8_t> tone_mapped(const PixelLayer& rgb, const LayerMosaic& mosaic, double stops) {
+std::vector<std::uint8_t> tone_mapped(const PixelLayer& rgb, const LayerMosaic& mosaic, double stops,
+                                      const ToCodes& to_codes) {
   const std::vector<float> values = layer_floats(rgb, mosaic.bytes());
-  std::vector<std::uint8_t> pixels(values.size());
-  for (std::size_t i = 0; i < values.size(); i += 3) {
-    if (std::isnan(values[i])) continue;  // no samples yet: black
-    const std::array<double, 3> colour = {values[i], values[i + 1], values[i + 2]};
-    const auto shown = srgb8(colour.data(), std::exp2(stops));
-    std::copy(shown.begin(), shown.end(), pixels.begin() + static_cast<std::ptrdiff_t>(i));
-  }
+  std::vector<double> scaled(values.size());
+  std::transform(values.begin(), values.end(), scaled.begin(),
+                 [scale = std::exp2(stops)](float v) { return v * scale; });
+  std::vector<std::uint8_t> pixels = to_codes(scaled);
+  for (std::size_t i = 0; i < values.size(); i += 3)
+    if (std::isnan(values[i])) std::fill_n(&pixels[i], 3, std::uint8_t{0});  // no samples yet: black
   return pixels;
 }
 
@@ -216,7 +216,9 @@ Result<LayerMosaic> Pictures::mosaic_of(const JobId& id, const PixelLayer& layer
   return mosaic;
 }
 
-Result<Pictures::Shown> Pictures::shown(const JobId& id, const VideoAsked& asked, int most_side) const {
+Result<Pictures::Shown> Pictures::shown(const JobId& id, const Look& look, int most_side) const {
+  const auto to_codes = codes_of(look.view);
+  if (!to_codes) return tl::unexpected(to_codes.error());
   FrameSize frame;
   {
     const auto core = core_.lock();
@@ -226,16 +228,16 @@ Result<Pictures::Shown> Pictures::shown(const JobId& id, const VideoAsked& asked
   }
   const int level = level_for(frame, most_side);
   const PixelLayer rgb = pixel_layer({}, "rgb").value();
-  if (asked.denoised) {
+  if (look.denoised) {
     const auto image = denoised_view(id);
     if (!image) return tl::unexpected(image.error());
     LayerMosaic mosaic(rgb, frame, level, whole(level_size(frame, level)));
     add_denoised(mosaic, image->get(), frame, whole(frame));
-    return Shown{level_size(frame, level), tone_mapped(rgb, mosaic, asked.exposure)};
+    return Shown{level_size(frame, level), tone_mapped(rgb, mosaic, look.exposure, *to_codes)};
   }
   const auto mosaic = mosaic_of(id, rgb, level);
   if (!mosaic) return tl::unexpected(mosaic.error());
-  return Shown{level_size(frame, level), tone_mapped(rgb, *mosaic, asked.exposure)};
+  return Shown{level_size(frame, level), tone_mapped(rgb, *mosaic, look.exposure, *to_codes)};
 }
 
 // The thumbnail of an image on disk is stored beside the image, since making it requires reading the whole

@@ -13,11 +13,13 @@
 namespace ls::coordinator {
 namespace {
 
+constexpr double kUsualFps = 24;  // of videos of jobs that do not state a rate
+
 Result<void> check(const VideoAsked& asked) {
-  if (!(asked.fps >= limits::kMinVideoFps && asked.fps <= limits::kMaxVideoFps))
+  if (asked.fps && !(*asked.fps >= limits::kMinVideoFps && *asked.fps <= limits::kMaxVideoFps))
     return fail(Errc::invalid_argument, fmt::format("'fps' must be from {} to {} pictures per second",
                                                     limits::kMinVideoFps, limits::kMaxVideoFps));
-  if (!(std::abs(asked.exposure) <= limits::kMaxExposure))
+  if (!(std::abs(asked.look.exposure) <= limits::kMaxExposure))
     return fail(Errc::invalid_argument,
                 fmt::format("'exposure' must be a number of stops from -{0} to {0}", limits::kMaxExposure));
   return {};
@@ -35,6 +37,7 @@ void Videos::forget_removed(Core& core) {
 
 Result<VideoView> Videos::make(const JobId& id, const VideoAsked& asked) {
   if (auto ok = check(asked); !ok) return tl::unexpected(ok.error());
+  if (auto ok = pictures_.codes_of(asked.look.view); !ok) return tl::unexpected(ok.error());
   if (!files_.on_disk())
     return fail(Errc::failed_precondition, "this coordinator keeps no files (--data), so it makes no videos");
   if (const auto ffmpeg = find_ffmpeg(); !ffmpeg) return tl::unexpected(ffmpeg.error());
@@ -48,7 +51,7 @@ Result<VideoView> Videos::make(const JobId& id, const VideoAsked& asked) {
   Video video;
   for (const EntryPtr& frame : sequence->frames) {
     if (!frame->broken.empty() || frame->stored.state != JobState::done) continue;
-    if (asked.denoised && !frame->stored.spec.denoise)
+    if (asked.look.denoised && !frame->stored.spec.denoise)
       return fail(
           Errc::failed_precondition,
           fmt::format("job {} was submitted without \"denoise\": it has no denoised images", id.value));
@@ -58,6 +61,9 @@ Result<VideoView> Videos::make(const JobId& id, const VideoAsked& asked) {
     return fail(Errc::failed_precondition, fmt::format("no frame of job {} is done yet", id.value));
   video.path = files_.folder(sequence->frames.front()->stored.id) / "video.mp4";
   video.view = {VideoState::waiting, asked, video.frames.size(), 0, 0, {}};
+  if (!asked.fps)
+    video.view.asked.fps = std::clamp(sequence->frames.front()->stored.spec.fps.value_or(kUsualFps),
+                                      limits::kMinVideoFps, limits::kMaxVideoFps);
   const std::lock_guard lock(mutex_);
   forget_removed(*core);
   if (const auto before = videos_.find(id); before != videos_.end() && open(before->second.view))
@@ -133,11 +139,11 @@ Result<void> Videos::encode(const JobId& id, const Video& video, const std::stop
   std::unique_ptr<VideoEncoder> encoder;
   FrameSize size;
   for (const JobId& frame : video.frames) {
-    auto picture = pictures_.shown(frame, video.view.asked, limits::kMaxVideoSide);
+    auto picture = pictures_.shown(frame, video.view.asked.look, limits::kMaxVideoSide);
     if (!picture) return tl::unexpected(picture.error());
     if (!encoder) {
       size = picture->size;
-      auto started = VideoEncoder::start({*ffmpeg, part, size, video.view.asked.fps, limits::kMaxVideoBytes,
+      auto started = VideoEncoder::start({*ffmpeg, part, size, *video.view.asked.fps, limits::kMaxVideoBytes,
                                           until, limits::kVideoStallLimit},
                                          clock_, stop);
       if (!started) return tl::unexpected(started.error());

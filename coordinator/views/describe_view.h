@@ -350,10 +350,12 @@ void describe(V& v, T& video) {
   static constexpr std::array<std::string_view, 5> kStates{"none", "waiting", "making", "ready", "failed"};
   const bool asked = video.state != VideoState::none;
   v.field("state", "", Word{kStates[static_cast<std::size_t>(video.state)], kStates});
-  v.field("fps", "Frames per second. null: there is no video.", only_if(asked, video.asked.fps));
-  v.field("exposure", "Exposure in stops.", only_if(asked, video.asked.exposure));
+  v.field("fps", "Frames per second. null: there is no video.", only_if(asked, video.asked.fps.value_or(0)));
+  v.field("exposure", "Exposure in stops.", only_if(asked, video.asked.look.exposure));
   v.field("layer", "The layer that the video shows: rgb or denoised.",
-          only_if(asked, std::string(video.asked.denoised ? "denoised" : "rgb")));
+          only_if(asked, std::string(video.asked.look.denoised ? "denoised" : "rgb")));
+  v.field("view", "The view of its colours (GET /api/v1/views).",
+          only_if(asked, video.asked.look.view.empty() ? std::string("sRGB") : video.asked.look.view));
   v.field("frames", "Number of frames in the finished video.", video.frames);
   v.field("frames_done", "Number of frames that are encoded so far.", video.frames_done);
   v.field("bytes", "Size of the finished video.", only_if(video.state == VideoState::ready, video.bytes));

@@ -273,11 +273,17 @@ struct PixelsAsked {
   PixelRect rect;
 };
 
+// How the colours of an image are shown.
+struct Look {
+  double exposure = 0;    // in stops: pixels are multiplied by 2^exposure
+  bool denoised = false;  // true: shows the denoised image; requires JobSpec::denoise
+  std::string view;       // a view of DisplayViews; empty: sRGB
+};
+
 // A request for a video of a sequence.
 struct VideoAsked {
-  double fps = 24;        // frames of the sequence per second of video
-  double exposure = 0;    // in stops: pixels are multiplied by 2^exposure
-  bool denoised = false;  // true: shows the denoised images; requires JobSpec::denoise
+  std::optional<double> fps;  // frames of the sequence per second of video; nullopt: those of the job, or 24
+  Look look;
 };
 enum class VideoState { none, waiting, making, ready, failed };
 struct VideoView {

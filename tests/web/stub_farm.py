@@ -89,6 +89,8 @@ class StubFarm:
                        "error": Layer(["Y"], lambda x, y: (0.03,)), "spp": Layer(["Y"], lambda x, y: (64,))}
         self.layers_of = {}  # by job, before `layers`
         self.mix = {"relmse": 0.02, "relmse_ci95": [0.018, 0.022], "trusted": True, "verdict": "trusted"}  # of every mix; or why there is none
+        self.default_view = "sRGB"
+        self.cubes = {}  # view -> bytes of its table
         self.video = {"state": "none", "fps": None, "exposure": None, "layer": None, "frames": 0, "frames_done": 0, "bytes": None, "error": None}
         self.no_video = None  # why none is made
         self.log = ""  # of every job
@@ -242,6 +244,12 @@ def _handler(farm):
             first = int(asked.get("offset", 0))
             return {"jobs": found[first:first + int(asked.get("limit", len(found)))], "total": len(found), "owners": sorted({job["owner"] for job in everything}),
                     "states": {state: sum(job["state"] == state for job in everything) for state in {job["state"] for job in everything}}}
+
+        def _get_views(self, parts, body):
+            if not parts:
+                return self._send(200, {"default": farm.default_view, "views": ["sRGB", *farm.cubes]})
+            name = dict(urllib.parse.parse_qsl(self.path.partition("?")[2]))["view"]
+            return self._send(200, farm.cubes[name], "application/octet-stream") if farm.cubes.get(name) else self._problem(404, f"there is no view '{name}'")
 
         def _delete_jobs(self, parts, body):
             if farm.jobs[parts[0]]["state"] == "running":

@@ -226,3 +226,37 @@ def test_a_job_that_measures_shows_its_values_instead_of_a_picture(farm, dashboa
     assert "<b>dark</b>" in text and "no sample has found light" in text
     assert not page.evaluate("document.querySelector('live-image') !== null")
     assert page.evaluate("[...document.querySelectorAll('.downloads a')].some(a => a.href.endsWith('/jobs/j-1/meters'))")
+
+
+def test_a_job_is_shown_in_the_chosen_view(farm, dashboard):
+    farm.cubes["Screen/Warm & <b>"] = b""
+    farm.jobs["j-1"] = job(state="done")
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('.stage live-image').dataset.painted")
+    assert page.evaluate("document.getElementById('display').value") == "sRGB"
+
+    page.evaluate("(() => { const s = document.getElementById('display'); s.value = 'Screen/Warm & <b>'; s.dispatchEvent(new Event('change')); })()")
+
+    page.wait("Number(document.querySelector('.stage live-image').dataset.painted) >= 2")
+    wanted = "image.png?exposure=0&view=Screen%2FWarm%20%26%20%3Cb%3E"
+    assert ("GET", f"/api/v1/jobs/j-1/{wanted}") in farm.requests
+    assert page.evaluate("document.querySelector('.downloads a[download$=\".png\"]').href").endswith(wanted)
+
+
+def test_a_job_opens_in_the_default_view_of_the_coordinator(farm, dashboard):
+    farm.cubes["Screen/Warm"], farm.default_view = b"", "Screen/Warm"
+    farm.jobs["j-1"] = job(state="done")
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('.stage live-image').dataset.painted")
+
+    assert page.evaluate("document.getElementById('display').value") == "Screen/Warm"
+    assert ("GET", "/api/v1/jobs/j-1/image.png?exposure=0&view=Screen%2FWarm") in farm.requests
+
+
+def test_a_coordinator_without_views_shows_the_curve_of_srgb(farm, dashboard):
+    farm.broken.add("views")
+    farm.jobs["j-1"] = job(state="done")
+    page = dashboard("#/jobs/j-1")
+    page.wait("document.querySelector('.stage live-image').dataset.painted")
+
+    assert page.evaluate("[...document.getElementById('display').options].map((o) => o.value)") == ["sRGB"]

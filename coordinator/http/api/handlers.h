@@ -38,6 +38,8 @@ Response delete_job(Api&, const Request&, const JobId&);
 Response get_image_exr(Api&, const Request&, const JobId&);
 Response get_mix(Api&, const Request&, const JobId&);
 Response get_image_png(Api&, const Request&, const JobId&);
+Response get_views(Api&, const Request&, const Params&);
+Response get_view_cube(Api&, const Request&, const Params&);
 Response get_thumbnail(Api&, const Request&, const JobId&);
 Response get_error_png(Api&, const Request&, const JobId&);
 Response get_samples_png(Api&, const Request&, const JobId&);

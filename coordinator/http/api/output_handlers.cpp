@@ -44,19 +44,22 @@ bool read_numbers(std::string_view text, std::array<int, N>& out) {
 }
 
 Result<VideoAsked> read_asked_video(std::string_view text) {
-  const auto body = read_object(text, {"fps", "exposure", "layer"});
+  const auto body = read_object(text, {"fps", "exposure", "layer", "view"});
   if (!body) return tl::unexpected(body.error());
   VideoAsked asked;
-  for (const auto& [key, value] : {std::pair("fps", &asked.fps), std::pair("exposure", &asked.exposure)}) {
-    const auto found = body->find(key);
-    if (found == body->end()) continue;
-    if (!found->is_number()) return bad_argument(fmt::format("'{}' must be a number", key));
-    *value = found->get<double>();
-  }
+  for (const char* key : {"fps", "exposure"})
+    if (body->contains(key) && !body->at(key).is_number())
+      return bad_argument(fmt::format("'{}' must be a number", key));
+  if (body->contains("fps")) asked.fps = body->at("fps").get<double>();
+  if (body->contains("exposure")) asked.look.exposure = body->at("exposure").get<double>();
   if (const auto layer = body->find("layer"); layer != body->end()) {
     if (*layer != "rgb" && *layer != "denoised")
       return bad_argument("'layer' must be \"rgb\" or \"denoised\"");
-    asked.denoised = *layer == "denoised";
+    asked.look.denoised = *layer == "denoised";
+  }
+  if (const auto view = body->find("view"); view != body->end()) {
+    if (!view->is_string()) return bad_argument("'view' must be a text");
+    asked.look.view = view->get<std::string>();
   }
   return asked;
 }
@@ -98,8 +101,9 @@ Response get_image_png(Api& api, const Request& request, const JobId& id) {
     return problem(400, "'layer' must be \"denoised\", or be left out for the image itself");
   const auto mix = mix_asked(request);
   if (!mix) return problem(mix.error());
-  return file_response("image/png", api.coordinator().image_png(id, *exposure, layer.has_value(), *mix),
-                       id.value + ".png");
+  const coordinator::Look look{*exposure, layer.has_value(),
+                               std::string(request.parameter("view").value_or(""))};
+  return file_response("image/png", api.coordinator().image_png(id, look, *mix), id.value + ".png");
 }
 
 Response get_thumbnail(Api& api, const Request&, const JobId& id) {
@@ -170,7 +174,7 @@ Response get_report(Api& api, const Request&, const JobId& id) {
 }
 
 Response get_report_page(Api& api, const Request&, const JobId& id) {
-  auto image = api.coordinator().image_png(id, 0);
+  auto image = api.coordinator().image_png(id);
   if (!image) return problem(image.error());
   auto report = api.coordinator().report_json(id);
   if (!report) return problem(report.error());

@@ -77,6 +77,8 @@ constexpr auto kRoutes = [] {
       plain(get, "/api/v1/jobs/{id}/log", token, quick, of_job<get_log>),
       plain(get, "/api/v1/jobs/{id}/events", token, quick, of_job<get_job_events>),
       plain(get, "/api/v1/events", token, quick, get_events),
+      plain(get, "/api/v1/views", token, here, get_views),
+      plain(get, "/api/v1/views/cube", token, slow, get_view_cube),
       plain(get, "/api/v1/tokens", admin, quick, get_tokens),
       Route{post, "/api/v1/tokens", admin, slow, buffered, kMaxControlJson, post_token, kJson},
       plain(del, "/api/v1/tokens/{token}", admin, slow, delete_token),

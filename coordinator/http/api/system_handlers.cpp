@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <bit>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 
 #include "coordinator/http/api/api.h"
@@ -50,6 +52,27 @@ Response get_readyz(Api& api, const Request&, const Params&) {
   // clients.
   const std::string trouble = api.coordinator().store_status().trouble;
   return text_response(200, "text/plain", trouble.empty() ? "ready\n" : "ready, but: " + trouble + "\n");
+}
+
+Response get_views(Api& api, const Request&, const Params&) {
+  const DisplayViews* views = api.coordinator().display_views();
+  const std::string plain(kPlainView);
+  const nlohmann::json out = {{"default", views != nullptr ? views->standard() : plain},
+                              {"views", views != nullptr ? views->names() : std::vector{plain}}};
+  return json_response(200, out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
+Response get_view_cube(Api& api, const Request& request, const Params&) {
+  const auto name = request.parameter("view");
+  const DisplayViews* views = api.coordinator().display_views();
+  if (!name) return problem(400, "'view' is missing: the name of a view of GET /api/v1/views");
+  if (views == nullptr) return problem(404, "this coordinator has no views but sRGB");
+  const auto view = views->view(*name);
+  if (!view) return problem(404, view.error().message);
+  const std::vector<std::uint16_t> cube = view->cube();
+  static_assert(std::endian::native == std::endian::little);
+  std::string bytes(reinterpret_cast<const char*>(cube.data()), 2 * cube.size());
+  return {.content_type = "application/octet-stream", .body = std::move(bytes)};
 }
 
 Response get_openapi(Api&, const Request&, const Params&) {

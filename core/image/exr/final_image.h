@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -156,12 +157,18 @@ std::array<std::uint8_t, 3> srgb8(const double* rgb, double scale);
 // by alpha, and alpha), row by row.
 Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::uint8_t> pixels);
 
-// Returns the film as a PNG in 8-bit sRGB: its means, multiplied by 2^exposure_stops. Pixels with NaN are
-// magenta; tiles without samples show a dark checkerboard. If the film has the AOV alpha, so does the PNG;
-// light of pixels whose alpha is 0 is then lost. If `denoised` is not empty (format as for final_exr()), its
-// pixels are shown instead of the film's.
+// Turns linear colours (triples) into the codes of a display, as many as there are colours.
+using ToCodes = std::function<std::vector<std::uint8_t>(std::span<const double> rgb)>;
+// Each channel by srgb8().
+std::vector<std::uint8_t> srgb_codes(std::span<const double> rgb);
+
+// Returns the film as an 8-bit PNG: its means, multiplied by 2^exposure_stops, as `to_codes` shows them.
+// Tiles without samples show a dark checkerboard. If the film has the AOV alpha, so does the PNG; light of
+// pixels whose alpha is 0 is then lost. If `denoised` is not empty (format as for final_exr()), its pixels
+// are shown instead of the film's.
 Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops,
-                                           std::span<const float> denoised = {});
+                                           std::span<const float> denoised = {},
+                                           const ToCodes& to_codes = srgb_codes);
 
 // False-colour maps of an image's error and of its sample counts.
 //

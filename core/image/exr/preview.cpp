@@ -60,8 +60,17 @@ Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::ui
   return png;
 }
 
+std::vector<std::uint8_t> srgb_codes(std::span<const double> rgb) {
+  std::vector<std::uint8_t> codes(rgb.size());
+  for (std::size_t i = 0; i < rgb.size(); i += 3) {
+    const Colour code = srgb8(&rgb[i], 1);
+    std::copy(code.begin(), code.end(), &codes[i]);
+  }
+  return codes;
+}
+
 Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops,
-                                           std::span<const float> denoised) {
+                                           std::span<const float> denoised, const ToCodes& to_codes) {
   if (!(std::abs(exposure_stops) <= kMaxStops))
     return bad_argument(
         fmt::format("exposure: {} stops; from -{} to {} are possible", exposure_stops, kMaxStops, kMaxStops));
@@ -75,20 +84,30 @@ Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_sto
     const TilePixels tile = film.pixels(t);
     std::vector<float> alpha;
     if (with_alpha) alpha = TileLayers(film, t, true).values(pixel_layer(film.aovs(), "alpha").value());
+    const auto alpha_at = [&](std::size_t from) {
+      return with_alpha ? std::clamp(double{alpha[from]}, 0., 1.) : 1;
+    };
+    std::vector<double> rgb(tile.mean.size());
     each_pixel(tile.rect, frame, [&](std::size_t to, std::size_t from) {
-      Colour colour = kEmpty[(to % width / kChecker + to / width / kChecker) % 2];
-      if (tile.spp > 0) {
-        const double a = with_alpha ? std::clamp(double{alpha[from]}, 0., 1.) : 1;
-        std::array<double, 3> rgb;
-        if (denoised.empty())
-          std::copy_n(&tile.mean[3 * from], 3, rgb.begin());
-        else
-          std::copy_n(&denoised[3 * to], 3, rgb.begin());
-        // The colours of a PNG are not multiplied by alpha.
-        colour = a > 0 ? srgb8(rgb.data(), scale / a) : Colour{0, 0, 0};
-        if (with_alpha) out[channels * to + 3] = static_cast<std::uint8_t>(std::lround(255 * a));
+      // The colours of a PNG are not multiplied by alpha.
+      const double a = alpha_at(from), factor = a > 0 ? scale / a : 0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double value = denoised.empty() ? tile.mean[3 * from + c] : denoised[3 * to + c];
+        rgb[3 * from + c] = a > 0 ? value * factor : 0;
       }
-      std::copy_n(colour.begin(), 3, &out[channels * to]);
+    });
+    const std::vector<std::uint8_t> codes = tile.spp > 0 ? to_codes(rgb) : std::vector<std::uint8_t>();
+    each_pixel(tile.rect, frame, [&](std::size_t to, std::size_t from) {
+      std::uint8_t* pixel = &out[channels * to];
+      if (tile.spp == 0) {
+        const Colour& empty = kEmpty[(to % width / kChecker + to / width / kChecker) % 2];
+        std::copy(empty.begin(), empty.end(), pixel);
+        return;
+      }
+      const double a = alpha_at(from);
+      std::copy_n(&codes[3 * from], 3, pixel);
+      if (!(a > 0)) std::fill_n(pixel, 3, std::uint8_t{0});
+      if (with_alpha) pixel[3] = static_cast<std::uint8_t>(std::lround(255 * a));
     });
   }
   return write_png(frame, out);

@@ -114,6 +114,10 @@ class AsyncFarm:
         """Lists the workers of the farm and their present work."""
         return await self._transport.run(steps.listed("/api/v1/workers", "workers"))
 
+    async def views(self) -> list[str]:
+        """Lists the views in which the farm can show colours, those of its OpenColorIO configuration."""
+        return await self._transport.run(steps.listed("/api/v1/views", "views", str))
+
 
 class AsyncJob(JobState):
     """A job of a farm. In a notebook `await job.snapshot()` shows it."""
@@ -149,10 +153,12 @@ class AsyncJob(JobState):
         'denoised'."""
         return await self._transport.run(jobs_of.layers(self.id))
 
-    async def png(self, exposure: float = 0, denoised: bool = False, mix: Mix | None = None) -> bytes:
+    async def png(
+        self, exposure: float = 0, denoised: bool = False, mix: Mix | None = None, view: str | None = None
+    ) -> bytes:
         """Returns the image as a PNG file, brightened by `exposure` stops. `denoised`: use the denoised layers.
-        `mix`: as of image()."""
-        return await self._transport.run(jobs_of.png(self.id, exposure, denoised, mix))
+        `mix`: as of image(). `view`: how its colours are shown, one of AsyncFarm.views(); without it as sRGB."""
+        return await self._transport.run(jobs_of.png(self.id, exposure, denoised, mix, view))
 
     async def save(self, path: str | os.PathLike[str], mix: Mix | None = None) -> None:
         """Writes the image as OpenEXR, with all layers and with a header that describes its origin. `mix`: as of

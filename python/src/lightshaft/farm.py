@@ -114,6 +114,10 @@ class Farm:
         """Lists the workers of the farm and their present work."""
         return self._transport.run(steps.listed("/api/v1/workers", "workers"))
 
+    def views(self) -> list[str]:
+        """Lists the views in which the farm can show colours, those of its OpenColorIO configuration."""
+        return self._transport.run(steps.listed("/api/v1/views", "views", str))
+
 
 class Job(JobState):
     """A job of a farm. In a notebook it shows its picture, its figures and the curve of its error."""
@@ -149,10 +153,12 @@ class Job(JobState):
         'denoised'."""
         return self._transport.run(jobs_of.layers(self.id))
 
-    def png(self, exposure: float = 0, denoised: bool = False, mix: Mix | None = None) -> bytes:
+    def png(
+        self, exposure: float = 0, denoised: bool = False, mix: Mix | None = None, view: str | None = None
+    ) -> bytes:
         """Returns the image as a PNG file, brightened by `exposure` stops. `denoised`: use the denoised layers.
-        `mix`: as of image()."""
-        return self._transport.run(jobs_of.png(self.id, exposure, denoised, mix))
+        `mix`: as of image(). `view`: how its colours are shown, one of Farm.views(); without it as sRGB."""
+        return self._transport.run(jobs_of.png(self.id, exposure, denoised, mix, view))
 
     def save(self, path: str | os.PathLike[str], mix: Mix | None = None) -> None:
         """Writes the image as OpenEXR, with all layers and with a header that describes its origin. `mix`: as of

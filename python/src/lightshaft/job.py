@@ -137,10 +137,11 @@ def _umask() -> int:
     return mask
 
 
-def png(job: str, exposure: float, denoised: bool, mix: Mix | None) -> Steps[bytes]:
+def png(job: str, exposure: float, denoised: bool, mix: Mix | None, view: str | None) -> Steps[bytes]:
     query = {
         **({"exposure": repr(float(exposure))} if exposure else {}),
         **({"layer": "denoised"} if denoised else {}),
+        **({"view": view} if view else {}),
         **_query(mix),
     }
     return fetch(_path(job, "/image.png", query))

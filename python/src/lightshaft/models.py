@@ -174,6 +174,8 @@ class Video(TypedDict):
     """Exposure in stops."""
     layer: Union[str, None]
     """The layer that the video shows: rgb or denoised."""
+    view: NotRequired[Union[str, None]]
+    """The view of its colours (GET /api/v1/views)."""
     frames: int
     """Number of frames in the finished video."""
     frames_done: int
@@ -847,6 +849,13 @@ class GetMetersAnswer(TypedDict):
 
 class GetTilesAnswer(TypedDict):
     tiles: list["Tile"]
+
+
+class ListViewsAnswer(TypedDict):
+    default: str
+    """The view that the configuration shows first; sRGB without a configuration."""
+    views: list[str]
+    """Names, `DISPLAY/VIEW` but for sRGB."""
 
 
 class ListTokensAnswer(TypedDict):

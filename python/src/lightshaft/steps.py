@@ -173,10 +173,10 @@ def job_path(job: str, rest: str = "") -> str:
     return f"/api/v1/jobs/{job}{rest}"
 
 
-def listed(path: str, key: str) -> Steps[list[Any]]:
+def listed(path: str, key: str, kind: type = dict) -> Steps[list[Any]]:
     answer = yield from ask_json(Call("GET", path))
     found = answer.get(key)
-    if not isinstance(found, list) or not all(isinstance(item, dict) for item in found):
+    if not isinstance(found, list) or not all(isinstance(item, kind) for item in found):
         raise BadAnswer(f"the farm's answer to {path} has no list of {key}")
     return found
 

@@ -71,6 +71,7 @@ LIBRARIES = [
     Library("OpenVDB", r"^(openvdb|nanovdb)/", r"^worker/render/vdb/", "a program of its own"),
     Library("Blosc", r"^blosc\.h$", r"^worker/render/vdb/", "the same program"),
     Library("OpenEXR", r"^(OpenEXR/|Imf\w*\.h|Iex\w*\.h|half\.h)", r"^core/image/exr/", "core/image/exr"),
+    Library("OpenColorIO", r"^OpenColorIO/", r"^util/display/display_views\.cpp$", "the views of a display"),
     Library("gRPC", r"^(grpc|grpcpp|grpc\+\+)/|^proto/\w+\.grpc\.pb\.h$", r"^(coordinator/rpc|worker/client)/", "the two ends of the stream"),
     Library("protobuf", r"^google/protobuf/|^proto/\w+\.pb\.h$", r"^(coordinator/rpc|worker/client|proto)/", "proto and the two ends of the stream"),
     Library("Boost", r"^boost/(?!math/|container/)", r"^coordinator/http/(net/|message/message\.cpp$)", "the HTTP server"),

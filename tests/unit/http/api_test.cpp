@@ -162,6 +162,8 @@ TEST_F(Jobs, HaveImagesReportAndFigures) {
   EXPECT_EQ(ask(Method::get, url + "/image.png?t=123").status, 200);
   for (const char* wrong : {"x", "", "1e9", "nan", "inf", "2x"})
     EXPECT_EQ(ask(Method::get, url + "/image.png?exposure=" + wrong).status, 400) << wrong;
+  EXPECT_EQ(ask(Method::get, url + "/image.png?view=sRGB").status, 200);
+  EXPECT_EQ(ask(Method::get, url + "/image.png?view=Screen%2FWarm").status, 400);
   EXPECT_EQ(json_of(ask(Method::get, url + "/report"))["size"], json({40, 24}));
   EXPECT_EQ(json_of(ask(Method::get, url + "/tiles"))["tiles"].size(), 2u);
   EXPECT_EQ(text(ask(Method::get, url + "/convergence.csv")).substr(0, 8), "seconds,");

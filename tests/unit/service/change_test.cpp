@@ -51,7 +51,7 @@ TEST(Restore, DamagedRecordFailsOnlyItsJobUntilItIsRemoved) {
   ASSERT_TRUE(coordinator->job(bad));
   EXPECT_EQ(coordinator->job(bad)->state, JobState::failed);
   EXPECT_THAT(coordinator->job(bad)->error, HasSubstr("damaged"));
-  EXPECT_FALSE(coordinator->image_png(bad, 0));
+  EXPECT_FALSE(coordinator->image_png(bad));
   EXPECT_FALSE(coordinator->tiles(bad));
   EXPECT_FALSE(set_priority(*coordinator, bad, 3));
   ASSERT_TRUE(finish(*coordinator, good));

@@ -179,13 +179,13 @@ TEST(ServiceDenoise, ExtendedJobIsDenoisedAgain) {
 TEST(ServiceDenoise, DenoisedImageIsShownWhileTheJobRenders) {
   auto coordinator = open_with({}, fake("blurs"));
   const JobId job = submit(*coordinator, denoised_job());
-  EXPECT_TRUE(coordinator->image_png(job, 0, true)) << "without a sample";
+  EXPECT_TRUE(coordinator->image_png(job, {.denoised = true})) << "without a sample";
   FakeFarm farm(*coordinator, 1);
   farm.stop_after = 3;
   farm.run([] { return false; });
   while (coordinator->job(job)->units_done < 3) std::this_thread::yield();
 
-  const auto shown = coordinator->image_png(job, 0, true), raw = coordinator->image_png(job, 0, false);
+  const auto shown = coordinator->image_png(job, {.denoised = true}), raw = coordinator->image_png(job);
 
   ASSERT_TRUE(shown && raw);
   EXPECT_NE(*shown, *raw);
@@ -198,7 +198,7 @@ TEST(ServiceDenoise, JobWithoutDenoiseHasNoDenoisedImage) {
   plain.denoise = false;
   const JobId job = submit(*coordinator, plain);
 
-  const auto none = coordinator->image_png(job, 0, true);
+  const auto none = coordinator->image_png(job, {.denoised = true});
 
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().code, Errc::failed_precondition);

@@ -257,7 +257,7 @@ TEST(Sequence, IsNotExtendedInPartsIfAFrameHasMoreSamplesAlready) {
 TEST(Sequence, RequestsForOneImageNeedTheFrame) {
   auto coordinator = open_at({});
   const JobId id = submit(*coordinator, frames(2, 3));
-  const auto error = coordinator->image_png(id, 0).error();
+  const auto error = coordinator->image_png(id).error();
   EXPECT_EQ(error.code, Errc::invalid_argument);
   EXPECT_NE(error.message.find("2-3"), std::string::npos) << error.message;
   const auto none = coordinator->tiles(frame_job(id, 9)).error();

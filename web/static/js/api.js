@@ -36,7 +36,11 @@ async function errorOf(response) {
 }
 
 const json = (value) => ({ headers: { "Content-Type": "application/json" }, body: JSON.stringify(value) });
+const lookOf = (exposure, layer, view) => `exposure=${exposure}${layer === "denoised" ? "&layer=denoised" : ""}${view === "sRGB" ? "" : `&view=${encodeURIComponent(view)}`}`;
 const jobPath = (id) => `/jobs/${encodeURIComponent(id)}`;
+
+/** The views of a coordinator that does not say which it has. */
+export const kOnlyPlain = { default: "sRGB", views: ["sRGB"] };
 
 export const api = {
   signIn: (token) => call("POST", "/session", json({ token })),
@@ -61,11 +65,12 @@ export const api = {
   /** Changes a job: {state, focus, ...}; what it is then. */
   change: async (id, changes) => (await call("PATCH", jobPath(id), json(changes))).json(),
   setState: (id, state) => call("PATCH", jobPath(id), json({ state })),
-  /** layer: "picture" or "denoised". */
-  image: async (id, exposure, layer, signal) => {
-    const query = `exposure=${exposure}${layer === "denoised" ? "&layer=denoised" : ""}`;
-    return createImageBitmap(await (await call("GET", `${jobPath(id)}/image.png?${query}`, { signal })).blob());
-  },
+  /** layer: "picture" or "denoised"; view: one of views(). */
+  image: async (id, exposure, layer, view, signal) => createImageBitmap(await (await call("GET", `${jobPath(id)}/image.png?${lookOf(exposure, layer, view)}`, { signal })).blob()),
+  /** {default, views}: how colours can be shown. */
+  views: () => call("GET", "/views").then((answer) => answer.json(), () => kOnlyPlain),
+  /** A view as a table, see viewer/display.js. */
+  viewCube: async (view) => (await call("GET", `/views/cube?view=${encodeURIComponent(view)}`)).arrayBuffer(),
   /** kind: "error" or "samples". */
   map: async (id, kind, signal) => createImageBitmap(await (await call("GET", `${jobPath(id)}/${kind}.png`, { signal })).blob()),
   /** {size, max_level, layers: [{name, channels, format, blocks, names}]}. */
@@ -94,7 +99,7 @@ export const api = {
 export const downloads = {
   /** mix: of light groups; without one the image itself. */
   exr: (id, mix = null) => `${kBase}${jobPath(id)}/image.exr${mix === null ? "" : `?mix=${encodeURIComponent(mix)}`}`,
-  png: (id, exposure, layer) => `${kBase}${jobPath(id)}/image.png?exposure=${exposure}${layer === "denoised" ? "&layer=denoised" : ""}`,
+  png: (id, exposure, layer, view) => `${kBase}${jobPath(id)}/image.png?${lookOf(exposure, layer, view)}`,
   meters: (id) => `${kBase}${jobPath(id)}/meters`,
   report: (id) => `${kBase}${jobPath(id)}/report`,
   page: (id) => `${kBase}${jobPath(id)}/report.html`,

@@ -1,6 +1,6 @@
 // What the user can do with a job and its page.
 import { frameHref } from "./route.js";
-import { doneFrames, layerOf, withJob, withOpen, withUi, withoutJob } from "./state.js";
+import { displayOf, doneFrames, layerOf, withJob, withOpen, withUi, withoutJob } from "./state.js";
 
 const kVideoPauseMs = 1000;
 
@@ -73,7 +73,7 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
 
   const pictureOf = (id, exposure, signal) => {
     const layer = shownLayer();
-    return layer === "picture" || layer === "denoised" ? api.image(id, exposure, layer, signal) : api.map(id, layer, signal);
+    return layer === "picture" || layer === "denoised" ? api.image(id, exposure, layer, displayOf(get()), signal) : api.map(id, layer, signal);
   };
 
   return {
@@ -89,7 +89,7 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
     makeVideo: (id) => {
       const { exposure, fps } = get().open;
       const layer = shownLayer();
-      return watchVideo(id, api.makeVideo(id, { exposure, fps, ...(layer === "denoised" ? { layer } : {}) }));
+      return watchVideo(id, api.makeVideo(id, { exposure, fps, view: displayOf(get()), ...(layer === "denoised" ? { layer } : {}) }));
     },
     setState: change,
     readLog: async (id) => {
@@ -113,6 +113,7 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
     setLayer: (layer) => set(withOpen(get(), { layer })),
     setClock: (clock) => set(withOpen(get(), { clock, picked: null })),
     onExposure: (event) => set(withOpen(get(), { exposure: Number(event.currentTarget.value) })),
+    setDisplay: (display) => set(withOpen(get(), { display })),
     resetExposure: () => set(withOpen(get(), { exposure: 0 })),
     toggleTiles: () => set(withOpen(get(), { showTiles: !get().open.showTiles })),
     pick: (picked) => (get().open && get().open.picked !== picked ? set(withOpen(get(), { picked })) : null),

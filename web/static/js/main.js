@@ -99,9 +99,10 @@ async function signIn(signing, first) {
 async function enter(first) {
   let page;
   let me;
+  let displays;
   const asked = state.route.view === "jobs" ? listOf(state.route.query) : state.list.asked;
   try {
-    [page, me] = await (first ?? askFirst(asked));
+    [page, me, displays] = await (first ?? askFirst(asked));
   } catch (error) {
     if (error.status === 401) signedOut();
     else if (state.session === "unknown") {
@@ -110,7 +111,7 @@ async function enter(first) {
     }
     return error;
   }
-  set(withUi({ ...withListed(withList(state, { asked }), page), me, session: "in" }, { signInError: null, notice: null }));
+  set(withUi({ ...withListed(withList(state, { asked }), page), me, displays, session: "in" }, { signInError: null, notice: null }));
   closeEvents ??= openEvents({ onOpen, onLost, onEvent });
   showRoute();
   return null;
@@ -209,8 +210,8 @@ function showFrame() {
   const { open, route } = state;
   const shown = open && shownOf(state, open.id, route.frame);
   if (!open || open.shown === shown) return false;
-  const { exposure, showTiles, layer, clock, film, fps, video } = open;
-  set({ ...state, open: { ...openJob(open.id, shown), exposure, showTiles, layer, clock, film, fps, video } });
+  const { exposure, display, showTiles, layer, clock, film, fps, video } = open;
+  set({ ...state, open: { ...openJob(open.id, shown), exposure, display, showTiles, layer, clock, film, fps, video } });
   refreshShown().catch(openFailed);
   return true;
 }

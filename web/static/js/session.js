@@ -4,8 +4,8 @@ import { api } from "./api.js";
 import { kWholeList, listOf, parametersOf } from "./job_list.js";
 import { routeOf, takeToken } from "./route.js";
 
-/** [page of the list, who is signed in]: what is shown first. */
-export const askFirst = (asked) => Promise.all([api.list(parametersOf(asked, Date.now() / 1000)), api.me()]);
+/** [page of the list, who is signed in, how colours can be shown]: what is needed first. */
+export const askFirst = (asked) => Promise.all([api.list(parametersOf(asked, Date.now() / 1000)), api.me(), api.views()]);
 
 /** A link with a token signs in at once where nobody is signed in: {signing}, a promise. {me}: who is; {}: the coordinator did not say. */
 export async function tryLink(token) {

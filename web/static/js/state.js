@@ -1,5 +1,6 @@
 // The state of the page as one value, and its changes: pure functions (state, event) -> state.
 
+import { kOnlyPlain } from "./api.js";
 import { kWholeList } from "./job_list.js";
 
 const kFlashes = 48; // most recently folded tiles that are highlighted
@@ -10,6 +11,7 @@ export function initialState() {
     session: "unknown", // also "in", "out"
     me: { role: "read", user: "" }, // the role with the fewest rights, until the role is known
     link: "connecting", // also "live", "lost"
+    displays: kOnlyPlain, // how colours can be shown: {default, views}
     route: { view: "jobs", id: null, frame: null },
     // a page of the list of jobs; ids: null until it is known; doing: how far what is done to the selected jobs is
     list: { asked: kWholeList, ids: null, total: 0, states: {}, owners: [], picked: new Set(), doing: null },
@@ -45,6 +47,7 @@ export const openJob = (id, shown = id) => ({
   flashes: [], // {key, rect, worker} of recently folded tiles
   folds: 0, // number of folds: a change means that the image has changed
   exposure: 0,
+  display: null, // the view in which colours are shown; null: the coordinator's default
   showTiles: true,
   layer: null, // "picture", "denoised", or as a map over the image "error", "samples"; null: the best picture there is
   clock: "seconds", // axis of the plot; or "core_seconds"
@@ -58,6 +61,9 @@ export const openJob = (id, shown = id) => ({
 
 /** The layer that is shown of a job: the one that was chosen, or the denoised picture of a job that is done and has one. */
 export const layerOf = ({ layer, report }, job) => layer ?? (job?.denoise && job.state === "done" && !report?.denoised?.error ? "denoised" : "picture");
+
+/** The view in which colours are shown. */
+export const displayOf = ({ open, displays }) => open.display ?? displays.default;
 
 /** What the coordinator would not take from this token anyway is not offered. */
 export const mayChange = (state) => state.me.role === "admin" || state.me.role === "submit";

@@ -1,7 +1,7 @@
 // What the user can do in the viewer, and the data that it fetches: at most two pictures, of jobs or of a
 // file.
 import { kCompared, kMostExposure, kOverlays, queryOf, viewOf } from "./viewer/address.js";
-import { kCurves } from "./viewer/tone.js";
+import { cubeFrom, curveOf, curvesOf, isView } from "./viewer/display.js";
 import { openFile } from "./viewer/file_source.js";
 import { PixelSource } from "./viewer/source.js";
 import { kindOf } from "./viewer/paint.js";
@@ -34,11 +34,20 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
     if (!before) return;
     change({ view: { ...before, ...more } });
     if (more.mix) remix();
+    if (more.curve) needCube();
     if ((more.layer ?? before.layer) !== before.layer) {
       probeAgain();
       survey();
       refreshFigures();
     }
+  }
+
+  /** Fetches the table of the view that is shown. Until it is there, the curve of sRGB is shown. */
+  async function needCube() {
+    const name = curveOf(get().viewer.view.curve, get().displays);
+    if (!isView(name) || get().viewer.cube?.name === name) return;
+    const buffer = await attempt(() => api.viewCube(name));
+    if (buffer && get().viewer) set(withViewer(get(), { cube: { name, values: cubeFrom(buffer) } }));
   }
 
   /** Mixes light groups as the address says. */
@@ -239,7 +248,7 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
     const what = kLetters[key.toLowerCase()];
     if (what === "exposure") look({ exposure: Math.min(kMostExposure, Math.max(-kMostExposure, view.exposure + by * kExposureStep)) });
     else if (what === "falseColour") look({ falseColour: !view.falseColour });
-    else if (what === "curve") look({ curve: next(kCurves.map(([name]) => name), view.curve, by) });
+    else if (what === "curve") look({ curve: next(curvesOf(get().displays).map(([name]) => name), curveOf(view.curve, get().displays), by) });
     else if (what === "overlay") look({ overlay: next(kOverlays.map(([name]) => name), view.overlay, by) });
     else if (what === "layer" && a) look({ layer: next(a.layers.map((layer) => layer.name), view.layer, by) });
     else if (what === "channel" && a) look({ channel: next([null, 0, 1, 2].slice(0, 1 + a.layer(view.layer).channels.length), view.channel, by) });
@@ -261,12 +270,14 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
         probeAgain();
         survey();
         if (String(view.mix) !== String(before.view.mix)) remix();
+        needCube();
         if (view.other !== before.view.other) compare(view.other);
         return;
       }
       closeSources();
-      set({ ...get(), viewer: { id, view, a: null, b: null, plain: "rgb", report: null, survey: null, histogram: false, file: null, others: null, tool: "pan", probe: null, figures: null, flip: null, problem: null, refused: null, changed: 0, mixing: null, mixError: null, mixWaits: false, mixRefused: null } });
+      set({ ...get(), viewer: { id, view, a: null, b: null, plain: "rgb", report: null, cube: null, survey: null, histogram: false, file: null, others: null, tool: "pan", probe: null, figures: null, flip: null, problem: null, refused: null, changed: 0, mixing: null, mixError: null, mixWaits: false, mixRefused: null } });
       openJob("a", id);
+      needCube();
       // if this fails, the viewer says so for the layers
       snapshot(`job ${id}`, () => api.job(id), (now, job) => (now.viewer?.id === id ? withJob(now, job) : now)).catch(() => {});
       // if this fails, only jobs that are known already are offered

@@ -1,14 +1,13 @@
 // The viewer's state in the address bar, so that a link opens the same view:
 // #/view/ID?layer=depth&ev=1.5&zoom=2&x=10&y=20 &with=ID&by=wipe&split=0.4&region=0,0,10,10&matte=name
 // &mix=sun*g1.5 (viewer/mix.js). Values that equal their defaults are left out.
-import { kCurves } from "./tone.js";
 
 export const kCompared = [["wipe", "Wipe"], ["a", "First"], ["b", "Second"], ["difference", "Difference"], ["relmse", "relMSE"], ["flip", "FLIP"]];
 export const kOverlays = [["", "None"], ["error", "Error"], ["spp", "Samples"]];
 export const kMostExposure = 16;
 
 export const kPlain = {
-  layer: "rgb", channel: null, exposure: 0, curve: "srgb", falseColour: false, overlay: "", zoom: null, x: 0, y: 0, other: null, by: "wipe", split: 0.5, region: null, matte: [], mix: [],
+  layer: "rgb", channel: null, exposure: 0, curve: null, falseColour: false, overlay: "", zoom: null, x: 0, y: 0, other: null, by: "wipe", split: 0.5, region: null, matte: [], mix: [],
 };
 
 const one = (options, value, otherwise) => (options.some(([name]) => name === value) ? value : otherwise);
@@ -24,7 +23,7 @@ export function viewOf(query) {
     layer: of.get("layer"), // null: the best picture there is
     channel: channel === null ? null : number(channel, 0, 2, null),
     exposure: number(of.get("ev"), -kMostExposure, kMostExposure, 0),
-    curve: one(kCurves, of.get("curve"), kPlain.curve),
+    curve: of.get("curve"), // null: the coordinator's default
     falseColour: of.get("false") === "1",
     overlay: one(kOverlays, of.get("over"), ""),
     zoom: number(of.get("zoom"), 1e-3, 128, null),

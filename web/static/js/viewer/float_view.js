@@ -170,8 +170,8 @@ class FloatView extends HTMLElement {
   }
 
   get #look() {
-    const { exposure, curve, falseColour, channel, range, matte } = this.#model.look;
-    return `${exposure} ${curve} ${falseColour} ${channel} ${range} ${[...matte].join()}`;
+    const { exposure, curve, cube, falseColour, channel, range, matte } = this.#model.look;
+    return `${exposure} ${curve} ${Boolean(cube)} ${falseColour} ${channel} ${range} ${[...matte].join()}`;
   }
 
   #block(which, source, layer, level, bx, by) {

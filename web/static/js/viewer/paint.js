@@ -1,6 +1,7 @@
 // Paints one block of a layer: converts values to 8-bit RGBA.
+import { isView, viewed } from "./display.js";
 import { floatsOf, halfBits, halfValues } from "./half.js";
-import { agx, codes, falseColour, kErrorScale, kFalseStops, kRelMseScale, kSamplesScale, onLogScale } from "./tone.js";
+import { codes, falseColour, kErrorScale, kFalseStops, kRelMseScale, kSamplesScale, onLogScale } from "./tone.js";
 
 const kNoSample = [24, 24, 27]; // colour of pixels without samples, as in the coordinator's previews
 // Light of the two kinds of squares behind an image with alpha, at exposure 0, and the side of a square in pixels
@@ -17,6 +18,9 @@ function codesOf(curve, exposure) {
   return kept.codes;
 }
 
+/** The curve of single channels that stands for a view. */
+const singly = (curve) => (isView(curve) ? "srgb" : curve);
+
 /** What a layer shows: "ramp" (error, samples), "matte", "normal", "measure" (a depth, say), or "colour". */
 export function kindOf(layer) {
   if (layer.blocks === "first") return "matte";
@@ -26,9 +30,9 @@ export function kindOf(layer) {
 }
 
 /**
- * look: {exposure, curve, falseColour, channel, range, matte: Set of picked identifiers}; channel: the only one that
- * is shown, as grey; range: [least, most] of a layer that is no light, which become black and white. Returns RGBA, row
- * by row.
+ * look: {exposure, curve, cube, falseColour, channel, range, matte: Set of picked identifiers}; cube: the table of the
+ * view that `curve` names, once it is there; channel: the only one that is shown, as grey; range: [least, most] of a
+ * layer that is no light, which become black and white. Returns RGBA, row by row.
  */
 export function paint(buffer, layer, look) {
   const kind = kindOf(layer);
@@ -47,11 +51,8 @@ export function paint(buffer, layer, look) {
     const brightness = look.channel !== null && look.channel !== undefined ? v(picked[0]) : layer.channels.length === 3 ? 0.2126 * v(0) + 0.7152 * v(1) + 0.0722 * v(2) : v(0);
     falseColour((Math.log2(brightness) + look.exposure + kFalseStops) / (2 * kFalseStops), out, at);
   });
-  if (look.curve === "agx") {
-    const scale = 2 ** look.exposure;
-    return each(halves, layer.channels.length, (v, out, at) => agx(v(picked[0]), v(picked[1]), picked[2] < 0 ? 0 : v(picked[2]), scale, out, at));
-  }
-  return coded(halves, layer.channels.length, picked, codesOf(look.curve, look.exposure));
+  if (look.cube) return viewed(look.cube, halves, layer.channels.length, picked, look.exposure, kNoSample);
+  return coded(halves, layer.channels.length, picked, codesOf(singly(look.curve), look.exposure));
 }
 
 /**
@@ -142,7 +143,7 @@ export function paintCompared(a, b, layer, look, how) {
   const channels = layer.channels.length;
   const out = new Uint8ClampedArray((4 * x.length) / channels);
   const scale = 2 ** look.exposure;
-  const code = codesOf(look.curve === "agx" ? "srgb" : look.curve, 0);
+  const code = codesOf(singly(look.curve), 0);
   for (let from = 0, at = 0; from < x.length; from += channels, at += 4) {
     out[at + 3] = 255;
     if (Number.isNaN(x[from]) || Number.isNaN(y[from])) {

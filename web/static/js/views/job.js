@@ -1,6 +1,6 @@
 // The page of one job: its image, the image's error, and the workers that render it.
 import { h } from "../dom.js";
-import { healthComplaints, isOver, layerOf, mayChange, ownerOf, seesOthers } from "../state.js";
+import { displayOf, healthComplaints, isOver, layerOf, mayChange, ownerOf, seesOthers } from "../state.js";
 import { duration, jobName, moment, percent, plural } from "../format.js";
 import { downloads } from "../api.js";
 import { againButton, againForm } from "./again.js";
@@ -40,7 +40,7 @@ function shownJob(state, job, actions) {
   return [
     job.sequence && job.error ? h("div", { key: "frame-error" }, notice("bad", `Frame ${job.frame}`, failure(job))) : null,
     h("div", { key: "columns", class: "columns" },
-      h("div", { class: "picture" }, job.meters > 0 ? meterPanel(state, job) : imagePanel(state, job, actions), started ? errorPlot(job, state.open, actions, state.narrow) : null, downloadLinks(job, state.open), logOf(job, state.open, actions)),
+      h("div", { class: "picture" }, job.meters > 0 ? meterPanel(state, job) : imagePanel(state, job, actions), started ? errorPlot(job, state.open, actions, state.narrow) : null, downloadLinks(job, state), logOf(job, state.open, actions)),
       h("div", { class: "facts" }, started ? figures(job, job.denoised ?? state.open.report?.denoised) : null, started ? timeSplit(job) : null, jobFacts(state, job, actions), inFlight(state, job))),
   ];
 }
@@ -108,7 +108,8 @@ const logOf = (job, { log }, actions) => h("details", { key: `log ${job.id}`, cl
   log === null ? h("p", { key: "waiting", class: "help" }, "Fetching the log …") : h("pre", { key: "lines", tabindex: 0, "aria-label": "Log" }, log || "Nothing has happened yet."),
   log === null ? null : h("button", { key: "again", type: "button", class: "small", onclick: () => actions.readLog(job.id) }, "Read it again"));
 
-function downloadLinks(job, open) {
+function downloadLinks(job, state) {
+  const { open } = state;
   const taken = !isOver(job) || job.units_done > 0; // before the end there may be a picture soon
   const shown = layerOf(open, job) === "denoised" ? "denoised" : "picture";
   const link = (href, label, hint, name) => h("a", { key: hint, class: "button", href, download: name }, label, h("small", null, hint));
@@ -116,7 +117,7 @@ function downloadLinks(job, open) {
   return h("nav", { class: "downloads", "aria-label": "Downloads" },
     taken && job.meters > 0 ? link(downloads.meters(job.id), "Values", "JSON", `${stem}.json`) : null,
     taken ? link(downloads.exr(job.id), "EXR", "image", `${stem}.exr`) : null,
-    taken ? link(downloads.png(job.id, open.exposure, shown), "PNG", shown === "denoised" ? "denoised" : "as shown", `${stem}.png`) : null,
+    taken ? link(downloads.png(job.id, open.exposure, shown, displayOf(state)), "PNG", shown === "denoised" ? "denoised" : "as shown", `${stem}.png`) : null,
     h("a", { key: "page", class: "button", href: downloads.page(job.id), target: "_blank", rel: "noopener" }, "Report", h("small", null, "page")),
     link(downloads.report(job.id), "Report", "JSON", `${stem}.report.json`),
     link(downloads.csv(job.id), "Convergence", "CSV", `${stem}.convergence.csv`),

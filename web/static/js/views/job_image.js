@@ -1,6 +1,6 @@
 // The live image or a map over it, the tiles being rendered, and the exposure slider or the map's legend.
 import { h } from "../dom.js";
-import { colourOf, doneFrames, isOver, layerOf } from "../state.js";
+import { colourOf, displayOf, doneFrames, isOver, layerOf } from "../state.js";
 import { exposure as exposureText, jobName } from "../format.js";
 import { viewHref } from "../route.js";
 import { choice, safeClass } from "./pieces.js";
@@ -25,13 +25,13 @@ export function imagePanel(state, job, actions) {
       job.sequence ? h("frame-film", { key: "film", "aria-hidden": "true", ".model": filmOf(state, job, actions), onturned: (event) => actions.turnFilm(event.detail) }) : null,
       h("live-image", {
         key: job.id, "aria-label": `${jobName(job)}, ${kNames[layer]}`, role: "img",
-        ".size": width * 65536 + height, ".source": actions.image, ".exposure": isPicture(layer) ? open.exposure : 0, ".version": `${layer} ${open.folds}`,
+        ".size": width * 65536 + height, ".source": actions.image, ".exposure": isPicture(layer) ? open.exposure : 0, ".version": `${layer} ${isPicture(layer) ? displayOf(state) : ""} ${open.folds}`,
       }),
       open.showTiles && !open.film ? overlay(state, width, height) : null,
       job.units_done ? null : h("p", { class: "stage-text" }, stageText(job))),
     h("figcaption", { class: "image-tools" },
       choice("layer", "What is shown", job.denoise ? kDenoised : kLayers, layer, actions.setLayer),
-      isPicture(layer) ? exposureTool(open, actions) : legend(layer, job.few_hits),
+      isPicture(layer) ? [exposureTool(open, actions), displayTool(state, actions)] : legend(layer, job.few_hits),
       h("a", { key: "viewer", class: "to-viewer", href: viewHref(job.id) }, "Open in the viewer"),
       h("label", { class: "check" }, h("input", { type: "checkbox", ".checked": open.showTiles, onchange: actions.toggleTiles }), "Tiles being rendered")));
 }
@@ -42,7 +42,7 @@ function filmOf(state, job, actions) {
   const layer = layerOf(state.open, job);
   return {
     ids: doneFrames(state.jobs.get(job.sequence)).map((frame) => frame.id), at: film?.id ?? null, playing: Boolean(film?.playing), fps, shown,
-    version: `${layer} ${isPicture(layer) ? exposure : 0}`, load: actions.filmPicture, small: smallPicture,
+    version: `${layer} ${isPicture(layer) ? `${exposure} ${displayOf(state)}` : 0}`, load: actions.filmPicture, small: smallPicture,
   };
 }
 
@@ -55,6 +55,11 @@ const exposureTool = (open, actions) => h("span", { key: "exposure", class: "ima
     oninput: actions.onExposure, ondblclick: actions.resetExposure,
   }),
   h("output", { for: "exposure", class: "number" }, exposureText(open.exposure)));
+
+const displayTool = (state, actions) => h("span", { key: "display", class: "image-tool" },
+  h("label", { for: "display" }, "View"),
+  h("select", { id: "display", ".value": displayOf(state), onchange: (event) => actions.setDisplay(event.currentTarget.value) },
+    state.displays.views.map((name) => h("option", { key: name, value: name, selected: name === displayOf(state) }, name))));
 
 export function legend(layer, fewHits = 0) {
   const [least, most, meaning] = kLegends[layer] ?? kFurther[layer];

@@ -4,7 +4,7 @@ import { exposure as exposureText, figure, interval, jobName, kAbsent, moment, s
 import { jobHref } from "../route.js";
 import { kCompared, kMostExposure, kOverlays } from "../viewer/address.js";
 import { kindOf } from "../viewer/paint.js";
-import { kCurves } from "../viewer/tone.js";
+import { curveOf, curvesOf } from "../viewer/display.js";
 import { isOver, mayChange } from "../state.js";
 import { doubtWord, doubtful } from "../verdict.js";
 import { comparable, identifiersOf, nameOf } from "../viewer_actions.js";
@@ -13,7 +13,7 @@ import { choice, notice } from "./pieces.js";
 
 const kLayerNames = { rgb: "Picture", denoised: "Denoised", stderr: "Standard error", error: "Relative error", spp: "Samples", mix: "Mix of light groups", "mix.stderr": "Standard error of the mix", crypto_object: "Objects", crypto_material: "Materials" };
 const kKeys = [
-  ["arrows", "move; with Shift by one pixel"], ["+ −", "zoom"], ["0", "fit"], ["z", "one to one"], ["1 – 9", "first picture, others of the list to compare"], ["k", "single channels"], ["h", "histogram"], ["e E", "brighter, darker"], ["c", "tone curve"], ["l L", "layer"],
+  ["arrows", "move; with Shift by one pixel"], ["+ −", "zoom"], ["0", "fit"], ["z", "one to one"], ["1 – 9", "first picture, others of the list to compare"], ["k", "single channels"], ["h", "histogram"], ["e E", "brighter, darker"], ["c", "view of the colours"], ["l L", "layer"],
   ["o", "overlay"], ["f", "false colours"], ["r", "region: what is seen, or none"], ["p", "render the region first, or none first"], ["Enter", "select the object in the middle"], ["b", "way to compare"], ["x", "first, second"], ["[ ]", "wipe"],
 ];
 
@@ -28,7 +28,7 @@ export function viewerView(state, actions) {
   const layer = a.layer(view.layer);
   const fits = b && b.size[0] === a.size[0] && b.size[1] === a.size[1];
   const second = fits && b.layer(layer.name).name === layer.name ? b : null;
-  const parts = [tools(viewer, layer, actions), compareTools(state, viewer, fits, second, actions)];
+  const parts = [tools(viewer, layer, state.displays, actions), compareTools(state, viewer, fits, second, actions)];
   // What comes and goes stands below the picture: it must not move while somebody drags in it.
   const mix = viewer.mixing?.panel(viewer) ?? null;
   const picture = [
@@ -61,7 +61,9 @@ function stage(state, viewer, layer, second, job, actions) {
   const { a, view } = viewer;
   const name = jobName(job);
   const focus = job.focus && !isOver(job) ? job.focus : null;
-  const { exposure, curve, falseColour, channel, by, split, region } = view;
+  const { exposure, falseColour, channel, by, split, region } = view;
+  const curve = curveOf(view.curve, state.displays);
+  const cube = viewer.cube?.name === curve ? viewer.cube.values : null;
   const overlay = overlaysOf(layer).some(([name]) => name === view.overlay) ? view.overlay : "";
   const range = viewer.survey?.layer === layer.name ? [viewer.survey.least, viewer.survey.most] : null;
   const other = viewer.file ? { name: viewer.file } : [...(viewer.others ?? []), ...(state.jobs?.values() ?? [])].find(({ id }) => id === view.other) ?? { id: view.other ?? "" };
@@ -69,7 +71,7 @@ function stage(state, viewer, layer, second, job, actions) {
   const matte = kindOf(layer) === "matte" ? identifiersOf(layer, view.matte) : new Set();
   return h("figure", { key: "stage", class: "panel viewer-stage" }, h("float-view", {
     key: "view", tabindex: 0, role: "application", "aria-label": `${layerName(layer)} of ${name}. ${kKeys.map(([key, what]) => `${key}: ${what}`).join("; ")}`,
-    ".model": { a, b: second, layer: layer.name, look: { exposure, curve, falseColour, channel, range, matte }, view, sides, by, split, overlay, region, focus, tool: viewer.tool, changed: viewer.changed },
+    ".model": { a, b: second, layer: layer.name, look: { exposure, curve, cube, falseColour, channel, range, matte }, view, sides, by, split, overlay, region, focus, tool: viewer.tool, changed: viewer.changed },
     onviewed: (event) => actions.look(event.detail), onpointed: (event) => actions.point(event.detail), onpicked: (event) => actions.pick(event.detail),
     onframed: (event) => actions.frame(event.detail), onsplit: (event) => actions.look({ split: event.detail }), onflipped: (event) => actions.flipped(event.detail), oncommand: (event) => actions.command(event.detail),
   }));
@@ -78,7 +80,7 @@ function stage(state, viewer, layer, second, job, actions) {
 /** The error that lies over a picture is that of the image itself. */
 const overlaysOf = (layer) => (layer.name === "mix" ? kOverlays.filter(([name]) => name !== "error") : kOverlays);
 
-function tools(viewer, layer, actions) {
+function tools(viewer, layer, displays, actions) {
   const { a, view } = viewer;
   const coloured = kindOf(layer) === "colour";
   return h("div", { key: "tools", class: "viewer-tools" },
@@ -87,7 +89,7 @@ function tools(viewer, layer, actions) {
       h("input", { id: "ev", type: "range", min: -kMostExposure, max: kMostExposure, step: 0.25, disabled: !coloured, ".value": String(view.exposure), "aria-valuetext": exposureText(view.exposure),
         oninput: (event) => actions.look({ exposure: Number(event.currentTarget.value) }), ondblclick: () => actions.look({ exposure: 0 }) }),
       h("output", { for: "ev", class: "number" }, exposureText(view.exposure))),
-    pick("curve", "Curve", kCurves, view.curve, (curve) => actions.look({ curve }), !coloured || view.falseColour),
+    pick("curve", "View", curvesOf(displays), curveOf(view.curve, displays), (curve) => actions.look({ curve }), !coloured || view.falseColour),
     h("label", { key: "false", class: "check" }, h("input", { type: "checkbox", id: "false", disabled: !coloured && kindOf(layer) !== "measure", ".checked": view.falseColour, onchange: () => actions.look({ falseColour: !view.falseColour }) }), "False colours"),
     layer.channels.length > 1 && kindOf(layer) !== "matte" ? pick("channel", "Channels", [["", "all"], ...layer.channels.slice(0, 3).map((name, i) => [String(i), name])], view.channel === null ? "" : String(view.channel), (value) => actions.look({ channel: value === "" ? null : Number(value) })) : null,
     pick("overlay", "Overlay", overlaysOf(layer), view.overlay, (overlay) => actions.look({ overlay })),
