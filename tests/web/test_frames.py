@@ -226,7 +226,7 @@ def test_a_video_is_made_on_request_and_says_how_far_it_is(farm, dashboard):
     page.evaluate("(() => { const s = document.querySelector('.player select'); s.value = '30'; s.dispatchEvent(new Event('change')); })()")
     page.click(".video button")
     page.wait("document.querySelector('.video').innerText.includes('waits')")
-    assert farm.submitted == [(SEQUENCE, {"exposure": 0, "fps": 30})]
+    assert farm.submitted == [(SEQUENCE, {"exposure": 0, "fps": 30, "view": "sRGB"})]
     assert page.evaluate("document.querySelector('.video button').disabled")
 
     farm.video = {**farm.video, "state": "making", "frames_done": 2}
