@@ -254,6 +254,20 @@ class Words {
     say("environment light", constant + map > 0, map > 0 ? "an environment map" : "a constant surrounding",
         "black surroundings");
     say("environment map", map, "environment maps");
+    missing_light(sampled - n_.area_lights - map);
+  }
+  // Light that no path finds. It is said only of scenes that have it.
+  void missing_light(std::uint32_t lamps) {
+    const std::uint32_t smooth = count<ConductorBsdf, DielectricBsdf, PlasticBsdf>(n_.materials);
+    if (lamps == 0 || smooth == 0) return;
+    out_.push_back(
+        {"light of lamps without extent by way of smooth surfaces", false,
+         fmt::format(
+             "missing in the image: {} lamps and {} smooth mirrors, glasses or glossy coats. No path can "
+             "follow light from such a surface to a point or a single direction; give the lamp an extent "
+             "(a sphere or rectangle with an area emitter), the surface a roughness, or make panes of "
+             "glass and sheets of water thindielectric",
+             lamps, smooth)});
   }
 
   const Needs& n_;

@@ -253,5 +253,23 @@ TEST(Needs, ExplainEveryPart) {
   }
 }
 
+// Lamps without extent beside smooth glass and mirrors.
+TEST(Needs, NameTheLightThatNoPathFinds) {
+  const auto missing = [](const std::string& shapes) {
+    for (const scene::Need& n : in_words(needs(shapes)))
+      if (n.part == "light of lamps without extent by way of smooth surfaces") return n.used ? "used" : n.why;
+    return std::string();
+  };
+  const std::string sun = R"(<emitter type="directional"/>)", point = R"(<emitter type="point"/>)",
+                    sky = R"(<emitter type="constant"/>)", glass = sphere(R"(<bsdf type="dielectric"/>)");
+
+  EXPECT_THAT(missing(glass + sun + point), HasSubstr("missing in the image: 2 lamps and 1 smooth"));
+  EXPECT_NE(missing(sphere(kMetal) + sun), "");
+  EXPECT_EQ(missing(glass + sky), "") << "paths that leave the glass find the sky";
+  EXPECT_EQ(missing(sphere(R"(<bsdf type="thindielectric"/>)") + sun), "") << "light passes straight";
+  EXPECT_EQ(missing(sphere(R"(<bsdf type="roughdielectric"/>)") + sun), "");
+  EXPECT_EQ(missing(sphere(kGreyMaterial) + point), "");
+}
+
 }  // namespace
 }  // namespace ls
