@@ -127,12 +127,28 @@ void Reader::read_geometry(const Element& e, T geometry) {
   bind(p, shape);
   shape.geometry = geometry;
   read_shape_parts(p, shape);
+  check_visibility(p, shape);
   p.finish();
   check_placement(e, shape);
   check_attributes(e, shape);
   scene_.shapes.push_back(std::move(shape));
   label_shape(e);
   shape_elements_.push_back(&e);
+}
+
+// Rays pass a surface without a material anyhow, and the medium behind it stays visible to them.
+void Reader::check_visibility(Params& p, const Shape& shape) {
+  if (shape.emitter || !std::holds_alternative<NullBsdf>(scene_.bsdfs[shape.bsdf.value])) return;
+  const auto check = [&](const char* name, bool visible) {
+    if (const Element* given = visible ? nullptr : p.take(name))
+      report_.error(given->at,
+                    fmt::format("'{}' has no effect on {} with the bsdf \"null\": every ray passes this "
+                                "surface and enters its medium. Remove the parameter",
+                                name, p.title()));
+  };
+  check("visible_shadow", shape.visible_shadow);
+  check("visible_reflection", shape.visible_reflection);
+  check("visible_volume", shape.visible_volume);
 }
 
 void Reader::read_shape_parts(Params& p, Shape& shape) {

@@ -9,7 +9,7 @@
 
 namespace ls::render {
 
-// The path passes every index-matched or unseen surface, and each null-transmitting surface with that
+// The path passes every index-matched or hidden surface, and each null-transmitting surface with that
 // surface's probability. As long as the ray hits the same surfaces as the path of the sample, the decisions
 // use the same random numbers as in trace().
 template <Features F, template <Features> class Light>
@@ -62,7 +62,7 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
     }
     if (!met || is_black(beta_)) break;
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    if ((surface.unseen && direct) || surface.null || (surface.null_transmission && passes_null(hit))) {
+    if (surface.hidden.has(direct ? RayKind::camera : RayKind::surface) || surface.null || (surface.null_transmission && passes_null(hit))) {
       pass_boundary(hit, surface);
       continue;
     }

@@ -193,13 +193,31 @@ class PathTracer {
   std::optional<BsdfSample> sample_bsdf(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo,
                                         const Group& g);
   void add_emission(const SurfaceHit& hit);
+  void add_emission_times(const C3& beta, const SurfaceHit& hit);
   void add_environment();
   [[gnu::cold, gnu::noinline]] void add_environment_seen();
-  // True if a camera ray passes straight through a surface that is unseen or held out; false if it ends
-  // there.
+  // True if a camera ray passes straight through the surface; false if it ends there.
   bool sees_past(const SurfaceHit& hit, const SurfaceInfo& surface) {
-    return surface.unseen || surface.null || (surface.null_transmission && passes_null(hit));
+    return surface.hidden.has(RayKind::camera) || surface.null ||
+           (surface.null_transmission && passes_null(hit));
   }
+  // With F.visibility (visibility.h): the kind of the path's current ray.
+  RayKind ray_kind() const {
+    if (depth_ == 0) return RayKind::camera;
+    return left_medium_ ? RayKind::medium : RayKind::surface;
+  }
+  // True if shadow rays alone find the light that arrives at the last vertex.
+  bool direct_by_shadows() const {
+    if constexpr (F.visibility) return world_.direct_by_shadows && depth_ > 0 && !last_.delta;
+    return false;
+  }
+  // True if what scatters rays of this kind (surfaces or media) receives the chosen light.
+  bool receives(const LightChoice& choice, RayKind kind) const {
+    if constexpr (F.visibility) return !world_.lights.hidden(choice.light, kind);
+    return true;
+  }
+  [[gnu::cold, gnu::noinline]] void add_environment_times(const C3& beta);
+  [[gnu::cold, gnu::noinline]] void add_direct();
   C3 unoccluded(const V3& start, const V3& p, const LightSample& light, const Within& medium,
                 RandomStream stream);
   [[gnu::always_inline]] inline C3 through_boundaries(C3 value, const V3& start, const V3& p, const V3& d,
@@ -361,6 +379,9 @@ class PathTracer {
   Within medium_;
   bool looked_for_sky_ = false;   // true if look_for_sky() sampled a second direction at the first vertex
   bool first_in_medium_ = false;  // with F.split: true if the first scattering was in a medium
+  // Both with F.visibility. left_medium_: true if the last scattering was in a medium. direct_due_: true if
+  // add_direct() has to look for light in the direction of the current ray.
+  bool left_medium_ = false, direct_due_ = false;
   Vertex last_;
   SubpathDensities densities_;  // with F.connected: densities of the path up to the current vertex
   Connections connections_;
@@ -423,6 +444,9 @@ bool PathTracer<F, Light>::begin_at_meter(const CameraRay& ray) {
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::go_on(float t_max) {
   for (; segment_ < kMaxSegments; ++segment_, t_max = kInfinity) {
+    if constexpr (F.visibility) {
+      if (direct_due_) add_direct();
+    }
     std::optional<Flight> flown;
     if constexpr (kFliesFirst) {
       const Medium* const medium = std::isfinite(t_max) ? nullptr : clear_medium(medium_, ray_.start);
@@ -467,8 +491,9 @@ void PathTracer<F, Light>::go_on(float t_max) {
     }
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     if constexpr (F.visibility) {
-      if (depth_ == 0 && (surface.unseen || surface.holdout)) {
-        if (!sees_past(hit, surface)) break;
+      const bool hidden = surface.hidden.has(ray_kind());
+      if (hidden || (depth_ == 0 && surface.holdout)) {
+        if (!hidden && !sees_past(hit, surface)) break;
         pass_boundary(hit, surface);
         if (is_black(beta_)) break;
         continue;
@@ -519,7 +544,7 @@ template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::light_surface_by(const LightChoice& choice, const SurfaceHit& hit,
                                             const SurfaceInfo& surface, const V3& wo) {
   const auto light = world_.lights.sample(choice, hit.p);
-  if (!light) return;
+  if (!light || !receives(choice, RayKind::surface)) return;
   const V3 wi = hit.shading.to_local(light->direction);
   // A shading normal must not let light through a surface that is opaque by its geometric normal. Sampled
   // directions are checked in the same way (scatter_on_surface).
@@ -569,6 +594,7 @@ template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   if (!may_go_on(depth_ + 1, passed_)) return {Collision::absorbed};
   ++depth_;
+  if constexpr (F.visibility) left_medium_ = false;
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
   const V3 wo = hit.shading.to_local(-ray_.d);
   if constexpr (F.aimed)
@@ -618,6 +644,7 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   last_.place = {hit.p, hit.shading.n};
   last_.pdf = s->pdf;
   last_.delta = s->delta;
+  if constexpr (F.visibility) direct_due_ = direct_by_shadows();
   if constexpr (F.connected) {
     last_.ng = hit.ng;
     last_.sum = densities_sum([&] { return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), s->wi, wo).pdf; });
@@ -692,7 +719,12 @@ void PathTracer<F, Light>::pass_boundary(const SurfaceHit& hit, [[maybe_unused]]
 
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
-  if (depth_ == 0 && world_.hide_emitters) return;
+  if ((depth_ == 0 && world_.hide_emitters) || direct_by_shadows()) return;
+  add_emission_times(beta_, hit);
+}
+
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::add_emission_times(const C3& beta, const SurfaceHit& hit) {
   const C3 emitted = world_.lights.emitted(hit, -ray_.d);
   if (is_black(emitted)) return;
   float weight = 1;
@@ -707,13 +739,19 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
     }
     weight = balance_weight(last_.pdf, p_l * last_.in_medium.found_as_light(world_.lights.pivot(hit)));
   }
-  add(beta_ * emitted * weight, F.split ? world_.lights.group(hit) : kNoLightGroup);
+  add(beta * emitted * weight, F.split ? world_.lights.group(hit) : kNoLightGroup);
 }
 
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_environment() {
   if (!world_.lights.has_environment()) return;
   if (depth_ == 0 && world_.hide_environment) return add_environment_seen();
+  if constexpr (F.visibility) {
+    if (depth_ > 0 && world_.ray_flags) {
+      if (!direct_by_shadows()) add_environment_times(beta_);
+      return;
+    }
+  }
   if constexpr (F.reuse) {
     if (is_leaving_second()) {
       const Lights::EnvironmentParts parts = world_.lights.environment_parts(last_.p, ray_.d, last_.place);
@@ -790,3 +828,4 @@ bool PathTracer<F, Light>::survives(float u) {
 #include "worker/render/integrator/path_reuse.h"
 #include "worker/render/integrator/shadow_ray.h"
 #include "worker/render/integrator/vertex_connection.h"
+#include "worker/render/integrator/visibility.h"

@@ -69,11 +69,11 @@ Result<void> Lights::add_map(const Scene& scene, const EnvmapEmitter& emitter, c
 Result<void> Lights::add_emitter(const Scene& scene, const Emitter& emitter, const ImageLoader& images) {
   return std::visit(overloaded{[&](const ConstantEmitter& e) -> Result<void> {
                                  environment_ += color(e.radiance);
-                                 hides_sky_ = !e.visible_camera;
+                                 sky_hidden_ = hidden_from(e);
                                  return {};
                                },
                                [&](const EnvmapEmitter& e) {
-                                 hides_sky_ = !e.visible_camera;
+                                 sky_hidden_ = hidden_from(e);
                                  return add_map(scene, e, images);
                                },
                                [&](const GoniometricEmitter& e) -> Result<void> {
@@ -101,17 +101,24 @@ Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const Textu
       light->group = index;
     return index;
   };
+  const auto hide = [&](std::size_t first, RayKinds from) {
+    for (std::size_t light = first; light < l.lights_.size(); ++light) l.lights_[light].hidden = from;
+  };
   l.geometry_ = &geometry;
   l.textures_ = &textures;
   const SurfacePrimitives primitives(geometry);
   for (std::uint32_t i = 0; i < scene.shapes.size(); ++i) {
     const auto& emitter = scene.shapes[i].emitter;
     if (!emitter) continue;
+    const auto first = l.lights_.size();
     l.add_area(scene, i, primitives, geometry);
     group(emitter->light_group);
+    hide(first, hidden_from(scene.shapes[i]));
   }
   for (const Emitter& e : scene.emitters) {
+    const auto first = l.lights_.size();
     if (auto ok = l.add_emitter(scene, e, images); !ok) return tl::unexpected(ok.error());
+    hide(first, std::visit([](const auto& any) { return hidden_from(any); }, e));
     const LightGroup index = std::visit([&](const auto& any) { return group(any.light_group); }, e);
     if (std::holds_alternative<ConstantEmitter>(e) || std::holds_alternative<EnvmapEmitter>(e))
       l.sky_group_ = index;
@@ -233,11 +240,11 @@ Lights::EnvironmentParts Lights::environment_parts(const V3& x, const V3& direct
 }
 
 bool Lights::hides_environment() const {
-  return hides_sky_ || std::ranges::any_of(suns_, [&](std::uint32_t i) { return !sun(i).seen; });
+  return sky_hidden_.has(RayKind::camera) || std::ranges::any_of(suns_, [&](std::uint32_t i) { return !sun(i).seen; });
 }
 
 C3 Lights::environment_seen(const V3& direction) const {
-  C3 sum = hides_sky_ ? C3(0) : environment_ + sky_.radiance(direction);
+  C3 sum = sky_hidden_.has(RayKind::camera) ? C3(0) : environment_ + sky_.radiance(direction);
   for (const std::uint32_t i : suns_)
     if (sun(i).seen) sum += sun(i).found(direction, kInfinity, 1);
   return sum;

@@ -141,6 +141,7 @@ enum class Purpose : std::uint32_t {
   connect,
   track_connect,
   track_opacity,
+  track_direct,
   end  // not a purpose, but the number of purposes
 };
 
