@@ -486,4 +486,9 @@ struct Scene {
   bool operator==(const Scene&) const = default;
 };
 
+// True if the camera sees of the shape only the shadows on it.
+inline bool catches_shadows(const Scene& scene, const Shape& shape) {
+  return shape.shadow_catcher && scene.film.transparent && shape.visible_camera;
+}
+
 }  // namespace ls

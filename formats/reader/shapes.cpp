@@ -138,9 +138,13 @@ void Reader::read_geometry(const Element& e, T geometry) {
 
 // Rays pass a surface without a material anyhow, and the medium behind it stays visible to them.
 void Reader::check_visibility(Params& p, const Shape& shape) {
+  if (const Element* given = shape.holdout && shape.shadow_catcher ? p.given("shadow_catcher") : nullptr)
+    report_.error(given->at, fmt::format("{} is a holdout, which shows no shadow: remove 'holdout' or "
+                                         "'shadow_catcher'",
+                                         p.title()));
   if (shape.emitter || !std::holds_alternative<NullBsdf>(scene_.bsdfs[shape.bsdf.value])) return;
   const auto check = [&](const char* name, bool visible) {
-    if (const Element* given = visible ? nullptr : p.take(name))
+    if (const Element* given = visible ? nullptr : p.given(name))
       report_.error(given->at,
                     fmt::format("'{}' has no effect on {} with the bsdf \"null\": every ray passes this "
                                 "surface and enters its medium. Remove the parameter",

@@ -71,7 +71,7 @@ void Analyst::shapes() {
     n_.boundaries = n_.boundaries || null;
     n_.null_transmission = n_.null_transmission || (!null && traits && (*traits)[s.bsdf.value].passes);
     n_.area_lights += s.emitter.has_value();
-    n_.flagged_shapes += !s.visible_camera || s.holdout;
+    n_.flagged_shapes += !s.visible_camera || s.holdout || catches_shadows(s_, s);
     n_.ray_flags += !s.visible_shadow || !s.visible_reflection || !s.visible_volume;
   }
 }
@@ -213,7 +213,8 @@ class Words {
     say("blends", count<BlendBsdf>(n_.materials), "materials");
     say("surfaces that let light pass straight on", n_.null_transmission,
         "masks or thin sheets: shadow rays collect", "no masks or thin sheets");
-    say("visibility by the camera", n_.flagged_shapes, "shapes hidden from the camera or held out");
+    say("visibility by the camera", n_.flagged_shapes,
+        "shapes hidden from the camera, held out or that catch shadows");
     say("visibility by other rays", n_.ray_flags, "shapes and lamps hidden from shadow or scattered rays");
     say("normal maps", count<NormalMapBsdf, BumpMapBsdf>(n_.materials), "normal and bump maps");
   }

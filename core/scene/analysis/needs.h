@@ -35,7 +35,8 @@ struct Needs {
   bool boundaries = false, null_transmission = false;
   bool lens = false, crop = false;
   bool transparent_film = false;
-  std::uint32_t flagged_shapes = 0;  // number of shapes that the camera does not see, or that are held out
+  // Number of shapes that the camera does not see, that are held out or that catch shadows
+  std::uint32_t flagged_shapes = 0;
   // Number of shapes that shadow rays or scattered rays do not meet, and of emitters whose light does not
   // reach all surfaces and media
   std::uint32_t ray_flags = 0;

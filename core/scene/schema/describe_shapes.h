@@ -95,6 +95,11 @@ void describe(V& v, T& s) {
               "media in front. Not in Mitsuba",
        .elided = true},
       s.holdout);
+  v.field({.name = "shadow_catcher",
+           .doc = "with a `transparent` film, the camera sees of it only the shadows on it: black, with an "
+                  "alpha of the share of direct light that is missing. Not in Mitsuba",
+           .elided = true},
+          s.shadow_catcher);
   v.field(on_unless_given("visible_shadow",
                           "whether rays to lamps meet it; if not, it casts no shadow in direct light. Not in "
                           "Mitsuba"),

@@ -40,6 +40,7 @@ struct SurfaceInfo {
   bool null = false;  // index-matched: rays pass straight through
   RayKinds hidden;       // rays of these kinds pass straight through the surface
   bool holdout = false;  // camera rays that do not pass the surface end there without light
+  bool catcher = false;  // true for some holdouts: shadows on the surface are seen (AOV shadow_catcher)
   // True if part of the light passes straight through (BsdfTable::null_transmission)
   bool null_transmission = false;
   // For meshes: `normals` is true if the vertices have normals, `uvs` if they have uvs.

@@ -214,7 +214,8 @@ SurfaceInfo surface_info(const Scene& scene, const std::vector<scene::BsdfTraits
   info.null_transmission = !info.null && traits.at(s.bsdf.value).passes;
   info.transition = s.is_medium_transition;
   info.hidden = hidden_from(s);
-  info.holdout = s.holdout;
+  info.catcher = catches_shadows(scene, s);
+  info.holdout = s.holdout || info.catcher;
   info.crossed = info.null || info.hidden.any() || traits.at(s.bsdf.value).transmits;
   if (s.interior) info.interior = s.interior->value;
   if (s.exterior) info.exterior = s.exterior->value;

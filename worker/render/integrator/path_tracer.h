@@ -67,6 +67,12 @@ constexpr float forced_survival(int depth) {
   return static_cast<float>(depth) / static_cast<float>(depth + 1);
 }
 
+// Where shadow rays and scattered rays may meet different surfaces (visibility.h), light from a direction that
+// a surface samples with more than this density, per steradian, is that which the scattered ray meets, as in a
+// mirror. Diffuse surfaces are far below, at most 1 / pi; the peak of a lobe of roughness alpha is about 1 / (4
+// pi alpha^2).
+inline constexpr float kLikeMirror = 1;
+
 enum class Collision : std::uint8_t {
   escaped,    // the path reached the end of the segment
   absorbed,   // the path ends here
@@ -208,8 +214,19 @@ class PathTracer {
   }
   // True if shadow rays alone find the light that arrives at the last vertex.
   bool direct_by_shadows() const {
-    if constexpr (F.visibility) return world_.direct_by_shadows && depth_ > 0 && !last_.delta;
+    if constexpr (F.visibility)
+      return world_.direct_by_shadows && depth_ > 0 && !last_.delta && !like_mirror_;
     return false;
+  }
+  // True if light from a direction that a surface samples with this density is not looked for by shadow rays.
+  bool is_like_mirror(float pdf) const {
+    if constexpr (F.visibility) return world_.direct_by_shadows && pdf > kLikeMirror;
+    return false;
+  }
+  // True if lights that the current ray hits have full weight.
+  bool hits_count_fully() const {
+    if constexpr (F.visibility) return last_.delta || like_mirror_;
+    return last_.delta;
   }
   // True if what scatters rays of this kind (surfaces or media) receives the chosen light.
   bool receives(const LightChoice& choice, RayKind kind) const {
@@ -218,6 +235,8 @@ class PathTracer {
   }
   [[gnu::cold, gnu::noinline]] void add_environment_times(const C3& beta);
   [[gnu::cold, gnu::noinline]] void add_direct();
+  [[gnu::cold, gnu::noinline]] C3 shadow_at(const SurfaceHit& hit);
+  bool meets_catcher(const V3& p, const LightSample& light) const;
   C3 unoccluded(const V3& start, const V3& p, const LightSample& light, const Within& medium,
                 RandomStream stream);
   [[gnu::always_inline]] inline C3 through_boundaries(C3 value, const V3& start, const V3& p, const V3& d,
@@ -382,6 +401,8 @@ class PathTracer {
   // Both with F.visibility. left_medium_: true if the last scattering was in a medium. direct_due_: true if
   // add_direct() has to look for light in the direction of the current ray.
   bool left_medium_ = false, direct_due_ = false;
+  // With F.visibility: true if the last direction was scattered as if by a mirror (is_like_mirror)
+  bool like_mirror_ = false;
   Vertex last_;
   SubpathDensities densities_;  // with F.connected: densities of the path up to the current vertex
   Connections connections_;
@@ -550,7 +571,7 @@ void PathTracer<F, Light>::light_surface_by(const LightChoice& choice, const Sur
   // directions are checked in the same way (scatter_on_surface).
   if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0)) return;
   const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, wi);
-  if (is_black(f.f_cos)) return;
+  if (is_black(f.f_cos) || (!light->delta && is_like_mirror(f.pdf))) return;
   float sampled = f.pdf;
   if constexpr (F.aimed) sampled = near_lamps_.pdf(f.pdf, light->direction);
   const float weight = light->delta ? 1 : balance_weight(light->pdf, sampled);
@@ -644,7 +665,12 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   last_.place = {hit.p, hit.shading.n};
   last_.pdf = s->pdf;
   last_.delta = s->delta;
-  if constexpr (F.visibility) direct_due_ = direct_by_shadows();
+  if constexpr (F.visibility) {
+    float pdf = s->pdf;
+    if constexpr (F.aimed) pdf *= aim_;
+    like_mirror_ = !s->delta && is_like_mirror(pdf);
+    direct_due_ = direct_by_shadows();
+  }
   if constexpr (F.connected) {
     last_.ng = hit.ng;
     last_.sum = densities_sum([&] { return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), s->wi, wo).pdf; });
@@ -728,7 +754,7 @@ void PathTracer<F, Light>::add_emission_times(const C3& beta, const SurfaceHit& 
   const C3 emitted = world_.lights.emitted(hit, -ray_.d);
   if (is_black(emitted)) return;
   float weight = 1;
-  if (!last_.delta) {
+  if (!hits_count_fully()) {
     const float p_l =
         world_.lights.pdf(hit, last_.p, ray_.d, last_.place, last_.in_medium.light_chosen_first());
     if constexpr (F.reuse) {

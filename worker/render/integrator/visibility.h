@@ -5,9 +5,11 @@
 // So a direction may be free for shadow rays and blocked for scattered rays, or the other way round, and
 // next-event estimation and scattered rays that hit a light would estimate different integrals. Where that is
 // possible (World::direct_by_shadows), the integral is the one that shadow rays see. Scattered rays then bring
-// no light straight from a light, unless they were scattered as by a mirror; instead add_direct() walks along
-// each of their directions as a shadow ray does, and adds what lights there give, weighted against next-event
-// estimation as usual.
+// no light straight from a light; instead add_direct() walks along each of their directions as a shadow ray
+// does, and adds what lights there give, weighted against next-event estimation as usual. Excepted are mirrors
+// and, of glossy surfaces, directions of a high density (kLikeMirror): there the scattered ray's hit alone
+// counts, and next-event estimation adds nothing. Otherwise a glossy floor would show the shadow of a shape
+// that is missing in its reflections.
 #pragma once
 
 #include <cmath>
@@ -83,7 +85,7 @@ void PathTracer<F, Light>::add_direct() {
 // receives.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_environment_times(const C3& beta) {
-  const float pdf = last_.delta ? kInfinity : last_.pdf / last_.in_medium.found_as_light();
+  const float pdf = hits_count_fully() ? kInfinity : last_.pdf / last_.in_medium.found_as_light();
   C3 light(0);
   world_.lights.environment_seen_from(ray_kind(), last_.p, ray_.d, pdf, last_.place,
                                       [&](LightGroup group, const C3& part) {

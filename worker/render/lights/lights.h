@@ -137,6 +137,8 @@ class Lights {
     for (const std::uint32_t i : suns_)
       if (sun(i).seen) f(group(i), sun(i).found(direction, kInfinity, 1));
   }
+  // True if rays of this kind do not see the environment map or the constant environment.
+  bool hides_sky(RayKind from) const { return sky_hidden_.has(from); }
   bool hides_environment() const;  // true if visible_camera of one of these lights is false
   // The radiance of the constant environment; black while portals are set, since the constant environment is
   // then a part of the sky, which is sampled as a light.

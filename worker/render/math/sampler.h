@@ -142,6 +142,8 @@ enum class Purpose : std::uint32_t {
   track_connect,
   track_opacity,
   track_direct,
+  shadow_catcher,
+  track_shadow_catcher,
   end  // not a purpose, but the number of purposes
 };
 

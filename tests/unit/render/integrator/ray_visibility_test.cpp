@@ -36,8 +36,9 @@ void expect_same_mean(const SceneBuilder& a, const SceneBuilder& b, const std::s
                     0x1p-16 * y.mean[c])
         << where << ", channel " << c;
 }
-void expect_darker(const SceneBuilder& a, const SceneBuilder& b, const std::string& where) {
-  const Estimate x = estimate(a, kMany, 1), y = estimate(b, kMany, 2);
+void expect_darker(const SceneBuilder& a, const SceneBuilder& b, const std::string& where,
+                   std::uint64_t samples = kMany) {
+  const Estimate x = estimate(a, samples, 1), y = estimate(b, samples, 2);
   EXPECT_LT(x.mean[1], y.mean[1] - test::kStandardErrors * std::hypot(x.standard_error[1], y.standard_error[1]))
       << where;
 }
@@ -128,6 +129,13 @@ TEST(RayVisibility, ShapeHiddenFromScatteredRaysAloneKeepsItsShadow) {
     }
 }
 
+BsdfIndex metal(SceneBuilder& builder, double alpha) {
+  RoughConductorBsdf b;
+  b.alpha_u = b.alpha_v = builder.texture({alpha, alpha, alpha});
+  b.specular_reflectance = builder.texture({1, 1, 1});
+  return builder.bsdf(b);
+}
+
 // A constant environment is found by scattered rays alone; the same one as an image by shadow rays, too.
 TEST(RayVisibility, ScatteredRaysAndShadowRaysFindTheSameLight) {
   SceneBuilder sky = floor_under(kLights[4]);
@@ -135,10 +143,7 @@ TEST(RayVisibility, ScatteredRaysAndShadowRaysFindTheSameLight) {
   Shape& lid = sky.shape(RectangleShape{}, translate({-1, 0, 1.5}), sky.diffuse(.5));
   lid.visible_reflection = lid.visible_camera = false;
   sky.scene.integrator.max_depth = 4;
-  RoughConductorBsdf metal;
-  metal.alpha_u = metal.alpha_v = sky.texture({.3, .3, .3});
-  metal.specular_reflectance = sky.texture({1, 1, 1});
-  sky.scene.shapes[0].bsdf = sky.bsdf(metal);
+  sky.scene.shapes[0].bsdf = metal(sky, .15);  // the lobe crosses kLikeMirror
   SceneBuilder image = sky;
   image.scene.emitters.clear();
   test::add_sky(image, test::SkyImage(8, 4, 1));
@@ -158,6 +163,21 @@ TEST(RayVisibility, MirrorDoesNotShowAShapeHiddenFromScatteredRays) {
   expect_darker(seen, bare, "mirror");
   expect_same_samples(hidden, bare, "hidden from scattered rays");
   expect_same_samples(shadowless, seen, "hidden from shadow rays");
+}
+
+// Of a Beckmann lobe of roughness .02, the share of 4 pi .02^2 = .5 % lies where the density is below 1, and
+// there shadows count.
+TEST(RayVisibility, GlossyFloorShowsNeitherAHiddenShapeNorItsShadow) {
+  SceneBuilder bare = floor_under(kLights[4]);
+  bare.scene.shapes[0].bsdf = metal(bare, .02);
+  SceneBuilder seen = bare, hidden = bare;
+  ball(seen);
+  ball(hidden).visible_reflection = false;
+
+  const Estimate b = estimate(bare, kMany), h = estimate(hidden, kMany), s = estimate(seen, kMany);
+
+  EXPECT_NEAR(h.mean[1], b.mean[1], .006 * b.mean[1]);
+  EXPECT_LT(s.mean[1], .95 * b.mean[1]);
 }
 
 TEST(RayVisibility, ShapeHiddenFromAllRaysIsNotThere) {
@@ -203,7 +223,7 @@ TEST(RayVisibility, ShapeHiddenFromShadowRaysCastsNoShaft) {
         ball(lit).visible_shadow = false;
         ball(seen).visible_volume = false;
 
-        expect_darker(shaded, bare, where);
+        expect_darker(shaded, bare, where, 16 * kMany);
         expect_same_mean(lit, bare, where);
         expect_same_mean(seen, shaded, where);
       }
