@@ -289,7 +289,10 @@ bool is_our_parameter(std::string_view tag, std::string_view plugin, std::string
     std::vector<std::string_view> parameters;
   };
   static const std::vector<Ours> all = {
-      {"shape", "", {"flat_without_normals", "visible_camera", "holdout", "shadow_catcher", "visible_shadow", "visible_reflection", "visible_volume"}},
+      {"shape",
+       "",
+       {"flat_without_normals", "visible_camera", "holdout", "shadow_catcher", "visible_shadow",
+        "visible_reflection", "visible_volume"}},
       {"shape", "obj", {"shape_index"}},
       {"shape", "ply", {"shape_index"}},
       {"bsdf", "", {"multiple_scattering"}},

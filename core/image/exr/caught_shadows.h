@@ -10,8 +10,9 @@
 namespace ls {
 
 // A shadow takes the share 1 - L/U of the light of a plate that reaches the camera, T. The AOV shadow_catcher
-// has sums of T and, both times T, of the direct light on the catcher (L) and of what it would be without other
-// shapes and media (U). The quotient is that of the sums, not a mean of quotients, which would be biased.
+// has sums of T and, both times T, of the direct light on the catcher (L) and of what it would be without
+// other shapes and media (U). The quotient is that of the sums, not a mean of quotients, which would be
+// biased.
 class CaughtShadows {
  public:
   // `tile` must outlive this.

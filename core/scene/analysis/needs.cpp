@@ -110,8 +110,7 @@ void Analyst::lights() {
   bool extended = n_.area_lights > 0;
   for (const Emitter& e : s_.emitters) {
     ++n_.lights[kind_of(e)];
-    n_.ray_flags +=
-        std::visit([](const auto& l) { return !l.visible_reflection || !l.visible_volume; }, e);
+    n_.ray_flags += std::visit([](const auto& l) { return !l.visible_reflection || !l.visible_volume; }, e);
     extended = extended || !traits_of(e, s_.textures).delta;
   }
   n_.only_delta_lights = !extended && !s_.emitters.empty();

@@ -37,7 +37,7 @@ struct SurfaceInfo {
   // True if the surface is not closed: it has an edge, or it encloses a volume only together with other
   // surfaces.
   bool sheet = false;
-  bool null = false;  // index-matched: rays pass straight through
+  bool null = false;     // index-matched: rays pass straight through
   RayKinds hidden;       // rays of these kinds pass straight through the surface
   bool holdout = false;  // camera rays that do not pass the surface end there without light
   bool catcher = false;  // true for some holdouts: shadows on the surface are seen (AOV shadow_catcher)

@@ -30,8 +30,8 @@ constexpr AovSet kOfLight = AovSet{}
                                 .with(Aov::volume)
                                 .with(Aov::volume_light_groups);
 constexpr AovSet kOfGuide = AovSet{}.with(Aov::denoising_albedo).with(Aov::denoising_normal);
-constexpr AovSet kOfOpacity = AovSet{}.with(Aov::alpha).with(Aov::opacity).with(Aov::volume_opacity).with(
-    Aov::shadow_catcher);
+constexpr AovSet kOfOpacity =
+    AovSet{}.with(Aov::alpha).with(Aov::opacity).with(Aov::volume_opacity).with(Aov::shadow_catcher);
 static_assert((kOfSurface.bits() ^ kOfLight.bits() ^ kOfGuide.bits() ^ kOfOpacity.bits()) ==
               (1u << kAovs) - 1);
 

@@ -62,7 +62,8 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
     }
     if (!met || is_black(beta_)) break;
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    if (surface.hidden.has(direct ? RayKind::camera : RayKind::surface) || surface.null || (surface.null_transmission && passes_null(hit))) {
+    if (surface.hidden.has(direct ? RayKind::camera : RayKind::surface) || surface.null ||
+        (surface.null_transmission && passes_null(hit))) {
       pass_boundary(hit, surface);
       continue;
     }
@@ -121,9 +122,9 @@ Opacity PathTracer<F, Light>::opacity(const CameraRay& ray) {
 }
 
 // Returns one sample of Opacity::shadow at a shadow catcher, for a share of 1. The light is the irradiance on
-// the side that the camera sees: of a light that is chosen as by next-event estimation, and of the part of the
-// environment that is not sampled as a light. Other catchers keep their light in both estimates, since their
-// shadows are in the picture that the image will be laid over.
+// the side that the camera sees: of a light that is chosen as by next-event estimation, and of the part of
+// the environment that is not sampled as a light. Other catchers keep their light in both estimates, since
+// their shadows are in the picture that the image will be laid over.
 template <Features F, template <Features> class Light>
 C3 PathTracer<F, Light>::shadow_at(const SurfaceHit& hit) {
   const auto to_viewer = [&](const V3& n) { return dot(n, ray_.d) > 0 ? -n : n; };

@@ -67,10 +67,10 @@ constexpr float forced_survival(int depth) {
   return static_cast<float>(depth) / static_cast<float>(depth + 1);
 }
 
-// Where shadow rays and scattered rays may meet different surfaces (visibility.h), light from a direction that
-// a surface samples with more than this density, per steradian, is that which the scattered ray meets, as in a
-// mirror. Diffuse surfaces are far below, at most 1 / pi; the peak of a lobe of roughness alpha is about 1 / (4
-// pi alpha^2).
+// Where shadow rays and scattered rays may meet different surfaces (visibility.h), light from a direction
+// that a surface samples with more than this density, per steradian, is that which the scattered ray meets,
+// as in a mirror. Diffuse surfaces are far below, at most 1 / pi; the peak of a lobe of roughness alpha is
+// about 1 / (4 pi alpha^2).
 inline constexpr float kLikeMirror = 1;
 
 enum class Collision : std::uint8_t {

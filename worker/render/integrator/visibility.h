@@ -4,12 +4,12 @@
 // A ray passes a surface that is hidden from its kind as if the surface were not there; media behind it stay.
 // So a direction may be free for shadow rays and blocked for scattered rays, or the other way round, and
 // next-event estimation and scattered rays that hit a light would estimate different integrals. Where that is
-// possible (World::direct_by_shadows), the integral is the one that shadow rays see. Scattered rays then bring
-// no light straight from a light; instead add_direct() walks along each of their directions as a shadow ray
-// does, and adds what lights there give, weighted against next-event estimation as usual. Excepted are mirrors
-// and, of glossy surfaces, directions of a high density (kLikeMirror): there the scattered ray's hit alone
-// counts, and next-event estimation adds nothing. Otherwise a glossy floor would show the shadow of a shape
-// that is missing in its reflections.
+// possible (World::direct_by_shadows), the integral is the one that shadow rays see. Scattered rays then
+// bring no light straight from a light; instead add_direct() walks along each of their directions as a shadow
+// ray does, and adds what lights there give, weighted against next-event estimation as usual. Excepted are
+// mirrors and, of glossy surfaces, directions of a high density (kLikeMirror): there the scattered ray's hit
+// alone counts, and next-event estimation adds nothing. Otherwise a glossy floor would show the shadow of a
+// shape that is missing in its reflections.
 #pragma once
 
 #include <cmath>
@@ -65,8 +65,8 @@ void PathTracer<F, Light>::add_direct() {
     if (!surface.hidden.has(RayKind::shadow)) {
       if (!surface.null && !surface.null_transmission) return;
       if (surface.null_transmission) {
-        beta *=
-            world_.bsdfs.null_transmission(surface.bsdf, hit.uv_point(), hit.shading.to_local(-ray.d)).transmission;
+        beta *= world_.bsdfs.null_transmission(surface.bsdf, hit.uv_point(), hit.shading.to_local(-ray.d))
+                    .transmission;
         if (is_black(beta)) return;
       }
       if (!may_go_on(depth_, ++passed)) return;

@@ -240,7 +240,8 @@ Lights::EnvironmentParts Lights::environment_parts(const V3& x, const V3& direct
 }
 
 bool Lights::hides_environment() const {
-  return sky_hidden_.has(RayKind::camera) || std::ranges::any_of(suns_, [&](std::uint32_t i) { return !sun(i).seen; });
+  return sky_hidden_.has(RayKind::camera) ||
+         std::ranges::any_of(suns_, [&](std::uint32_t i) { return !sun(i).seen; });
 }
 
 C3 Lights::environment_seen(const V3& direction) const {

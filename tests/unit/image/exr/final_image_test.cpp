@@ -295,8 +295,8 @@ TEST(FinalExr, HasAlphaWithItsStandardError) {
   EXPECT_EQ(image.channels.count("alpha.A"), 0u);
 }
 
-// The opacity .25 of half A and .5 of half B; the shadow takes 1/4 of the light by half A, and 3/4 of half of the
-// light by half B. Both halves together: 3/8 + 3/4 (1 - 1 / 2).
+// The opacity .25 of half A and .5 of half B; the shadow takes 1/4 of the light by half A, and 3/4 of half of
+// the light by half B. Both halves together: 3/8 + 3/4 (1 - 1 / 2).
 TEST(FinalExr, AddsTheShadowsOnShadowCatchersToAlphaAndOpacity) {
   Partial p = flat(kFinalGrid, 0, {1, 1, 1});
   p.aovs = AovSet{}.with(Aov::alpha).with(Aov::opacity).with(Aov::shadow_catcher).with(Aov::volume_opacity);

@@ -122,7 +122,8 @@ TEST(ShadowCatcher, IsCoveredByFogInFront) {
   EXPECT_NEAR(alpha_of(builder).value, 1, 4 * kClose);
 }
 
-// A disk of radius r at the height h above a point takes r^2 / (r^2 + h^2) of the irradiance of a constant sky.
+// A disk of radius r at the height h above a point takes r^2 / (r^2 + h^2) of the irradiance of a constant
+// sky.
 TEST(ShadowCatcher, ShowsTheShadowOfADiskUnderTheSky) {
   for (const bool image : {false, true}) {
     SceneBuilder builder = floor_at(0);

@@ -96,9 +96,10 @@ TEST(ReadVisibility, IsKeptAndLeavesOtherScenesAsTheyAre) {
 TEST(ReadVisibility, OfABoundaryWithoutASurfaceIsRefused) {
   for (const char* name : {"visible_shadow", "visible_reflection", "visible_volume"}) {
     const auto shape = [&](std::string_view value, std::string_view more) {
-      return wrong_with(fmt::format("<shape type=\"cube\">\n<boolean name=\"{}\" value=\"{}\"/>"
-                                               "<bsdf type=\"null\"/>{}</shape>",
-                                               name, value, more));
+      return wrong_with(
+          fmt::format("<shape type=\"cube\">\n<boolean name=\"{}\" value=\"{}\"/>"
+                      "<bsdf type=\"null\"/>{}</shape>",
+                      name, value, more));
     };
     const std::string fog = R"(<medium name="interior" type="homogeneous"/>)";
     EXPECT_THAT(shape("false", fog), HasSubstr(fmt::format("'{}' has no effect on shape \"cube\"", name)));
