@@ -59,11 +59,6 @@ const Element* Params::take(std::string_view name) {
   return nullptr;
 }
 
-const Element* Params::given(std::string_view name) const {
-  const auto at = std::ranges::find(children_, name, &Child::name);
-  return at == children_.end() ? nullptr : at->element;
-}
-
 std::vector<Params::Nested> Params::take_nested(std::string_view tag, Names names) {
   std::vector<Nested> out;
   for (Child& c : children_)

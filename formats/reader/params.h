@@ -26,8 +26,6 @@ class Params {
   // Returns the child of that name (a property, an object or a reference), and marks it as taken. nullptr:
   // there is none. From then on, a message about an unknown parameter may suggest this name.
   const Element* take(std::string_view name);
-  // Returns the child of that name, taken or not; nullptr: there is none.
-  const Element* given(std::string_view name) const;
   // A nested object that was not taken by name. `use` is the element in the parent: the object itself, or a
   // reference to it.
   struct Nested {

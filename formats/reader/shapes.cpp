@@ -11,6 +11,16 @@
 #include "formats/xml/transform_element.h"
 
 namespace ls::scene {
+namespace {
+
+// Returns the child that gives this parameter; nullptr: there is none.
+const Element* parameter_of(const Element& object, std::string_view name) {
+  const auto at =
+      std::ranges::find_if(object.children, [&](const Element& child) { return child.get("name") == name; });
+  return at == object.children.end() ? nullptr : &*at;
+}
+
+}  // namespace
 
 void Reader::read_shape(const Element& e) {
   const std::string_view type = e.get("type");
@@ -138,13 +148,14 @@ void Reader::read_geometry(const Element& e, T geometry) {
 
 // Rays pass a surface without a material anyhow, and the medium behind it stays visible to them.
 void Reader::check_visibility(Params& p, const Shape& shape) {
-  if (const Element* given = shape.holdout && shape.shadow_catcher ? p.given("shadow_catcher") : nullptr)
+  if (const Element* given =
+          shape.holdout && shape.shadow_catcher ? parameter_of(p.object(), "shadow_catcher") : nullptr)
     report_.error(given->at, fmt::format("{} is a holdout, which shows no shadow: remove 'holdout' or "
                                          "'shadow_catcher'",
                                          p.title()));
   if (shape.emitter || !std::holds_alternative<NullBsdf>(scene_.bsdfs[shape.bsdf.value])) return;
   const auto check = [&](const char* name, bool visible) {
-    if (const Element* given = visible ? nullptr : p.given(name))
+    if (const Element* given = visible ? nullptr : parameter_of(p.object(), name))
       report_.error(given->at,
                     fmt::format("'{}' has no effect on {} with the bsdf \"null\": every ray passes this "
                                 "surface and enters its medium. Remove the parameter",

@@ -93,6 +93,20 @@ TEST(ReadVisibility, IsKeptAndLeavesOtherScenesAsTheyAre) {
                    .film.transparent);
 }
 
+TEST(ReadVisibility, OfAHoldoutThatCatchesShadowsIsRefusedWithItsPlace) {
+  const std::string holdout = "<boolean name=\"holdout\" value=\"true\"/>",
+                    catcher = "\n  <boolean name=\"shadow_catcher\" value=\"true\"/>";
+  const Scene s = must_read(with_sensor("<shape type=\"cube\">" + catcher + "</shape>"));
+  EXPECT_TRUE(s.shapes[0].shadow_catcher);
+  expect_kept(s);
+
+  const ReadResult r = read(with_sensor("<shape type=\"cube\">" + holdout + catcher + "</shape>"));
+  ASSERT_EQ(r.diagnostics.size(), 1u) << messages(r);
+  EXPECT_THAT(r.diagnostics[0].text, HasSubstr("is a holdout, which shows no shadow"));
+  EXPECT_GT(r.diagnostics[0].place.line, 1);
+  EXPECT_EQ(r.diagnostics[0].place.column, 4);
+}
+
 TEST(ReadVisibility, OfABoundaryWithoutASurfaceIsRefused) {
   for (const char* name : {"visible_shadow", "visible_reflection", "visible_volume"}) {
     const auto shape = [&](std::string_view value, std::string_view more) {
