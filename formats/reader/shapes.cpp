@@ -153,7 +153,9 @@ void Reader::check_visibility(Params& p, const Shape& shape) {
     report_.error(given->at, fmt::format("{} is a holdout, which shows no shadow: remove 'holdout' or "
                                          "'shadow_catcher'",
                                          p.title()));
-  if (shape.emitter || !std::holds_alternative<NullBsdf>(scene_.bsdfs[shape.bsdf.value])) return;
+  // A bsdf that could not be read is not in the list.
+  const bool known = shape.bsdf.value < scene_.bsdfs.size();
+  if (shape.emitter || !known || !std::holds_alternative<NullBsdf>(scene_.bsdfs[shape.bsdf.value])) return;
   const auto check = [&](const char* name, bool visible) {
     if (const Element* given = visible ? nullptr : parameter_of(p.object(), name))
       report_.error(given->at,
