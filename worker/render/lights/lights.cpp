@@ -94,15 +94,14 @@ Result<void> Lights::add_emitter(const Scene& scene, const Emitter& emitter, con
 Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const TextureTable& textures,
                              const ImageLoader& images, std::span<const std::string> light_groups) {
   Lights l;
-  // Sets the group of the lights that were added last, as it has none yet.
-  const auto group = [&](const std::string& name) {
-    const LightGroup index = light_group_of(light_groups, name);
-    for (auto light = l.lights_.rbegin(); light != l.lights_.rend() && light->group == kNoLightGroup; ++light)
-      light->group = index;
-    return index;
-  };
-  const auto hide = [&](std::size_t first, RayKinds from) {
-    for (std::size_t light = first; light < l.lights_.size(); ++light) l.lights_[light].hidden = from;
+  // Sets the group and the receivers of the lights from `first` on.
+  const auto mark = [&](std::size_t first, const std::string& name, RayKinds hidden) {
+    const LightGroup group = light_group_of(light_groups, name);
+    for (std::size_t light = first; light < l.lights_.size(); ++light) {
+      l.lights_[light].group = group;
+      l.lights_[light].hidden = hidden;
+    }
+    return group;
   };
   l.geometry_ = &geometry;
   l.textures_ = &textures;
@@ -112,14 +111,13 @@ Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const Textu
     if (!emitter) continue;
     const auto first = l.lights_.size();
     l.add_area(scene, i, primitives, geometry);
-    group(emitter->light_group);
-    hide(first, hidden_from(scene.shapes[i]));
+    mark(first, emitter->light_group, hidden_from(scene.shapes[i]));
   }
   for (const Emitter& e : scene.emitters) {
     const auto first = l.lights_.size();
     if (auto ok = l.add_emitter(scene, e, images); !ok) return tl::unexpected(ok.error());
-    hide(first, std::visit([](const auto& any) { return hidden_from(any); }, e));
-    const LightGroup index = std::visit([&](const auto& any) { return group(any.light_group); }, e);
+    const LightGroup index =
+        std::visit([&](const auto& any) { return mark(first, any.light_group, hidden_from(any)); }, e);
     if (std::holds_alternative<ConstantEmitter>(e) || std::holds_alternative<EnvmapEmitter>(e))
       l.sky_group_ = index;
   }
