@@ -118,9 +118,9 @@ def instructions(binary, scene, folder):
 # By name: the flags of worker/render/base/features.h in their order, without those that are not set at the end.
 INSTANTIATIONS = {"surfaces": (), "surfaces that light passes": (0, 0, 0, 0, 0, 1), "homogeneous grey media": (1, 0, 0, 0, 0, 1),
                   "homogeneous chromatic media": (1, 0, 1, 0, 0, 1), "grey grids": (1, 1, 0, 0, 0, 1), "chromatic grids": (1, 1, 1, 0, 0, 1),
-                  "everything": (1, 1, 1, 1, 1, 1), "everything, and light in parts": (1, 1, 1, 1, 1, 1, 1),
-                  "homogeneous grey media, aimed": (1, 0, 0, 0, 0, 1, 0, 1), "grey grids, aimed": (1, 1, 0, 0, 0, 1, 0, 1),
-                  "everything, aimed": (1, 1, 1, 1, 1, 1, 0, 1), "everything, aimed, and light in parts": (1, 1, 1, 1, 1, 1, 1, 1)}
+                  "everything": (1, 1, 1, 1, 1, 1), "everything, and light in parts": (1, 1, 1, 1, 1, 1, 1, 1),
+                  "homogeneous grey media, aimed": (1, 0, 0, 0, 0, 1, 0, 0, 1), "grey grids, aimed": (1, 1, 0, 0, 0, 1, 0, 0, 1),
+                  "everything, aimed": (1, 1, 1, 1, 1, 1, 0, 0, 1), "everything, aimed, and light in parts": (1, 1, 1, 1, 1, 1, 1, 1, 1)}
 
 
 def inclusive(callgrind):

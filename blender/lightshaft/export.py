@@ -8,10 +8,11 @@ from . import meshes
 from .camera import add_camera, may_see
 from .document import Document, element, reference
 from .light_groups import LightGroups
-from .lights import add_light, only_if_hidden
+from .lights import add_light
 from .materials import Materials, Owner
 from .problems import Problems
 from .textures import Textures
+from .visibility import visibility_of
 from .volumes import Volumes
 from .world import add_world
 
@@ -26,7 +27,7 @@ class Shape:
     def __init__(self, filenames, bsdf, emission, medium, flags, group):
         self.filenames, self.bsdf, self.emission, self.medium = filenames, bsdf, emission, medium
         self.group = group  # light group of the emission, or None
-        self.flags = flags  # parameters about what the camera sees
+        self.flags = flags  # parameters about what rays meet the shape
         self.tree = None
 
 
@@ -47,18 +48,23 @@ class Exporter:
         self.override = self.layer.material_override
         self.groups = LightGroups(self.problems)
         self.known, self.places, self.bodies = {}, {}, []
+        self.catchers, self.dim = False, []  # whether objects catch shadows; lights that do not light those
 
     def run(self):
         camera = self.scene.camera
         if camera is None:
             self.problems.error("The scene has no camera. Add one (Shift A > Camera)")
             self.problems.raise_errors()
-        self.check_collections(self.layer.layer_collection)
         for group in self.layer.lightgroups:
             self.groups.add(group.name)
         for instance in self.depsgraph.object_instances:
             if instance.show_self:
-                self.add(instance.object, instance.matrix_world.copy())
+                parent = instance.parent if instance.is_instance else None
+                self.add(instance.object, parent, instance.matrix_world.copy())
+        for name in self.dim if self.catchers else ():
+            self.problems.unsupported(
+                f"light '{name}': Shadow Catcher off. All lights light shadow catchers: switch it on in Object properties > Visibility"
+            )
         self.place_meshes()
         world = self.layer.world_override or self.scene.world
         add_world(self.document, self.problems, self.textures, world, self.groups)
@@ -69,14 +75,15 @@ class Exporter:
         self.problems.raise_errors()
         return self.document.save(), self.document, self.problems.warnings
 
-    def add(self, item, matrix):
+    def add(self, item, parent, matrix):
         name = item.name
         if item.type in UNSEEN:
             return
-        self.check_visibility(item)
+        visible = visibility_of(self.problems, item, parent, self.depsgraph.view_layer)
+        self.check_visibility(item, visible)
         if item.type == "LIGHT":
             group = self.groups.of(item)
-            add_light(self.document, self.problems, item, matrix, Matrix, self.may_see, group)
+            add_light(self.document, self.problems, item, matrix, Matrix, self.may_see, group, visible)
         elif item.type == "VOLUME":
             self.add_grid(item, matrix)
         elif item.type in MESHES:
@@ -100,12 +107,11 @@ class Exporter:
                 item.original.data.as_pointer(),
                 len(item.modifiers) and item.original.as_pointer(),
                 tuple(material_name(s) for s in item.material_slots),
-                item.visible_camera,
-                item.is_holdout,
+                visible.key(),
                 item.lightgroup,
             )
             if key not in self.known:
-                self.known[key] = self.shapes_of(item)
+                self.known[key] = self.shapes_of(item, visible)
             self.places.setdefault(key, []).append((name, matrix))
         else:
             self.problems.unsupported(
@@ -116,40 +122,29 @@ class Exporter:
         camera = self.scene.camera.evaluated_get(self.depsgraph)
         return may_see(camera, self.scene, self.size, centre, radius, Matrix)
 
-    def check_collections(self, layer):
-        """Reports Holdout and Indirect Only of collections, since the objects inside do not have these flags
-        themselves."""
-        if layer.exclude:
-            return
-        for name, on in (("Holdout", layer.holdout), ("Indirect Only", layer.indirect_only)):
-            if on and len(layer.collection.all_objects):
-                self.problems.unsupported(
-                    f"collection '{layer.collection.name}': {name}. Switch it off in the Outliner (Filter > Restriction Toggles)"
-                )
-        for child in layer.children:
-            self.check_collections(child)
-
-    def check_visibility(self, item):
+    def check_visibility(self, item, visible):
         kind = "light" if item.type == "LIGHT" else "object"
         where = "Object properties > Visibility"
-        # Of a light the second says that it lights shadow catchers, of which there are none here.
-        # Meshes and lights can be hidden from the camera, and meshes can be held out.
+        # Meshes and lights can be hidden from rays, and meshes can be held out or catch shadows.
         mesh = item.type in MESHES
-        if (item.is_holdout and not mesh) or (item.is_shadow_catcher and kind == "object"):
+        if (visible.holdout or visible.catcher) and not mesh:
             self.problems.unsupported(
                 f"{kind} '{item.name}': Holdout or Shadow Catcher. Switch it off in {where}"
             )
-        if item.is_holdout and mesh and not self.scene.render.film_transparent:
+        if visible.holdout and mesh and not self.scene.render.film_transparent:
             self.problems.warning(
                 f"object '{item.name}': Holdout leaves black where it is seen. Set Render Properties > Film > Transparent for alpha"
             )
-        rays = ["diffuse", "glossy", "transmission", "volume_scatter"]
-        if kind == "object":
-            rays += ["shadow"] if mesh else ["camera", "shadow"]
-        hidden = [ray for ray in rays if not getattr(item, f"visible_{ray}")]
-        if hidden:
+        if visible.catcher and not self.scene.render.film_transparent:
+            self.problems.warning(
+                f"object '{item.name}': Shadow Catcher has no effect. Set Render Properties > Film > Transparent"
+            )
+        self.catchers = self.catchers or visible.catcher
+        if kind == "light" and not item.is_shadow_catcher:
+            self.dim.append(item.name)
+        if kind == "object" and not mesh and visible.hidden():
             self.problems.unsupported(
-                f"{kind} '{item.name}': hidden from rays ({', '.join(hidden)}). Switch all on in {where}"
+                f"{kind} '{item.name}': hidden from rays ({', '.join(visible.hidden())}). Media are seen by all rays: switch all on in {where}"
             )
         linking = item.light_linking
         if linking and (linking.receiver_collection or linking.blocker_collection):
@@ -157,13 +152,13 @@ class Exporter:
                 f"{kind} '{item.name}': Light Linking or Shadow Linking. Clear it in Object properties > Shading"
             )
 
-    def shapes_of(self, item):
+    def shapes_of(self, item, visible):
         mesh = item.to_mesh()
         if mesh is None:
             return []
         try:
             extent = max((v for corner in item.bound_box for v in (abs(c) for c in corner)), default=1) or 1
-            shapes = [self.shape(item, part, extent) for part in meshes.parts(mesh)]
+            shapes = [self.shape(item, visible, part, extent) for part in meshes.parts(mesh)]
             if any(shape.medium for shape in shapes):
                 tree = BVHTree.FromPolygons(
                     [v.co for v in mesh.vertices], [p.vertices for p in mesh.polygons]
@@ -174,7 +169,7 @@ class Exporter:
         finally:
             item.to_mesh_clear()
 
-    def shape(self, item, part, extent):
+    def shape(self, item, visible, part, extent):
         slots = item.material_slots
         material = self.override
         if material is None and len(slots):
@@ -190,16 +185,20 @@ class Exporter:
                 self.problems.error(
                     f"{owner}: a volume needs a closed mesh. Fill its holes and merge its doubles (Edit Mode, M > By Distance)"
                 )
-            if not item.visible_camera:  # Blender's camera then does not see the volume, and Lightshaft's does
+            if visible.hidden():  # Blender's rays then do not see the volume, and Lightshaft's do
                 self.problems.unsupported(
-                    f"{owner}: hidden from rays (camera) with a volume in it. Switch Camera on in Object properties > Visibility"
+                    f"{owner}: hidden from rays ({', '.join(visible.hidden())}) with a volume in it. Switch all on in Object properties > Visibility"
                 )
             medium = self.volumes.homogeneous(f"{item.name}-{material.name}", found, group)
         sides = [part.front()]
         if emission is not None and not part.closed:  # Blender's sheets give off light on both sides
             sides.append(part.back(SHEET * extent))
-        flags = {"visible_camera": only_if_hidden(item), "holdout": True if item.is_holdout else None}
-        return Shape([self.document.write(side, ".ply") for side in sides], bsdf, emission, medium, flags, group)
+        files = [self.document.write(side, ".ply") for side in sides]
+        flags = visible.of_shape()
+        if bsdf in self.materials.passing and emission is None:
+            names = ("visible_camera", "holdout", "shadow_catcher")
+            flags = {name: flags[name] for name in names}
+        return Shape(files, bsdf, emission, medium, flags, group)
 
     def place_meshes(self):
         for key, places in self.places.items():

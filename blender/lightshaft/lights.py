@@ -11,9 +11,9 @@ FLIP = ((1, 0, 0, 0), (0, -1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1))  # Blender's l
 PROFILE = 512  # pixels of the image that a spot light throws
 
 
-def add_light(document, problems, item, matrix, matrix_class, may_see, group):
-    """Adds a light object at `matrix`, in a light group or None. Its power is in W, as in the Light properties. `may_see`: a function of a
-    centre and a radius, False if the camera does not see the ball."""
+def add_light(document, problems, item, matrix, matrix_class, may_see, group, visible):
+    """Adds a light object at `matrix`, in a light group or None. Its power is in W, as in the Light properties. `may_see`:
+    a function of a centre and a radius, False if the camera does not see the ball. `visible`: its Visibility."""
     data, name = item.data, item.name
     colour = light_colour(data)
     if (
@@ -49,8 +49,9 @@ def add_light(document, problems, item, matrix, matrix_class, may_see, group):
             None,
             irradiance=colour,
             angular_radius=math.degrees(data.angle / 2),
-            visible_camera=only_if_hidden(item),
+            visible_camera=visible.camera,
             light_group=group,
+            **visible.receivers,
         )
         sun.append(vector("direction", direction))
         document.add(sun)
@@ -59,16 +60,19 @@ def add_light(document, problems, item, matrix, matrix_class, may_see, group):
         if radius > 0:
             ball = matrix_class.Translation(matrix.translation) @ matrix_class.Scale(radius, 4)
             radiance = [c / (4 * math.pi**2 * radius**2) for c in colour]
-            document.add(lamp("sphere", ball, radiance, item, may_see, group))
+            document.add(lamp("sphere", ball, radiance, visible, may_see, group))
         else:
             intensity = [c / (4 * math.pi) for c in colour]
-            point = element("emitter", "point", None, intensity=intensity, light_group=group)
+            point = element(
+                "emitter", "point", None, intensity=intensity, light_group=group, **visible.receivers
+            )
             point.append(vector("position", matrix.translation, "point"))
             document.add(point)
     elif data.type == "SPOT":
-        add_spot(document, problems, data, name, colour, rigid @ matrix_class(FLIP), group)
+        add_spot(document, problems, item, colour, rigid @ matrix_class(FLIP), group, visible)
     else:
-        add_area(document, problems, item, colour, matrix @ matrix_class(FLIP), matrix_class, may_see, group)
+        placed = matrix @ matrix_class(FLIP)
+        add_area(document, problems, item, colour, placed, matrix_class, may_see, group, visible)
 
 
 def light_colour(data):
@@ -86,16 +90,11 @@ def vector(name, values, kind="vector"):
     )
 
 
-def only_if_hidden(item):
-    """Returns the value of `visible_camera` of an object, or None if it is true, as it is unless given."""
-    return None if item.visible_camera else False
-
-
-def lamp(shape, to_world, radiance, item, may_see, group):
+def lamp(shape, to_world, radiance, visible, may_see, group):
     """Makes a shape that emits light and lets the light of others pass, like Blender's lamps. They are hidden from the
     camera by default; a lamp that is out of sight anyway is not marked, because marked shapes cost render time."""
     radius = to_world.col[0].xyz.length + to_world.col[1].xyz.length
-    hidden = only_if_hidden(item) if may_see(to_world.translation, radius) else None
+    hidden = visible.camera if may_see(to_world.translation, radius) else None
     emitter = element("emitter", "area", None, radiance=radiance, light_group=group)
     return element(
         "shape",
@@ -105,10 +104,12 @@ def lamp(shape, to_world, radiance, item, may_see, group):
         emitter,
         to_world=to_world,
         visible_camera=hidden,
+        **visible.receivers,
     )
 
 
-def add_spot(document, problems, data, name, colour, to_world, group):
+def add_spot(document, problems, item, colour, to_world, group, visible):
+    data, name = item.data, item.name
     if data.shadow_soft_size > 0:
         problems.unsupported(f"light '{name}': a spot's Radius. Lightshaft's spots are points: set it to 0")
     half = data.spot_size / 2
@@ -138,6 +139,7 @@ def add_spot(document, problems, data, name, colour, to_world, group):
             beam_width=angle * 0.9999,
             texture=texture,
             light_group=group,
+            **visible.receivers,
         )
     )
 
@@ -153,7 +155,7 @@ def spot_profile(half, blend):
     return step * step * (3 - 2 * step)
 
 
-def add_area(document, problems, item, colour, to_world, matrix_class, may_see, group):
+def add_area(document, problems, item, colour, to_world, matrix_class, may_see, group, visible):
     data, name = item.data, item.name
     if data.spread < math.pi - 1e-4:
         problems.unsupported(
@@ -169,4 +171,4 @@ def add_area(document, problems, item, colour, to_world, matrix_class, may_see, 
         problems.error(f"light '{name}': its size is 0. Give it a size, or make it a point light")
         return
     radiance = [c / (math.pi * area) for c in colour]
-    document.add(lamp("disk" if round_one else "rectangle", placed, radiance, item, may_see, group))
+    document.add(lamp("disk" if round_one else "rectangle", placed, radiance, visible, may_see, group))

@@ -31,6 +31,7 @@ class Materials:
     def __init__(self, document, problems, textures):
         self.document, self.problems, self.textures = document, problems, textures
         self.known = {}
+        self.passing = set()  # ids of the bsdfs that all light passes unchanged
 
     def surface(self, name, material):
         """Returns (id of the bsdf or None, emission or None) of a material. Each material is exported once."""
@@ -40,10 +41,10 @@ class Materials:
             bsdf = found.bsdf
             if bsdf is None:  # light alone, or what was refused
                 bsdf = element("bsdf", "diffuse", None, reflectance=0.0)
-            self.known[key] = (
-                self.document.define(material.name if material else "no material", bsdf),
-                found.emission,
-            )
+            identifier = self.document.define(material.name if material else "no material", bsdf)
+            if bsdf.get("type") == "null":
+                self.passing.add(identifier)
+            self.known[key] = (identifier, found.emission)
         return self.known[key]
 
     def build(self, owner):

@@ -57,7 +57,14 @@ class LIGHTSHAFT_PT_object(LightshaftPanel):
     bl_label = "Ray Visibility"
     bl_context = "object"
     bl_parent_id = "OBJECT_PT_visibility"  # which has Holdout
-    rows = ("visible_camera",)
+    rows = (
+        "visible_camera",
+        "visible_diffuse",
+        "visible_glossy",
+        "visible_transmission",
+        "visible_volume_scatter",
+        "visible_shadow",
+    )
 
     @staticmethod
     def owner(context):
@@ -115,7 +122,7 @@ class LIGHTSHAFT_PT_light_groups(LightshaftPanel):
 class LIGHTSHAFT_PT_world(LightshaftPanel):
     bl_label = "Ray Visibility"
     bl_context = "world"
-    rows = ("camera",)
+    rows = ("camera", "diffuse", "glossy", "transmission", "scatter")
 
     @staticmethod
     def owner(context):

@@ -4,11 +4,11 @@ import numpy as np
 
 from .document import element
 from .nodes import Place, constant, output_node
+from .visibility import visibility_of_world
 
 # The middle of a world image is the direction +x in Blender and +z in the scene format; the point a quarter from its
 # left edge is +y in Blender and +x in the scene format.
 AXES = np.array([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]], float)
-RAYS = ("diffuse", "glossy", "transmission", "scatter")
 
 
 def add_world(document, problems, textures, world, groups):
@@ -18,13 +18,9 @@ def add_world(document, problems, textures, world, groups):
     node = output_node(world.node_tree, "OUTPUT_WORLD") if world.node_tree else None
     if node is None:
         return
-    hidden = [ray for ray in RAYS if not getattr(world.cycles_visibility, ray)]
-    if hidden:
-        problems.unsupported(
-            f"{owner}: hidden from rays ({', '.join(hidden)}). Switch all on in World properties > Settings > Ray Visibility"
-        )
     group = groups.of(world)
-    seen = None if world.cycles_visibility.camera else False
+    visible = visibility_of_world(problems, owner, world)
+    flags = {"visible_camera": visible.camera, **visible.receivers}
     output = Place(node)
     if output.source(output.input("Volume"))[0]:
         problems.error(
@@ -48,7 +44,7 @@ def add_world(document, problems, textures, world, groups):
         if any(radiance):
             document.add(
                 element(
-                    "emitter", "constant", None, radiance=radiance, visible_camera=seen, light_group=group
+                    "emitter", "constant", None, radiance=radiance, light_group=group, **flags
                 )
             )
         return
@@ -73,8 +69,8 @@ def add_world(document, problems, textures, world, groups):
                 filename=name,
                 scale=strength,
                 to_world=np.linalg.inv(turn) @ AXES,
-                visible_camera=seen,
                 light_group=group,
+                **flags,
             )
         )
 

@@ -146,10 +146,12 @@ Result<void> set_aovs(std::vector<std::string> names, bool denoise,
 }
 
 // Sets the AOVs: those that the job requests, those that the scene requests, and alpha for a transparent
-// film.
+// film, and the shadows on shadow catchers.
 Result<void> choose_aovs(const Scene& scene, const JobSpec& spec, RenderSettings& settings) {
   std::vector<std::string> names = spec.aov;
   if (scene.film.transparent) names.emplace_back(row_of(Aov::alpha).name);
+  if (std::ranges::any_of(scene.shapes, [&](const Shape& s) { return catches_shadows(scene, s); }))
+    names.emplace_back(row_of(Aov::shadow_catcher).name);
   for (std::string_view rest = scene.aovs; !rest.empty();) {
     const auto end = std::min(rest.find(','), rest.size());
     names.emplace_back(rest.substr(0, end));

@@ -307,11 +307,13 @@ using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
 // apart. Empty: the emitter is in the group `other`.
 //
 // Camera rays that leave the scene before they are scattered do not see an emitter whose visible_camera is
-// false.
+// false. Surfaces receive no light from an emitter whose visible_reflection is false, and media none from one
+// whose visible_volume is false.
 struct ConstantEmitter {  // the same radiance from all directions
   Rgb radiance{1, 1, 1};
   bool visible_camera = true;
   std::string light_group;
+  bool visible_reflection = true, visible_volume = true;
   bool operator==(const ConstantEmitter&) const = default;
 };
 // Parallel light. `direction` is the direction in which the light travels, in world space. `irradiance` is
@@ -324,12 +326,14 @@ struct DirectionalEmitter {
   double angular_radius = 0;
   bool visible_camera = true;
   std::string light_group;
+  bool visible_reflection = true, visible_volume = true;
   bool operator==(const DirectionalEmitter&) const = default;
 };
 struct PointEmitter {
   Vec3 position{0, 0, 0};
   Rgb intensity{1, 1, 1};  // W/sr
   std::string light_group;
+  bool visible_reflection = true, visible_volume = true;
   bool operator==(const PointEmitter&) const = default;
 };
 struct SpotEmitter {  // a spot light at the origin of to_world, which emits along its +z axis
@@ -341,6 +345,7 @@ struct SpotEmitter {  // a spot light at the origin of to_world, which emits alo
   double beam_width = 15;
   std::optional<TextureIndex> texture;  // factor on the intensity, projected along +z as by Mitsuba
   std::string light_group;
+  bool visible_reflection = true, visible_volume = true;
   bool operator==(const SpotEmitter&) const = default;
 };
 // How an environment map's image covers the directions, in the map's own space.
@@ -359,6 +364,7 @@ struct EnvmapEmitter {
   bool visible_camera = true;
   std::string light_group;
   ImageColours colours = ImageColours::automatic;
+  bool visible_reflection = true, visible_volume = true;
   bool operator==(const EnvmapEmitter&) const = default;
 };
 
@@ -374,6 +380,7 @@ struct ProjectorEmitter {
   FovAxis fov_axis = FovAxis::x;
   bool as_intensity = false;
   std::string light_group;
+  bool visible_reflection = true, visible_volume = true;
   bool operator==(const ProjectorEmitter&) const = default;
 };
 // A light at the origin of to_world, whose intensity is multiplied by an image of all directions: a square in
@@ -385,6 +392,7 @@ struct GoniometricEmitter {
   Rgb intensity{1, 1, 1};  // W/sr where the image is 1
   TextureIndex texture;
   std::string light_group;
+  bool visible_reflection = true, visible_volume = true;
   bool operator==(const GoniometricEmitter&) const = default;
 };
 using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter, EnvmapEmitter,
@@ -477,5 +485,10 @@ struct Scene {
   std::vector<Meter> meters;  // if there are any, they are measured, and no image is rendered
   bool operator==(const Scene&) const = default;
 };
+
+// True if the camera sees of the shape only the shadows on it.
+inline bool catches_shadows(const Scene& scene, const Shape& shape) {
+  return shape.shadow_catcher && scene.film.transparent && shape.visible_camera;
+}
 
 }  // namespace ls

@@ -77,6 +77,15 @@ struct Shape {
   // A camera ray that meets the shape and does not pass it ends there without light. The shape has no opacity
   // in the AOVs of opacity, but hides what is behind.
   bool holdout = false;
+  // With a transparent film, the camera sees of the shape only the shadows that other shapes and media cast
+  // on it: it is black, and its opacity is the share of direct light that is missing. All other rays meet it
+  // as ever.
+  bool shadow_catcher = false;
+  // Other rays that pass straight through the shape if the flag is false. visible_shadow: rays from a vertex
+  // to a lamp, so that the shape casts no shadow in direct light. visible_reflection: rays that a surface
+  // scattered (reflected or refracted). visible_volume: rays that a medium scattered. If the shape emits
+  // light, vertices on surfaces (visible_reflection) or in media (visible_volume) receive none of it.
+  bool visible_shadow = true, visible_reflection = true, visible_volume = true;
   std::optional<MeterIndex> meter;  // a meter measures the light that reaches the shape
   bool operator==(const Shape&) const = default;
 };

@@ -289,14 +289,17 @@ bool is_our_parameter(std::string_view tag, std::string_view plugin, std::string
     std::vector<std::string_view> parameters;
   };
   static const std::vector<Ours> all = {
-      {"shape", "", {"flat_without_normals", "visible_camera", "holdout"}},
+      {"shape",
+       "",
+       {"flat_without_normals", "visible_camera", "holdout", "shadow_catcher", "visible_shadow",
+        "visible_reflection", "visible_volume"}},
       {"shape", "obj", {"shape_index"}},
       {"shape", "ply", {"shape_index"}},
       {"bsdf", "", {"multiple_scattering"}},
       {"bsdf", "normalmap", {"follow_mirroring"}},
       {"texture", "bitmap", {"channel", "color_space"}},
       {"emitter", "area", {"cutoff_angle", "beam_width", "falloff", "two_sided"}},
-      {"emitter", "", {"visible_camera", "light_group"}},
+      {"emitter", "", {"visible_camera", "visible_reflection", "visible_volume", "light_group"}},
       {"emitter", "directional", {"angular_radius"}},
       {"emitter", "envmap", {"mapping", "color_space"}},
       {"emitter", "projector", {"as_intensity"}},

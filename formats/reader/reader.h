@@ -119,6 +119,7 @@ class Reader {
   template <class T>
   void read_geometry(const Element& e, T geometry);
   void read_shape_parts(Params& p, Shape& shape);
+  void check_visibility(Params& p, const Shape& shape);
   std::optional<AreaEmitter> read_area(const Element& e);
   void check_placement(const Element& e, const Shape& shape);
   void warn_of_media_around_camera();

@@ -11,6 +11,16 @@
 #include "formats/xml/transform_element.h"
 
 namespace ls::scene {
+namespace {
+
+// Returns the child that gives this parameter; nullptr: there is none.
+const Element* parameter_of(const Element& object, std::string_view name) {
+  const auto at =
+      std::ranges::find_if(object.children, [&](const Element& child) { return child.get("name") == name; });
+  return at == object.children.end() ? nullptr : &*at;
+}
+
+}  // namespace
 
 void Reader::read_shape(const Element& e) {
   const std::string_view type = e.get("type");
@@ -127,12 +137,35 @@ void Reader::read_geometry(const Element& e, T geometry) {
   bind(p, shape);
   shape.geometry = geometry;
   read_shape_parts(p, shape);
+  check_visibility(p, shape);
   p.finish();
   check_placement(e, shape);
   check_attributes(e, shape);
   scene_.shapes.push_back(std::move(shape));
   label_shape(e);
   shape_elements_.push_back(&e);
+}
+
+// Rays pass a surface without a material anyhow, and the medium behind it stays visible to them.
+void Reader::check_visibility(Params& p, const Shape& shape) {
+  if (const Element* given =
+          shape.holdout && shape.shadow_catcher ? parameter_of(p.object(), "shadow_catcher") : nullptr)
+    report_.error(given->at, fmt::format("{} is a holdout, which shows no shadow: remove 'holdout' or "
+                                         "'shadow_catcher'",
+                                         p.title()));
+  // A bsdf that could not be read is not in the list.
+  const bool known = shape.bsdf.value < scene_.bsdfs.size();
+  if (shape.emitter || !known || !std::holds_alternative<NullBsdf>(scene_.bsdfs[shape.bsdf.value])) return;
+  const auto check = [&](const char* name, bool visible) {
+    if (const Element* given = visible ? nullptr : parameter_of(p.object(), name))
+      report_.error(given->at,
+                    fmt::format("'{}' has no effect on {} with the bsdf \"null\": every ray passes this "
+                                "surface and enters its medium. Remove the parameter",
+                                name, p.title()));
+  };
+  check("visible_shadow", shape.visible_shadow);
+  check("visible_reflection", shape.visible_reflection);
+  check("visible_volume", shape.visible_volume);
 }
 
 void Reader::read_shape_parts(Params& p, Shape& shape) {

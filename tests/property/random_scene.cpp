@@ -22,6 +22,7 @@ class Composer {
     lights();
     camera();
     film();
+    visibility();
     integrator();
     if (draw_.wild()) scene_.sample_count = static_cast<std::uint64_t>(dice_.extreme({1, 1e6}));
   }
@@ -185,6 +186,25 @@ class Composer {
     s.aperture_radius = wild ? drawn.aperture_radius : dice_.between(0, .3);
     s.focus_distance = wild ? drawn.focus_distance : dice_.between(1, 6);
     s.aperture_scale = drawn.aperture_scale;
+  }
+  // In some scenes, shapes and lights are hidden from some rays.
+  void visibility() {
+    const bool some = dice_.chance(.2);
+    const auto seen = [&] { return !some || dice_.chance(.8); };
+    for (Emitter& emitter : scene_.emitters)
+      std::visit(
+          [&](auto& e) {
+            e.visible_reflection = seen();
+            e.visible_volume = seen();
+          },
+          emitter);
+    for (Shape& s : scene_.shapes) {
+      if (std::holds_alternative<NullBsdf>(scene_.bsdfs[s.bsdf.value]) && !s.emitter) continue;
+      s.visible_camera = seen();
+      s.visible_shadow = seen();
+      s.visible_reflection = seen();
+      s.visible_volume = seen();
+    }
   }
   void film() {
     FilmSettings& f = scene_.film;

@@ -14,7 +14,7 @@ from local_farm import SCENE, HttpError
 STANDARD_ERRORS = 5  # kStandardErrors of tests/support/significance.h
 SPP = 12  # rounds of 2, 2, 4 and a cut one of 4
 ALL = ("albedo,alpha,coverage,depth,direct,emission,geo_normal,indirect,material_id,multiple,normal,opacity,position,"
-       "shape_id,single,surface,uv,volume,volume_opacity")
+       "shadow_catcher,shape_id,single,surface,uv,volume,volume_opacity")
 
 
 @pytest.fixture(scope="module")
@@ -129,6 +129,24 @@ def test_a_transparent_film_has_alpha_in_every_form(fog, tmp_path):
     assert (tmp_path / "film.png").read_bytes()[24:26] == bytes([8, 6])
     lightshaft("merge", tmp_path / "partials", "-o", tmp_path / "merged.exr")
     assert layers(tmp_path / "merged.exr") == film
+
+
+def test_shadows_on_shadow_catchers_add_up_over_partials(fog, tmp_path):
+    scene = fog.parent / "catcher.xml"
+    text = fog.read_text().replace('<film type="hdrfilm">', '<film type="hdrfilm"><boolean name="transparent" value="true"/>')
+    scene.write_text(text.replace('<shape type="rectangle" id="floor">',
+                                  '<shape type="rectangle" id="floor"><boolean name="shadow_catcher" value="true"/>'))
+    assert "shadow_catcher" in scene.read_text()
+    render(scene, tmp_path / "film.exr", "--partial-dir", tmp_path / "partials")
+    film = {c: np.array(rows) for c, rows in layers(tmp_path / "film.exr").items()}
+
+    assert json.loads(read(tmp_path / "film.exr")[1]["lightshaft:job"])["aov"] == ["alpha", "shadow_catcher"]
+    floor = film["shadow_catcher.T"] == 1  # with no fog in front
+    assert floor.any() and not film["R"][floor].any() and film["shadow_catcher.U"][floor].min() > 0
+    shadow = 1 - film["shadow_catcher.L"][floor] / film["shadow_catcher.U"][floor]
+    assert np.allclose(film["A"][floor], shadow, atol=.01 + 2 ** -11) and shadow.max() > 0
+    lightshaft("merge", tmp_path / "partials", "-o", tmp_path / "merged.exr")
+    assert layers(tmp_path / "merged.exr") == layers(tmp_path / "film.exr")
 
 
 def test_over_a_plate_it_is_the_image_with_the_plate_behind_it(tmp_path):

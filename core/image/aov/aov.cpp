@@ -29,6 +29,7 @@ constexpr std::array<AovRow, kAovs> kAovRows = {{
     {Aov::normal, "normal", AovKind::of_all, "XYZ", true},
     {Aov::opacity, "opacity", AovKind::opacity, "RGB", true},
     {Aov::position, "position", AovKind::of_hits, "XYZ", false},
+    {Aov::shadow_catcher, "shadow_catcher", AovKind::opacity, "LTU", false},
     {Aov::shape_id, "shape_id", AovKind::ids, "", false},
     {Aov::single, "single", AovKind::light, "RGB", true},
     {Aov::surface, "surface", AovKind::light, "RGB", true},

@@ -40,6 +40,7 @@ enum class Aov : std::uint8_t {
   normal,
   opacity,
   position,
+  shadow_catcher,
   shape_id,
   single,
   surface,
@@ -48,7 +49,7 @@ enum class Aov : std::uint8_t {
   volume_light_groups,
   volume_opacity
 };
-inline constexpr std::size_t kAovs = 23;
+inline constexpr std::size_t kAovs = 24;
 
 // The type of an AOV's values, and by what number of samples its sums are divided.
 enum class AovKind {

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "core/image/aov/identifiers.h"
+#include "core/image/exr/caught_shadows.h"
 #include "core/image/exr/exr_file.h"
 
 namespace ls {
@@ -176,6 +177,7 @@ class Layers {
   void gather_means(const TileAovs& tile) {
     const auto n = static_cast<std::size_t>(tile.rect.pixels());
     const double* hits = planes_.hits == SIZE_MAX ? nullptr : &tile.sums[planes_.hits * n];
+    const CaughtShadows shadows(tile, planes_);
     for (std::size_t p = 0; p < sums_.size(); ++p) {
       if (sums_[p].empty()) continue;
       const AovRow& row = row_of(planes_.sums[p].aov);
@@ -189,6 +191,10 @@ class Layers {
         // Half the difference of the means of the two halves, as for the colour (Film::pixels())
         if (!differences_[p].empty())
           differences_[p][to] = static_cast<float>((tile.sums[p * n + from] - other[from]) / count) + 0.f;
+        if (shadows.add_to(row.aov)) {
+          sums_[p][to] += static_cast<float>(shadows.opacity(from));
+          if (!differences_[p].empty()) differences_[p][to] += static_cast<float>(shadows.difference(from));
+        }
       });
     }
   }

@@ -11,6 +11,7 @@
 
 #include "core/image/aov/identifiers.h"
 #include "core/image/error/relative_weights.h"
+#include "core/image/exr/caught_shadows.h"
 #include "core/image/exr/final_image.h"
 
 namespace ls {
@@ -56,6 +57,7 @@ std::vector<float> means(const TileAovs& tile, const AovPlanes& planes, const Pi
   const auto n = static_cast<std::size_t>(tile.rect.pixels()), channels = row.components.size();
   std::vector<float> out(n * channels);
   const double* hits = planes.hits == SIZE_MAX ? nullptr : &tile.sums[planes.hits * n];
+  const CaughtShadows shadows(tile, planes);
   for (std::size_t plane = 0; plane < planes.sums.size(); ++plane) {
     const AovPlane& p = planes.sums[plane];
     if (p.hits || p.aov != row.aov || p.half != 0 || p.group != layer.group) continue;
@@ -67,6 +69,9 @@ std::vector<float> means(const TileAovs& tile, const AovPlanes& planes, const Pi
       const double b = other ? other[i] : 0, sum = tile.sums[plane * n + i] + (layer.difference ? -b : b);
       out[i * channels + static_cast<std::size_t>(p.component)] =
           count > 0 ? static_cast<float>(sum / count) : 0.f;
+      if (shadows.add_to(row.aov))
+        out[i * channels + static_cast<std::size_t>(p.component)] +=
+            static_cast<float>(layer.difference ? shadows.difference(i) : shadows.opacity(i));
     }
   }
   return out;

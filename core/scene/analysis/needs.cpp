@@ -71,7 +71,8 @@ void Analyst::shapes() {
     n_.boundaries = n_.boundaries || null;
     n_.null_transmission = n_.null_transmission || (!null && traits && (*traits)[s.bsdf.value].passes);
     n_.area_lights += s.emitter.has_value();
-    n_.flagged_shapes += !s.visible_camera || s.holdout;
+    n_.flagged_shapes += !s.visible_camera || s.holdout || catches_shadows(s_, s);
+    n_.ray_flags += !s.visible_shadow || !s.visible_reflection || !s.visible_volume;
   }
 }
 
@@ -109,6 +110,7 @@ void Analyst::lights() {
   bool extended = n_.area_lights > 0;
   for (const Emitter& e : s_.emitters) {
     ++n_.lights[kind_of(e)];
+    n_.ray_flags += std::visit([](const auto& l) { return !l.visible_reflection || !l.visible_volume; }, e);
     extended = extended || !traits_of(e, s_.textures).delta;
   }
   n_.only_delta_lights = !extended && !s_.emitters.empty();
@@ -210,7 +212,9 @@ class Words {
     say("blends", count<BlendBsdf>(n_.materials), "materials");
     say("surfaces that let light pass straight on", n_.null_transmission,
         "masks or thin sheets: shadow rays collect", "no masks or thin sheets");
-    say("visibility by the camera", n_.flagged_shapes, "shapes hidden from the camera or held out");
+    say("visibility by the camera", n_.flagged_shapes,
+        "shapes hidden from the camera, held out or that catch shadows");
+    say("visibility by other rays", n_.ray_flags, "shapes and lamps hidden from shadow or scattered rays");
     say("normal maps", count<NormalMapBsdf, BumpMapBsdf>(n_.materials), "normal and bump maps");
   }
   void media() {
@@ -301,6 +305,7 @@ std::string canonical_json(const Needs& n) {
   if (n.transparent_film) j["transparent_film"] = true;
   if (n.meters > 0) j["meters"] = n.meters;
   if (n.flagged_shapes > 0) j["flagged_shapes"] = n.flagged_shapes;
+  if (n.ray_flags > 0) j["ray_flags"] = n.ray_flags;
   return j.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 

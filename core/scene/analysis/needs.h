@@ -35,8 +35,12 @@ struct Needs {
   bool boundaries = false, null_transmission = false;
   bool lens = false, crop = false;
   bool transparent_film = false;
-  std::uint32_t flagged_shapes = 0;  // number of shapes that the camera does not see, or that are held out
-  std::uint32_t meters = 0;          // number of values that are measured; 0: the scene has a camera
+  // Number of shapes that the camera does not see, that are held out or that catch shadows
+  std::uint32_t flagged_shapes = 0;
+  // Number of shapes that shadow rays or scattered rays do not meet, and of emitters whose light does not
+  // reach all surfaces and media
+  std::uint32_t ray_flags = 0;
+  std::uint32_t meters = 0;  // number of values that are measured; 0: the scene has a camera
   // Number of objects of each type. The key is the name of the type (describe.h). Types without objects are
   // left out.
   std::map<std::string, std::uint32_t> shapes, materials, textures, lights, media_kinds;

@@ -15,6 +15,22 @@
 namespace ls::scene {
 namespace {
 
+// True if the camera does not see the emitter, and nothing receives its light.
+bool shines_on_nothing(const Emitter& emitter) {
+  return std::visit(
+      [](const auto& e) {
+        if constexpr (requires { e.visible_camera; })
+          if (e.visible_camera) return false;
+        return !e.visible_reflection && !e.visible_volume;
+      },
+      emitter);
+}
+
+// True if no ray meets the shape.
+bool is_hidden(const Shape& s) {
+  return !s.visible_camera && !s.holdout && !s.visible_shadow && !s.visible_reflection && !s.visible_volume;
+}
+
 class Pruner {
  public:
   Pruner(const Scene& scene, const PrunedFor& whom)
@@ -226,6 +242,8 @@ void Pruner::lights() {
   dark += static_cast<std::uint32_t>(
       std::erase_if(s_.emitters, [&](const Emitter& e) { return traits_of(e, s_.textures).dark; }));
   note("light", "it is black", dark);
+  note("light", "it is hidden from the camera, surfaces and media",
+       static_cast<std::uint32_t>(std::erase_if(s_.emitters, shines_on_nothing)));
 }
 
 // Erases the elements for which `gone` returns true, and their labels (`labels` is empty or has one label per
@@ -247,8 +265,8 @@ std::uint32_t erase_labelled(std::vector<T>& all, std::vector<Label>& labels, co
   return erased;
 }
 
-// Removes surfaces that light passes unchanged (bsdf "null") if they neither bound a medium nor emit. Then
-// removes the instances of groups that have no shapes left.
+// Removes surfaces that bound no medium and that light passes unchanged (bsdf "null") without being emitted
+// there, or that no ray meets. Then removes the instances of groups that have no shapes left.
 void Pruner::invisible() {
   const auto unseen = [&](const Shape& s) {
     return !whom_.passing_counts && std::holds_alternative<NullBsdf>(s_.bsdfs[s.bsdf.value]) &&
@@ -256,6 +274,8 @@ void Pruner::invisible() {
   };
   note("surface", "light passes it unchanged, and there is no medium on either side",
        erase_labelled(s_.shapes, s_.shape_labels, unseen));
+  const auto hidden = [&](const Shape& s) { return is_hidden(s) && !s.is_medium_transition && !s.meter; };
+  note("shape", "it is hidden from all rays", erase_labelled(s_.shapes, s_.shape_labels, hidden));
   std::vector<bool> seen(s_.groups.size(), false);
   for (const Shape& s : s_.shapes)
     if (s.group) seen[s.group->value] = true;

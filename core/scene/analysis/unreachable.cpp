@@ -46,8 +46,8 @@ class Search {
 
   bool unreachable(std::size_t i) {
     const Shape& s = s_.shapes[i];
-    // Camera rays pass a surface that they do not see. Meters may be anywhere.
-    if (!s_.meters.empty() || !s.interior || s.group || !s.visible_camera || !has_interior_behind(s))
+    // Meters may be anywhere.
+    if (!s_.meters.empty() || !s.interior || s.group || lets_rays_in(s) || !has_interior_behind(s))
       return false;
     const auto box = box_of(s);
     const bool clear = box ? camera_is_outside(s_.sensor, *box) : !s_.sensor.medium;
@@ -59,6 +59,10 @@ class Search {
     std::size_t shape;
     std::optional<Box> box;  // bounding box in the scene; nullopt: unknown
   };
+  // True if some rays pass the shape because they do not see it.
+  static bool lets_rays_in(const Shape& s) {
+    return !s.visible_camera || !s.visible_shadow || !s.visible_reflection || !s.visible_volume;
+  }
   bool emits(MediumIndex m) const { return traits_of(s_.media[m.value], s_.volumes).emits; }
   static std::optional<Box> place_in_scene(const Shape& s) { return s.group ? std::nullopt : box_of(s); }
 
@@ -66,7 +70,7 @@ class Search {
   // "null") and that bounds no medium does not count, since prune.cpp removes it later.
   bool is_entrance(const Shape& s) const {
     const auto glowing = [&](const std::optional<MediumIndex>& m) { return m && emits(*m); };
-    if (s.emitter || glowing(s.interior) || glowing(s.exterior)) return true;
+    if (s.emitter || glowing(s.interior) || glowing(s.exterior) || lets_rays_in(s)) return true;
     const bool nothing = std::holds_alternative<NullBsdf>(s_.bsdfs[s.bsdf.value]) && !s.is_medium_transition;
     return traits_[s.bsdf.value].transmits && !nothing;
   }

@@ -96,6 +96,15 @@ inline Field nested_field(std::string_view name, std::string_view doc, std::stri
 inline Field on_unless_given(std::string_view name, std::string_view doc) {
   return {.name = name, .doc = doc, .unwritten = 1, .elided = true};
 }
+// Describes which vertices receive light from an emitter without a shape.
+template <class V, class T>
+void describe_receivers(V& v, T& e) {
+  v.field(on_unless_given("visible_reflection", "whether surfaces receive its light. Not in Mitsuba"),
+          e.visible_reflection);
+  v.field(on_unless_given("visible_volume",
+                          "whether media receive its light; if not, it makes no shafts. Not in Mitsuba"),
+          e.visible_volume);
+}
 // The field of the light group of an emitter or a medium.
 inline constexpr Field kLightGroup{
     .name = "light_group",

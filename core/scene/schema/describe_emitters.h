@@ -39,6 +39,7 @@ void describe(V& v, T& e) {
   v.field({.name = "radiance", .doc = "radiance", .range = kNonNegative}, e.radiance);
   v.field(on_unless_given("visible_camera", "whether the camera sees the light itself. Not in Mitsuba"),
           e.visible_camera);
+  describe_receivers(v, e);
   v.field(kLightGroup, e.light_group);
 }
 
@@ -60,6 +61,7 @@ void describe(V& v, T& e) {
           e.angular_radius);
   v.field(on_unless_given("visible_camera", "whether the camera sees the light itself. Not in Mitsuba"),
           e.visible_camera);
+  describe_receivers(v, e);
   v.field(kLightGroup, e.light_group);
 }
 
@@ -70,6 +72,7 @@ void describe(V& v, T& e) {
   v.field({.name = "position", .doc = "where, in the world", .unit = "length", .given_as = "point"},
           e.position);
   v.field(quantity("intensity", "radiant intensity", "W/sr", kNonNegative), e.intensity);
+  describe_receivers(v, e);
   v.field(kLightGroup, e.light_group);
 }
 
@@ -85,6 +88,7 @@ void describe(V& v, T& e) {
                    "degrees", {0, 180}),
           e.beam_width);
   v.field({.name = "texture", .doc = "an image projected by the light", .range = kNonNegative}, e.texture);
+  describe_receivers(v, e);
   v.field(kLightGroup, e.light_group);
 }
 
@@ -106,6 +110,7 @@ void describe(V& v, T& e) {
           e.mapping);
   v.field(on_unless_given("visible_camera", "whether the camera sees the light itself. Not in Mitsuba"),
           e.visible_camera);
+  describe_receivers(v, e);
   v.field(kLightGroup, e.light_group);
   v.field(image_colours_field(), e.colours);
 }
@@ -128,6 +133,7 @@ void describe(V& v, T& e) {
                   "irradiance. Not in Mitsuba",
            .elided = true},
           e.as_intensity);
+  describe_receivers(v, e);
   v.field(kLightGroup, e.light_group);
 }
 
@@ -143,6 +149,7 @@ void describe(V& v, T& e) {
   v.field(quantity("intensity", "radiant intensity where the image is 1", "W/sr", kNonNegative), e.intensity);
   v.field({.name = "texture", .doc = "the image, which multiplies the intensity", .range = kNonNegative},
           e.texture);
+  describe_receivers(v, e);
   v.field(kLightGroup, e.light_group);
 }
 

@@ -95,6 +95,23 @@ void describe(V& v, T& s) {
               "media in front. Not in Mitsuba",
        .elided = true},
       s.holdout);
+  v.field({.name = "shadow_catcher",
+           .doc = "with a `transparent` film, the camera sees of it only the shadows on it: black, with an "
+                  "alpha of the share of direct light that is missing. Not in Mitsuba",
+           .elided = true},
+          s.shadow_catcher);
+  v.field(on_unless_given("visible_shadow",
+                          "whether rays to lamps meet it; if not, it casts no shadow in direct light. Not in "
+                          "Mitsuba"),
+          s.visible_shadow);
+  v.field(on_unless_given("visible_reflection",
+                          "whether rays meet it that a surface reflected or refracted; if not, it is missing "
+                          "in mirrors and behind glass, and its lamp lights no surface. Not in Mitsuba"),
+          s.visible_reflection);
+  v.field(on_unless_given("visible_volume",
+                          "whether rays meet it that a medium scattered; if not, its lamp lights no medium. "
+                          "Not in Mitsuba"),
+          s.visible_volume);
   v.field({.name = "meter", .doc = "what is measured on it", .derived = true, .elided = true}, s.meter);
 }
 

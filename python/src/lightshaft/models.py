@@ -117,7 +117,7 @@ class JobSpec(TypedDict):
     aov: NotRequired[list[str]]
     """Further layers of the image (docs/reference/aovs.md). Possible are albedo, alpha, coverage,
     denoising_albedo, denoising_normal, depth, direct, emission, geo_normal, indirect, light_groups,
-    material_id, multiple, normal, opacity, position, shape_id, single, surface, uv, volume,
+    material_id, multiple, normal, opacity, position, shadow_catcher, shape_id, single, surface, uv, volume,
     volume_light_groups, volume_opacity."""
     mix: NotRequired[str]
     """Multiplies the light of the scene's light groups (docs/guide/light-groups.md): key=2,fill=0.5:0.4:0.3

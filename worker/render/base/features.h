@@ -17,8 +17,8 @@ struct Features {
   // The scene has surfaces that light passes straight through: index-matched boundaries, masks, thin
   // dielectrics.
   bool passing = false;
-  // Some surfaces are hidden from the camera or held out (SurfaceInfo::unseen, holdout). Only the variants
-  // with `split` have this.
+  // Some surfaces or lights are hidden from some kinds of rays, or some surfaces are held out
+  // (SurfaceInfo::hidden, holdout). Only the variants with `split` have this.
   bool visibility = false;
   // The radiance of each sample is split into the components of the light AOVs (path_records.h).
   bool split = false;

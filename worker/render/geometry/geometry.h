@@ -13,6 +13,7 @@
 #include "core/base/error.h"
 #include "core/scene/scene.h"
 #include "worker/render/base/asset_loader.h"
+#include "worker/render/base/ray_kind.h"
 #include "worker/render/math/math.h"
 #include "worker/render/math/transform.h"
 #include "worker/render/texture/surface_attributes.h"
@@ -36,10 +37,10 @@ struct SurfaceInfo {
   // True if the surface is not closed: it has an edge, or it encloses a volume only together with other
   // surfaces.
   bool sheet = false;
-  bool null = false;  // index-matched: rays pass straight through
-  // Both are for camera rays, up to the first scattering. unseen: they pass straight through. holdout: if
-  // they do not pass, they end without light.
-  bool unseen = false, holdout = false;
+  bool null = false;     // index-matched: rays pass straight through
+  RayKinds hidden;       // rays of these kinds pass straight through the surface
+  bool holdout = false;  // camera rays that do not pass the surface end there without light
+  bool catcher = false;  // true for some holdouts: shadows on the surface are seen (AOV shadow_catcher)
   // True if part of the light passes straight through (BsdfTable::null_transmission)
   bool null_transmission = false;
   // For meshes: `normals` is true if the vertices have normals, `uvs` if they have uvs.

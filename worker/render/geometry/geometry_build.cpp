@@ -213,9 +213,10 @@ SurfaceInfo surface_info(const Scene& scene, const std::vector<scene::BsdfTraits
   info.null = std::holds_alternative<NullBsdf>(scene.bsdfs.at(s.bsdf.value));
   info.null_transmission = !info.null && traits.at(s.bsdf.value).passes;
   info.transition = s.is_medium_transition;
-  info.unseen = !s.visible_camera;
-  info.holdout = s.holdout;
-  info.crossed = info.null || info.unseen || traits.at(s.bsdf.value).transmits;
+  info.hidden = hidden_from(s);
+  info.catcher = catches_shadows(scene, s);
+  info.holdout = s.holdout || info.catcher;
+  info.crossed = info.null || info.hidden.any() || traits.at(s.bsdf.value).transmits;
   if (s.interior) info.interior = s.interior->value;
   if (s.exterior) info.exterior = s.exterior->value;
   info.orientation = orientation_of(s, vertex_normals);
@@ -272,6 +273,11 @@ Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
   return parts;
 }
 
+// True if shadow rays may pass the surface.
+bool lets_light_pass(const SurfaceInfo& s) {
+  return s.null || s.null_transmission || s.hidden.has(RayKind::shadow);
+}
+
 // Appends to g the shapes of one space, opaque ones first. `shapes` holds the indices of these shapes in
 // `parts.shapes`, ascending.
 PrimitiveSet append_all(Geometry& g, const std::vector<std::uint32_t>& shapes, const Parts& parts,
@@ -287,8 +293,7 @@ PrimitiveSet append_all(Geometry& g, const std::vector<std::uint32_t>& shapes, c
   for (const bool passes : {false, true}) {
     note(&PrimitiveRange::passing);
     for (const std::uint32_t i : shapes)
-      if ((g.surfaces[i].null || g.surfaces[i].null_transmission) == passes)
-        append(g, parts.shapes[i], i, space);
+      if (lets_light_pass(g.surfaces[i]) == passes) append(g, parts.shapes[i], i, space);
   }
   note(&PrimitiveRange::last);
   return set;

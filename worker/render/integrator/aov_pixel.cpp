@@ -30,7 +30,8 @@ constexpr AovSet kOfLight = AovSet{}
                                 .with(Aov::volume)
                                 .with(Aov::volume_light_groups);
 constexpr AovSet kOfGuide = AovSet{}.with(Aov::denoising_albedo).with(Aov::denoising_normal);
-constexpr AovSet kOfOpacity = AovSet{}.with(Aov::alpha).with(Aov::opacity).with(Aov::volume_opacity);
+constexpr AovSet kOfOpacity =
+    AovSet{}.with(Aov::alpha).with(Aov::opacity).with(Aov::volume_opacity).with(Aov::shadow_catcher);
 static_assert((kOfSurface.bits() ^ kOfLight.bits() ^ kOfGuide.bits() ^ kOfOpacity.bits()) ==
               (1u << kAovs) - 1);
 
@@ -153,12 +154,14 @@ void AovPixel::add_guide(const CameraRay& ray, const SampleStream& stream, std::
 }
 
 void AovPixel::add_opacity(const CameraRay& ray, const SampleStream& stream, std::size_t half) {
-  const Opacity opacity = PathTracer<kEveryScene>(world_, stream).opacity(ray);
+  constexpr Features kFeatures = kEveryScene.with(&Features::visibility);
+  const Opacity opacity = PathTracer<kFeatures>(world_, stream).opacity(ray);
   if (!is_finite(opacity.all) || !is_finite(opacity.media)) return;
   const V3d all(opacity.all);
   add(Aov::alpha, {(all.x + all.y + all.z) / 3, 0, 0}, half);
   add(Aov::opacity, all, half);
   add(Aov::volume_opacity, V3d(opacity.media), half);
+  if (is_finite(opacity.shadow)) add(Aov::shadow_catcher, V3d(opacity.shadow), half);
 }
 
 void AovPixel::add_id(std::vector<IdSlot>& seen, float id) {

@@ -9,7 +9,7 @@
 
 namespace ls::render {
 
-// The path passes every index-matched or unseen surface, and each null-transmitting surface with that
+// The path passes every index-matched or hidden surface, and each null-transmitting surface with that
 // surface's probability. As long as the ray hits the same surfaces as the path of the sample, the decisions
 // use the same random numbers as in trace().
 template <Features F, template <Features> class Light>
@@ -62,7 +62,8 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
     }
     if (!met || is_black(beta_)) break;
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    if ((surface.unseen && direct) || surface.null || (surface.null_transmission && passes_null(hit))) {
+    if (surface.hidden.has(direct ? RayKind::camera : RayKind::surface) || surface.null ||
+        (surface.null_transmission && passes_null(hit))) {
       pass_boundary(hit, surface);
       continue;
     }
@@ -91,7 +92,7 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
 template <Features F, template <Features> class Light>
 Opacity PathTracer<F, Light>::opacity(const CameraRay& ray) {
   // Transmittances of the media, and of the surfaces that light passes straight through
-  C3 media(1), surfaces(1);
+  C3 media(1), surfaces(1), shadow(0);
   ray_ = {ray.o, ray.o, ray.d};
   medium_ = start_medium(ray);
   float reach = ray.t_max;
@@ -110,12 +111,74 @@ Opacity PathTracer<F, Light>::opacity(const CameraRay& ray) {
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     if (!sees_past(hit, surface)) {
       if (!surface.holdout) surfaces = C3(0);
+      if (surface.catcher && world_.aovs.has(Aov::shadow_catcher))
+        shadow = shadow_at(hit) * mean(media * surfaces);
       break;
     }
     surfaces = beta_;
     pass_boundary(hit, surface);
   }
-  return {C3(1) - media * surfaces, C3(1) - media};
+  return {C3(1) - media * surfaces, C3(1) - media, shadow};
+}
+
+// Returns one sample of Opacity::shadow at a shadow catcher, for a share of 1. The light is the irradiance on
+// the side that the camera sees: of a light that is chosen as by next-event estimation, and of the part of
+// the environment that is not sampled as a light. Other catchers keep their light in both estimates, since
+// their shadows are in the picture that the image will be laid over.
+template <Features F, template <Features> class Light>
+C3 PathTracer<F, Light>::shadow_at(const SurfaceHit& hit) {
+  const auto to_viewer = [&](const V3& n) { return dot(n, ray_.d) > 0 ? -n : n; };
+  const V3 n = to_viewer(hit.shading.n), ng = to_viewer(hit.ng);
+  float lit = 0, unlit = 0;
+  const auto receive = [&](const LightSample& light, float weight, int number) {
+    if (!(dot(light.direction, n) > 0) || !(dot(light.direction, ng) > 0)) return;
+    const V3 p = offset_point(hit, light.direction);
+    const C3 arriving =
+        unoccluded(hit.p, p, light, medium_, stream_.stream(number, Purpose::track_shadow_catcher));
+    if (is_black(arriving) && meets_catcher(p, light)) return;
+    lit += mean(arriving) * weight;
+    unlit += mean(light.radiance) * weight;
+  };
+  const Group g = stream_.group(0, Purpose::shadow_catcher), sky = stream_.group(1, Purpose::shadow_catcher);
+  if (world_.lights.can_sample()) {
+    const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, {hit.p, n});
+    const auto light = world_.lights.sample(choice, hit.p);
+    if (light && receives(choice, RayKind::surface))
+      receive(*light, dot(light->direction, n) / light->pdf, 0);
+  }
+  if (!is_black(world_.lights.constant_environment()) && !world_.lights.hides_sky(RayKind::surface)) {
+    LightSample light;
+    light.direction = normalize(Frame(n).to_world(cosine_hemisphere({sky.u(0), sky.u(1)})));
+    light.distance = kInfinity;
+    light.radiance = world_.lights.constant_environment();
+    receive(light, kPi, 1);
+  }
+  return {lit, 1, unlit};
+}
+
+// True if the way from p to the light meets a shadow catcher.
+template <Features F, template <Features> class Light>
+bool PathTracer<F, Light>::meets_catcher(const V3& p, const LightSample& light) const {
+  V3 o = p, d = light.direction;
+  float left = light.distance;
+  if (std::isfinite(left)) {
+    const V3 way = light.target - p;
+    left = std::sqrt(dot(way, way));
+    if (!(left > 0)) return false;
+    d = way / left;
+  }
+  for (int i = 0; i < kMaxShadowSegments; ++i) {
+    SurfaceHit hit;
+    const auto primitive = world_.accel.nearest(o, d, left);
+    if (!primitive || !world_.geometry.complete(*primitive, o, d, hit)) return false;
+    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if (surface.catcher && !surface.null && !surface.hidden.has(RayKind::shadow)) return true;
+    const V3 next = offset_point(hit, d);
+    if (std::isfinite(left)) left -= dot(next - o, d);
+    if (!(left > 0)) return false;
+    o = next;
+  }
+  return false;
 }
 
 }  // namespace ls::render

@@ -129,6 +129,7 @@ void PathTracer<F, Light>::begin_vertex(Segment segment, const Flight& flight) {
   if (!by_segment) last_.place.p = last_.p;
   apply(flight);
   if constexpr (F.split) first_in_medium_ = first_in_medium_ || depth_ == 0;
+  if constexpr (F.visibility) left_medium_ = true;
   ++depth_;
 }
 
@@ -152,6 +153,10 @@ auto PathTracer<F, Light>::scatter_by_phase(const Medium& medium) -> Step {
   }
   last_.pdf = s.pdf;
   ray_.d = s.w;
+  if constexpr (F.visibility) {
+    like_mirror_ = false;
+    direct_due_ = direct_by_shadows();
+  }
   if constexpr (F.reuse) {
     if (looks_for_second())
       go_on_as_tail(s.w, C3(1));
@@ -209,7 +214,7 @@ template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::light_vertex_by(const LightChoice& choice, const Medium& medium, const V3& p,
                                            const V3& d) {
   const auto light = world_.lights.sample(choice, p);
-  if (!light) return;
+  if (!light || !receives(choice, RayKind::medium)) return;
   const float phase = medium.phase.value(d, light->direction);
   const float sampled = direction_pdf(p, phase, light->direction);
   const float weight = light->delta ? 1 : light->pdf / (light->pdf + sampled);
@@ -382,7 +387,7 @@ void PathTracer<F, Light>::add_emission_of_others(const SurfaceHit& hit) {
       continue;
     const SurfaceInfo& s = world_.geometry.surfaces[other.surface];
     if constexpr (F.visibility) {
-      if (depth_ == 0 && (s.unseen || s.holdout)) continue;
+      if (s.hidden.has(ray_kind()) || (depth_ == 0 && s.holdout)) continue;
     }
     if (s.null && s.light != kNone) add_emission(other);
   }

@@ -49,6 +49,10 @@ struct DenoisingGuide {
 // and of the media up to the first surface that scatters (`media`).
 struct Opacity {
   C3 all{0, 0, 0}, media{0, 0, 0};
+  // Of the AOV shadow_catcher, if the ray ends on a shadow catcher: its direct light, the share of the light
+  // behind the scene that reaches the camera, and the direct light without other shapes and media. The first
+  // and the last are multiplied by the share.
+  C3 shadow{0, 0, 0};
 };
 
 // The components into which the radiance of a sample is split. The light AOVs (auxiliary images) are sums of

@@ -67,6 +67,12 @@ constexpr float forced_survival(int depth) {
   return static_cast<float>(depth) / static_cast<float>(depth + 1);
 }
 
+// Where shadow rays and scattered rays may meet different surfaces (visibility.h), light from a direction
+// that a surface samples with more than this density, per steradian, is that which the scattered ray meets,
+// as in a mirror. Diffuse surfaces are far below, at most 1 / pi; the peak of a lobe of roughness alpha is
+// about 1 / (4 pi alpha^2).
+inline constexpr float kLikeMirror = 1;
+
 enum class Collision : std::uint8_t {
   escaped,    // the path reached the end of the segment
   absorbed,   // the path ends here
@@ -193,13 +199,44 @@ class PathTracer {
   std::optional<BsdfSample> sample_bsdf(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo,
                                         const Group& g);
   void add_emission(const SurfaceHit& hit);
+  void add_emission_times(const C3& beta, const SurfaceHit& hit);
   void add_environment();
   [[gnu::cold, gnu::noinline]] void add_environment_seen();
-  // True if a camera ray passes straight through a surface that is unseen or held out; false if it ends
-  // there.
+  // True if a camera ray passes straight through the surface; false if it ends there.
   bool sees_past(const SurfaceHit& hit, const SurfaceInfo& surface) {
-    return surface.unseen || surface.null || (surface.null_transmission && passes_null(hit));
+    return surface.hidden.has(RayKind::camera) || surface.null ||
+           (surface.null_transmission && passes_null(hit));
   }
+  // With F.visibility (visibility.h): the kind of the path's current ray.
+  RayKind ray_kind() const {
+    if (depth_ == 0) return RayKind::camera;
+    return left_medium_ ? RayKind::medium : RayKind::surface;
+  }
+  // True if shadow rays alone find the light that arrives at the last vertex.
+  bool direct_by_shadows() const {
+    if constexpr (F.visibility)
+      return world_.direct_by_shadows && depth_ > 0 && !last_.delta && !like_mirror_;
+    return false;
+  }
+  // True if light from a direction that a surface samples with this density is not looked for by shadow rays.
+  bool is_like_mirror(float pdf) const {
+    if constexpr (F.visibility) return world_.direct_by_shadows && pdf > kLikeMirror;
+    return false;
+  }
+  // True if lights that the current ray hits have full weight.
+  bool hits_count_fully() const {
+    if constexpr (F.visibility) return last_.delta || like_mirror_;
+    return last_.delta;
+  }
+  // True if what scatters rays of this kind (surfaces or media) receives the chosen light.
+  bool receives(const LightChoice& choice, RayKind kind) const {
+    if constexpr (F.visibility) return !world_.lights.hidden(choice.light, kind);
+    return true;
+  }
+  [[gnu::cold, gnu::noinline]] void add_environment_times(const C3& beta);
+  [[gnu::cold, gnu::noinline]] void add_direct();
+  [[gnu::cold, gnu::noinline]] C3 shadow_at(const SurfaceHit& hit);
+  bool meets_catcher(const V3& p, const LightSample& light) const;
   C3 unoccluded(const V3& start, const V3& p, const LightSample& light, const Within& medium,
                 RandomStream stream);
   [[gnu::always_inline]] inline C3 through_boundaries(C3 value, const V3& start, const V3& p, const V3& d,
@@ -361,6 +398,11 @@ class PathTracer {
   Within medium_;
   bool looked_for_sky_ = false;   // true if look_for_sky() sampled a second direction at the first vertex
   bool first_in_medium_ = false;  // with F.split: true if the first scattering was in a medium
+  // Both with F.visibility. left_medium_: true if the last scattering was in a medium. direct_due_: true if
+  // add_direct() has to look for light in the direction of the current ray.
+  bool left_medium_ = false, direct_due_ = false;
+  // With F.visibility: true if the last direction was scattered as if by a mirror (is_like_mirror)
+  bool like_mirror_ = false;
   Vertex last_;
   SubpathDensities densities_;  // with F.connected: densities of the path up to the current vertex
   Connections connections_;
@@ -423,6 +465,9 @@ bool PathTracer<F, Light>::begin_at_meter(const CameraRay& ray) {
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::go_on(float t_max) {
   for (; segment_ < kMaxSegments; ++segment_, t_max = kInfinity) {
+    if constexpr (F.visibility) {
+      if (direct_due_) add_direct();
+    }
     std::optional<Flight> flown;
     if constexpr (kFliesFirst) {
       const Medium* const medium = std::isfinite(t_max) ? nullptr : clear_medium(medium_, ray_.start);
@@ -467,8 +512,9 @@ void PathTracer<F, Light>::go_on(float t_max) {
     }
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     if constexpr (F.visibility) {
-      if (depth_ == 0 && (surface.unseen || surface.holdout)) {
-        if (!sees_past(hit, surface)) break;
+      const bool hidden = surface.hidden.has(ray_kind());
+      if (hidden || (depth_ == 0 && surface.holdout)) {
+        if (!hidden && !sees_past(hit, surface)) break;
         pass_boundary(hit, surface);
         if (is_black(beta_)) break;
         continue;
@@ -519,13 +565,13 @@ template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::light_surface_by(const LightChoice& choice, const SurfaceHit& hit,
                                             const SurfaceInfo& surface, const V3& wo) {
   const auto light = world_.lights.sample(choice, hit.p);
-  if (!light) return;
+  if (!light || !receives(choice, RayKind::surface)) return;
   const V3 wi = hit.shading.to_local(light->direction);
   // A shading normal must not let light through a surface that is opaque by its geometric normal. Sampled
   // directions are checked in the same way (scatter_on_surface).
   if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0)) return;
   const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, wi);
-  if (is_black(f.f_cos)) return;
+  if (is_black(f.f_cos) || (!light->delta && is_like_mirror(f.pdf))) return;
   float sampled = f.pdf;
   if constexpr (F.aimed) sampled = near_lamps_.pdf(f.pdf, light->direction);
   const float weight = light->delta ? 1 : balance_weight(light->pdf, sampled);
@@ -569,6 +615,7 @@ template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   if (!may_go_on(depth_ + 1, passed_)) return {Collision::absorbed};
   ++depth_;
+  if constexpr (F.visibility) left_medium_ = false;
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
   const V3 wo = hit.shading.to_local(-ray_.d);
   if constexpr (F.aimed)
@@ -618,6 +665,12 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   last_.place = {hit.p, hit.shading.n};
   last_.pdf = s->pdf;
   last_.delta = s->delta;
+  if constexpr (F.visibility) {
+    float pdf = s->pdf;
+    if constexpr (F.aimed) pdf *= aim_;
+    like_mirror_ = !s->delta && is_like_mirror(pdf);
+    direct_due_ = direct_by_shadows();
+  }
   if constexpr (F.connected) {
     last_.ng = hit.ng;
     last_.sum = densities_sum([&] { return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), s->wi, wo).pdf; });
@@ -691,70 +744,6 @@ void PathTracer<F, Light>::pass_boundary(const SurfaceHit& hit, [[maybe_unused]]
 }
 
 template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
-  if (depth_ == 0 && world_.hide_emitters) return;
-  const C3 emitted = world_.lights.emitted(hit, -ray_.d);
-  if (is_black(emitted)) return;
-  float weight = 1;
-  if (!last_.delta) {
-    const float p_l =
-        world_.lights.pdf(hit, last_.p, ray_.d, last_.place, last_.in_medium.light_chosen_first());
-    if constexpr (F.reuse) {
-      if (is_leaving_second()) {
-        keep_emitted(emitted, p_l, world_.lights.group(hit));
-        return;
-      }
-    }
-    weight = balance_weight(last_.pdf, p_l * last_.in_medium.found_as_light(world_.lights.pivot(hit)));
-  }
-  add(beta_ * emitted * weight, F.split ? world_.lights.group(hit) : kNoLightGroup);
-}
-
-template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::add_environment() {
-  if (!world_.lights.has_environment()) return;
-  if (depth_ == 0 && world_.hide_environment) return add_environment_seen();
-  if constexpr (F.reuse) {
-    if (is_leaving_second()) {
-      const Lights::EnvironmentParts parts = world_.lights.environment_parts(last_.p, ray_.d, last_.place);
-      keep_emitted(parts.sampled, parts.pdf, parts.group);
-      add(beta_ * parts.unsampled, world_.lights.sky_group());
-      return;
-    }
-  }
-  const float pdf = last_.pdf / last_.in_medium.found_as_light();
-  C3 light = world_.lights.environment(last_.p, ray_.d, last_.delta ? kInfinity : pdf, last_.place);
-  if constexpr (F.connected) {
-    if (connections_.learner && !last_.delta && !is_black(light)) {
-      ++connections_.learner->left;
-      connections_.learner->found_sky(last_.p, ray_.d, mean(beta_ * light));
-    }
-  }
-  const bool half_sky = depth_ == 1 && looked_for_sky_;
-  if (half_sky) light -= world_.lights.constant_environment() * .5f;
-  add(beta_ * light, kNoLightGroup);
-  if constexpr (F.split) {
-    if (split_->groups == 0) return;
-    world_.lights.environment_by_group(
-        last_.p, ray_.d, last_.delta ? kInfinity : pdf, last_.place,
-        [&](LightGroup group, const C3& part) { add_to_group(group, beta_ * part); });
-    if (half_sky)
-      add_to_group(world_.lights.sky_group(), beta_ * world_.lights.constant_environment() * -.5f);
-  }
-}
-
-template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::add_environment_seen() {
-  if (world_.hide_emitters || world_.transparent) return;
-  const C3 light = world_.lights.environment_seen(ray_.d);
-  if (is_black(light)) return;
-  add(beta_ * light, kNoLightGroup);
-  if constexpr (F.split)
-    world_.lights.environment_seen_by_group(
-        ray_.d, [&](LightGroup group, const C3& part) { add_to_group(group, beta_ * part); });
-}
-
-template <Features F, template <Features> class Light>
 float PathTracer<F, Light>::size() const {
   float size = max_component(beta_) * eta_scale_;
   if constexpr (F.reuse) size *= sharing_.survival;
@@ -786,7 +775,9 @@ bool PathTracer<F, Light>::survives(float u) {
 }  // namespace ls::render
 
 #include "worker/render/integrator/aov_rays.h"
+#include "worker/render/integrator/light_hits.h"
 #include "worker/render/integrator/medium_crossing.h"
 #include "worker/render/integrator/path_reuse.h"
 #include "worker/render/integrator/shadow_ray.h"
 #include "worker/render/integrator/vertex_connection.h"
+#include "worker/render/integrator/visibility.h"

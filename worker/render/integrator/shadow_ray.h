@@ -44,6 +44,7 @@ template <Features F, template <Features> class Light>
 C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left,
                                             Within medium, RandomStream stream) {
   OffsetRay ray{start, p, d};
+  int unmet = 0;  // number of surfaces that are hidden from shadow rays
   for (int i = 0; i < kMaxShadowSegments; ++i) {
     SurfaceHit hit;
     LS_COUNT(boundary_rays);
@@ -69,9 +70,12 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
       }
     }
     if (!met) return value;
-    if (!may_go_on(depth_, passed_ + i + 1)) return {0, 0, 0};
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    if (surface.null_transmission) {
+    bool hidden = false;
+    if constexpr (F.visibility) hidden = surface.hidden.has(RayKind::shadow);
+    if (hidden) ++unmet;
+    if (!may_go_on(depth_, passed_ + i + 1 - unmet)) return {0, 0, 0};
+    if (surface.null_transmission && !hidden) {
       const NullTransmission null_transmission =
           world_.bsdfs.null_transmission(surface.bsdf, hit.uv_point(), hit.shading.to_local(-d));
       value *= null_transmission.transmission;

@@ -69,11 +69,11 @@ Result<void> Lights::add_map(const Scene& scene, const EnvmapEmitter& emitter, c
 Result<void> Lights::add_emitter(const Scene& scene, const Emitter& emitter, const ImageLoader& images) {
   return std::visit(overloaded{[&](const ConstantEmitter& e) -> Result<void> {
                                  environment_ += color(e.radiance);
-                                 hides_sky_ = !e.visible_camera;
+                                 sky_hidden_ = hidden_from(e);
                                  return {};
                                },
                                [&](const EnvmapEmitter& e) {
-                                 hides_sky_ = !e.visible_camera;
+                                 sky_hidden_ = hidden_from(e);
                                  return add_map(scene, e, images);
                                },
                                [&](const GoniometricEmitter& e) -> Result<void> {
@@ -94,12 +94,14 @@ Result<void> Lights::add_emitter(const Scene& scene, const Emitter& emitter, con
 Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const TextureTable& textures,
                              const ImageLoader& images, std::span<const std::string> light_groups) {
   Lights l;
-  // Sets the group of the lights that were added last, as it has none yet.
-  const auto group = [&](const std::string& name) {
-    const LightGroup index = light_group_of(light_groups, name);
-    for (auto light = l.lights_.rbegin(); light != l.lights_.rend() && light->group == kNoLightGroup; ++light)
-      light->group = index;
-    return index;
+  // Sets the group and the receivers of the lights from `first` on.
+  const auto mark = [&](std::size_t first, const std::string& name, RayKinds hidden) {
+    const LightGroup group = light_group_of(light_groups, name);
+    for (std::size_t light = first; light < l.lights_.size(); ++light) {
+      l.lights_[light].group = group;
+      l.lights_[light].hidden = hidden;
+    }
+    return group;
   };
   l.geometry_ = &geometry;
   l.textures_ = &textures;
@@ -107,12 +109,15 @@ Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const Textu
   for (std::uint32_t i = 0; i < scene.shapes.size(); ++i) {
     const auto& emitter = scene.shapes[i].emitter;
     if (!emitter) continue;
+    const auto first = l.lights_.size();
     l.add_area(scene, i, primitives, geometry);
-    group(emitter->light_group);
+    mark(first, emitter->light_group, hidden_from(scene.shapes[i]));
   }
   for (const Emitter& e : scene.emitters) {
+    const auto first = l.lights_.size();
     if (auto ok = l.add_emitter(scene, e, images); !ok) return tl::unexpected(ok.error());
-    const LightGroup index = std::visit([&](const auto& any) { return group(any.light_group); }, e);
+    const LightGroup index =
+        std::visit([&](const auto& any) { return mark(first, any.light_group, hidden_from(any)); }, e);
     if (std::holds_alternative<ConstantEmitter>(e) || std::holds_alternative<EnvmapEmitter>(e))
       l.sky_group_ = index;
   }
@@ -233,11 +238,12 @@ Lights::EnvironmentParts Lights::environment_parts(const V3& x, const V3& direct
 }
 
 bool Lights::hides_environment() const {
-  return hides_sky_ || std::ranges::any_of(suns_, [&](std::uint32_t i) { return !sun(i).seen; });
+  return sky_hidden_.has(RayKind::camera) ||
+         std::ranges::any_of(suns_, [&](std::uint32_t i) { return !sun(i).seen; });
 }
 
 C3 Lights::environment_seen(const V3& direction) const {
-  C3 sum = hides_sky_ ? C3(0) : environment_ + sky_.radiance(direction);
+  C3 sum = sky_hidden_.has(RayKind::camera) ? C3(0) : environment_ + sky_.radiance(direction);
   for (const std::uint32_t i : suns_)
     if (sun(i).seen) sum += sun(i).found(direction, kInfinity, 1);
   return sum;

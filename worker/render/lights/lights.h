@@ -52,6 +52,8 @@ class Lights {
   LightGroup group(std::uint32_t light) const { return lights_[light].group; }
   LightGroup group(const SurfaceHit& hit) const { return group(geometry_->surfaces[hit.surface].light); }
   LightGroup sky_group() const { return sky_group_; }
+  // True if what scatters rays of this kind (surfaces or media) does not receive the light.
+  bool hidden(std::uint32_t light, RayKind from) const { return lights_[light].hidden.has(from); }
 
   // False if there is no light that next-event estimation can sample.
   bool can_sample() const { return !lights_.empty(); }
@@ -116,16 +118,27 @@ class Lights {
     f(sky_group_, sky_.sampled() ? environment_ + sky(x, direction, pdf, place) : environment_);
     for (const std::uint32_t i : suns_) f(group(i), sun(i).found(direction, pdf, probability_at(i, place)));
   }
+  // The same, for parts that rays of this kind see.
+  template <class F>
+  void environment_seen_from(RayKind kind, const V3& x, const V3& direction, float pdf,
+                             const LightPlace& place, F f) const {
+    if (!sky_hidden_.has(kind))
+      f(sky_group_, sky_.sampled() ? environment_ + sky(x, direction, pdf, place) : environment_);
+    for (const std::uint32_t i : suns_)
+      if (!hidden(i, kind)) f(group(i), sun(i).found(direction, pdf, probability_at(i, place)));
+  }
   // The radiance that a camera ray sees if it leaves the scene in this direction without a scattering: that
   // of the lights whose visible_camera is true.
   C3 environment_seen(const V3& direction) const;
   // Calls f(group, radiance) for each of these lights.
   template <class F>
   void environment_seen_by_group(const V3& direction, F f) const {
-    if (!hides_sky_) f(sky_group_, environment_ + sky_.radiance(direction));
+    if (!sky_hidden_.has(RayKind::camera)) f(sky_group_, environment_ + sky_.radiance(direction));
     for (const std::uint32_t i : suns_)
       if (sun(i).seen) f(group(i), sun(i).found(direction, kInfinity, 1));
   }
+  // True if rays of this kind do not see the environment map or the constant environment.
+  bool hides_sky(RayKind from) const { return sky_hidden_.has(from); }
   bool hides_environment() const;  // true if visible_camera of one of these lights is false
   // The radiance of the constant environment; black while portals are set, since the constant environment is
   // then a part of the sky, which is sampled as a light.
@@ -191,6 +204,7 @@ class Lights {
     VariantOf<AreaKinds, PunctualKinds, DistantKinds> kind;
     float probability = 0;
     LightGroup group = kNoLightGroup;
+    RayKinds hidden;  // what does not receive this light: surfaces, media
   };
 
   static bool has_place(const Light& light) {
@@ -271,7 +285,7 @@ class Lights {
   bool tree_in_media_ = false;
   bool any_with_place_ = false;
   LightGroup sky_group_ = kNoLightGroup;
-  bool hides_sky_ = false;  // true if the camera does not see the environment map or the constant environment
+  RayKinds sky_hidden_;  // what does not see the environment map or the constant environment
   std::uint64_t left_out_ = 0, clamped_ = 0;
 };
 

@@ -141,6 +141,9 @@ enum class Purpose : std::uint32_t {
   connect,
   track_connect,
   track_opacity,
+  track_direct,
+  shadow_catcher,
+  track_shadow_catcher,
   end  // not a purpose, but the number of purposes
 };
 

@@ -52,7 +52,7 @@ void aim(const IntegratorSettings& settings, World& w) {
 }
 
 void learn_sky_samples(const IntegratorSettings& settings, World& w) {
-  if (settings.sky_samples < 0 || w.need.media || w.need.connected ||
+  if (settings.sky_samples < 0 || w.need.media || w.need.connected || w.ray_flags ||
       is_black(w.lights.constant_environment()))
     return;
   if (!w.depth_allows(1)) return;

@@ -109,6 +109,13 @@ class World {
   // True if camera rays do not see all of the environment, because of the two members above or
   // Lights::hides_environment()
   bool hide_environment = false;
+  // True if some surfaces are hidden from shadow rays or scattered rays, or some lights from what receives
+  // light
+  bool ray_flags = false;
+  // True if rays that are scattered in some direction may meet other surfaces than shadow rays in that
+  // direction. Shadow rays then decide about all light that comes straight from a light to a vertex that does
+  // not scatter as a mirror does.
+  bool direct_by_shadows = false;
   int max_depth = -1;  // maximum path length in segments; -1: unlimited
   // True if passing straight through a surface (null, or with null transmission) counts as a segment for
   // max_depth, as in Mitsuba's `path`; false if it does not, as in Mitsuba's `volpath`.

@@ -28,7 +28,7 @@ Features features_of(const scene::Needs& n) {
           .chromatic = n.chromatic,
           .emission = n.emission,
           .passing = n.boundaries || n.null_transmission,
-          .visibility = n.flagged_shapes > 0};
+          .visibility = n.flagged_shapes > 0 || n.ray_flags > 0};
 }
 
 // Returns the features that the finished world requires. Except for `overlaps` and `chromatic`, features_of()
@@ -39,7 +39,7 @@ Features found_in(const World& w) {
   f.passing = std::any_of(surfaces.begin(), surfaces.end(),
                           [](const SurfaceInfo& s) { return s.null || s.null_transmission; });
   f.visibility = std::any_of(surfaces.begin(), surfaces.end(),
-                             [](const SurfaceInfo& s) { return s.unseen || s.holdout; });
+                             [](const SurfaceInfo& s) { return s.hidden.any() || s.holdout; });
   if (!w.use_media) return f;
   const auto use = [&](std::uint32_t i) {
     if (i == kNone) return;
@@ -312,6 +312,11 @@ Result<std::shared_ptr<World>> make_world(const Scene& given, const RenderSettin
   if (w.aovs.any_of(aovs_of(AovKind::ids))) name_surfaces(scene, w);
   bool homogeneous_media = false;
   for (const Medium& m : w.media) homogeneous_media = homogeneous_media || (!m.grid && !is_black(m.sigma_t));
+  w.ray_flags = w.needs.ray_flags > 0;
+  w.direct_by_shadows = std::ranges::any_of(w.geometry.surfaces, [&](const SurfaceInfo& s) {
+    const bool shadow = s.hidden.has(RayKind::shadow);
+    return s.hidden.has(RayKind::surface) != shadow || s.hidden.has(RayKind::medium) != shadow;
+  });
   w.shadows_walk = w.null_transmission || (w.need.media && w.accel.has_boundaries());
   const bool segments = w.distant_mis || scene.integrator.equiangular == 0;
   w.equiangular = segments && w.need.media && homogeneous_media && w.lights.any_with_place();

@@ -92,7 +92,8 @@ WorldReport describe(const World& w) {
   feature(w.overlaps, "media within or across each other");
   feature(w.coincident, "a search for surfaces that lie on null ones");
   feature(w.need.split, "AOVs of light");
-  feature(w.need.visibility, "surfaces hidden from the camera or held out");
+  feature(w.needs.flagged_shapes > 0, "surfaces hidden from the camera, held out or that catch shadows");
+  feature(w.ray_flags, "surfaces and lights hidden from shadow or scattered rays");
   const TechniqueSet techniques = techniques_of(w);
   feature(techniques.has(Technique::equiangular), "equi-angular sampling about lights");
   feature(techniques.has(Technique::exponential), "points along segments, as light fades");

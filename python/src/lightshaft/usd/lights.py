@@ -16,6 +16,7 @@ from .meshes import Part
 from .problems import Problems
 from .shading import plain
 from .transforms import Matrix, is_similarity, mean_scale, mirrors, scale, unscaled
+from .visibility import Visibility
 
 FLIP = scale(1, -1, -1)  # USD's lights shine along -z, those of the scene format along +z
 PROFILE = 512  # pixels of the image that a spot light throws
@@ -34,7 +35,7 @@ class Lights:
     ) -> None:
         self._document, self._images, self._problems, self._time = document, images, problems, time
         self._up_axis = up_axis
-        self._sky: list[tuple[str, list[float]]] = []
+        self._sky: list[tuple[Usd.Prim, list[float], Dict]] = []
         self._maps = 0
         self.count = 0
 
@@ -46,18 +47,24 @@ class Lights:
         self.count += 1
         self._check(prim)
         tell_light(prim, self._problems)
+        self._visible = Visibility(prim, self._time, self._problems)
         build(self, prim, matrix)
 
     def finish(self) -> None:
         """Combines domes of one colour into one sky, because the scene format has only one."""
         if self._maps > 1 or (self._maps and self._sky):
             self._problems.error(
-                self._sky[0][0] if self._sky else "the stage",
+                self._sky[0][0].GetPath() if self._sky else "the stage",
                 "there is more than one dome light, one of them with an image. Leave one",
             )
         elif self._sky:
-            total = np.sum([radiance for _, radiance in self._sky], axis=0)
-            self._document.define(self._sky[0][0], {"type": "constant", "radiance": colour(list(total))})
+            total = np.sum([radiance for _, radiance, _ in self._sky], axis=0)
+            first, _, flags = self._sky[0]
+            if any(others != flags for _, _, others in self._sky):
+                self._problems.warn(first, "dome lights differ in which rays see them: all are seen by all")
+                flags = {}
+            sky = {"type": "constant", "radiance": colour(list(total)), **flags}
+            self._document.define(str(first.GetPath()), sky)
 
     def value(self, prim: Usd.Prim, name: str, default: Any) -> Any:
         """Returns an input. In files from before 2021 it has its old name."""
@@ -124,6 +131,7 @@ class Lights:
                 "direction": direction / np.linalg.norm(direction),
                 "irradiance": colour([x * (1 if whole else size) for x in luminance]),
                 "angular_radius": half,
+                **self._visible.of_sky(),
             },
         )
 
@@ -133,7 +141,7 @@ class Lights:
         if not any(luminance):
             return
         if file is None or not file.path:
-            self._sky.append((str(prim.GetPath()), luminance))
+            self._sky.append((prim, luminance, self._visible.of_sky()))
             return
         kind = str(self.value(prim, "texture:format", "automatic"))
         if kind not in ("automatic", "latlong"):
@@ -164,6 +172,7 @@ class Lights:
                 "scale": luminance[0] if grey else 1.0,
                 # USD's map lies as the scene format's: its middle is +z, a quarter from its left edge is +x.
                 "to_world": _turned(matrix) @ (turn if stands else np.eye(4)),
+                **self._visible.of_sky(),
             },
         )
 
@@ -236,7 +245,7 @@ class Lights:
             radiance["wrap_mode"] = "clamp"
         emitter = {"type": "area", "radiance": radiance, **self._beam(prim, flat)}
         placed = {**shape, "to_world": to_world, "bsdf": {"type": "null"}, "emitter": emitter}
-        self._document.define(str(prim.GetPath()), placed)
+        self._document.define(str(prim.GetPath()), {**placed, **self._visible.of_sky()})
 
     def _beam(self, prim: Usd.Prim, flat: bool) -> Dict:
         """Returns cone and focus as the angles of an area light, measured from its normal."""
@@ -277,7 +286,7 @@ class Lights:
             return
         if cone >= 180:
             place = {"type": "point", "position": matrix[:3, 3], "intensity": colour(intensity)}
-            self._document.define(str(prim.GetPath()), place)
+            self._document.define(str(prim.GetPath()), {**place, **self._visible.of_light()})
             return
         if radius > 0:
             self._problems.warn(prim, "a sphere light with a cone shines from its centre: shadows are hard")
@@ -298,7 +307,7 @@ class Lights:
             spot["beam_width"] = cone * (1 - soft)
         if self.number(prim, "shaping:focus", 0.0) > 0:
             self._problems.warn(prim, "inputs:shaping:focus beside a cone is left out")
-        self._document.define(str(prim.GetPath()), spot)
+        self._document.define(str(prim.GetPath()), {**spot, **self._visible.of_light()})
 
 
 def soft_profile(cone: float, soft: float) -> Any:

@@ -21,6 +21,7 @@ from .ignored import SILENT, tell_prim
 from .lights import Lights, is_light
 from .problems import Problems
 from .transforms import Matrix, column_matrix, is_usable
+from .visibility import Visibility
 from .volumes import Volumes
 
 SHOWN = ("default", "render")  # purposes
@@ -130,7 +131,11 @@ class Walk:
         elif prim.IsA(UsdGeom.Gprim):
             if prim.HasAPI(UsdLux.LightAPI):
                 self._problems.warn(prim, "the light of a mesh is ignored: give it an emissiveColor")
-            content.leaves += self._geometry.leaves(prim, matrix)
+            leaves = self._geometry.leaves(prim, matrix)
+            flags = Visibility(prim, self._time, self._problems).of_shape() if leaves else {}
+            for leaf in leaves:
+                leaf.shape.update(flags)
+            content.leaves += leaves
         elif kind not in SILENT:
             self._problems.warn(prim, f"a {kind} is not read")
 

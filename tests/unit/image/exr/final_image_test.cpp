@@ -14,6 +14,7 @@
 
 #include "core/image/exr/exr_file.h"
 #include "core/image/exr/memory.h"
+#include "core/image/exr/pixel_layers.h"
 #include "tests/unit/image/support.h"
 
 namespace ls {
@@ -292,6 +293,39 @@ TEST(FinalExr, HasAlphaWithItsStandardError) {
   EXPECT_EQ(std::get<ExrHalf>(image.channels.at("A")).values[0], .5f);
   EXPECT_EQ(std::get<ExrFloat>(image.channels.at("stderr.A")).values[0], .25f);  // half of the difference
   EXPECT_EQ(image.channels.count("alpha.A"), 0u);
+}
+
+// The opacity .25 of half A and .5 of half B; the shadow takes 1/4 of the light by half A, and 3/4 of half of
+// the light by half B. Both halves together: 3/8 + 3/4 (1 - 1 / 2).
+TEST(FinalExr, AddsTheShadowsOnShadowCatchersToAlphaAndOpacity) {
+  Partial p = flat(kFinalGrid, 0, {1, 1, 1});
+  p.aovs = AovSet{}.with(Aov::alpha).with(Aov::opacity).with(Aov::shadow_catcher).with(Aov::volume_opacity);
+  const auto n = static_cast<std::size_t>(p.header.tile.pixels());
+  for (const std::string& name : planes_of(p.aovs).names) {
+    const bool a = name.find(".A.") != std::string::npos;
+    float value = a ? .25f : .5f;
+    if (name.ends_with("shadow_catcher.A.L")) value = .75f;
+    if (name.ends_with("shadow_catcher.B.L")) value = .25f;
+    if (name.find("shadow_catcher") != std::string::npos && name.ends_with(".T")) value = a ? 1 : .5f;
+    if (name.find("shadow_catcher") != std::string::npos && name.ends_with(".U")) value = 1;
+    p.sums.insert(p.sums.end(), n, value);
+  }
+  const float both = .375f + .75f * (1 - .5f), half_a = .25f + .25f, half_b = .5f + .5f * .75f;
+  Film film(kFinalGrid, p.aovs);
+  ASSERT_TRUE(film.fold(0, 0, p));
+
+  const auto image = read_final_exr(final_exr(film, some_provenance(), {})->exr, "a shadow").value();
+  const auto viewed = [&](std::string_view name) {
+    return TileLayers(film, 0, true).values(pixel_layer(film.aovs(), name).value())[0];
+  };
+
+  EXPECT_EQ(std::get<ExrHalf>(image.channels.at("A")).values[0], both);
+  EXPECT_EQ(std::get<ExrHalf>(image.channels.at("opacity.G")).values[0], both);
+  EXPECT_EQ(std::get<ExrHalf>(image.channels.at("volume_opacity.G")).values[0], .375f);
+  EXPECT_EQ(std::get<ExrFloat>(image.channels.at("stderr.A")).values[0], (half_b - half_a) / 2);
+  EXPECT_EQ(std::get<ExrFloat>(image.channels.at("shadow_catcher.U")).values[0], 1);
+  EXPECT_EQ(viewed("alpha"), both);
+  EXPECT_EQ(viewed("volume_opacity"), .375f);
 }
 
 struct Decoded {

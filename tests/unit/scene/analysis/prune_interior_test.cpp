@@ -51,10 +51,12 @@ std::string bsdf(std::string_view type, std::string_view inside = "") {
 
 std::size_t media(std::string_view objects) { return pruned(objects).scene.media.size(); }
 
-TEST(PruneInteriors, InteriorThatTheCameraLooksIntoStays) {
-  const std::string hidden = R"(<boolean name="visible_camera" value="false"/>)";
+TEST(PruneInteriors, InteriorThatSomeRaysLookIntoStays) {
   EXPECT_EQ(media(cube(kWhole + kFog) + R"(<emitter type="point"/>)"), 0u);
-  EXPECT_EQ(media(cube(kWhole + kFog + hidden) + R"(<emitter type="point"/>)"), 1u);
+  for (const char* flag : {"visible_camera", "visible_shadow", "visible_reflection", "visible_volume"}) {
+    const std::string hidden = fmt::format("<boolean name=\"{}\" value=\"false\"/>", flag);
+    EXPECT_EQ(media(cube(kWhole + kFog + hidden) + R"(<emitter type="point"/>)"), 1u) << flag;
+  }
 }
 
 TEST(PruneInteriors, InteriorOfAnOpaqueBodyIsRemovedWithItsGrid) {

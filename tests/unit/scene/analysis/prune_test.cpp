@@ -110,6 +110,31 @@ TEST(Prune, RemovesSurfacesWithoutEffectUnlessTheyEmitOrSeparateMedia) {
   EXPECT_EQ(pruned_text(sphere(kGreyMaterial)).scene.shapes.size(), 1u);
 }
 
+std::string hidden_from(std::initializer_list<std::string_view> rays) {
+  std::string flags;
+  for (const auto ray : rays) flags += fmt::format("<boolean name=\"visible_{}\" value=\"false\"/>", ray);
+  return flags;
+}
+
+TEST(Prune, RemovesShapesAndLightsThatAreHiddenFromAllRays) {
+  const std::string all = hidden_from({"camera", "shadow", "reflection", "volume"}),
+                    some = hidden_from({"camera", "reflection", "volume"}),
+                    receivers = hidden_from({"reflection", "volume"});
+  EXPECT_EQ(pruned_text(sphere(kGreyMaterial + all)).scene.shapes.size(), 0u);
+  EXPECT_EQ(pruned_text(sphere(kGreyMaterial + some)).scene.shapes.size(), 1u) << "it casts shadows";
+  EXPECT_EQ(pruned_text(sphere(kGreyMaterial + all + R"(<medium type="homogeneous" name="interior"/>)"))
+                .scene.shapes.size(),
+            1u)
+      << "the medium inside stays";
+  const auto lights = [](const std::string& type, const std::string& flags) {
+    return pruned_text("<emitter type=\"" + type + "\">" + flags + "</emitter>").scene.emitters.size();
+  };
+  EXPECT_EQ(lights("point", receivers), 0u);
+  EXPECT_EQ(lights("point", hidden_from({"volume"})), 1u);
+  EXPECT_EQ(lights("constant", receivers), 1u) << "the camera sees it";
+  EXPECT_EQ(lights("constant", receivers + hidden_from({"camera"})), 0u);
+}
+
 TEST(Prune, RemovesAGroupOfInvisibleShapesWithItsInstances) {
   const std::string group = "<shape type=\"shapegroup\" id=\"g\">" + sphere(kNull) + "</shape>";
   const std::string instance = R"(<shape type="instance"><ref id="g"/></shape>)";
@@ -218,6 +243,16 @@ TEST(Needs, MatchTheScene) {
   ASSERT_EQ(cloud.files.size(), 1u);
   EXPECT_EQ(cloud.files[0].uses, (std::vector<std::string>{"grid"}));
   EXPECT_TRUE(needs(R"(<emitter type="point"/>)").only_delta_lights);
+}
+
+TEST(Needs, CountWhatIsHiddenFromSomeRays) {
+  EXPECT_EQ(needs(sphere(kGreyMaterial + hidden_from({"camera"}))).ray_flags, 0u);
+  const Needs some = needs(sphere(kGreyMaterial + hidden_from({"shadow"})) + "<emitter type=\"point\">" +
+                           hidden_from({"volume"}) + "</emitter>");
+  EXPECT_EQ(some.ray_flags, 2u);
+  EXPECT_EQ(some.flagged_shapes, 0u);
+  EXPECT_THAT(canonical_json(some), HasSubstr("\"ray_flags\":2"));
+  EXPECT_EQ(canonical_json(needs(sphere(kGreyMaterial))).find("ray_flags"), std::string::npos);
 }
 
 TEST(Needs, IntegratorWithoutMediaNeedsNone) {

@@ -64,7 +64,7 @@ TEST(ReadVisibility, IsKeptAndLeavesOtherScenesAsTheyAre) {
   };
   const Scene plain = must_read(with_sensor(R"(<shape type="sphere"/><emitter type="constant"/>)"));
   EXPECT_TRUE(plain.shapes[0].visible_camera);
-  for (const char* name : {"visible_camera", "holdout", "transparent"})
+  for (const char* name : {"visible_", "holdout", "transparent"})
     EXPECT_EQ(serialize(plain).find(name), std::string::npos) << name;
 
   const Scene s = must_read(with_sensor(
@@ -78,11 +78,48 @@ TEST(ReadVisibility, IsKeptAndLeavesOtherScenesAsTheyAre) {
   EXPECT_FALSE(std::get<DirectionalEmitter>(s.emitters[1]).visible_camera);
   expect_kept(s);
 
+  for (const char* light : {"constant", "directional", "point", "spot"}) {
+    const Scene lit = must_read(with_sensor(fmt::format("<emitter type=\"{}\">", light) +
+                                            flag("visible_reflection", "false") +
+                                            flag("visible_volume", "false") + "</emitter>"));
+    std::visit([](const auto& e) { EXPECT_FALSE(e.visible_reflection || e.visible_volume); },
+               lit.emitters[0]);
+    expect_kept(lit);
+  }
   const Scene film = must_read(sensor("perspective", "", flag("transparent", "true")));
   EXPECT_TRUE(film.film.transparent);
   expect_kept(film);
   EXPECT_FALSE(must_read(sensor("perspective", "", "<string name=\"pixel_format\" value=\"rgba\"/>"))
                    .film.transparent);
+}
+
+TEST(ReadVisibility, OfAHoldoutThatCatchesShadowsIsRefusedWithItsPlace) {
+  const std::string holdout = "<boolean name=\"holdout\" value=\"true\"/>",
+                    catcher = "\n  <boolean name=\"shadow_catcher\" value=\"true\"/>";
+  const Scene s = must_read(with_sensor("<shape type=\"cube\">" + catcher + "</shape>"));
+  EXPECT_TRUE(s.shapes[0].shadow_catcher);
+  expect_kept(s);
+
+  const ReadResult r = read(with_sensor("<shape type=\"cube\">" + holdout + catcher + "</shape>"));
+  ASSERT_EQ(r.diagnostics.size(), 1u) << messages(r);
+  EXPECT_THAT(r.diagnostics[0].text, HasSubstr("is a holdout, which shows no shadow"));
+  EXPECT_GT(r.diagnostics[0].place.line, 1);
+  EXPECT_EQ(r.diagnostics[0].place.column, 4);
+}
+
+TEST(ReadVisibility, OfABoundaryWithoutASurfaceIsRefused) {
+  for (const char* name : {"visible_shadow", "visible_reflection", "visible_volume"}) {
+    const auto shape = [&](std::string_view value, std::string_view more) {
+      return wrong_with(
+          fmt::format("<shape type=\"cube\">\n<boolean name=\"{}\" value=\"{}\"/>"
+                      "<bsdf type=\"null\"/>{}</shape>",
+                      name, value, more));
+    };
+    const std::string fog = R"(<medium name="interior" type="homogeneous"/>)";
+    EXPECT_THAT(shape("false", fog), HasSubstr(fmt::format("'{}' has no effect on shape \"cube\"", name)));
+    EXPECT_EQ(shape("true", fog), "");
+    EXPECT_EQ(shape("false", R"(<emitter type="area"/>)"), "");
+  }
 }
 
 constexpr std::string_view kGroup =

@@ -143,6 +143,11 @@ TEST(XmlWrite, KeepsEveryBitOfEveryValue) {
       if (auto* spot = std::get_if<SpotEmitter>(&e)) spot->beam_width = spot->cutoff_angle / 3;
     for (Bsdf& b : s.bsdfs)  // needs equal roughnesses
       if (auto* metal = std::get_if<RoughConductorBsdf>(&b)) metal->multiple_scattering = false;
+    for (Shape& shape : s.shapes) {
+      shape.shadow_catcher = shape.shadow_catcher && !shape.holdout;
+      if (std::holds_alternative<NullBsdf>(s.bsdfs[shape.bsdf.value]) && !shape.emitter)
+        shape.visible_shadow = shape.visible_reflection = shape.visible_volume = true;
+    }
     const ReadResult again = read(write_xml(s));
     ASSERT_TRUE(again.scene) << messages(again) << write_xml(s);
     ASSERT_EQ(serialize(*again.scene), serialize(s)) << seed;

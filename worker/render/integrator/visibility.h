@@ -1,0 +1,98 @@
+// Part of path_tracer.h, which includes it: light that comes straight from lights to a vertex where some
+// shapes or lights are hidden from some kinds of rays (Features::visibility, RayKind).
+//
+// A ray passes a surface that is hidden from its kind as if the surface were not there; media behind it stay.
+// So a direction may be free for shadow rays and blocked for scattered rays, or the other way round, and
+// next-event estimation and scattered rays that hit a light would estimate different integrals. Where that is
+// possible (World::direct_by_shadows), the integral is the one that shadow rays see. Scattered rays then
+// bring no light straight from a light; instead add_direct() walks along each of their directions as a shadow
+// ray does, and adds what lights there give, weighted against next-event estimation as usual. Excepted are
+// mirrors and, of glossy surfaces, directions of a high density (kLikeMirror): there the scattered ray's hit
+// alone counts, and next-event estimation adds nothing. Otherwise a glossy floor would show the shadow of a
+// shape that is missing in its reflections.
+#pragma once
+
+#include <cmath>
+
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::add_direct() {
+  direct_due_ = false;
+  const RayKind kind = ray_kind();
+  OffsetRay ray = ray_;
+  Within medium = medium_;
+  C3 beta = beta_;
+  int passed = passed_;
+  RandomStream stream = stream_.stream(segment_, Purpose::track_direct);
+  const auto add_light_of = [&](const SurfaceHit& hit) {
+    const std::uint32_t light = world_.geometry.surfaces[hit.surface].light;
+    if (light != kNone && !world_.lights.hidden(light, kind)) add_emission_times(beta, hit);
+  };
+  for (int i = 0; i < kMaxShadowSegments; ++i) {
+    SurfaceHit hit;
+    const auto primitive = world_.accel.nearest(ray.origin, ray.d, kInfinity);
+    const bool met = primitive && world_.geometry.complete(*primitive, ray.origin, ray.d, hit);
+    if constexpr (F.overlaps) {
+      if (met && world_.coincident) prefer_scatterer(hit, ray.origin, ray.d, kInfinity);
+    }
+    if constexpr (F.media) {
+      if (medium.any()) {
+        beta *= through_media(medium, ray.start, ray.d, met ? ray.length_to(hit) : kInfinity, stream);
+        if (is_black(beta)) return;
+      }
+    }
+    if (!met) {
+      if (is_finite(ray.d)) add_environment_times(beta);
+      return;
+    }
+    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if constexpr (F.overlaps) {
+      if (world_.lights_on_others && surface.coincident_reach > 0) {
+        const CoincidentHits others = others_at(hit, ray.d, ray.d);
+        for (int k = 0; k < others.count; ++k) {
+          SurfaceHit other;
+          const PrimitiveId id = others.ids[static_cast<std::size_t>(k)];
+          if (world_.geometry.complete(id, ray.origin, ray.d, other) &&
+              world_.geometry.surfaces[other.surface].null)
+            add_light_of(other);
+        }
+      }
+    }
+    add_light_of(hit);
+    if (!surface.hidden.has(RayKind::shadow)) {
+      if (!surface.null && !surface.null_transmission) return;
+      if (surface.null_transmission) {
+        beta *= world_.bsdfs.null_transmission(surface.bsdf, hit.uv_point(), hit.shading.to_local(-ray.d))
+                    .transmission;
+        if (is_black(beta)) return;
+      }
+      if (!may_go_on(depth_, ++passed)) return;
+    }
+    const V3 from = ray.d;
+    if constexpr (F.media) medium = beyond(hit, surface, from, from, medium);
+    if constexpr (F.overlaps) {
+      if (medium.overflowed()) return outcome_.reject(HealthCause::nested_media);
+    }
+    ray.leave(hit, from);
+  }
+  outcome_.reject(HealthCause::too_many_surfaces);
+}
+
+// Adds the light of the environment for the path's current ray, times beta: of the parts that the vertex
+// receives.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::add_environment_times(const C3& beta) {
+  const float pdf = hits_count_fully() ? kInfinity : last_.pdf / last_.in_medium.found_as_light();
+  C3 light(0);
+  world_.lights.environment_seen_from(ray_kind(), last_.p, ray_.d, pdf, last_.place,
+                                      [&](LightGroup group, const C3& part) {
+                                        light += part;
+                                        if constexpr (F.split) add_to_group(group, beta * part);
+                                      });
+  add(beta * light, kNoLightGroup);
+}
+
+}  // namespace ls::render
