@@ -48,6 +48,11 @@ Result<ImageFormat> image_format(const fs::path& file) {
                   file.string()));
 }
 
+fs::path deep_file(const fs::path& image) {
+  fs::path deep = image;
+  return deep.replace_extension(".deep.exr");
+}
+
 Result<void> check_folder(const std::string& option, const fs::path& folder) {
   std::string trial = (folder / ".lightshaft-XXXXXX").string();
   const coordinator::File made(::mkostemp(trial.data(), O_CLOEXEC));

@@ -25,6 +25,8 @@ enum class ImageFormat { exr, png, json };
 // Returns the format from the file name's extension, in upper or lower case; EXR if it has none.
 // invalid_argument: it has the extension of another format.
 Result<ImageFormat> image_format(const std::filesystem::path& file);
+// Returns the name of the deep image beside the image of this name: out.deep.exr beside out.exr.
+std::filesystem::path deep_file(const std::filesystem::path& image);
 Result<void> check_folder(const std::string& option, const std::filesystem::path& folder);
 // Checks the name of an output file that is written once per frame. invalid_argument: there are several
 // frames, and the name has no # to distinguish their files.

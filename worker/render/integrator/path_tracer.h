@@ -93,7 +93,10 @@ class PathTracer {
   // clear glass, seen through the surfaces before it.
   DenoisingGuide denoising_guide(const CameraRay& ray);
   // Returns one sample of how much of what is behind the scene does not reach the camera along this ray.
-  Opacity opacity(const CameraRay& ray);
+  // Unless it is null, `deep` receives what the same sample says of the slices of a deep image.
+  Opacity opacity(const CameraRay& ray, const DeepTransmittance* deep = nullptr);
+  // Follows a ray through boundaries and surfaces that light passes straight through.
+  DeepProbe deep_probe(const CameraRay& ray);
   // With F.connected: follows a ray of the sun, and calls keep(vertex) for each light vertex on its way.
   // Camera paths are connected to light vertices (light_vertices.h).
   template <class Keep>
@@ -255,7 +258,10 @@ class PathTracer {
   BsdfEval scattered_at(const PathVertex& y, const V3& d, const V3& w) const;
   void add_shared(const C3& light) {
     outcome_.radiance += light;
-    if constexpr (F.split) split_->parts[static_cast<std::size_t>(part_of(2, first_in_medium_))] += light;
+    if constexpr (F.split) {
+      split_->parts[static_cast<std::size_t>(part_of(2, first_in_medium_))] += light;
+      if (split_->by_depth.wanted) split_->by_depth.add(light);
+    }
   }
   void add_shared_to_group(LightGroup group, const C3& light) {
     split_->add_to_group(group, part_of(2, first_in_medium_), light);
@@ -320,8 +326,21 @@ class PathTracer {
       const LightPart part = part_ahead(ahead);
       split_->parts[static_cast<std::size_t>(part)] += light;
       split_->add_to_group(group, part, light);
+      if (split_->by_depth.wanted) split_->by_depth.add(light);
     }
   }
+  // With F.split: tells the depths of a deep image that the path, if it was not scattered yet, is scattered at
+  // p or finds light there.
+  void see([[maybe_unused]] const V3& p) {
+    if constexpr (F.split)
+      if (depth_ == 0 && split_->by_depth.wanted) split_->by_depth.see(p, ray_.d);
+  }
+  void see_environment() {
+    if constexpr (F.split)
+      if (depth_ == 0 && split_->by_depth.wanted) split_->by_depth.see(kInfinity);
+  }
+  template <class UpTo>
+  void add_along(const C3& total, LightGroup group, float t_max, const UpTo& up_to);
   LightPart part_ahead(bool ahead) const {
     return part_of(depth_ + ahead, depth_ == 0 ? ahead : first_in_medium_);
   }
@@ -382,6 +401,8 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
   if (!world_.depth_allows(0)) return outcome_;
   ray_ = {ray.o, ray.o, ray.d};
   last_.p = ray.o;
+  if constexpr (F.split)
+    if (split_->by_depth.wanted) split_->by_depth.begin(ray.o, world_.camera.near_distance(ray.d));
   if constexpr (F.media) medium_ = start_medium(ray);
   if constexpr (F.chromatic) hero_ = std::min(2, static_cast<int>(3 * stream_.group(0, Purpose::hero).u(0)));
   if constexpr (kSplits) reference_ = world_.mean_radiance > 0 ? kNoReference : 1;
@@ -568,6 +589,7 @@ void PathTracer<F, Light>::look_for_sky(const SurfaceHit& hit, const SurfaceInfo
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   if (!may_go_on(depth_ + 1, passed_)) return {Collision::absorbed};
+  see(hit.p);
   ++depth_;
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
   const V3 wo = hit.shading.to_local(-ray_.d);
@@ -695,6 +717,7 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
   if (depth_ == 0 && world_.hide_emitters) return;
   const C3 emitted = world_.lights.emitted(hit, -ray_.d);
   if (is_black(emitted)) return;
+  see(hit.p);
   float weight = 1;
   if (!last_.delta) {
     const float p_l =
@@ -713,6 +736,7 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_environment() {
   if (!world_.lights.has_environment()) return;
+  see_environment();
   if (depth_ == 0 && world_.hide_environment) return add_environment_seen();
   if constexpr (F.reuse) {
     if (is_leaving_second()) {
