@@ -155,7 +155,8 @@ int run(const MergeFlags& flags) {
   if (merged->film.aovs().deep().count > 0) {
     const auto deep = deep_exr_of(merged->film, provenance, form_of(*spec));
     if (!deep) return print_error(deep.error());
-    if (const auto saved = save_result(deep_file(flags.out), *deep); !saved) return print_error(saved.error());
+    if (const auto saved = save_result(deep_file(flags.out), *deep); !saved)
+      return print_error(saved.error());
   }
   const std::string digest = pixels_sha256(merged->film).hex();
   if (!flags.report.empty())

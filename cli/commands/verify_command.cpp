@@ -69,9 +69,10 @@ Result<DeepFile> open_deep(const std::string& image, const SealedImage& sealed) 
     const auto theirs = deep.picture.strings.find(name);
     if (ours == sealed.picture.strings.end() || theirs == deep.picture.strings.end() ||
         ours->second != theirs->second)
-      return bad_argument(fmt::format("{}: its header \"{}\" is not that of {}: it is the deep image of other "
-                                      "samples",
-                                      deep.path, name, image));
+      return bad_argument(
+          fmt::format("{}: its header \"{}\" is not that of {}: it is the deep image of other "
+                      "samples",
+                      deep.path, name, image));
   }
   std::size_t first = 0;
   for (const std::uint32_t count : deep.picture.rows.counts) {
@@ -279,8 +280,8 @@ std::string line_of(const VerifiedTile& t) {
 
 // Verifies the tiles in parallel; each thread renders one tile at a time.
 std::vector<VerifiedTile> verify_all(const render::World& world, const SealedImage& image,
-                                     const DeepFile* deep, const std::vector<TileIndex>& tiles, int threads, bool quiet,
-                                     const std::atomic<bool>& stop) {
+                                     const DeepFile* deep, const std::vector<TileIndex>& tiles, int threads,
+                                     bool quiet, const std::atomic<bool>& stop) {
   std::vector<VerifiedTile> out(tiles.size());
   std::atomic<std::size_t> next{0};
   std::mutex printing;
@@ -336,8 +337,9 @@ int run(const VerifyFlags& flags) {
     auto beside = open_deep(flags.image, *image);
     if (!beside && beside.error().code != Errc::not_found) return print_error(beside.error());
     if (beside) deep = std::move(*beside);
-    if (!deep) print_note(fmt::format("{} is not there: the deep image is not verified",
-                                      deep_file(flags.image).string()));
+    if (!deep)
+      print_note(
+          fmt::format("{} is not there: the deep image is not verified", deep_file(flags.image).string()));
     if (deep && !deep->picture.changed)
       contents.sealed = false;
     else if (deep)
@@ -358,7 +360,8 @@ int run(const VerifyFlags& flags) {
   const auto world = build_world_again(*scene, image->settings, threads);
   if (!world) return print_rejected(world.error());
   const auto tiles = random_tiles(image->grid().count(), numbers->tiles, numbers->seed);
-  const auto verified = verify_all(**world, *image, deep ? &*deep : nullptr, tiles, threads, flags.json, stop);
+  const auto verified =
+      verify_all(**world, *image, deep ? &*deep : nullptr, tiles, threads, flags.json, stop);
   for (std::string& header :
        wrong_headers(*image, coordinator::layer_names_of(scene->scene, image->settings), verified))
     if (std::find(contents.changed.begin(), contents.changed.end(), header) == contents.changed.end())

@@ -301,6 +301,7 @@ tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, 
 }
 
 Result<void> check_job(const StoredJob& job) {
+  if (auto ok = check_film_size(job.settings); !ok) return ok;
   JobPlan plan = plan_of(job);
   plan.brief.job.value = "new";
   return check_plan(plan);
@@ -416,7 +417,8 @@ Result<Admission> admit_again(const StoredJob& before, const JobSpec& changes, c
   job.spec.after = changes.after;
   if (changes.seed) job.settings.seed = *(job.spec.seed = changes.seed) + frame.value_or(0);
   if (changes.deep > 0) {
-    if (job.settings.meters > 0) return invalid("the job measures, so there is no deep image: leave deep out");
+    if (job.settings.meters > 0)
+      return invalid("the job measures, so there is no deep image: leave deep out");
     job.settings.deep = job.spec.deep = changes.deep;
   }
   if (changes.denoise) job.spec.denoise = true;

@@ -56,7 +56,8 @@ Result<void> write_deep(const std::filesystem::path& path, const Film& film, con
   auto file = AtomicFile::create(path);
   if (!file) return tl::unexpected(file.error());
   ImageFile sink(*file);
-  if (auto written = write_deep_image(film, provenance_of(facts, blobs), form_of(facts.job.spec), sink); !written)
+  if (auto written = write_deep_image(film, provenance_of(facts, blobs), form_of(facts.job.spec), sink);
+      !written)
     return written;
   return file->commit();
 }

@@ -54,8 +54,8 @@ class Pictures {
   Result<std::string> meters_json(const JobId& id) const;
   // The log of a sequence has the lines of all frames, ordered by time.
   Result<std::string> log(const JobId& id) const;
-  // Returns the path of the file `name` (image.exr, deep.exr or report.json) in the folder of a done job. Empty if the
-  // job is not done, or if everything is in memory.
+  // Returns the path of the file `name` (image.exr, deep.exr or report.json) in the folder of a done job.
+  // Empty if the job is not done, or if everything is in memory.
   std::filesystem::path final_file(const JobId& id, const std::string& name) const;
 
  private:

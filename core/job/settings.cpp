@@ -150,20 +150,24 @@ Result<RenderSettings> parse_render_settings(std::string_view text) {
   return settings;
 }
 
-Result<void> check_job_size(const RenderSettings& s, std::uint64_t spp) {
-  if (auto ok = job::check_ranges(s, kRenderSettings); !ok) return ok;
-  if (auto ok = job::check_ranges(JobSpec{.spp = spp}, "spec"); !ok) return ok;
+Result<void> check_film_size(const RenderSettings& s) {
   const AovSet aovs = aovs_of(s);
   const std::uint64_t film = film_bytes_per_pixel(aovs) * s.size.pixels();
   if (film > kMaxFilmBytes)
-    return bad_argument(
-        fmt::format("{} x {} pixels with the AOVs {}{} take {} bytes each, {} in all; the limit is {}: ask for "
-                    "fewer AOVs{} or a smaller frame",
-                    s.size.width, s.size.height, fmt::join(s.aov, ", "),
-                    s.deep > 0 ? fmt::format("{} and {} slices of a deep image", s.aov.empty() ? "(none)" : "",
-                                             s.deep)
-                               : "",
-                    film_bytes_per_pixel(aovs), film, kMaxFilmBytes, s.deep > 0 ? ", fewer slices" : ""));
+    return bad_argument(fmt::format(
+        "{} x {} pixels with the AOVs {}{} take {} bytes each, {} in all; the limit is {}: ask for "
+        "fewer AOVs{} or a smaller frame",
+        s.size.width, s.size.height, fmt::join(s.aov, ", "),
+        s.deep > 0 ? fmt::format("{} and {} slices of a deep image", s.aov.empty() ? "(none)" : "", s.deep)
+                   : "",
+        film_bytes_per_pixel(aovs), film, kMaxFilmBytes, s.deep > 0 ? ", fewer slices" : ""));
+  return {};
+}
+
+Result<void> check_job_size(const RenderSettings& s, std::uint64_t spp) {
+  if (auto ok = job::check_ranges(s, kRenderSettings); !ok) return ok;
+  if (auto ok = job::check_ranges(JobSpec{.spp = spp}, "spec"); !ok) return ok;
+  if (auto ok = check_film_size(s); !ok) return ok;
   const std::uint64_t tiles = grid_of(s).count(), units = tiles * round_count(spp);
   if (tiles > kMaxTiles || units > kMaxUnits)
     return bad_argument(

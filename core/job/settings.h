@@ -38,7 +38,7 @@ struct RenderSettings {
   std::vector<std::string> light_groups;
   int deep = 0;             // number of slices of the deep image in each pixel; 0: there is none
   bool deep_alpha = false;  // true: the deep image has no colours
-  int meters = 0;  // number of meters that the scene has; `size` is then that of their blocks
+  int meters = 0;           // number of meters that the scene has; `size` is then that of their blocks
   bool operator==(const RenderSettings&) const = default;
 };
 AovSet aovs_of(const RenderSettings& settings);
@@ -100,7 +100,9 @@ std::string canonical_json(const RenderSettings& settings);
 Result<RenderSettings> parse_render_settings(std::string_view json);
 Digest digest_of(const RenderSettings& settings);
 
-// Checks size, tile, samples and the number of units against core/job/limits.h.
+// Checks that the film, the pixel sums of the whole image, is not larger than kMaxFilmBytes.
+Result<void> check_film_size(const RenderSettings& settings);
+// Checks size, tile, film, samples and the number of units against core/job/limits.h.
 Result<void> check_job_size(const RenderSettings& settings, std::uint64_t spp);
 
 std::string canonical_json(const JobSpec& spec);

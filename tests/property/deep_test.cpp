@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "core/image/deep/slices.h"
+#include "core/image/aov/deep_planes.h"
 #include "tests/property/split_scenes.h"
 
 namespace ls::test {
@@ -40,8 +40,7 @@ TEST(DeepImage, SlicesAddUpToTheColourAndLeaveItsBits) {
           sum += part;
           size += std::abs(part);
         }
-        const double whole =
-            double{colour[c * deep.pixels + i]} + double{colour[(3 + c) * deep.pixels + i]};
+        const double whole = double{colour[c * deep.pixels + i]} + double{colour[(3 + c) * deep.pixels + i]};
         wrong = std::max(wrong, std::abs(sum - whole) / std::max(std::max(std::abs(whole), size), 1e-30));
       }
     EXPECT_LE(wrong, kClose) << s.name << ": " << deep.variant;
@@ -86,8 +85,8 @@ TEST(DeepImage, WithoutColoursHasTheSameAlphaAndColour) {
       Picture p;
       p.pixels = settings.size.pixels();
       p.planes = planes_of(aovs_of(settings));
-      p.sums = render::render_tile(**world, {0, 0, settings.size.width, settings.size.height}, {0, 4}, nullptr,
-                                   nullptr)
+      p.sums = render::render_tile(**world, {0, 0, settings.size.width, settings.size.height}, {0, 4},
+                                   nullptr, nullptr)
                    .sums;
       return p;
     };

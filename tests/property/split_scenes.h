@@ -53,7 +53,7 @@ struct Picture {
   }
 };
 inline Picture picture(const SceneBuilder& builder, std::vector<std::string> aovs, std::uint64_t spp,
-                std::uint64_t seed, int deep = 0) {
+                       std::uint64_t seed, int deep = 0) {
   RenderSettings settings = settings_of(builder.scene, seed);
   settings.aov = names_of(parse_aovs(aovs).value());
   if (aovs_of(settings).has(Aov::light_groups)) settings.light_groups = scene::light_groups_of(builder.scene);

@@ -118,8 +118,7 @@ def test_a_deep_image_of_any_number_of_slices_flattens_to_the_picture(tmp_path):
 
 
 def test_merged_deep_images_are_the_picture_of_both(tmp_path):
-    """Parts that absorb and shine, but scatter nothing, do not light each other. Edges of pixels differ: there one image has
-    a mean of depths where the other has another, so single pixels at the rims of the balls may be off, and no others."""
+    """Parts that absorb and shine, but scatter nothing, do not light each other."""
     parts = {"fog": fog("0"), "balls": balls(), "both": fog("0") + balls()}
     for name, shapes in parts.items():
         render(write(tmp_path, name, shapes, transparent="true"), tmp_path / f"{name}.exr", "--deep", 16, "--float", spp=64)
@@ -128,10 +127,14 @@ def test_merged_deep_images_are_the_picture_of_both(tmp_path):
 
     together, picture = flat(merged), layers(tmp_path / "both.exr")
 
-    # The fog is homogeneous, so splitting its samples is exact but for float32. Within a slice its emission is spread as the
-    # merge spreads colour, in proportion to alpha, which is exact for this fog, too.
-    wrong = np.max([np.abs(together[c] - picture[c]) for c in "RGBA"], axis=0)
-    assert np.quantile(wrong, .9) <= 1e-3 and wrong.max() < .1, (np.quantile(wrong, .9), wrong.max())
+    # Alpha has no noise in homogeneous fog, and splitting its samples is exact but for float32; only the rims of the fog and
+    # of the balls, where a pixel's transmittance is a mean, differ by their product.
+    assert np.quantile(np.abs(together["A"] - picture["A"]), .9) <= 1e-5
+    # The colour behind fog has noise in the picture of both, and none in its parts. Five standard errors of the mean.
+    for c in "RGB":
+        error = np.sqrt((picture[f"stderr.{c}"] ** 2).sum())
+        assert abs((together[c] - picture[c]).sum()) <= 5 * error + 1e-4 * picture[c].sum(), c
+        assert picture[c].sum() > 20 * error
 
 
 def test_mutual_holdouts_merge_to_the_picture_of_both(tmp_path):
@@ -226,9 +229,8 @@ def test_a_deep_image_without_colours_has_the_same_alpha(image, tmp_path):
     render(scene, tmp_path / "alpha.exr", "--deep", SLICES, "--deep-alpha")
     channels = read_header(deep(tmp_path / "alpha.exr").read_bytes())[0]["channels"][1]
     assert b"A\0" in channels and b"ZBack\0" in channels and b"R\0" not in channels
-    oiiotool(deep(tmp_path / "alpha.exr"), "--flatten", "-d", "float", "-o", tmp_path / "a.exr")
     # Where no light is behind, an alpha may be rounded to 1 that is not with colours.
-    assert np.abs(layers(tmp_path / "a.exr")["A"] - flat(deep(whole))["A"]).max() <= 2 * 2 ** -11
+    assert np.abs(flat(deep(tmp_path / "alpha.exr"))["A"] - flat(deep(whole))["A"]).max() <= 2 * 2 ** -11
 
 
 def test_what_cannot_be_is_refused_with_its_name(image, tmp_path):

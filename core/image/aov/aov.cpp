@@ -9,7 +9,6 @@
 #include <iterator>
 
 #include "core/image/aov/identifiers.h"
-#include "core/image/deep/slices.h"
 
 namespace ls {
 namespace {

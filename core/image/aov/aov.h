@@ -7,8 +7,8 @@
 // identifiers (identifiers.h), sorted by the AOV's name. The partial's EXR file has these planes in the same
 // order, except that it sorts the colour planes by name, too: A.B A.G A.R B.B B.G B.R.
 //
-// The slices of a deep image are further planes of sums, after those of the AOVs; core/image/deep/slices.h
-// says what they are.
+// The slices of a deep image are further planes of sums, after those of the AOVs;
+// core/image/aov/deep_planes.h says what they are.
 #pragma once
 
 #include <cstddef>
@@ -20,6 +20,7 @@
 
 #include "core/base/error.h"
 #include "core/base/light/light_group.h"
+#include "core/image/aov/deep_planes.h"
 
 namespace ls {
 
@@ -81,15 +82,6 @@ struct AovRow {
 std::span<const AovRow> aov_rows();  // all AOVs, sorted by name
 const AovRow& row_of(Aov aov);
 
-// The slices of a deep image: how many there are in a pixel (0: there is no deep image), and whether they have
-// colours or only alpha.
-struct DeepSlices {
-  std::uint32_t count = 0;
-  bool colours = true;  // true if there are no slices
-  bool operator==(const DeepSlices&) const = default;
-};
-inline constexpr std::uint32_t kMostDeepSlices = 64;
-
 // A set of AOVs, the number of light groups for those of AovKind::groups, and the slices of a deep image.
 class AovSet {
  public:
@@ -136,7 +128,7 @@ struct AovPlane {
 struct AovPlanes {
   std::vector<AovPlane> sums;  // those of AOVs
   // The planes of the slices of a deep image, which follow those of `sums`: their number, in the order of
-  // DeepPlanes (core/image/deep/slices.h)
+  // DeepPlanes (deep_planes.h)
   std::size_t deep = 0;
   std::vector<Aov> ids;  // the AOVs of identifiers; each has kIdPlanes planes
   // names of all planes (sums, those of slices, then identifiers), in the order within a partial

@@ -20,7 +20,7 @@
 
 #include "core/base/error.h"
 #include "core/base/light/colour_space.h"
-#include "core/image/deep/slices.h"
+#include "core/image/exr/deep_samples.h"
 #include "core/image/frame/camera_matrices.h"
 #include "core/image/frame/frame.h"
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/image/aov/deep_planes.h"
 #include "core/image/aov/identifiers.h"
 #include "core/image/exr/exr_file.h"
 
@@ -434,8 +435,8 @@ DeepRows deep_rows(const Film& film, const ImageForm& form) {
     each_pixel(tile.rect, frame, [&](std::size_t to, std::size_t from) {
       const auto sum = [&](std::size_t plane) { return tile.sums[(before + plane) * n + from]; };
       for (std::size_t i = 0; i < planes.records(); ++i) {
-        // Every round states the same edge. A sum of up to 2^29 equal floats is exact in double, and so is its
-        // quotient.
+        // Every round states the same edge. A sum of up to 2^29 equal floats is exact in double, and so is
+        // its quotient.
         pixel.edges[i] = sum(planes.edge(i)) / rounds;
         pixel.transmittance[i] = sum(planes.transmittance(i)) / samples;
         if (!slices.colours) continue;

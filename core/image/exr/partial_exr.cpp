@@ -21,7 +21,6 @@
 
 #include "core/base/bytes.h"
 #include "core/image/aov/identifiers.h"
-#include "core/image/deep/slices.h"
 #include "core/image/exr/memory.h"
 #include "core/image/film/partial.h"
 #include "core/image/frame/render_limits.h"
@@ -109,8 +108,8 @@ Result<std::vector<std::string_view>> channel_names(std::span<const std::byte> r
 }
 
 // Returns the AOVs of which at least one channel is among `names`. There are as many light groups as the
-// largest two-digit number after the AOV's name says, but at most kMostLightGroups; and likewise the slices of a
-// deep image.
+// largest two-digit number after the AOV's name says, but at most kMostLightGroups; and likewise the slices
+// of a deep image.
 AovSet aovs_among(std::span<const std::string_view> names) {
   AovSet set;
   std::size_t groups = 0;
@@ -337,9 +336,9 @@ std::string described(AovSet aovs) {
   const DeepSlices deep = aovs.deep();
   return fmt::format("the AOVs [{}]{}{}", fmt::join(names_of(aovs), ", "),
                      aovs.groups() > 0 ? fmt::format(" with {} light groups", aovs.groups()) : "",
-                     deep.count > 0
-                         ? fmt::format(" and {} slices {}colours", deep.count, deep.colours ? "with " : "without ")
-                         : "");
+                     deep.count > 0 ? fmt::format(" and {} slices {}colours", deep.count,
+                                                  deep.colours ? "with " : "without ")
+                                    : "");
 }
 
 }  // namespace

@@ -44,23 +44,43 @@ Result<void> check_deep_header(const Imf::Header& header, const std::string& nam
     const bool depth = channel == "Z" || channel == "ZBack";
     const bool known = depth || channel == "A" || channel == "R" || channel == "G" || channel == "B";
     if (!known || at.channel().type != (depth || picture.floats ? Imf::FLOAT : Imf::HALF))
-      return refuse_deep(name, fmt::format("its channel {} is none of a deep image of ours", plain_text(channel)));
+      return refuse_deep(name,
+                         fmt::format("its channel {} is none of a deep image of ours", plain_text(channel)));
   }
-  if (count != (picture.colours ? 6u : 3u)) return refuse_deep(name, "it lacks channels of a deep image of ours");
+  if (count != (picture.colours ? 6u : 3u))
+    return refuse_deep(name, "it lacks channels of a deep image of ours");
   return {};
 }
 
 Result<void> read_deep_band(Imf::DeepScanLineInputFile& file, int y0, int y1, const std::string& name,
-                       DeepPicture& picture) {
+                            DeepPicture& picture) {
   const auto width = static_cast<std::size_t>(picture.rows.size.width);
   const std::size_t pixels = static_cast<std::size_t>(y1 - y0) * width;
   std::vector<std::uint32_t> counts(pixels);
-  std::vector<DeepSample*> places(pixels);
   const auto base = [&](auto& values) {
     return reinterpret_cast<char*>(values.data()) - static_cast<std::size_t>(y0) * width * sizeof(values[0]);
   };
+  struct Column {
+    const char* name;
+    std::size_t offset;
+    std::vector<char*> of_pixel;
+  };
+  constexpr std::size_t kRgb = offsetof(DeepSample, rgb);
+  std::array columns{Column{"A", offsetof(DeepSample, alpha), {}},
+                     Column{"Z", offsetof(DeepSample, z), {}},
+                     Column{"ZBack", offsetof(DeepSample, z_back), {}},
+                     Column{"R", kRgb, {}},
+                     Column{"G", kRgb + sizeof(float), {}},
+                     Column{"B", kRgb + 2 * sizeof(float), {}}};
   Imf::DeepFrameBuffer buffer;
-  buffer.insertSampleCountSlice(Imf::Slice(Imf::UINT, base(counts), sizeof counts[0], sizeof counts[0] * width));
+  buffer.insertSampleCountSlice(
+      Imf::Slice(Imf::UINT, base(counts), sizeof counts[0], sizeof counts[0] * width));
+  for (Column& column : columns) {
+    if (!file.header().channels().findChannel(column.name)) continue;
+    column.of_pixel.resize(pixels);
+    buffer.insert(column.name, Imf::DeepSlice(Imf::FLOAT, base(column.of_pixel), sizeof(char*),
+                                              sizeof(char*) * width, sizeof(DeepSample)));
+  }
   file.setFrameBuffer(buffer);
   file.readPixelSampleCounts(y0, y1 - 1);
   std::size_t total = 0;
@@ -69,25 +89,11 @@ Result<void> read_deep_band(Imf::DeepScanLineInputFile& file, int y0, int y1, co
     total += count;
   }
   std::vector<DeepSample> samples(total);
-  struct Column {
-    const char* name;
-    std::size_t offset;
-  };
-  constexpr std::size_t kRgb = offsetof(DeepSample, rgb);
-  constexpr std::array kColumns{Column{"A", offsetof(DeepSample, alpha)}, Column{"Z", offsetof(DeepSample, z)},
-                                Column{"ZBack", offsetof(DeepSample, z_back)}, Column{"R", kRgb},
-                                Column{"G", kRgb + sizeof(float)}, Column{"B", kRgb + 2 * sizeof(float)}};
-  std::vector<std::vector<char*>> pointers;
-  pointers.reserve(kColumns.size());
-  for (const Column& column : kColumns) {
-    if (!file.header().channels().findChannel(column.name)) continue;
-    auto& of_pixel = pointers.emplace_back(pixels);
+  for (Column& column : columns) {
     char* at = reinterpret_cast<char*>(samples.data()) + column.offset;
-    for (std::size_t i = 0; i < pixels; at += sizeof(DeepSample) * counts[i++]) of_pixel[i] = at;
-    buffer.insert(column.name, Imf::DeepSlice(Imf::FLOAT, base(of_pixel), sizeof(char*), sizeof(char*) * width,
-                                              sizeof(DeepSample)));
+    for (std::size_t i = 0; i < column.of_pixel.size(); at += sizeof(DeepSample) * counts[i++])
+      column.of_pixel[i] = at;
   }
-  file.setFrameBuffer(buffer);
   file.readPixels(y0, y1 - 1);
   picture.rows.counts.insert(picture.rows.counts.end(), counts.begin(), counts.end());
   picture.rows.samples.insert(picture.rows.samples.end(), samples.begin(), samples.end());
@@ -102,7 +108,8 @@ Result<DeepPicture> read_deep_exr(std::span<const std::byte> bytes, const std::s
                          .max_side = kMaxFrameSide};
   if (bytes.size() > limits.max_bytes) return refuse_deep(name, "the file is larger than any image of ours");
   return exr::guarded(
-      Errc::invalid_argument, fmt::format("{}: cannot read this deep EXR", name), [&]() -> Result<DeepPicture> {
+      Errc::invalid_argument, fmt::format("{}: cannot read this deep EXR", name),
+      [&]() -> Result<DeepPicture> {
         if (const auto ok = exr::check_headers(bytes, name, limits); !ok) return tl::unexpected(ok.error());
         exr::MemoryReader in(bytes, name);
         DeepPicture picture;
@@ -115,7 +122,9 @@ Result<DeepPicture> read_deep_exr(std::span<const std::byte> bytes, const std::s
           if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&at.attribute()))
             picture.strings.emplace(at.name(), text->value());
         for (int y0 = 0; y0 < picture.rows.size.height; y0 += kDeepBand)
-          if (auto ok = read_deep_band(file, y0, std::min(y0 + kDeepBand, picture.rows.size.height), name, picture); !ok)
+          if (auto ok =
+                  read_deep_band(file, y0, std::min(y0 + kDeepBand, picture.rows.size.height), name, picture);
+              !ok)
             return tl::unexpected(ok.error());
         exr::Seal seal;
         seal.add(exr::values_of(picture.rows, picture.colours, !picture.floats));

@@ -227,18 +227,18 @@ void write_deep_rows(Imf::DeepScanLineOutputFile& file, const ExrPicture& values
   const auto add = [&](const std::string& name, Imf::PixelType type, const auto* data) {
     auto& of_channel = pointers.emplace_back(counts.size());
     for (std::size_t i = 0; i < counts.size(); data += counts[i++]) of_channel[i] = data;
-    buffer.insert(name, Imf::DeepSlice(type, base(of_channel), sizeof(void*), sizeof(void*) * width, sizeof *data));
+    buffer.insert(name,
+                  Imf::DeepSlice(type, base(of_channel), sizeof(void*), sizeof(void*) * width, sizeof *data));
   };
   halves.reserve(values.channels.size());
   pointers.reserve(values.channels.size());
   for (const auto& entry : values.channels) {
     const std::string& name = entry.first;
-    std::visit(overloaded{[&](const ExrHalf& c) {
-                            add(name, Imf::HALF, halves.emplace_back(to_half(c.values)).data());
-                          },
-                          [&](const ExrFloat& c) { add(name, Imf::FLOAT, c.values.data()); },
-                          [](const ExrUint&) {}},
-               entry.second);
+    std::visit(
+        overloaded{
+            [&](const ExrHalf& c) { add(name, Imf::HALF, halves.emplace_back(to_half(c.values)).data()); },
+            [&](const ExrFloat& c) { add(name, Imf::FLOAT, c.values.data()); }, [](const ExrUint&) {}},
+        entry.second);
   }
   file.setFrameBuffer(buffer);
   file.writePixels(values.size.height);

@@ -104,8 +104,8 @@ class Film {
 
   // Returns the film with another colour: the sum over the light groups of their light times these factors,
   // one for each group. The AOVs of light groups and the slices of a deep image are left out; the digests of
-  // tiles stay those of the samples. Without the AOV volume_light_groups, the factors `surface` apply to all light. The film must
-  // have the AOV light_groups.
+  // tiles stay those of the samples. Without the AOV volume_light_groups, the factors `surface` apply to all
+  // light. The film must have the AOV light_groups.
   Film mixed(std::span<const GroupFactors> factors) const;
 
   // Saving and loading of tiles, so that a job continues after a restart of the coordinator.

@@ -188,8 +188,8 @@ void AovPixel::add_slices() {
   for (const LightByDepth::Event& event : split_.by_depth.events) {
     if (!is_finite(event.light)) continue;
     const auto at = std::ranges::upper_bound(between_, event.depth);
-    const std::size_t slice = std::isinf(event.depth) ? slices_.records() - 1
-                                                      : static_cast<std::size_t>(at - between_.begin());
+    const std::size_t slice =
+        std::isinf(event.depth) ? slices_.records() - 1 : static_cast<std::size_t>(at - between_.begin());
     for (std::size_t c = 0; c < 3; ++c) slice_light_[slice][c] += double{event.light[static_cast<int>(c)]};
   }
 }

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/image/aov/deep_planes.h"
 #include "core/image/aov/identifiers.h"
-#include "core/image/deep/slices.h"
 #include "worker/render/integrator/path_tracer.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/world/world.h"

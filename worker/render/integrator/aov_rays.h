@@ -2,9 +2,12 @@
 // random number of the path, but for the decisions at surfaces that light passes straight through.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
+#include "core/image/aov/aov.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {
@@ -87,9 +90,9 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
   return guide;
 }
 
-// In grids the transmittance is an estimate, whose random numbers nothing else uses. The estimates between the
-// slices of a deep image use the same numbers, so that those of neighbouring slices are close to each other,
-// and the last one is that of the whole.
+// In grids the transmittance is an estimate, whose random numbers nothing else uses. The estimates between
+// the slices of a deep image use the same numbers, so that those of neighbouring slices are close to each
+// other, and the last one is that of the whole.
 template <Features F, template <Features> class Light>
 Opacity PathTracer<F, Light>::opacity(const CameraRay& ray, const DeepTransmittance* deep) {
   const float near = deep ? world_.camera.near_distance(ray.d) : 0;
@@ -115,15 +118,26 @@ Opacity PathTracer<F, Light>::opacity(const CameraRay& ray, const DeepTransmitta
       const float t = met ? ray_.length_to(hit) : reach;
       RandomStream tracker = stream_.stream(segment_, Purpose::track_opacity);
       if (deep) [[unlikely]] {
-        const float begin = depth_of(ray_.start);
-        pass_edges(met ? depth_of(hit.p) : begin + reach, [&](float at) {
-          RandomStream same = tracker;
-          const float part = std::min(at - begin, t);
-          return media * surfaces *
-                 (part > 0 ? through_media(medium_, ray_.start, ray_.d, part, same) : C3(1));
-        });
+        const float begin = depth_of(ray_.start), end = met ? depth_of(hit.p) : begin + reach;
+        std::array<float, kMostDeepSlices> points;
+        std::array<C3, kMostDeepSlices> through, all;
+        std::size_t count = 0;
+        while (edge + count < deep->edges.size() && deep->edges[edge + count] <= end) {
+          points[count] = std::clamp(deep->edges[edge + count] - begin, 0.f, t);
+          all[count++] = media * surfaces;
+        }
+        C3 whole(1);
+        for (const std::uint32_t m : medium_.all()) {
+          whole *=
+              transmittance_to_points(world_.media[m], ray_.start, ray_.d, t, RandomStream(tracker.next()),
+                                      {points.data(), count}, through.data());
+          for (std::size_t i = 0; i < count; ++i) all[i] *= through[i];
+        }
+        media *= whole;
+        for (std::size_t i = 0; i < count; ++i) deep->through[edge++] = mean_of(all[i]);
+      } else {
+        media *= through_media(medium_, ray_.start, ray_.d, t, tracker);
       }
-      media *= through_media(medium_, ray_.start, ray_.d, t, tracker);
     }
     if (deep) [[unlikely]]
       pass_edges(met ? depth_of(hit.p) : kInfinity, [&](float) { return media * surfaces; });
@@ -163,9 +177,9 @@ DeepProbe PathTracer<F, Light>::deep_probe(const CameraRay& ray) {
     if (met && world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
     if (medium_.any()) {
       const float begin = depth_of(ray_.start);
-      DeepStretch& stretch = probe.stretches.emplace_back();
-      stretch = {begin, met ? depth_of(hit.p) : begin + reach, ray_.start, ray_.d, probe.reaches, {}};
-      for (const std::uint32_t m : medium_.all()) stretch.media.push_back(&world_.media[m]);
+      DeepSegment& segment = probe.segments.emplace_back();
+      segment = {begin, met ? depth_of(hit.p) : begin + reach, ray_.start, ray_.d, probe.reaches, {}};
+      for (const std::uint32_t m : medium_.all()) segment.media.push_back(&world_.media[m]);
     }
     if (!met) return probe;
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];

@@ -1,9 +1,9 @@
 // Slices are placed by probes: camera rays through fixed points of the pixel, its filter and the lens. Where
 // probes meet surfaces there is a slice of their own for each range of depths without large gaps. The other
 // slices divide the media before, between and behind them, so that each takes about the same share of the
-// light: equal parts of what is scattered on the way to the camera, not of optical depth, of which most can lie
-// where nothing is seen. So no slice is seen through less than about one over the number of slices, and colours
-// divided by that stay small and free of noise.
+// light: equal parts of what is scattered on the way to the camera, not of optical depth, of which most can
+// lie where nothing is seen. So no slice is seen through less than about one over the number of slices, and
+// colours divided by that stay small and free of noise.
 #include "worker/render/integrator/deep_edges.h"
 
 #include <algorithm>
@@ -13,24 +13,27 @@
 #include <span>
 #include <utility>
 
-#include "core/image/deep/slices.h"
+#include "core/image/aov/deep_planes.h"
 #include "worker/render/integrator/variant.h"
 #include "worker/render/media/optical_depth.h"
 
 namespace ls::render {
 namespace {
 
-// The number of probes, and the number if the first ones meet nothing: something may be seen at an edge of the
-// pixel alone.
-constexpr std::uint32_t kProbes = 16, kMoreProbes = 64;
+// The number of probes, and the number if the first ones meet nothing: something may be seen at an edge of
+// the pixel alone.
+constexpr std::uint32_t kProbes = 16;
+constexpr std::uint32_t kMoreProbes = 64;
 // Surfaces whose depths differ by less than this share belong to one slice.
 constexpr float kGap = .01f;
-// A slice of surfaces is this share of its depths larger on both sides than the probes say, as samples are met
-// between and beside them; and at least by the rounding of depths.
-constexpr float kMargin = .25f, kRounding = 1e-5f;
+// A slice of surfaces is this share of its depths larger on both sides than the probes say, as samples are
+// met between and beside them; and at least by the rounding of depths.
+constexpr float kDeepMargin = .25f;
+constexpr float kRounding = 1e-5f;
 // Points on the way through the media of a pixel at which their transmittance is computed.
-constexpr int kSteps = 64;
-// The share of the slices that divides the way evenly, whatever the transmittance: media may shine or be thin.
+constexpr int kSteps = 32;
+// The share of the slices that divides the way evenly, whatever the transmittance: media may shine or be
+// thin.
 constexpr double kEven = .1;
 // Media without end are divided up to this optical depth.
 constexpr float kDeepest = 12;
@@ -55,32 +58,42 @@ std::vector<DeepProbe> probes_of(const World& w, int x, int y, std::uint32_t cou
 
 float mean_extinction(const Medium& m) { return (m.sigma_t.x + m.sigma_t.y + m.sigma_t.z) / 3; }
 
-// One medium of a stretch.
+// One medium of a segment.
 struct Crossing {
   OpticalDepth depth;
-  float begin = 0;  // depth of the stretch's start
+  float begin = 0;  // depth of the segment's start
   float sigma = 0;
 };
 // A probe, prepared to compute its transmittance.
 struct Prepared {
-  std::vector<std::vector<Crossing>> stretches;
-  std::span<const DeepStretch> of;
+  std::vector<std::vector<Crossing>> segments;
+  std::span<const DeepSegment> of;
 
-  // Returns the share of the light that media on the way scatter or absorb up to the depth z.
-  double taken(double z) const {
-    double taken = 0, left = 1;
-    for (std::size_t i = 0; i < of.size() && of[i].begin < z; ++i) {
-      const double end = std::min(z, double{of[i].end});
-      double optical = 0;
-      for (const Crossing& c : stretches[i]) {
-        const double t = std::clamp(end - c.begin, double{c.depth.from()}, double{c.depth.to()});
-        optical += double{c.sigma} * c.depth.at(static_cast<float>(t)).x;
+  // Adds, for each of the ascending depths, the share of the light that media on the way scatter or absorb up
+  // to there.
+  void add_taken(std::span<const float> depths, std::span<double> taken) const {
+    std::vector<float> t(depths.size());
+    std::vector<double> x(depths.size()), optical(depths.size());
+    double left = 1, before = 0;
+    for (std::size_t i = 0; i < of.size(); ++i) {
+      std::ranges::fill(optical, 0.0);
+      double whole = 0;
+      for (const Crossing& c : segments[i]) {
+        for (std::size_t k = 0; k < depths.size(); ++k)
+          t[k] = std::clamp(depths[k] - c.begin, c.depth.from(), c.depth.to());
+        c.depth.at_each(t, x);
+        for (std::size_t k = 0; k < depths.size(); ++k) optical[k] += double{c.sigma} * x[k];
+        if (c.sigma > 0) whole += double{c.sigma} * c.depth.total();
       }
-      const double behind = left * std::exp(-optical);
-      taken += of[i].surfaces * (left - behind);
+      for (std::size_t k = 0; k < depths.size(); ++k)
+        if (depths[k] > of[i].begin && (depths[k] <= of[i].end || i + 1 == of.size()))
+          taken[k] += before + of[i].surfaces * left * -std::expm1(-optical[k]);
+        else if (i + 1 < of.size() && depths[k] > of[i].end && depths[k] <= of[i + 1].begin)
+          taken[k] += before + of[i].surfaces * left * -std::expm1(-whole);
+      const double behind = left * std::exp(-whole);
+      before += of[i].surfaces * (left - behind);
       left = behind;
     }
-    return taken;
   }
 };
 
@@ -89,9 +102,9 @@ Range prepare(std::span<const DeepProbe> probes, std::vector<Prepared>& out) {
   Range media;
   for (const DeepProbe& probe : probes) {
     Prepared& prepared = out.emplace_back();
-    prepared.of = probe.stretches;
-    for (const DeepStretch& s : probe.stretches) {
-      auto& crossings = prepared.stretches.emplace_back();
+    prepared.of = probe.segments;
+    for (const DeepSegment& s : probe.segments) {
+      auto& crossings = prepared.segments.emplace_back();
       const float length = std::max(0.f, s.end - s.begin);
       for (const Medium* m : s.media) {
         Crossing c{OpticalDepth(*m, s.start, s.d, length), s.begin, mean_extinction(*m)};
@@ -107,8 +120,8 @@ Range prepare(std::span<const DeepProbe> probes, std::vector<Prepared>& out) {
   return media;
 }
 
-// Returns the ranges of the depths at which probes end on surfaces, at most `most` of them, separated where the
-// gaps are largest.
+// Returns the ranges of the depths at which probes end on surfaces, at most `most` of them, separated where
+// the gaps are largest.
 std::vector<Range> surfaces_of(std::span<const DeepProbe> probes, std::size_t most) {
   std::vector<float> depths;
   for (const DeepProbe& probe : probes)
@@ -127,21 +140,23 @@ std::vector<Range> surfaces_of(std::span<const DeepProbe> probes, std::size_t mo
   for (std::size_t k = 0; k < begins.size(); ++k) {
     const float first = depths[begins[k]],
                 last = depths[(k + 1 < begins.size() ? begins[k + 1] : depths.size()) - 1];
-    const float margin = std::max(kMargin * (last - first), kRounding * last);
-    ranges.push_back({std::max(0.f, first - margin), last + margin});
+    const float margin = std::max(kDeepMargin * (last - first), kRounding * last);
+    // A range keeps at least half of the gap in front of it free.
+    const float before = k > 0 ? depths[begins[k] - 1] : 0;
+    ranges.push_back({std::max(first - margin, before + (first - before) / 2), last + margin});
+    if (k > 0) ranges[k - 1].end = std::min(ranges[k - 1].end, ranges[k].begin);
   }
-  for (std::size_t k = 1; k < ranges.size(); ++k)
-    if (ranges[k].begin < ranges[k - 1].end)
-      ranges[k].begin = ranges[k - 1].end = (ranges[k].begin + ranges[k - 1].end) / 2;
   return ranges;
 }
 
 // Returns `count` depths that divide the media into parts of about the same share of the light.
 std::vector<float> divisions(std::span<const Prepared> probes, const Range& media, std::size_t count) {
-  std::vector<double> taken(kSteps + 1);
+  std::vector<double> taken(kSteps + 1, 0);
+  std::vector<float> steps(kSteps + 1);
   const double step = (double{media.end} - media.begin) / kSteps;
   for (int i = 0; i <= kSteps; ++i)
-    for (const Prepared& probe : probes) taken[static_cast<std::size_t>(i)] += probe.taken(media.begin + i * step);
+    steps[static_cast<std::size_t>(i)] = static_cast<float>(media.begin + i * step);
+  for (const Prepared& probe : probes) probe.add_taken(steps, taken);
   const double all = taken.back();
   // Shares of the slices up to each step, from 0 to 1
   for (int i = 0; i <= kSteps; ++i) {

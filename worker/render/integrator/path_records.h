@@ -47,7 +47,7 @@ struct DenoisingGuide {
 };
 
 // The medium between two boundaries on a ray of a probe (DeepProbe).
-struct DeepStretch {
+struct DeepSegment {
   float begin = 0, end = 0;  // depths, counted as that of the AOV depth; `end` may be infinite
   V3 start{0, 0, 0}, d{0, 0, 1};
   float surfaces = 1;  // transmittance of the surfaces in front of it
@@ -55,7 +55,7 @@ struct DeepStretch {
 };
 // What a camera ray passes and meets: of a few such rays, the slices of a deep image are made.
 struct DeepProbe {
-  std::vector<DeepStretch> stretches;
+  std::vector<DeepSegment> segments;
   float surface = kInfinity;  // depth of the surface at which it ends; infinite: it leaves the scene
   float reaches = 1;          // transmittance of the surfaces that it passed
 };

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/image/deep/slices.h"
+#include "core/image/aov/deep_planes.h"
 #include "tests/support/significance.h"
 #include "tests/unit/render/integrator/aov_picture.h"
 
@@ -20,15 +20,15 @@ using test::operator*;
 
 constexpr int kSlices = 6;
 
-// A cube of side 2 in front of the wall, filled with this medium: from depth 2 to depth 4 of the camera, which
-// sees the wall at depth 5.
+// A cube of side 2 in front of the wall, filled with this medium: from depth 2 to depth 4 of the camera,
+// which sees the wall at depth 5.
 void fill(SceneBuilder& builder, MediumIndex medium) {
   builder.container(CubeShape{}, translate({0, 0, 2}), builder.null(), medium);
 }
-SceneBuilder fog(const std::array<double, 3>& sigma, double emission = 0) {
+SceneBuilder fog(const std::array<double, 3>& sigma) {
   SceneBuilder builder = wall();
   builder.scene.film.transparent = true;
-  fill(builder, builder.homogeneous({sigma[0], sigma[1], sigma[2]}, {.5, .5, .5}, emission));
+  fill(builder, builder.homogeneous({sigma[0], sigma[1], sigma[2]}, {.5, .5, .5}));
   return builder;
 }
 void remove_wall(SceneBuilder& builder) { builder.scene.shapes.erase(builder.scene.shapes.begin()); }
@@ -88,7 +88,8 @@ TEST(DeepSlices, HaveTheEmissionOfTheirPartOfAMedium) {
   for (const double albedo : {0., .5}) {
     SceneBuilder builder = wall();
     builder.scene.film.transparent = true;
-    fill(builder, builder.homogeneous({sigma, sigma, sigma}, {albedo, albedo, albedo}, 3));
+    fill(builder, builder.homogeneous({sigma, sigma, sigma}, {albedo, albedo, albedo}));
+    for (Medium& m : builder.scene.media) std::get<HomogeneousMedium>(m).emission = {3, 3, 3};
     remove_wall(builder);
     builder.scene.emitters.clear();
     const Slices s = slices_of(Picture(builder, {"emission"}, kSamples, kSlices));
@@ -179,8 +180,8 @@ TEST(DeepSlices, OfAGridLetThroughWhatItsDensitySays) {
   fill(builder, builder.heterogeneous(
                     builder.grid({1, 1, 2}, {0, 3}, translate({-1, -1, 1}) * test::scale(2)), {.9, .9, .9}));
   const Picture p(builder, {"alpha"}, 256, kSlices);
-  // Voxels have their centres at a quarter and three quarters of the way; the density is linear in between and
-  // constant outside. From the camera, at depth 4, it is first 3 and then falls.
+  // Voxels have their centres at a quarter and three quarters of the way; the density is linear in between
+  // and constant outside. From the camera, at depth 4, it is first 3 and then falls.
   const auto optical = [](double z) {
     const double t = std::clamp(z - 4, 0., 2.);
     const double falling = std::clamp(t - .5, 0., 1.);

@@ -1,5 +1,5 @@
 // Tests of the samples that the slices of a deep pixel become, and of the files of deep images.
-#include "core/image/deep/slices.h"
+#include "core/image/exr/deep_samples.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -74,10 +74,10 @@ TEST(DeepSamples, LaidOverEachOtherAreThePixel) {
       const auto samples = deep_samples(pixel, halves);
       expect_tidy(samples, "a random pixel");
       const Flat flat = flattened(samples);
-      // Each colour is rounded once, by 2^-11 of itself if it is a half, or by 2^-24; colours below the normal
-      // halves by 2^-25. The flattener rounds three times for each of at most 65 samples: its alpha has an
-      // absolute error of 3 x 65 x 2^-24, by which each colour is multiplied, which is at most its light
-      // divided by the light's transmittance; colours count here only through `sizes`.
+      // Each colour is rounded once, by 2^-11 of itself if it is a half, or by 2^-24; colours below the
+      // normal halves by 2^-25. The flattener rounds three times for each of at most 65 samples: its alpha
+      // has an absolute error of 3 x 65 x 2^-24, by which each colour is multiplied, which is at most its
+      // light divided by the light's transmittance; colours count here only through `sizes`.
       double sizes[3] = {0, 0, 0};
       for (const DeepSample& s : samples)
         for (std::size_t c = 0; c < 3; ++c) sizes[c] += double{s.rgb[c]};
@@ -87,7 +87,8 @@ TEST(DeepSamples, LaidOverEachOtherAreThePixel) {
         const double rounding = (halves ? 0x1p-11 : 0x1p-24) * light + (halves ? 65 * 0x1p-25 : 0);
         EXPECT_NEAR(flat.rgb[c], light, rounding + sizes[c] * 3 * 65 * 0x1p-24) << "pixel " << i;
       }
-      // The last alpha is rounded by half a unit of the halves below 1, or by a whole one where light is behind.
+      // The last alpha is rounded by half a unit of the halves below 1, or by a whole one where light is
+      // behind.
       EXPECT_NEAR(flat.alpha, 1 - pixel.transmittance.back(), (halves ? 0x1p-11 : 0) + 3 * 65 * 0x1p-24);
     }
   }
@@ -118,7 +119,8 @@ TEST(DeepSamples, PutSurfacesAtOneDepthAndTheEnvironmentFarAway) {
 
   ASSERT_EQ(samples.size(), 2u);
   EXPECT_EQ(samples[0], (DeepSample{2.25f, 2.25f, .5f, {1, 2, 3}}));
-  EXPECT_EQ(samples[1], (DeepSample{static_cast<float>(kDeepFar), static_cast<float>(kDeepFar), 1, {8, 8, 8}}));
+  EXPECT_EQ(samples[1],
+            (DeepSample{static_cast<float>(kDeepFar), static_cast<float>(kDeepFar), 1, {8, 8, 8}}));
 }
 
 TEST(DeepSamples, JoinLightThatNothingLetsThroughToTheSliceInFront) {
@@ -147,7 +149,8 @@ TEST(DeepPlanes, HaveNamesInTheOrderOfTheFile) {
   EXPECT_THAT(names_of_deep_planes({1, true}),
               ElementsAre("deep.00.B", "deep.00.E", "deep.00.G", "deep.00.R", "deep.00.T", "deep.01.B",
                           "deep.01.E", "deep.01.G", "deep.01.R", "deep.01.T"));
-  EXPECT_THAT(names_of_deep_planes({1, false}), ElementsAre("deep.00.E", "deep.00.T", "deep.01.E", "deep.01.T"));
+  EXPECT_THAT(names_of_deep_planes({1, false}),
+              ElementsAre("deep.00.E", "deep.00.T", "deep.01.E", "deep.01.T"));
   EXPECT_THAT(names_of_deep_planes({}), IsEmpty());
   for (const std::uint32_t count : {1u, 9u, kMostDeepSlices})
     for (const bool colours : {true, false}) {
@@ -232,7 +235,8 @@ TEST(DeepPartial, ComesBackFromItsFile) {
 TEST(DeepPartial, IsRefusedWithOtherSlicesOrNumbersThatAreNone) {
   Partial partial = deep_partial(1, {0, 2});
   const auto exr = encode_partial(partial, kDeepGrid.frame);
-  for (const DeepSlices other : {DeepSlices{}, DeepSlices{2, true}, DeepSlices{4, true}, DeepSlices{3, false}}) {
+  for (const DeepSlices other :
+       {DeepSlices{}, DeepSlices{2, true}, DeepSlices{4, true}, DeepSlices{3, false}}) {
     const auto back = decode_partial(*exr, partial.header, kDeepGrid.frame, kDeepSet.with_deep(other));
     ASSERT_FALSE(back);
     EXPECT_THAT(back.error().message, HasSubstr("3 slices with colours"));

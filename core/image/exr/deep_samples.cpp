@@ -1,19 +1,16 @@
-#include "core/image/deep/slices.h"
-
-#include <fmt/format.h>
+#include "core/image/exr/deep_samples.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <utility>
 
+#include "core/image/aov/deep_planes.h"
 #include "core/image/exr/final_image.h"
 
 namespace ls {
 namespace {
-
-constexpr std::string_view kDeepPrefix = "deep.";
 
 // The half below 1. An alpha that is not 1 is not rounded to 1 if there is light behind it.
 constexpr float kHalfBelowOne = 1 - 0x1p-11f;
@@ -70,8 +67,7 @@ class SamplesBuilder {
     return std::ranges::all_of(light, [&](double c) { return c == 0 || std::abs(c) <= most_ * share; });
   }
   void set_colour(DeepSample& sample) const {
-    for (std::size_t c = 0; c < 3; ++c)
-      sample.rgb[c] = light_[c] == 0 ? 0.f : stored(light_[c] / before_);
+    for (std::size_t c = 0; c < 3; ++c) sample.rgb[c] = light_[c] == 0 ? 0.f : stored(light_[c] / before_);
   }
   void join(double z_back, const std::array<double, 3>& light, double through, bool more_behind) {
     DeepSample& last = samples_.back();
@@ -93,32 +89,6 @@ class SamplesBuilder {
 
 }  // namespace
 
-std::vector<std::string> names_of_deep_planes(DeepSlices slices) {
-  std::vector<std::string> names;
-  for (std::size_t i = 0; i < DeepPlanes(slices).records(); ++i)
-    for (const char letter : std::string_view(slices.colours ? "BEGRT" : "ET"))
-      names.push_back(fmt::format("{}{:02}.{}", kDeepPrefix, i, letter));
-  return names;
-}
-
-DeepSlices deep_slices_among(std::span<const std::string_view> names) {
-  DeepSlices slices;
-  std::uint32_t last = 0;
-  bool any = false, colours = false;
-  for (const std::string_view name : names) {
-    if (!name.starts_with(kDeepPrefix)) continue;
-    const std::string_view rest = name.substr(kDeepPrefix.size());
-    if (rest.size() != 4 || !std::isdigit(static_cast<unsigned char>(rest[0])) ||
-        !std::isdigit(static_cast<unsigned char>(rest[1])))
-      continue;
-    any = true;
-    last = std::max(last, static_cast<std::uint32_t>((rest[0] - '0') * 10 + (rest[1] - '0')));
-    colours = colours || rest[3] == 'R';
-  }
-  if (any) slices = {std::clamp(last, 1u, kMostDeepSlices), colours};
-  return slices;
-}
-
 std::vector<DeepSample> deep_samples(const DeepPixel& pixel, bool halves) {
   const std::size_t records = pixel.edges.size();
   if (records == 0) return {};
@@ -139,8 +109,8 @@ std::vector<DeepSample> deep_samples(const DeepPixel& pixel, bool halves) {
     from = std::max(from, std::abs(pixel.edges[i]));
     const double begin = far ? std::max(from, kDeepFar) : from;
     const double end = far ? begin : std::max(from, std::abs(pixel.edges[i + 1]));
-    builder.add(begin, end, !far && pixel.edges[i] < 0, pixel.light.empty() ? kBlack : pixel.light[i], through[i],
-                light_behind[i]);
+    builder.add(begin, end, !far && pixel.edges[i] < 0, pixel.light.empty() ? kBlack : pixel.light[i],
+                through[i], light_behind[i]);
   }
   return builder.take();
 }

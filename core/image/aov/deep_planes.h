@@ -1,5 +1,5 @@
-// The slices of a deep image: what the sums of a pixel say of them, and how they become the samples of a deep
-// EXR. docs/decisions/0047-deep-images.md says why it is done in this way.
+// The slices of a deep image: the planes of sums that say what they are. docs/decisions/0047-deep-images.md
+// says why it is done in this way.
 //
 // A pixel has `count` slices, one behind the other, and a last record for what is infinitely far: the
 // environment. Slice k begins at its edge E[k] and ends at E[k + 1]. The first slice also has what lies in
@@ -13,17 +13,23 @@
 //            the last record 1 - alpha, in which an environment that the camera sees is opaque.
 #pragma once
 
-#include <array>
 #include <cstddef>
-#include <optional>
+#include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "core/base/light/colour_space.h"
-#include "core/image/aov/aov.h"
-
 namespace ls {
+
+// The slices of a deep image: how many there are in a pixel (0: there is no deep image), and whether they
+// have colours or only alpha.
+struct DeepSlices {
+  std::uint32_t count = 0;
+  bool colours = true;  // true if there are no slices
+  bool operator==(const DeepSlices&) const = default;
+};
+inline constexpr std::uint32_t kMostDeepSlices = 64;
 
 // The depth that a deep image states for what is infinitely far.
 inline constexpr double kDeepFar = 1e10;
@@ -54,29 +60,5 @@ class DeepPlanes {
 std::vector<std::string> names_of_deep_planes(DeepSlices slices);
 // Returns the slices whose planes are among `names`; there are none if no such plane is among them.
 DeepSlices deep_slices_among(std::span<const std::string_view> names);
-
-// One pixel of a deep image as its sums say it: means over all samples.
-struct DeepPixel {
-  std::vector<double> edges;          // for each record its edge, with its sign
-  std::vector<double> transmittance;  // for each record
-  // R, G, B of each record; empty if the slices have no colours
-  std::vector<std::array<double, 3>> light;
-};
-
-// One sample of a pixel of a deep EXR. Its colour is multiplied by its own alpha, but not by the
-// transmittance of the samples in front of it.
-struct DeepSample {
-  float z = 0, z_back = 0;
-  float alpha = 0;
-  std::array<float, 3> rgb{0, 0, 0};
-  bool operator==(const DeepSample&) const = default;
-};
-// Returns the samples of a pixel, sorted by depth, none over another. Slices without light and alpha give no
-// sample. Laid over each other from the front, the samples give the pixel's light, and 1 minus the last
-// transmittance as alpha, up to the rounding of one number of the file. For this, each colour is computed from
-// the alphas as they are rounded in the file. A slice that is seen through so little that its colour would not
-// fit the file is joined to the one in front of it. `halves`: colours and alpha are stored as half floats.
-// Any numbers give samples that a deep EXR may have: with alphas from 0 to 1, and finite.
-std::vector<DeepSample> deep_samples(const DeepPixel& pixel, bool halves);
 
 }  // namespace ls
