@@ -123,7 +123,7 @@ def test_merged_deep_images_are_the_picture_of_both(tmp_path):
     for name, shapes in parts.items():
         render(write(tmp_path, name, shapes, transparent="true"), tmp_path / f"{name}.exr", "--deep", 16, "--float", spp=64)
     merged = tmp_path / "merged.exr"
-    oiiotool(deep(tmp_path / "fog.exr"), deep(tmp_path / "balls.exr"), "--deepmerge", "-o", merged)
+    oiiotool(deep(tmp_path / "balls.exr"), deep(tmp_path / "fog.exr"), "--deepmerge", "-o", merged)
 
     together, picture = flat(merged), layers(tmp_path / "both.exr")
 

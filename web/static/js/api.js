@@ -94,6 +94,7 @@ export const api = {
 export const downloads = {
   /** mix: of light groups; without one the image itself. */
   exr: (id, mix = null) => `${kBase}${jobPath(id)}/image.exr${mix === null ? "" : `?mix=${encodeURIComponent(mix)}`}`,
+  deep: (id) => `${kBase}${jobPath(id)}/deep.exr`,
   png: (id, exposure, layer) => `${kBase}${jobPath(id)}/image.png?exposure=${exposure}${layer === "denoised" ? "&layer=denoised" : ""}`,
   meters: (id) => `${kBase}${jobPath(id)}/meters`,
   report: (id) => `${kBase}${jobPath(id)}/report`,

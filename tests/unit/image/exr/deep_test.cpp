@@ -114,11 +114,11 @@ TEST(DeepSamples, LeaveOutWhatIsEmpty) {
   EXPECT_THAT(deep_samples({}, true), IsEmpty());
 }
 
-TEST(DeepSamples, PutSurfacesAtOneDepthAndTheEnvironmentFarAway) {
+TEST(DeepSamples, GiveSurfacesTheLeastThicknessAndPutTheEnvironmentFarAway) {
   const auto samples = deep_samples({{-2, 2.5, 4}, {.5, .5, 0}, {{1, 2, 3}, {0, 0, 0}, {4, 4, 4}}}, true);
 
   ASSERT_EQ(samples.size(), 2u);
-  EXPECT_EQ(samples[0], (DeepSample{2.25f, 2.25f, .5f, {1, 2, 3}}));
+  EXPECT_EQ(samples[0], (DeepSample{2.25f, std::nextafter(2.25f, 3.f), .5f, {1, 2, 3}}));
   EXPECT_EQ(samples[1],
             (DeepSample{static_cast<float>(kDeepFar), static_cast<float>(kDeepFar), 1, {8, 8, 8}}));
 }
