@@ -159,6 +159,12 @@ int run(const MergeFlags& flags) {
   if (!shown) return print_error(shown.error());
   if (const auto saved = save_result(flags.out, png ? *shown : image->exr); !saved)
     return print_error(saved.error());
+  if (merged->film.aovs().deep().count > 0) {
+    const auto deep = deep_exr_of(merged->film, provenance, form_of(*spec));
+    if (!deep) return print_error(deep.error());
+    if (const auto saved = save_result(deep_file(flags.out), *deep); !saved)
+      return print_error(saved.error());
+  }
   const std::string digest = pixels_sha256(merged->film).hex();
   if (!flags.report.empty())
     if (const auto written = write_report(flags, *merged, digest, image->clamped); !written)

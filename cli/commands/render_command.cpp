@@ -104,6 +104,8 @@ LocalRenderOptions of_frame(const LocalRenderOptions& options, std::uint32_t fra
 Result<void> check_files(const LocalRenderOptions& o) {
   const auto& frames = o.spec.frames;
   if (auto ok = check_outputs("-o", o.out.string(), frames); !ok) return ok;
+  if (o.spec.deep > 0)
+    if (auto ok = check_outputs("-o", deep_file(o.out).string(), frames); !ok) return ok;
   for (const auto& [option, path] : {std::pair("--report", &o.report), std::pair("--html", &o.html),
                                      std::pair("--partial-dir", &o.partial_dir)}) {
     if (!*path) continue;

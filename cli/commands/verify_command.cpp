@@ -17,6 +17,7 @@
 #include "cli/output/console.h"
 #include "cli/output/interrupt.h"
 #include "cli/output/job_options.h"
+#include "cli/output/output_file.h"
 #include "coordinator/admission/layer_names.h"
 #include "coordinator/store/files.h"
 #include "core/base/safe_text.h"
@@ -45,6 +46,62 @@ Result<FinalPicture> open_image(const std::string& path) {
   const auto bytes = coordinator::read_file(path, kMaxFinalBytes);
   if (!bytes) return tl::unexpected(bytes.error());
   return read_final_exr(*bytes, path);
+}
+
+// The deep image of a job, beside its image.
+struct DeepFile {
+  std::string path;
+  DeepPicture picture;
+  std::vector<std::size_t> first;  // for each pixel the index of its first sample
+};
+// Reads the deep image beside the image of this name. Fails if it is not that of the same samples.
+Result<DeepFile> open_deep(const std::string& image, const SealedImage& sealed) {
+  DeepFile deep{deep_file(image).string(), {}, {}};
+  const auto bytes = coordinator::read_file(deep.path, std::uint64_t{1} << 36);
+  if (!bytes) return tl::unexpected(bytes.error());
+  auto picture = read_deep_exr(*bytes, deep.path);
+  if (!picture) return tl::unexpected(picture.error());
+  deep.picture = std::move(*picture);
+  if (deep.picture.rows.size != sealed.picture.size)
+    return bad_argument(fmt::format("{}: it has another size than {}", deep.path, image));
+  for (const char* name : {"lightshaft:scene", "lightshaft:job", "lightshaft:class", "lightshaft:tiles"}) {
+    const auto ours = sealed.picture.strings.find(name);
+    const auto theirs = deep.picture.strings.find(name);
+    if (ours == sealed.picture.strings.end() || theirs == deep.picture.strings.end() ||
+        ours->second != theirs->second)
+      return bad_argument(
+          fmt::format("{}: its header \"{}\" is not that of {}: it is the deep image of other "
+                      "samples",
+                      deep.path, name, image));
+  }
+  std::size_t first = 0;
+  for (const std::uint32_t count : deep.picture.rows.counts) {
+    deep.first.push_back(first);
+    first += count;
+  }
+  return deep;
+}
+
+// Returns the first pixel of the tile whose samples in the deep image are not those of the film.
+std::optional<std::pair<int, int>> deep_difference(const DeepFile& deep, const SealedImage& image,
+                                                   const Film& film, TileIndex tile) {
+  const int row = static_cast<int>(tile) / film.grid().columns(), top = row * film.grid().tile;
+  const PixelRect rect = film.grid().rect(tile);
+  ImageForm form = image.form;
+  form.float_output = deep.picture.floats;
+  const DeepRows ours = deep_rows(film.row(row), form);
+  const auto width = static_cast<std::size_t>(ours.size.width);
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < ours.counts.size(); at += ours.counts[i++]) {
+    const int x = static_cast<int>(i % width), y = top + static_cast<int>(i / width);
+    if (x < rect.x0 || x >= rect.x1) continue;
+    const std::size_t theirs = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+    const auto begin = deep.picture.rows.samples.begin() + static_cast<std::ptrdiff_t>(deep.first[theirs]);
+    if (deep.picture.rows.counts[theirs] != ours.counts[i] ||
+        !std::equal(begin, begin + ours.counts[i], ours.samples.begin() + static_cast<std::ptrdiff_t>(at)))
+      return std::pair(x, y);
+  }
+  return std::nullopt;
 }
 
 // Checks that the image was rendered from this scene, and that this machine has the image's numeric class.
@@ -92,9 +149,9 @@ std::vector<TileIndex> random_tiles(TileIndex all, std::uint64_t count, std::uin
 
 // Renders all rounds of the tile again. Compares the hash chain over the rounds' digests with the chain
 // stored in the image, and the values in every layer with the image's. The world must have been built from
-// the image's scene and settings.
-VerifiedTile verify_tile(const render::World& world, const SealedImage& image, TileIndex tile,
-                         const std::atomic<bool>& stop) {
+// the image's scene and settings. `deep` is the deep image beside it, or null.
+VerifiedTile verify_tile(const render::World& world, const SealedImage& image, const DeepFile* deep,
+                         TileIndex tile, const std::atomic<bool>& stop) {
   VerifiedTile out{tile, image.grid().rect(tile), 0, false, {}};
   const auto spp = tile_samples(image, tile);
   if (!spp) {
@@ -127,6 +184,9 @@ VerifiedTile verify_tile(const render::World& world, const SealedImage& image, T
         "the seal is right, but pixel {},{} has another value in layer {} than its samples: the image was "
         "changed afterwards",
         pixel->x, pixel->y, pixel->layer);
+  else if (const auto at = deep ? deep_difference(*deep, image, film, tile) : std::nullopt)
+    out.problem = fmt::format("pixel {},{} of {} has other samples than the slices of this image", at->first,
+                              at->second, deep->path);
   out.error = film.error(tile);
   return out;
 }
@@ -220,14 +280,14 @@ std::string line_of(const VerifiedTile& t) {
 
 // Verifies the tiles in parallel; each thread renders one tile at a time.
 std::vector<VerifiedTile> verify_all(const render::World& world, const SealedImage& image,
-                                     const std::vector<TileIndex>& tiles, int threads, bool quiet,
-                                     const std::atomic<bool>& stop) {
+                                     const DeepFile* deep, const std::vector<TileIndex>& tiles, int threads,
+                                     bool quiet, const std::atomic<bool>& stop) {
   std::vector<VerifiedTile> out(tiles.size());
   std::atomic<std::size_t> next{0};
   std::mutex printing;
   const auto work = [&] {
     for (std::size_t i = next++; i < tiles.size(); i = next++) {
-      out[i] = verify_tile(world, image, tiles[i], stop);
+      out[i] = verify_tile(world, image, deep, tiles[i], stop);
       const std::lock_guard lock(printing);
       if (!quiet && !out[i].stopped) print(line_of(out[i]));
     }
@@ -272,6 +332,20 @@ int run(const VerifyFlags& flags) {
   if (!contents.changed.empty()) complain(fmt::format("{}: {}", flags.image, line_of(contents)));
   const auto image = read_sealed_image(std::move(*picture), flags.image);
   if (!image) return print_error(image.error());
+  std::optional<DeepFile> deep;
+  if (image->settings.deep > 0) {
+    auto beside = open_deep(flags.image, *image);
+    if (!beside && beside.error().code != Errc::not_found) return print_error(beside.error());
+    if (beside) deep = std::move(*beside);
+    if (!deep)
+      print_note(
+          fmt::format("{} is not there: the deep image is not verified", deep_file(flags.image).string()));
+    if (deep && !deep->picture.changed)
+      contents.sealed = false;
+    else if (deep)
+      for (const std::string& changed : *deep->picture.changed)
+        contents.changed.push_back(fmt::format("{} of {}", changed, deep->path));
+  }
   auto scene = read_local_scene(flags.scene, *defines, false, numbers->frame,
                                 coordinator::wants_labels(image->settings));
   if (!scene) return print_rejected(scene.error());
@@ -286,7 +360,8 @@ int run(const VerifyFlags& flags) {
   const auto world = build_world_again(*scene, image->settings, threads);
   if (!world) return print_rejected(world.error());
   const auto tiles = random_tiles(image->grid().count(), numbers->tiles, numbers->seed);
-  const auto verified = verify_all(**world, *image, tiles, threads, flags.json, stop);
+  const auto verified =
+      verify_all(**world, *image, deep ? &*deep : nullptr, tiles, threads, flags.json, stop);
   for (std::string& header :
        wrong_headers(*image, coordinator::layer_names_of(scene->scene, image->settings), verified))
     if (std::find(contents.changed.begin(), contents.changed.end(), header) == contents.changed.end())

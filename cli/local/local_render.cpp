@@ -214,6 +214,11 @@ class LocalRender {
           format == ImageFormat::png ? coordinator.image_png(job_, look) : coordinator.image_exr(job_);
       if (!image) return tl::unexpected(image.error());
       saved = save_result(options_.out, *image);
+      if (saved && options_.spec.deep > 0) {
+        const auto deep = coordinator.deep_exr(job_);
+        if (!deep) return tl::unexpected(deep.error());
+        saved = save_result(deep_file(options_.out), *deep);
+      }
     }
     const auto report_text = write_report(cut, saved.has_value());
     return saved ? report_text : saved;

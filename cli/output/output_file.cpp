@@ -65,6 +65,11 @@ Result<std::shared_ptr<const DisplayViews>> views_for(const std::string& view, c
   return std::make_shared<const DisplayViews>(std::move(*views));
 }
 
+fs::path deep_file(const fs::path& image) {
+  fs::path deep = image;
+  return deep.replace_extension(".deep.exr");
+}
+
 Result<void> check_folder(const std::string& option, const fs::path& folder) {
   std::string trial = (folder / ".lightshaft-XXXXXX").string();
   const coordinator::File made(::mkostemp(trial.data(), O_CLOEXEC));

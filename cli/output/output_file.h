@@ -31,6 +31,8 @@ Result<ImageFormat> image_format(const std::filesystem::path& file);
 Result<std::shared_ptr<const DisplayViews>> views_for(const std::string& view, const std::string& out);
 // Checks that --view may be given for `out`.
 Result<void> check_view(const std::string& view, const std::string& out);
+// Returns the name of the deep image beside the image of this name: out.deep.exr beside out.exr.
+std::filesystem::path deep_file(const std::filesystem::path& image);
 Result<void> check_folder(const std::string& option, const std::filesystem::path& folder);
 // Checks the name of an output file that is written once per frame. invalid_argument: there are several
 // frames, and the name has no # to distinguish their files.

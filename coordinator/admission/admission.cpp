@@ -134,9 +134,17 @@ Result<void> set_aovs(std::vector<std::string> names, bool denoise,
   if (!aovs) return tl::unexpected(aovs.error());
   // The light of a group's surfaces is the difference between the two layers.
   if (aovs->has(Aov::volume_light_groups)) *aovs = aovs->with(Aov::light_groups);
+  if (settings.deep > 0 && aovs->has(Aov::shadow_catcher))
+    return invalid(
+        "the image has the shadows on shadow catchers, which are at no depth and have no place in a deep "
+        "image: "
+        "leave deep out, or shadow_catcher");
   settings.aov = names_of(*aovs);
   settings.light_groups.clear();
-  if (!aovs->has(Aov::light_groups)) return {};
+  if (!aovs->has(Aov::light_groups)) {
+    if (settings.deep > 0) shrink_tiles(settings);
+    return {};
+  }
   if (light_groups.size() > kMostLightGroups)
     return invalid(fmt::format("the scene has {} light groups; layers can have at most {}",
                                light_groups.size(), kMostLightGroups));
@@ -172,6 +180,10 @@ Result<RenderSettings> settings_of(const Scene& scene, const JobSpec& spec, std:
     return invalid("the scene has meters and no camera, so there is no image of a size: leave the size out");
   if (settings.meters > 0 && (!spec.aov.empty() || spec.denoise))
     return invalid("the scene has meters and no camera, so there is no image with AOVs or denoised layers");
+  if (settings.meters > 0 && spec.deep > 0)
+    return invalid("the scene has meters and no camera, so there is no deep image: leave deep out");
+  settings.deep = spec.deep;
+  settings.deep_alpha = spec.deep_alpha;
   settings.seed = spec.seed.value_or(0) + frame;
   if (auto ok = choose_integrator(scene, spec, settings, warnings); !ok) return tl::unexpected(ok.error());
   if (auto ok = choose_aovs(scene, spec, settings); !ok) return tl::unexpected(ok.error());
@@ -296,6 +308,7 @@ tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, 
 }
 
 Result<void> check_job(const StoredJob& job) {
+  if (auto ok = check_film_size(job.settings); !ok) return ok;
   JobPlan plan = plan_of(job);
   plan.brief.job.value = "new";
   return check_plan(plan);
@@ -410,10 +423,15 @@ Result<Admission> admit_again(const StoredJob& before, const JobSpec& changes, c
   job.spec.priority = changes.priority;
   job.spec.after = changes.after;
   if (changes.seed) job.settings.seed = *(job.spec.seed = changes.seed) + frame.value_or(0);
-  if (changes.denoise && !job.spec.denoise) {
-    job.spec.denoise = true;
+  if (changes.deep > 0) {
+    if (job.settings.meters > 0)
+      return invalid("the job measures, so there is no deep image: leave deep out");
+    job.settings.deep = job.spec.deep = changes.deep;
+  }
+  if (changes.denoise) job.spec.denoise = true;
+  if (job.spec.denoise != before.spec.denoise || changes.deep > 0) {
     const std::vector<std::string> groups = job.settings.light_groups;
-    if (auto ok = set_aovs(job.settings.aov, true, groups, job.settings); !ok)
+    if (auto ok = set_aovs(job.settings.aov, job.spec.denoise, groups, job.settings); !ok)
       return tl::unexpected(ok.error());
   }
   for (const BlobRef& asset : job.assets)

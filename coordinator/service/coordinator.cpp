@@ -273,6 +273,10 @@ Result<std::vector<std::byte>> Coordinator::image_exr(const JobId& id,
   return parts_->pictures.image_exr(id, mix);
 }
 
+Result<std::vector<std::byte>> Coordinator::deep_exr(const JobId& id) const {
+  return parts_->pictures.deep_exr(id);
+}
+
 Result<std::string> Coordinator::mix_json(const JobId& id, const LightMix& mix) const {
   return parts_->pictures.mix_json(id, mix);
 }

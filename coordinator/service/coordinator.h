@@ -103,6 +103,8 @@ class Coordinator {
   // The final image if there is one, else the current image. With `mix`, that image with other factors of its
   // light groups.
   Result<std::vector<std::byte>> image_exr(const JobId& id, const std::optional<LightMix>& mix = {}) const;
+  // The deep image, final or current, of a job with JobSpec::deep.
+  Result<std::vector<std::byte>> deep_exr(const JobId& id) const;
   // Returns the error of a mix of light groups as JSON.
   Result<std::string> mix_json(const JobId& id, const LightMix& mix) const;
   // The image as an 8-bit PNG, also while the job renders. One image is denoised at a time, which takes
@@ -127,8 +129,8 @@ class Coordinator {
   Result<std::string> report_json(const JobId& id) const;
   Result<std::string> meters_json(const JobId& id) const;  // what a job without an image measures
   Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const;
-  // Returns the path of the file `name` (image.exr or report.json) of a done job. Empty if the job is not
-  // done, or if everything is in memory: then image_exr() and report_json() give the contents.
+  // Returns the path of the file `name` (image.exr, deep.exr or report.json) of a done job. Empty if the job
+  // is not done, or if everything is in memory: then image_exr() and report_json() give the contents.
   std::filesystem::path final_file(const JobId& id, const std::string& name) const;
   Result<std::vector<TileView>> tiles(const JobId& id) const;
   Result<std::string> job_log(const JobId& id) const;

@@ -51,6 +51,17 @@ Result<std::uint64_t> write_image(const std::filesystem::path& path, const Film&
   return clamped;
 }
 
+Result<void> write_deep(const std::filesystem::path& path, const Film& film, const ReportFacts& facts,
+                        const BlobStore& blobs) {
+  auto file = AtomicFile::create(path);
+  if (!file) return tl::unexpected(file.error());
+  ImageFile sink(*file);
+  if (auto written = write_deep_image(film, provenance_of(facts, blobs), form_of(facts.job.spec), sink);
+      !written)
+    return written;
+  return file->commit();
+}
+
 void count_units(JobTotals& totals, const Farm& farm, const JobId& id) {
   const JobFigures figures = farm.job(id).value_or(JobFigures{});
   totals.units = figures.units_done;
@@ -265,6 +276,9 @@ Result<void> ImageWriter::write_files(const EntryPtr& entry, const Folded& folde
   denoised = denoising_.of_job(folded.film, facts, std::move(denoised));
   if (facts.denoised && facts.denoised->by.empty())
     log_warn(fmt::format("job={}", facts.job.id.value), "no denoised layers: " + facts.denoised->trouble);
+  // The deep image comes first: once image.exr is there, the job has all its images.
+  if (facts.job.settings.deep > 0)
+    if (auto deep = write_deep(where / "deep.exr", folded.film, facts, blobs_); !deep) return deep;
   const auto clamped = write_image(where / "image.exr", folded.film, facts, blobs_, denoised.get());
   if (!clamped) return tl::unexpected(clamped.error());
   facts.clamped_values = *clamped;

@@ -88,6 +88,17 @@ Result<std::vector<std::byte>> Pictures::image_exr(const JobId& id,
   return std::move(image->exr);
 }
 
+Result<std::vector<std::byte>> Pictures::deep_exr(const JobId& id) const {
+  if (const auto file = final_file(id, "deep.exr"); !file.empty())
+    if (auto bytes = read_file(file, std::uint64_t{1} << 36)) return bytes;
+  const auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  if (shown->facts.job.settings.deep == 0)
+    return fail(Errc::failed_precondition,
+                fmt::format("job {} was submitted without \"deep\": it has no deep image", id.value));
+  return deep_exr_of(shown->film, provenance_of(shown->facts, blobs_), form_of(shown->facts.job.spec));
+}
+
 Result<std::string> Pictures::mix_json(const JobId& id, const LightMix& mix) const {
   auto core = core_.lock();
   const auto entry = core->jobs.usable(id);

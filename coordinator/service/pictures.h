@@ -36,6 +36,7 @@ class Pictures {
 
   // `mix`: the image with other factors of its light groups, instead of the image itself.
   Result<std::vector<std::byte>> image_exr(const JobId& id, const std::optional<LightMix>& mix) const;
+  Result<std::vector<std::byte>> deep_exr(const JobId& id) const;
   Result<std::vector<std::byte>> image_png(const JobId& id, const Look& look,
                                            const std::optional<LightMix>& mix) const;
   Result<std::string> mix_json(const JobId& id, const LightMix& mix) const;  // the error of a mix
@@ -63,8 +64,8 @@ class Pictures {
   Result<std::string> meters_json(const JobId& id) const;
   // The log of a sequence has the lines of all frames, ordered by time.
   Result<std::string> log(const JobId& id) const;
-  // Returns the path of the file `name` (image.exr or report.json) in the folder of a done job. Empty if the
-  // job is not done, or if everything is in memory.
+  // Returns the path of the file `name` (image.exr, deep.exr or report.json) in the folder of a done job.
+  // Empty if the job is not done, or if everything is in memory.
   std::filesystem::path final_file(const JobId& id, const std::string& name) const;
 
  private:

@@ -211,6 +211,7 @@ void describe(V& v, T& j) {
           j.denoised_check);
   v.field("denoise", "True if the image also gets the layers denoised.R, denoised.G and denoised.B.",
           j.denoise);
+  v.field("deep", "The most slices in a pixel of the deep image. 0: the job has none.", j.deep);
   v.field("spp_done", "Samples per pixel so far, averaged over the pixels.", j.spp_done);
   v.field("rmse", "Estimated from the image itself.", only_if(known, error.rmse));
   v.field("rmse_ci95", "[low, high]: the 95 % interval of the error of this image. null: unknown.",

@@ -154,6 +154,7 @@ struct JobView {
   // no check was made yet
   std::optional<DenoisedCheck> denoised_check;
   bool denoise = false;  // true: its image also gets denoised layers
+  int deep = 0;          // slices of its deep image in each pixel; 0: it has none
   std::optional<DenoisedFigure>
       denoised;         // error of the denoised layers; nullopt: not made yet, or a sequence
   double spp_done = 0;  // samples per pixel so far, mean over all pixels

@@ -28,6 +28,8 @@ void describe(V& v, T& s) {
     v.setting({.name = name, .range = range, .always = true}, value);
   };
   row("aov", s.aov);
+  v.setting({.name = "deep", .range = {0, kMostDeepSlices}}, s.deep);
+  v.setting({.name = "deep_alpha"}, s.deep_alpha);
   row("integrator", s.integrator);
   v.setting({.name = kLightGroups}, s.light_groups);
   v.setting({.name = "meters", .range = {0, kMaxMeters}}, s.meters);
@@ -119,7 +121,10 @@ std::optional<TargetLayer> parse_target_layer(std::string_view text) {
 }
 
 AovSet aovs_of(const RenderSettings& settings) {
-  return parse_aovs(settings.aov).value_or(AovSet{}).with_groups(settings.light_groups.size());
+  return parse_aovs(settings.aov)
+      .value_or(AovSet{})
+      .with_groups(settings.light_groups.size())
+      .with_deep({static_cast<std::uint32_t>(settings.deep), settings.deep == 0 || !settings.deep_alpha});
 }
 
 Digest digest_of(const RenderSettings& settings) { return sha256(canonical_json(settings)); }
@@ -138,20 +143,31 @@ Result<RenderSettings> parse_render_settings(std::string_view text) {
     return bad_argument(
         fmt::format("{}: 'aov' must be sorted, each name once, as it is called", kRenderSettings));
   if (auto ok = check_light_groups(*settings, *aovs); !ok) return tl::unexpected(ok.error());
+  if (settings->deep_alpha && settings->deep == 0)
+    return bad_argument(fmt::format("{}: 'deep_alpha' needs 'deep'", kRenderSettings));
+  if (settings->deep > 0 && settings->meters > 0)
+    return bad_argument(fmt::format("{}: there is no deep image of meters", kRenderSettings));
   return settings;
+}
+
+Result<void> check_film_size(const RenderSettings& s) {
+  const AovSet aovs = aovs_of(s);
+  const std::uint64_t film = film_bytes_per_pixel(aovs) * s.size.pixels();
+  if (film > kMaxFilmBytes)
+    return bad_argument(fmt::format(
+        "{} x {} pixels with the AOVs {}{} take {} bytes each, {} in all; the limit is {}: ask for "
+        "fewer AOVs{} or a smaller frame",
+        s.size.width, s.size.height, fmt::join(s.aov, ", "),
+        s.deep > 0 ? fmt::format("{} and {} slices of a deep image", s.aov.empty() ? "(none)" : "", s.deep)
+                   : "",
+        film_bytes_per_pixel(aovs), film, kMaxFilmBytes, s.deep > 0 ? ", fewer slices" : ""));
+  return {};
 }
 
 Result<void> check_job_size(const RenderSettings& s, std::uint64_t spp) {
   if (auto ok = job::check_ranges(s, kRenderSettings); !ok) return ok;
   if (auto ok = job::check_ranges(JobSpec{.spp = spp}, "spec"); !ok) return ok;
-  const AovSet aovs = aovs_of(s);
-  const std::uint64_t film = film_bytes_per_pixel(aovs) * s.size.pixels();
-  if (film > kMaxFilmBytes)
-    return bad_argument(
-        fmt::format("{} x {} pixels with the AOVs {} take {} bytes each, {} in all; the limit is {}: ask for "
-                    "fewer AOVs or a smaller frame",
-                    s.size.width, s.size.height, fmt::join(s.aov, ", "), film_bytes_per_pixel(aovs), film,
-                    kMaxFilmBytes));
+  if (auto ok = check_film_size(s); !ok) return ok;
   const std::uint64_t tiles = grid_of(s).count(), units = tiles * round_count(spp);
   if (tiles > kMaxTiles || units > kMaxUnits)
     return bad_argument(

@@ -36,7 +36,9 @@ struct RenderSettings {
   // Sorted names of the light groups, for AOVs of AovKind::groups; empty without such AOVs. A light whose
   // group is not in the list belongs to the group `other` if the list has it, and else to none.
   std::vector<std::string> light_groups;
-  int meters = 0;  // number of meters that the scene has; `size` is then that of their blocks
+  int deep = 0;             // number of slices of the deep image in each pixel; 0: there is none
+  bool deep_alpha = false;  // true: the deep image has no colours
+  int meters = 0;           // number of meters that the scene has; `size` is then that of their blocks
   bool operator==(const RenderSettings&) const = default;
 };
 AovSet aovs_of(const RenderSettings& settings);
@@ -60,6 +62,8 @@ struct JobSpec {
   std::optional<std::string> integrator;
   std::optional<TechniqueChoice> techniques;  // instead of what the scene's integrator says
   std::vector<std::string> aov;
+  int deep = 0;                                // as in RenderSettings
+  bool deep_alpha = false;                     // as in RenderSettings
   std::optional<LightMix> mix;                 // factors of the light of the scene's light groups
   std::map<std::string, std::string> defines;  // values of the $name parameters in Mitsuba scenes, by name
   int priority = 0;
@@ -96,7 +100,9 @@ std::string canonical_json(const RenderSettings& settings);
 Result<RenderSettings> parse_render_settings(std::string_view json);
 Digest digest_of(const RenderSettings& settings);
 
-// Checks size, tile, samples and the number of units against core/job/limits.h.
+// Checks that the film, the pixel sums of the whole image, is not larger than kMaxFilmBytes.
+Result<void> check_film_size(const RenderSettings& settings);
+// Checks size, tile, film, samples and the number of units against core/job/limits.h.
 Result<void> check_job_size(const RenderSettings& settings, std::uint64_t spp);
 
 std::string canonical_json(const JobSpec& spec);

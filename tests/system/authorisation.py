@@ -59,6 +59,7 @@ ROUTES = {
     "patch /api/v1/jobs/{id}": changes_job(200),
     "delete /api/v1/jobs/{id}": changes_job(204),
     "get /api/v1/jobs/{id}/image.exr": of_job(200),
+    "get /api/v1/jobs/{id}/deep.exr": of_job(409, "409: it has no deep image"),
     "get /api/v1/jobs/{id}/image.png": of_job(200),
     "get /api/v1/jobs/{id}/mix": of_job(409, "409: it has no light groups"),
     "get /api/v1/jobs/{id}/error.png": of_job(200),

@@ -95,7 +95,7 @@ inline void fake_aovs(Partial& partial, std::size_t pixel, std::size_t pixels) {
     partial.sums[(kPartialChannels + p) * pixels + pixel] = p == planes.hits ? count : red;
   for (std::size_t p = 0; p < planes.ids.size(); ++p)
     store_slots(ranked({{1.f, count}}),
-                &partial.sums[(kPartialChannels + planes.sums.size() + p * kIdPlanes) * pixels + pixel],
+                &partial.sums[(kPartialChannels + planes.all_sums() + p * kIdPlanes) * pixels + pixel],
                 pixels);
 }
 

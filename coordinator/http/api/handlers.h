@@ -36,6 +36,7 @@ Response delete_job(Api&, const Request&, const JobId&);
 
 // Defined in output_handlers.cpp
 Response get_image_exr(Api&, const Request&, const JobId&);
+Response get_deep_exr(Api&, const Request&, const JobId&);
 Response get_mix(Api&, const Request&, const JobId&);
 Response get_image_png(Api&, const Request&, const JobId&);
 Response get_views(Api&, const Request&, const Params&);

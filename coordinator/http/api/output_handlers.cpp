@@ -91,6 +91,13 @@ Response get_image_exr(Api& api, const Request& request, const JobId& id) {
   return file_response("image/x-exr", api.coordinator().image_exr(id), id.value + ".exr");
 }
 
+Response get_deep_exr(Api& api, const Request&, const JobId& id) {
+  if (const auto path = api.coordinator().final_file(id, "deep.exr"); !path.empty())
+    if (auto file = open_file_body(path))
+      return file_response("image/x-exr", std::move(file), id.value + ".deep.exr");
+  return file_response("image/x-exr", api.coordinator().deep_exr(id), id.value + ".deep.exr");
+}
+
 Response get_image_png(Api& api, const Request& request, const JobId& id) {
   const auto exposure = parse_number<double>(request.parameter("exposure").value_or("0"));
   if (!exposure || !(std::abs(*exposure) <= coordinator::limits::kMaxExposure))

@@ -56,6 +56,7 @@ constexpr auto kRoutes = [] {
             kPatchJson},
       plain(del, "/api/v1/jobs/{id}", submit, quick, of_job<delete_job>),
       picture("/api/v1/jobs/{id}/image.exr", of_job<get_image_exr>),
+      picture("/api/v1/jobs/{id}/deep.exr", of_job<get_deep_exr>),
       picture("/api/v1/jobs/{id}/image.png", of_job<get_image_png>),
       picture("/api/v1/jobs/{id}/mix", of_job<get_mix>),
       picture("/api/v1/jobs/{id}/thumbnail.png", of_job<get_thumbnail>),

@@ -148,6 +148,7 @@ JobView JobViews::job(const JobEntry& entry) const {
   v.target_layer = job.spec.target_layer;
   if (!job.denoised_checks.empty()) v.denoised_check = job.denoised_checks.back();
   v.denoise = job.spec.denoise;
+  v.deep = job.settings.deep;
   if (job.state == JobState::done) v.denoised = job.denoised;
   v.error = job.error.empty() ? entry.trouble : job.error;
   v.failure = job.failure;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <iterator>
 
 #include "core/image/aov/identifiers.h"
 
@@ -162,6 +163,10 @@ AovPlanes planes_of(AovSet set) {
     if (out.sums[i].hits) out.hits = i;
     out.names.push_back(out.sums[i].name);
   }
+  if (set.deep().count > 0) {
+    std::ranges::move(names_of_deep_planes(set.deep()), std::back_inserter(out.names));
+    out.deep = out.names.size() - out.sums.size();
+  }
   for (const Aov aov : out.ids) {
     for (int slot = 0; slot < kIdSlots; ++slot) {
       out.names.push_back(fmt::format("id.{}.{}.id", row_of(aov).name, slot));
@@ -178,7 +183,7 @@ std::size_t partial_bytes_per_pixel(AovSet set) {
 
 std::size_t film_bytes_per_pixel(AovSet set) {
   const AovPlanes planes = planes_of(set);
-  return sizeof(double) * (kPartialChannels + planes.sums.size()) +
+  return sizeof(double) * (kPartialChannels + planes.all_sums()) +
          sizeof(float) * kIdPlanes * planes.ids.size();
 }
 

@@ -6,6 +6,9 @@
 // a partial has the planes of sums of the requested AOVs, sorted by channel name, then the planes of
 // identifiers (identifiers.h), sorted by the AOV's name. The partial's EXR file has these planes in the same
 // order, except that it sorts the colour planes by name, too: A.B A.G A.R B.B B.G B.R.
+//
+// The slices of a deep image are further planes of sums, after those of the AOVs;
+// core/image/aov/deep_planes.h says what they are.
 #pragma once
 
 #include <cstddef>
@@ -17,6 +20,7 @@
 
 #include "core/base/error.h"
 #include "core/base/light/light_group.h"
+#include "core/image/aov/deep_planes.h"
 
 namespace ls {
 
@@ -79,23 +83,26 @@ struct AovRow {
 std::span<const AovRow> aov_rows();  // all AOVs, sorted by name
 const AovRow& row_of(Aov aov);
 
-// A set of AOVs, and the number of light groups for those of AovKind::groups.
+// A set of AOVs, the number of light groups for those of AovKind::groups, and the slices of a deep image.
 class AovSet {
  public:
   constexpr AovSet() = default;
-  constexpr explicit AovSet(std::uint32_t bits, std::size_t groups = 0)
-      : bits_(bits & ((1u << kAovs) - 1)), groups_(static_cast<std::uint32_t>(groups)) {}
+  constexpr explicit AovSet(std::uint32_t bits, std::size_t groups = 0, DeepSlices deep = {})
+      : bits_(bits & ((1u << kAovs) - 1)), groups_(static_cast<std::uint32_t>(groups)), deep_(deep) {}
   constexpr bool has(Aov a) const { return bits_ >> static_cast<int>(a) & 1; }
   constexpr bool any_of(AovSet other) const { return bits_ & other.bits_; }
-  constexpr bool empty() const { return bits_ == 0; }
+  constexpr bool empty() const { return bits_ == 0 && deep_.count == 0; }
   constexpr std::uint32_t bits() const { return bits_; }
   constexpr std::size_t groups() const { return groups_; }
-  constexpr AovSet with(Aov a) const { return AovSet(bits_ | 1u << static_cast<int>(a), groups_); }
-  constexpr AovSet with_groups(std::size_t groups) const { return AovSet(bits_, groups); }
+  constexpr DeepSlices deep() const { return deep_; }
+  constexpr AovSet with(Aov a) const { return AovSet(bits_ | 1u << static_cast<int>(a), groups_, deep_); }
+  constexpr AovSet with_groups(std::size_t groups) const { return AovSet(bits_, groups, deep_); }
+  constexpr AovSet with_deep(DeepSlices deep) const { return AovSet(bits_, groups_, deep); }
   bool operator==(const AovSet&) const = default;
 
  private:
   std::uint32_t bits_ = 0, groups_ = 0;
+  DeepSlices deep_;
 };
 AovSet aovs_of(AovKind kind);  // returns all AOVs of a kind
 
@@ -120,11 +127,15 @@ struct AovPlane {
   std::size_t group = 0;  // index of the light group, for AovKind::groups
 };
 struct AovPlanes {
-  std::vector<AovPlane> sums;
+  std::vector<AovPlane> sums;  // those of AOVs
+  // The planes of the slices of a deep image, which follow those of `sums`: their number, in the order of
+  // DeepPlanes (deep_planes.h)
+  std::size_t deep = 0;
   std::vector<Aov> ids;  // the AOVs of identifiers; each has kIdPlanes planes
-  // names of all planes (sums, then identifiers), in the order within a partial
+  // names of all planes (sums, those of slices, then identifiers), in the order within a partial
   std::vector<std::string> names;
   std::size_t count() const { return names.size(); }
+  std::size_t all_sums() const { return sums.size() + deep; }  // the planes of sums, with those of slices
   std::size_t hits = SIZE_MAX;  // index in `sums` of the plane of hits; SIZE_MAX: there is none
 };
 AovPlanes planes_of(AovSet set);

@@ -20,6 +20,7 @@
 
 #include "core/base/error.h"
 #include "core/base/light/colour_space.h"
+#include "core/image/exr/deep_samples.h"
 #include "core/image/frame/camera_matrices.h"
 #include "core/image/frame/frame.h"
 
@@ -145,5 +146,33 @@ struct ExrBands {
 // Writes the image to `sink` as one EXR file. Unless its compression is lossy, its header has a seal (digests
 // of all layers and headers, seal.h).
 Result<void> write_sealed_exr(const ExrBands& bands, ByteSink& sink);
+
+// Some whole rows of a deep image: how many samples each pixel has, and the samples, pixel after pixel.
+struct DeepRows {
+  FrameSize size;
+  std::vector<std::uint32_t> counts;
+  std::vector<DeepSample> samples;
+};
+// A deep image that is delivered in bands, as ExrBands. Colours and alpha are halves unless `floats`.
+struct DeepBands {
+  FrameSize size;
+  std::map<std::string, std::string> strings;
+  std::function<DeepRows(int band)> band;
+  StandardAttributes standard = {};
+  bool colours = true;  // false: there are no channels R, G, B
+  bool floats = false;
+};
+// Writes a file with one part of type deepscanline, with the channels A, R, G, B, Z and ZBack, packed with
+// ZIPS. Its seal has each channel as a layer of the values of all samples, and the layer "samples" with the
+// numbers of samples.
+Result<void> write_sealed_deep_exr(const DeepBands& bands, ByteSink& sink);
+// Reads such a file from untrusted bytes, in one band. `changed` is as in FinalPicture.
+struct DeepPicture {
+  DeepRows rows;
+  std::map<std::string, std::string> strings;
+  bool colours = true, floats = false;
+  std::optional<std::vector<std::string>> changed;
+};
+Result<DeepPicture> read_deep_exr(std::span<const std::byte> bytes, const std::string& name);
 
 }  // namespace ls

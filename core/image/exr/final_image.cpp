@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/image/aov/deep_planes.h"
 #include "core/image/aov/identifiers.h"
 #include "core/image/exr/caught_shadows.h"
 #include "core/image/exr/exr_file.h"
@@ -419,6 +420,69 @@ Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& from, 
                        parts_of_colours()};
   if (auto written = write_sealed_exr(bands, sink); !written) return tl::unexpected(written.error());
   return clamped;
+}
+
+DeepRows deep_rows(const Film& film, const ImageForm& form) {
+  const FrameSize frame = film.grid().frame;
+  const DeepSlices slices = film.aovs().deep();
+  const DeepPlanes planes(slices);
+  const std::size_t before = planes_of(film.aovs()).sums.size();
+  const auto matrix = matrix_to(form.colour_space);
+  std::vector<std::vector<DeepSample>> of_pixel(frame.pixels());
+  DeepPixel pixel;
+  pixel.edges.resize(planes.records());
+  pixel.transmittance.resize(planes.records());
+  if (slices.colours) pixel.light.resize(planes.records());
+  for (TileIndex t = 0; t < film.grid().count(); ++t) {
+    if (film.spp(t) == 0) continue;
+    const TileAovs tile = film.aov_pixels(t);
+    const auto n = static_cast<std::size_t>(tile.rect.pixels());
+    const auto samples = static_cast<double>(tile.spp), rounds = static_cast<double>(tile.rounds);
+    each_pixel(tile.rect, frame, [&](std::size_t to, std::size_t from) {
+      const auto sum = [&](std::size_t plane) { return tile.sums[(before + plane) * n + from]; };
+      for (std::size_t i = 0; i < planes.records(); ++i) {
+        // Every round states the same edge. A sum of up to 2^29 equal floats is exact in double, and so is
+        // its quotient.
+        pixel.edges[i] = sum(planes.edge(i)) / rounds;
+        pixel.transmittance[i] = sum(planes.transmittance(i)) / samples;
+        if (!slices.colours) continue;
+        for (std::size_t c = 0; c < 3; ++c) pixel.light[i][c] = sum(planes.light(i, c)) / samples;
+        if (matrix) pixel.light[i] = *matrix * pixel.light[i];
+      }
+      of_pixel[to] = deep_samples(pixel, !form.float_output);
+    });
+  }
+  DeepRows rows{frame, {}, {}};
+  for (const std::vector<DeepSample>& samples : of_pixel) {
+    rows.counts.push_back(static_cast<std::uint32_t>(samples.size()));
+    rows.samples.insert(rows.samples.end(), samples.begin(), samples.end());
+  }
+  return rows;
+}
+
+Result<void> write_deep_image(const Film& film, const Provenance& from, const ImageForm& form,
+                              ByteSink& sink) {
+  const DeepSlices slices = film.aovs().deep();
+  if (slices.count == 0)
+    return fail(Errc::failed_precondition, "the image has no slices: render it with the setting deep");
+  auto strings = strings_of(film, from);
+  strings[kDeepSlicesName] = fmt::format("{}", slices.count);
+  if (form.colour_space != ColourSpace::rec709)
+    strings[kColourSpaceName] = std::string(to_string(form.colour_space));
+  return write_sealed_deep_exr({film.grid().frame,
+                                std::move(strings),
+                                [&](int row) { return deep_rows(film.row(row), form); },
+                                {chromaticities_of(form.colour_space), from.camera, from.frames_per_second},
+                                slices.colours,
+                                form.float_output},
+                               sink);
+}
+
+Result<std::vector<std::byte>> deep_exr_of(const Film& film, const Provenance& from, const ImageForm& form) {
+  MemorySink sink;
+  if (auto written = write_deep_image(film, from, form, sink); !written)
+    return tl::unexpected(written.error());
+  return std::move(sink.bytes);
 }
 
 Result<FinalImage> final_exr(const Film& film, const Provenance& from, const ImageForm& form,

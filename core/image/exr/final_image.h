@@ -125,6 +125,17 @@ Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, con
 Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& provenance, const ImageForm& form,
                                       ByteSink& sink, std::span<const float> denoised = {});
 
+// Writes the deep image of a film, one row of tiles at a time. Fails with failed_precondition if the film has
+// no slices. Compression and parts of the form do not matter. The header has the strings of the final EXR,
+// and `lightshaft:deep` with the number of slices.
+Result<void> write_deep_image(const Film& film, const Provenance& provenance, const ImageForm& form,
+                              ByteSink& sink);
+Result<std::vector<std::byte>> deep_exr_of(const Film& film, const Provenance& provenance,
+                                           const ImageForm& form);
+// Returns the rows of the deep image of a film, which is a whole film or one row of its tiles.
+DeepRows deep_rows(const Film& film, const ImageForm& form);
+inline constexpr const char* kDeepSlicesName = "lightshaft:deep";
+
 // Returns the header strings about the error of an image; the keys are their full names. `sums` are the sums
 // over all tiles of the image. `lightshaft:verdict` is based on the pixels only, not on the convergence over
 // time. If there are no samples, only `lightshaft:pixels_without_samples` is returned. It is left out if

@@ -39,8 +39,9 @@ constexpr std::int64_t kMaxPartialPixels = 256 * 256;  // number of pixels of th
 
 constexpr std::int32_t kMaxUnitJson = 1024;
 // upper limit of the size of the channel list, in bytes; all AOVs together need about 2700, and the light
-// groups up to 47 for each of 2 x 6 x kMostLightGroups channels
-constexpr std::int32_t kMaxChannelList = 32768;
+// groups up to 47 for each of 2 x 6 x kMostLightGroups channels, and slices 26 for each of
+// 5 x (kMostDeepSlices + 1)
+constexpr std::int32_t kMaxChannelList = 49152;
 // longest name, unless the file has the flag for long names, which partials never have
 constexpr std::size_t kMaxNameBytes = 31;
 
@@ -107,7 +108,8 @@ Result<std::vector<std::string_view>> channel_names(std::span<const std::byte> r
 }
 
 // Returns the AOVs of which at least one channel is among `names`. There are as many light groups as the
-// largest two-digit number after the AOV's name says, but at most kMostLightGroups.
+// largest two-digit number after the AOV's name says, but at most kMostLightGroups; and likewise the slices
+// of a deep image.
 AovSet aovs_among(std::span<const std::string_view> names) {
   AovSet set;
   std::size_t groups = 0;
@@ -123,7 +125,7 @@ AovSet aovs_among(std::span<const std::string_view> names) {
         groups = std::max(groups, std::min(group, kMostLightGroups - 1) + 1);
     }
   }
-  return set.with_groups(groups);
+  return set.with_groups(groups).with_deep(deep_slices_among(names));
 }
 
 Result<AovSet> check_channels(std::span<const std::byte> raw) {
@@ -305,7 +307,7 @@ Result<void> counts_possible(const Partial& partial) {
   const PixelRect& t = partial.header.tile;
   const auto pixels = static_cast<std::size_t>(t.pixels());
   const std::uint64_t samples = partial.header.samples.count();
-  const float* ids = partial.sums.data() + (kPartialChannels + planes.sums.size()) * pixels;
+  const float* ids = partial.sums.data() + (kPartialChannels + planes.all_sums()) * pixels;
   for (const Aov aov : planes.ids) {
     for (std::size_t i = 0; i < pixels; ++i)
       if (const std::string wrong = wrong_with(load_slots(ids + i, pixels), samples); !wrong.empty())
@@ -331,8 +333,12 @@ Result<Partial> finish(std::span<const std::byte> exr, const Shape& shape, UnitH
 }
 
 std::string described(AovSet aovs) {
-  return fmt::format("the AOVs [{}]{}", fmt::join(names_of(aovs), ", "),
-                     aovs.groups() > 0 ? fmt::format(" with {} light groups", aovs.groups()) : "");
+  const DeepSlices deep = aovs.deep();
+  return fmt::format("the AOVs [{}]{}{}", fmt::join(names_of(aovs), ", "),
+                     aovs.groups() > 0 ? fmt::format(" with {} light groups", aovs.groups()) : "",
+                     deep.count > 0 ? fmt::format(" and {} slices {}colours", deep.count,
+                                                  deep.colours ? "with " : "without ")
+                                    : "");
 }
 
 }  // namespace

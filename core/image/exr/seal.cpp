@@ -70,6 +70,27 @@ std::string Seal::text() {
   return out;
 }
 
+ExrPicture values_of(const DeepRows& rows, bool colours, bool halves) {
+  ExrPicture picture{rows.size, {}, {}};
+  const auto add = [&](const char* name, bool as_halves, const auto& value) {
+    std::vector<float> values;
+    values.reserve(rows.samples.size());
+    for (const DeepSample& s : rows.samples) values.push_back(value(s));
+    if (as_halves)
+      picture.channels[name] = ExrHalf{std::move(values)};
+    else
+      picture.channels[name] = ExrFloat{std::move(values)};
+  };
+  constexpr const char* kRgb[] = {"R", "G", "B"};
+  for (std::size_t c = 0; c < 3 && colours; ++c)
+    add(kRgb[c], halves, [c](const DeepSample& s) { return s.rgb[c]; });
+  add("A", halves, [](const DeepSample& s) { return s.alpha; });
+  add("Z", false, [](const DeepSample& s) { return s.z; });
+  add("ZBack", false, [](const DeepSample& s) { return s.z_back; });
+  picture.channels["samples"] = ExrUint{rows.counts};
+  return picture;
+}
+
 std::vector<std::string> differences(const std::string& sealed, const std::string& now) {
   const auto before = lines_of(sealed), after = lines_of(now);
   std::set<std::string> names;

@@ -36,6 +36,10 @@ class Seal {
   bool first_part_ = true;
 };
 
+// Returns the values of the samples of a deep image, by the names of their channels, as the seal takes them:
+// the layer "samples" has the numbers of samples of the pixels.
+ExrPicture values_of(const DeepRows& rows, bool colours, bool halves);
+
 // Compares the texts of two seals. Returns the names of the layers and headers whose digests differ ("layer
 // depth.Z"), sorted.
 std::vector<std::string> differences(const std::string& sealed, const std::string& now);

@@ -1,4 +1,6 @@
 #include <ImfChannelList.h>
+#include <ImfDeepFrameBuffer.h>
+#include <ImfDeepScanLineOutputFile.h>
 #include <ImfFrameBuffer.h>
 #include <ImfFramesPerSecond.h>
 #include <ImfHeader.h>
@@ -209,6 +211,68 @@ Result<void> write_bands(Imf::OStream& out, const ExrBands& bands) {
   });
 }
 
+// Writes the rows that begin at the file's row y0.
+void write_deep_rows(Imf::DeepScanLineOutputFile& file, const ExrPicture& values, int y0) {
+  const auto width = static_cast<std::size_t>(values.size.width), skipped = static_cast<std::size_t>(y0);
+  std::vector<std::uint32_t> counts = std::get<ExrUint>(values.channels.at("samples")).values;
+  // The library finds the pixel (x, y) at base + x * xStride + y * yStride.
+  const auto base = [&](auto& of_pixels) {
+    return reinterpret_cast<char*>(of_pixels.data()) - skipped * width * sizeof(of_pixels[0]);
+  };
+  Imf::DeepFrameBuffer buffer;
+  buffer.insertSampleCountSlice(
+      Imf::Slice(Imf::UINT, base(counts), sizeof counts[0], sizeof counts[0] * width));
+  std::vector<std::vector<half>> halves;
+  std::vector<std::vector<const void*>> pointers;
+  const auto add = [&](const std::string& name, Imf::PixelType type, const auto* data) {
+    auto& of_channel = pointers.emplace_back(counts.size());
+    for (std::size_t i = 0; i < counts.size(); data += counts[i++]) of_channel[i] = data;
+    buffer.insert(name,
+                  Imf::DeepSlice(type, base(of_channel), sizeof(void*), sizeof(void*) * width, sizeof *data));
+  };
+  halves.reserve(values.channels.size());
+  pointers.reserve(values.channels.size());
+  for (const auto& entry : values.channels) {
+    const std::string& name = entry.first;
+    std::visit(
+        overloaded{
+            [&](const ExrHalf& c) { add(name, Imf::HALF, halves.emplace_back(to_half(c.values)).data()); },
+            [&](const ExrFloat& c) { add(name, Imf::FLOAT, c.values.data()); }, [](const ExrUint&) {}},
+        entry.second);
+  }
+  file.setFrameBuffer(buffer);
+  file.writePixels(values.size.height);
+}
+
+// Generates the bands twice, as write_bands() does: for the seal, and for the file.
+Result<void> write_deep_bands(Imf::OStream& out, const DeepBands& bands) {
+  if (bands.size.width < 1 || bands.size.height < 1)
+    return bad_argument("writing a deep EXR: the image is empty");
+  const auto each = [&](const auto& take) -> Result<void> {
+    for (int band = 0, y = 0; y < bands.size.height; ++band) {
+      const DeepRows rows = bands.band(band);
+      if (rows.size.width != bands.size.width || rows.size.height > bands.size.height - y ||
+          rows.counts.size() != rows.size.pixels())
+        return fail(Errc::internal, "writing a deep EXR: its bands are not those of one picture");
+      take(exr::values_of(rows, bands.colours, !bands.floats), y);
+      y += rows.size.height;
+    }
+    return {};
+  };
+  Imf::Header header = header_of(bands.size, ExrCompression::zips);
+  header.setType(Imf::DEEPSCANLINE);
+  add_standard(bands.standard, header);
+  for (const auto& [name, channel] : exr::values_of({}, bands.colours, !bands.floats).channels)
+    if (name != "samples") header.channels().insert(name, Imf::Channel(type_of(channel)));
+  add_strings(bands.strings, header);
+  exr::Seal seal;
+  if (auto read = each([&](const ExrPicture& values, int) { seal.add(values); }); !read) return read;
+  seal.add(header);
+  header.insert(exr::kSealName, Imf::StringAttribute(seal.text()));
+  Imf::DeepScanLineOutputFile file(out, header, /*numThreads=*/0);
+  return each([&](const ExrPicture& values, int y) { write_deep_rows(file, values, y); });
+}
+
 // A stream that writes to a sink. It can report an error to the library only by an exception, so it keeps the
 // sink's own Error in `trouble`.
 class SinkStream final : public Imf::OStream {
@@ -268,6 +332,14 @@ Result<std::vector<std::byte>> write_exr(const ExrPicture& picture) {
 Result<void> write_sealed_exr(const ExrBands& bands, ByteSink& sink) {
   SinkStream out(sink);
   auto written = exr::guarded(Errc::internal, "writing an EXR", [&] { return write_bands(out, bands); });
+  if (out.trouble) return tl::unexpected(*out.trouble);
+  return written;
+}
+
+Result<void> write_sealed_deep_exr(const DeepBands& bands, ByteSink& sink) {
+  SinkStream out(sink);
+  auto written =
+      exr::guarded(Errc::internal, "writing a deep EXR", [&] { return write_deep_bands(out, bands); });
   if (out.trouble) return tl::unexpected(*out.trouble);
   return written;
 }

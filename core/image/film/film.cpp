@@ -32,7 +32,7 @@ void add_ids(std::vector<float>& to, std::span<const float> from, std::size_t pi
 
 Film::Film(TileGrid grid, AovSet aovs) : grid_(grid), aovs_(aovs) {
   const AovPlanes planes = planes_of(aovs);
-  planes_ = {kPartialChannels + planes.sums.size(), kIdPlanes * planes.ids.size()};
+  planes_ = {kPartialChannels + planes.all_sums(), kIdPlanes * planes.ids.size()};
   CHECK(grid.frame.width > 0 && grid.frame.height > 0 && grid.tile > 0, "a film of {} x {} in tiles of {}",
         grid.frame.width, grid.frame.height, grid.tile);
   tiles_.resize(grid.count());
@@ -182,7 +182,7 @@ TilePixels Film::pixels(TileIndex index) const {
 }
 
 TileAovs Film::aov_pixels(TileIndex index) const {
-  TileAovs out{.rect = grid_.rect(index), .spp = spp(index)};
+  TileAovs out{.rect = grid_.rect(index), .spp = spp(index), .rounds = rounds_folded(index)};
   const auto n = static_cast<std::size_t>(out.rect.pixels()), colour = kPartialChannels * n;
   out.sums.resize(planes_.sums * n - colour);
   out.ids.resize(planes_.ids * n);

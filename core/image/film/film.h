@@ -46,8 +46,9 @@ struct TilePixels {
 struct TileAovs {
   PixelRect rect;
   std::uint64_t spp = 0;
-  // The sum planes, in the order of planes_of(aovs).sums; 0 if spp is 0.
+  // The planes of sums, in the order of planes_of(aovs), those of slices included; 0 if spp is 0.
   std::vector<double> sums;
+  RoundIndex rounds = 0;  // number of rounds in these sums
   // The identifier planes: kIdPlanes for each AOV in planes_of(aovs).ids.
   std::vector<float> ids;
 };
@@ -102,9 +103,9 @@ class Film {
   Film row(int row) const;
 
   // Returns the film with another colour: the sum over the light groups of their light times these factors,
-  // one for each group. The AOVs of light groups are left out; the digests of tiles stay those of the
-  // samples. Without the AOV volume_light_groups, the factors `surface` apply to all light. The film must
-  // have the AOV light_groups.
+  // one for each group. The AOVs of light groups and the slices of a deep image are left out; the digests of
+  // tiles stay those of the samples. Without the AOV volume_light_groups, the factors `surface` apply to all
+  // light. The film must have the AOV light_groups.
   Film mixed(std::span<const GroupFactors> factors) const;
 
   // Saving and loading of tiles, so that a job continues after a restart of the coordinator.

@@ -165,6 +165,10 @@ class AsyncJob(JobState):
         image(); the file has no layers of light groups then."""
         await self._transport.run(jobs_of.save(self.id, path, mix))
 
+    async def save_deep(self, path: str | os.PathLike[str]) -> None:
+        """Writes the deep image of a job with `deep` as OpenEXR."""
+        await self._transport.run(jobs_of.save_deep(self.id, path))
+
     async def mix(self, factors: Mix) -> models.MixError:
         """Returns the error of a mix of the image's light groups: relmse with its interval relmse_ci95, rmse, and
         whether they can be trusted. image(mix=factors) is the mixed image."""

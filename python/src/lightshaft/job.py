@@ -118,6 +118,11 @@ def save(job: str, path: str | os.PathLike[str], mix: Mix | None) -> Steps[None]
     yield from work(lambda: _write(pathlib.Path(path), data))
 
 
+def save_deep(job: str, path: str | os.PathLike[str]) -> Steps[None]:
+    data = yield from fetch(_path(job, "/deep.exr", {}))
+    yield from work(lambda: _write(pathlib.Path(path), data))
+
+
 def _write(path: pathlib.Path, data: bytes) -> None:
     """Writes the whole file or nothing."""
     handle, aside = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)

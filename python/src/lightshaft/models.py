@@ -119,6 +119,13 @@ class JobSpec(TypedDict):
     denoising_albedo, denoising_normal, depth, direct, emission, geo_normal, indirect, light_groups,
     material_id, multiple, normal, opacity, position, shadow_catcher, shape_id, single, surface, uv, volume,
     volume_light_groups, volume_opacity."""
+    deep: NotRequired[int]
+    """The image also has a deep image, with at most this many slices in each pixel, and one behind them for
+    the environment; 0: none (docs/guide/compositing.md). Each slice takes 20 bytes a pixel in every unit's
+    result and 40 in the coordinator's memory."""
+    deep_alpha: NotRequired[bool]
+    """The deep image has alpha and depths, but no colours, as holdouts need it. Each slice then takes 8
+    bytes a pixel in every unit's result and 16 in the coordinator's memory. Needs `deep`."""
     mix: NotRequired[str]
     """Multiplies the light of the scene's light groups (docs/guide/light-groups.md): key=2,fill=0.5:0.4:0.3
     (R:G:B). The groups are those of `light_group` in the scene; `other` is the light without one."""
@@ -237,6 +244,8 @@ class Job(TypedDict):
     """The last comparison of the denoised layers' error with the target."""
     denoise: NotRequired[bool]
     """True if the image also gets the layers denoised.R, denoised.G and denoised.B."""
+    deep: NotRequired[int]
+    """The most slices in a pixel of the deep image. 0: the job has none."""
     spp_done: NotRequired[float]
     """Samples per pixel so far, averaged over the pixels."""
     rmse: NotRequired[Union[float, None]]

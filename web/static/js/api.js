@@ -99,6 +99,7 @@ export const api = {
 export const downloads = {
   /** mix: of light groups; without one the image itself. */
   exr: (id, mix = null) => `${kBase}${jobPath(id)}/image.exr${mix === null ? "" : `?mix=${encodeURIComponent(mix)}`}`,
+  deep: (id) => `${kBase}${jobPath(id)}/deep.exr`,
   png: (id, exposure, layer, view) => `${kBase}${jobPath(id)}/image.png?${lookOf(exposure, layer, view)}`,
   meters: (id) => `${kBase}${jobPath(id)}/meters`,
   report: (id) => `${kBase}${jobPath(id)}/report`,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "worker/render/integrator/deep_edges.h"
 #include "worker/render/integrator/variant.h"
 #include "worker/render/math/math.h"
 
@@ -65,12 +66,23 @@ AovPixel::AovPixel(const World& world)
       wants_surface_(world.aovs.any_of(kOfSurface)),
       wants_light_(world.aovs.any_of(kOfLight)),
       wants_guide_(world.aovs.any_of(kOfGuide)),
-      wants_opacity_(world.aovs.any_of(kOfOpacity)) {
+      wants_opacity_(world.aovs.any_of(kOfOpacity) || world.aovs.deep().count > 0),
+      slices_(world.aovs.deep()) {
+  split_.by_depth.wanted = slices_.records() > 0 && world.aovs.deep().colours;
+  through_.resize(world.aovs.deep().count);
   for (auto& of_aov : group_sums_)
     for (auto& of_half : of_aov) of_half.resize(world.aovs.groups());
 }
 
-void AovPixel::begin_pixel() {
+void AovPixel::begin_pixel(int x, int y) {
+  if (slices_.records() > 0) {
+    edges_ = deep_edges(world_, x + world_.origin_x, y + world_.origin_y);
+    between_.clear();
+    for (std::size_t k = 1; k + 1 < edges_.size(); ++k) between_.push_back(std::abs(edges_[k]));
+    split_.by_depth.edges = between_;
+    slice_light_.assign(slices_.records(), Sums{});
+    slice_through_.assign(slices_.records(), 0);
+  }
   sums_ = {};
   for (auto& of_aov : group_sums_)
     for (auto& of_half : of_aov) std::ranges::fill(of_half, Sums{});
@@ -86,6 +98,7 @@ void AovPixel::add(Aov aov, const V3d& v, std::size_t half) {
 
 void AovPixel::end_sample(int x, int y, std::uint64_t sample, bool usable) {
   if (wants_light_ && usable) add_light(sample & 1);
+  if (split_.by_depth.wanted && usable) add_slices();
   if (!wants_surface_ && !wants_guide_ && !wants_opacity_) return;
   x += world_.origin_x;
   y += world_.origin_y;
@@ -155,13 +168,33 @@ void AovPixel::add_guide(const CameraRay& ray, const SampleStream& stream, std::
 
 void AovPixel::add_opacity(const CameraRay& ray, const SampleStream& stream, std::size_t half) {
   constexpr Features kFeatures = kEveryScene.with(&Features::visibility);
-  const Opacity opacity = PathTracer<kFeatures>(world_, stream).opacity(ray);
-  if (!is_finite(opacity.all) || !is_finite(opacity.media)) return;
-  const V3d all(opacity.all);
+  const bool deep = slices_.records() > 0;
+  const DeepTransmittance slices{between_, through_};
+  if (deep) std::ranges::fill(through_, 0.0);
+  const Opacity opacity = PathTracer<kFeatures>(world_, stream).opacity(ray, deep ? &slices : nullptr);
+  const bool finite = is_finite(opacity.all) && is_finite(opacity.media);
+  const V3d all(finite ? opacity.all : C3(0));
+  if (deep) {
+    for (std::size_t i = 0; i < through_.size(); ++i)
+      slice_through_[i] += finite && std::isfinite(through_[i]) ? through_[i] : 1;
+    slice_through_.back() += 1 - (all.x + all.y + all.z) / 3;
+  }
+  if (!finite) return;
   add(Aov::alpha, {(all.x + all.y + all.z) / 3, 0, 0}, half);
   add(Aov::opacity, all, half);
   add(Aov::volume_opacity, V3d(opacity.media), half);
   if (is_finite(opacity.shadow)) add(Aov::shadow_catcher, V3d(opacity.shadow), half);
+}
+
+// Adds the light of a usable sample to the slices. Light that is not finite counts as 0.
+void AovPixel::add_slices() {
+  for (const LightByDepth::Event& event : split_.by_depth.events) {
+    if (!is_finite(event.light)) continue;
+    const auto at = std::ranges::upper_bound(between_, event.depth);
+    const std::size_t slice =
+        std::isinf(event.depth) ? slices_.records() - 1 : static_cast<std::size_t>(at - between_.begin());
+    for (std::size_t c = 0; c < 3; ++c) slice_light_[slice][c] += double{event.light[static_cast<int>(c)]};
+  }
 }
 
 void AovPixel::add_id(std::vector<IdSlot>& seen, float id) {
@@ -181,7 +214,14 @@ void AovPixel::store(float* planes, std::size_t pixels, std::size_t i) const {
         by_group ? group_sums_[plane.aov == Aov::volume_light_groups][half][plane.group] : sums_[half][aov];
     planes[p * pixels + i] = rounded(plane.hits ? hits_ : of_aov[static_cast<std::size_t>(plane.component)]);
   }
-  float* ids = planes + planes_.sums.size() * pixels + i;
+  float* deep = planes + planes_.sums.size() * pixels + i;
+  for (std::size_t k = 0; k < slices_.records(); ++k) {
+    deep[slices_.edge(k) * pixels] = rounded(edges_[k] / world_.geometry.scale);
+    deep[slices_.transmittance(k) * pixels] = rounded(slice_through_[k]);
+    if (!world_.aovs.deep().colours) continue;
+    for (std::size_t c = 0; c < 3; ++c) deep[slices_.light(k, c) * pixels] = rounded(slice_light_[k][c]);
+  }
+  float* ids = planes + planes_.all_sums() * pixels + i;
   for (const Aov aov : planes_.ids) {
     store_slots(ranked(aov == Aov::shape_id ? shapes_ : materials_), ids, pixels);
     ids += kIdPlanes * pixels;

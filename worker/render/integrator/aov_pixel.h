@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/image/aov/deep_planes.h"
 #include "core/image/aov/identifiers.h"
 #include "worker/render/integrator/path_tracer.h"
 #include "worker/render/math/sampler.h"
@@ -18,7 +19,7 @@ class AovPixel {
   explicit AovPixel(const World& world);
 
   LightSplit* split() { return &split_; }  // light components of the current sample
-  void begin_pixel();
+  void begin_pixel(int x, int y);
   void begin_sample() { split_.clear(world_.aovs.groups()); }
   // Call after sample number `sample` of the image's pixel (x, y) has been rendered. `usable` is true if the
   // radiance of the sample counts.
@@ -34,6 +35,7 @@ class AovPixel {
   void add_surface(const FirstSurface& first, const SampleStream& stream, const CameraRay& ray);
   void add_guide(const CameraRay& ray, const SampleStream& stream, std::size_t half);
   void add_opacity(const CameraRay& ray, const SampleStream& stream, std::size_t half);
+  void add_slices();
   void add_id(std::vector<IdSlot>& seen, float id);
 
   const World& world_;
@@ -46,6 +48,12 @@ class AovPixel {
   // Sums of light_groups [0] and volume_light_groups [1], by half and group
   std::array<std::array<std::vector<Sums>, 2>, 2> group_sums_;
   double hits_ = 0;
+  // With a deep image: the edges of the pixel's slices, the depths between its slices, and by record
+  // (DeepPlanes) the sums of light and transmittance. `through_` is that of the current sample.
+  DeepPlanes slices_;
+  std::vector<float> edges_, between_;
+  std::vector<Sums> slice_light_;
+  std::vector<double> slice_through_, through_;
   std::vector<IdSlot> shapes_, materials_;
 };
 

@@ -2,9 +2,12 @@
 // random number of the path, but for the decisions at surfaces that light passes straight through.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
+#include "core/image/aov/aov.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {
@@ -88,9 +91,20 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
   return guide;
 }
 
-// In grids the transmittance is an estimate, whose random numbers nothing else uses.
+// In grids the transmittance is an estimate, whose random numbers nothing else uses. The estimates between
+// the slices of a deep image use the same numbers, so that those of neighbouring slices are close to each
+// other, and the last one is that of the whole.
 template <Features F, template <Features> class Light>
-Opacity PathTracer<F, Light>::opacity(const CameraRay& ray) {
+Opacity PathTracer<F, Light>::opacity(const CameraRay& ray, const DeepTransmittance* deep) {
+  const float near = deep ? world_.camera.near_distance(ray.d) : 0;
+  const auto depth_of = [&](const V3& p) { return near + dot(p - ray.o, ray.d); };
+  const auto mean_of = [](const C3& c) { return (double{c.x} + c.y + c.z) / 3; };
+  std::size_t edge = 0;
+  // Sets the transmittances of the edges up to the depth `end` that are not set yet.
+  const auto pass_edges = [&](float end, const auto& through) {
+    for (; edge < deep->edges.size() && deep->edges[edge] <= end; ++edge)
+      deep->through[edge] = mean_of(through(deep->edges[edge]));
+  };
   // Transmittances of the media, and of the surfaces that light passes straight through
   C3 media(1), surfaces(1), shadow(0);
   ray_ = {ray.o, ray.o, ray.d};
@@ -104,8 +118,32 @@ Opacity PathTracer<F, Light>::opacity(const CameraRay& ray) {
     if (medium_.any()) {
       const float t = met ? ray_.length_to(hit) : reach;
       RandomStream tracker = stream_.stream(segment_, Purpose::track_opacity);
-      media *= through_media(medium_, ray_.start, ray_.d, t, tracker);
+      if (deep) [[unlikely]] {
+        const float begin = depth_of(ray_.start), end = met ? depth_of(hit.p) : begin + reach;
+        std::array<float, kMostDeepSlices> points;
+        std::array<C3, kMostDeepSlices> through, all;
+        std::size_t count = 0;
+        while (edge + count < deep->edges.size() && deep->edges[edge + count] <= end) {
+          points[count] = std::clamp(deep->edges[edge + count] - begin, 0.f, t);
+          all[count++] = media * surfaces;
+        }
+        C3 whole(1);
+        for (const std::uint32_t m : medium_.all()) {
+          whole *=
+              transmittance_to_points(world_.media[m], ray_.start, ray_.d, t, RandomStream(tracker.next()),
+                                      {points.data(), count}, through.data());
+          for (std::size_t i = 0; i < count; ++i) all[i] *= through[i];
+        }
+        media *= whole;
+        for (std::size_t i = 0; i < count; ++i) deep->through[edge++] = mean_of(all[i]);
+      } else {
+        media *= through_media(medium_, ray_.start, ray_.d, t, tracker);
+      }
     }
+    if (deep) [[unlikely]]
+      pass_edges(met ? depth_of(hit.p) : kInfinity, [&](float) { return media * surfaces; });
+    if (!met && deep) [[unlikely]]
+      deep->through.back() = mean_of(media * surfaces);
     if (!met && world_.lights.has_sky() && !world_.hide_environment) surfaces = C3(0);
     if (!met || is_black(media)) break;
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
@@ -113,6 +151,10 @@ Opacity PathTracer<F, Light>::opacity(const CameraRay& ray) {
       if (!surface.holdout) surfaces = C3(0);
       if (surface.catcher && world_.aovs.has(Aov::shadow_catcher))
         shadow = shadow_at(hit) * mean(media * surfaces);
+      if (deep) [[unlikely]] {
+        pass_edges(kInfinity, [&](float) { return media * surfaces; });
+        deep->through.back() = mean_of(media * surfaces);
+      }
       break;
     }
     surfaces = beta_;
@@ -179,6 +221,39 @@ bool PathTracer<F, Light>::meets_catcher(const V3& p, const LightSample& light) 
     o = next;
   }
   return false;
+}
+
+template <Features F, template <Features> class Light>
+DeepProbe PathTracer<F, Light>::deep_probe(const CameraRay& ray) {
+  // A ray that passes more surfaces than this ends; the slices are then coarser behind them.
+  constexpr int kProbeSegments = 64;
+  DeepProbe probe;
+  const float near = world_.camera.near_distance(ray.d);
+  const auto depth_of = [&](const V3& p) { return near + dot(p - ray.o, ray.d); };
+  ray_ = {ray.o, ray.o, ray.d};
+  medium_ = start_medium(ray);
+  float reach = ray.t_max;
+  for (segment_ = 0; segment_ < kProbeSegments; ++segment_, reach = kInfinity) {
+    SurfaceHit hit;
+    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, reach);
+    const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
+    if (met && world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
+    if (medium_.any()) {
+      const float begin = depth_of(ray_.start);
+      DeepSegment& segment = probe.segments.emplace_back();
+      segment = {begin, met ? depth_of(hit.p) : begin + reach, ray_.start, ray_.d, probe.reaches, {}};
+      for (const std::uint32_t m : medium_.all()) segment.media.push_back(&world_.media[m]);
+    }
+    if (!met) return probe;
+    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if (!sees_past(hit, surface)) {
+      probe.surface = depth_of(hit.p);
+      return probe;
+    }
+    probe.reaches = std::max(0.f, mean(beta_));
+    pass_boundary(hit, surface);
+  }
+  return probe;
 }
 
 }  // namespace ls::render

@@ -17,6 +17,7 @@ template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_emission_times(const C3& beta, const SurfaceHit& hit) {
   const C3 emitted = world_.lights.emitted(hit, -ray_.d);
   if (is_black(emitted)) return;
+  see(hit.p);
   float weight = 1;
   if (!hits_count_fully()) {
     const float p_l =
@@ -35,6 +36,7 @@ void PathTracer<F, Light>::add_emission_times(const C3& beta, const SurfaceHit& 
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_environment() {
   if (!world_.lights.has_environment()) return;
+  see_environment();
   if (depth_ == 0 && world_.hide_environment) return add_environment_seen();
   if constexpr (F.visibility) {
     if (depth_ > 0 && world_.ray_flags) {

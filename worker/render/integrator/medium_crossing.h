@@ -124,6 +124,7 @@ void PathTracer<F, Light>::begin_vertex(Segment segment, const Flight& flight) {
   // (path_reuse.h), so the choice depends on the vertex alone. No light is chosen before this vertex.
   if constexpr (F.reuse) by_segment = by_segment && !looks_for_second();
   if (by_segment) last_.place = place_on(segment);
+  see(ray_.start + ray_.d * flight.t);
   ray_.advance_to(segment, flight.t);
   last_.p = ray_.origin;
   if (!by_segment) last_.place.p = last_.p;
@@ -235,19 +236,26 @@ void PathTracer<F, Light>::add_medium_emission_among(float t_max) {
     const std::uint64_t key = streams.next();
     const Medium& m = world_.media[media[i]];
     if (m.emission_kind == EmissionKind::none) continue;
-    C3 light(0);
-    float last = -1;
-    C3 up_to_last;
-    for (int c = 0; c < 3; ++c) {
-      const float t = others_end(i, c, t_max, RandomStream(key));
-      if (t != last) {
-        up_to_last = m.grid ? emission_of_grid(m, ray_.start, ray_.d, t, RandomStream(mix64(key)))
-                            : emission_of_length(m, t);
-        last = t;
+    std::array<float, 3> ends;
+    for (int c = 0; c < 3; ++c)
+      ends[static_cast<std::size_t>(c)] = others_end(i, c, t_max, RandomStream(key));
+    const auto up_to = [&](float most) {
+      C3 light(0);
+      float last = -1;
+      C3 up_to_last;
+      for (int c = 0; c < 3; ++c) {
+        const float t = std::min(ends[static_cast<std::size_t>(c)], most);
+        if (t != last) {
+          up_to_last = m.grid ? emission_of_grid(m, ray_.start, ray_.d, t, RandomStream(mix64(key)))
+                              : emission_of_length(m, t);
+          last = t;
+        }
+        light[c] = up_to_last[c];
       }
-      light[c] = up_to_last[c];
-    }
-    if (!is_black(light)) add(beta_ * light, m.light_group);
+      return light;
+    };
+    const C3 light = up_to(t_max);
+    if (!is_black(light)) add_along(light, m.light_group, t_max, up_to);
   }
 }
 
@@ -271,10 +279,48 @@ template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_medium_emission(const Medium& medium, float t_max) {
   if (medium.emission_kind == EmissionKind::none || (depth_ == 0 && world_.hide_emitters)) return;
   LS_COUNT(medium_emission);
-  const C3 light = medium.grid ? emission_of_grid(medium, ray_.start, ray_.d, t_max,
-                                                  stream_.stream(segment_, Purpose::emission))
-                               : emission_of_length(medium, t_max);
-  if (!is_black(light)) add(beta_ * light, medium.light_group);
+  const auto up_to = [&](float t) {
+    return medium.grid
+               ? emission_of_grid(medium, ray_.start, ray_.d, t, stream_.stream(segment_, Purpose::emission))
+               : emission_of_length(medium, t);
+  };
+  const C3 light = up_to(t_max);
+  if (!is_black(light)) add_along(light, medium.light_group, t_max, up_to);
+}
+
+// Adds `total`, the emission of a medium on the segment ahead, of length t_max. up_to(t) returns that of the
+// first part of the segment. It uses the same random numbers for any t, so that the parts of the emission in
+// the slices of a deep image are each right on average, and add up to the whole.
+template <Features F, template <Features> class Light>
+template <class UpTo>
+void PathTracer<F, Light>::add_along(const C3& total, LightGroup group, [[maybe_unused]] float t_max,
+                                     [[maybe_unused]] const UpTo& up_to) {
+  if constexpr (F.split) {
+    LightByDepth& deep = split_->by_depth;
+    if (deep.wanted && depth_ == 0) [[unlikely]] {
+      deep.wanted = false;
+      add(beta_ * total, group);
+      deep.wanted = true;
+      C3 weight = beta_;
+      if constexpr (F.chromatic) weight /= mean(density_);
+      const float begin = deep.depth(ray_.start, ray_.d);
+      float from = begin;
+      C3 before(0);
+      for (const float edge : deep.edges) {
+        if (!(edge > from)) continue;
+        if (!(edge - begin < t_max)) break;
+        const C3 now = up_to(edge - begin);
+        deep.see(from);
+        deep.add(weight * (now - before));
+        from = edge;
+        before = now;
+      }
+      deep.see(from);
+      deep.add(weight * (total - before));
+      return;
+    }
+  }
+  add(beta_ * total, group);
 }
 
 template <Features F, template <Features> class Light>

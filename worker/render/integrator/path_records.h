@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/image/film/health.h"
@@ -45,6 +46,26 @@ struct DenoisingGuide {
   V3d normal{0, 0, 0};
 };
 
+// The medium between two boundaries on a ray of a probe (DeepProbe).
+struct DeepSegment {
+  float begin = 0, end = 0;  // depths, counted as that of the AOV depth; `end` may be infinite
+  V3 start{0, 0, 0}, d{0, 0, 1};
+  float surfaces = 1;  // transmittance of the surfaces in front of it
+  std::vector<const Medium*> media;
+};
+// What a camera ray passes and meets: of a few such rays, the slices of a deep image are made.
+struct DeepProbe {
+  std::vector<DeepSegment> segments;
+  float surface = kInfinity;  // depth of the surface at which it ends; infinite: it leaves the scene
+  float reaches = 1;          // transmittance of the surfaces that it passed
+};
+// What PathTracer::opacity() finds between the slices of a deep image.
+struct DeepTransmittance {
+  std::span<const float> edges;  // depths between slices, in ascending order
+  // The transmittance up to each of them, and behind everything but the environment: mean of the channels
+  std::span<double> through;
+};
+
 // One sample of the AOVs of opacity: 1 - transmittance of all media and surfaces on the camera ray (`all`),
 // and of the media up to the first surface that scatters (`media`).
 struct Opacity {
@@ -72,8 +93,44 @@ inline constexpr std::size_t kLightParts = 5;
 constexpr bool in_volume(LightPart part) {
   return part == LightPart::volume_once || part == LightPart::volume_again;
 }
+
+// The light of a sample by the depth at which it was first scattered or emitted, seen from the camera, for a
+// deep image. The path tracer notes the depth with see() before it adds light, until the first scattering:
+// from then on all light counts at that depth.
+struct LightByDepth {
+  struct Event {
+    float depth;  // distance from the camera, as that of the AOV depth; infinite for the environment
+    C3 light;
+  };
+  bool wanted = false;
+  // The depths between the pixel's slices. The emission of a medium, which is one number for a whole segment,
+  // is divided there. Empty: no medium emits light.
+  std::span<const float> edges;
+  std::vector<Event> events;
+
+  void clear() { events.clear(); }
+  void begin(const V3& camera, float near_distance) {
+    camera_ = camera;
+    near_ = near_distance;
+  }
+  float depth(const V3& p, const V3& d) const { return near_ + dot(p - camera_, d); }
+  void see(const V3& p, const V3& d) { at_ = depth(p, d); }
+  void see(float depth) { at_ = depth; }
+  void add(const C3& light) {
+    if (!events.empty() && events.back().depth == at_)
+      events.back().light += light;
+    else
+      events.push_back({at_, light});
+  }
+
+ private:
+  V3 camera_{0, 0, 0};
+  float near_ = 0, at_ = 0;
+};
+
 struct LightSplit {
   std::array<C3, kLightParts> parts;
+  LightByDepth by_depth;
   // The first `groups` elements of `by_group` have the light of each group; those of `volume_by_group` the
   // part of it whose first scattering was in a medium (in_volume()). The other elements are not set.
   std::size_t groups = 0;
@@ -83,6 +140,7 @@ struct LightSplit {
   void clear(std::size_t light_groups) {
     groups = light_groups;
     parts.fill(C3(0));
+    by_depth.clear();
     std::fill_n(by_group.begin(), groups, C3(0));
     std::fill_n(volume_by_group.begin(), groups, C3(0));
   }

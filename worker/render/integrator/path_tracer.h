@@ -99,7 +99,10 @@ class PathTracer {
   // clear glass, seen through the surfaces before it.
   DenoisingGuide denoising_guide(const CameraRay& ray);
   // Returns one sample of how much of what is behind the scene does not reach the camera along this ray.
-  Opacity opacity(const CameraRay& ray);
+  // Unless it is null, `deep` receives what the same sample says of the slices of a deep image.
+  Opacity opacity(const CameraRay& ray, const DeepTransmittance* deep = nullptr);
+  // Follows a ray through boundaries and surfaces that light passes straight through.
+  DeepProbe deep_probe(const CameraRay& ray);
   // With F.connected: follows a ray of the sun, and calls keep(vertex) for each light vertex on its way.
   // Camera paths are connected to light vertices (light_vertices.h).
   template <class Keep>
@@ -292,7 +295,10 @@ class PathTracer {
   BsdfEval scattered_at(const PathVertex& y, const V3& d, const V3& w) const;
   void add_shared(const C3& light) {
     outcome_.radiance += light;
-    if constexpr (F.split) split_->parts[static_cast<std::size_t>(part_of(2, first_in_medium_))] += light;
+    if constexpr (F.split) {
+      split_->parts[static_cast<std::size_t>(part_of(2, first_in_medium_))] += light;
+      if (split_->by_depth.wanted) split_->by_depth.add(light);
+    }
   }
   void add_shared_to_group(LightGroup group, const C3& light) {
     split_->add_to_group(group, part_of(2, first_in_medium_), light);
@@ -357,8 +363,21 @@ class PathTracer {
       const LightPart part = part_ahead(ahead);
       split_->parts[static_cast<std::size_t>(part)] += light;
       split_->add_to_group(group, part, light);
+      if (split_->by_depth.wanted) split_->by_depth.add(light);
     }
   }
+  // With F.split: tells the depths of a deep image that the path, if it was not scattered yet, is scattered
+  // at p or finds light there.
+  void see([[maybe_unused]] const V3& p) {
+    if constexpr (F.split)
+      if (depth_ == 0 && split_->by_depth.wanted) split_->by_depth.see(p, ray_.d);
+  }
+  void see_environment() {
+    if constexpr (F.split)
+      if (depth_ == 0 && split_->by_depth.wanted) split_->by_depth.see(kInfinity);
+  }
+  template <class UpTo>
+  void add_along(const C3& total, LightGroup group, float t_max, const UpTo& up_to);
   LightPart part_ahead(bool ahead) const {
     return part_of(depth_ + ahead, depth_ == 0 ? ahead : first_in_medium_);
   }
@@ -424,6 +443,8 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
   if (!world_.depth_allows(0)) return outcome_;
   ray_ = {ray.o, ray.o, ray.d};
   last_.p = ray.o;
+  if constexpr (F.split)
+    if (split_->by_depth.wanted) split_->by_depth.begin(ray.o, world_.camera.near_distance(ray.d));
   if constexpr (F.media) medium_ = start_medium(ray);
   if constexpr (F.chromatic) hero_ = std::min(2, static_cast<int>(3 * stream_.group(0, Purpose::hero).u(0)));
   if constexpr (kSplits) reference_ = world_.mean_radiance > 0 ? kNoReference : 1;
@@ -546,74 +567,12 @@ void PathTracer<F, Light>::go_on(float t_max) {
   outcome_.majorant_violations += counters_.majorant_violations;
 }
 
-// Adds the light that next-event estimation finds at a surface. wo is the direction back along the path, in
-// the shading frame of `hit`.
-template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
-  const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-  if (!world_.lights.can_sample() || !surface.smooth) return;
-  const Group g = stream_.group(depth_, Purpose::light);
-  if constexpr (F.connected) {
-    learn_lights({hit.p, hit.shading.n},
-                 [&](const LightChoice& light) { light_surface_by(light, hit, surface, wo); });
-  }
-  light_surface_by(world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, {hit.p, hit.shading.n}), hit,
-                   surface, wo);
-}
-
-template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::light_surface_by(const LightChoice& choice, const SurfaceHit& hit,
-                                            const SurfaceInfo& surface, const V3& wo) {
-  const auto light = world_.lights.sample(choice, hit.p);
-  if (!light || !receives(choice, RayKind::surface)) return;
-  const V3 wi = hit.shading.to_local(light->direction);
-  // A shading normal must not let light through a surface that is opaque by its geometric normal. Sampled
-  // directions are checked in the same way (scatter_on_surface).
-  if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0)) return;
-  const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, wi);
-  if (is_black(f.f_cos) || (!light->delta && is_like_mirror(f.pdf))) return;
-  float sampled = f.pdf;
-  if constexpr (F.aimed) sampled = near_lamps_.pdf(f.pdf, light->direction);
-  const float weight = light->delta ? 1 : balance_weight(light->pdf, sampled);
-  const V3 p = offset_point(hit, light->direction);
-  const Within medium = beyond(hit, surface, light->direction, ray_.d, medium_);
-  const C3 arriving = unoccluded(hit.p, p, *light, medium, stream_.stream(depth_, Purpose::track_shadow));
-  if (!is_black(arriving))
-    add_found(choice, hit.p, hit.ng, light->direction, beta_ * f.f_cos * arriving * (weight / light->pdf),
-              [&] { return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wi, wo).pdf; });
-}
-
-// At the path's first vertex: samples a second direction and adds half of the constant environment's light
-// from there (aim.h). `numbers` are the random numbers of the path's own direction. Called only in scenes
-// without media.
-template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::look_for_sky(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo,
-                                        Group numbers) {
-  looked_for_sky_ = true;
-  numbers.bits[0] = ~numbers.bits[0];
-  numbers.bits[1] = ~numbers.bits[1];
-  const auto s = sample_bsdf(hit, surface, wo, numbers);
-  if (!s) return;
-  LightSample sky;
-  sky.direction = normalize(hit.shading.to_world(s->wi));
-  if ((dot(sky.direction, hit.ng) > 0) != (s->wi.z > 0)) return;
-  if (!is_finite(sky.direction)) {
-    outcome_.reject(HealthCause::no_direction);
-    return;
-  }
-  sky.distance = kInfinity;
-  sky.radiance = world_.lights.constant_environment();
-  // There are no media, so unoccluded() draws no random numbers
-  const C3 arriving = unoccluded(hit.p, offset_point(hit, sky.direction), sky, medium_,
-                                 stream_.stream(depth_, Purpose::track_shadow));
-  if (!is_black(arriving)) add(beta_ * s->weight * arriving * .5f, world_.lights.sky_group());
-}
-
 // Scatters the path at a surface. Returns Collision::absorbed if the surface absorbs the path, or if the path
 // has reached its maximum depth.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   if (!may_go_on(depth_ + 1, passed_)) return {Collision::absorbed};
+  see(hit.p);
   ++depth_;
   if constexpr (F.visibility) left_medium_ = false;
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
@@ -779,5 +738,6 @@ bool PathTracer<F, Light>::survives(float u) {
 #include "worker/render/integrator/medium_crossing.h"
 #include "worker/render/integrator/path_reuse.h"
 #include "worker/render/integrator/shadow_ray.h"
+#include "worker/render/integrator/surface_nee.h"
 #include "worker/render/integrator/vertex_connection.h"
 #include "worker/render/integrator/visibility.h"

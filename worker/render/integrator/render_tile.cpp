@@ -144,6 +144,7 @@ class Samples {
       std::array<SampleOutcome, kMostTogether> outcomes;
       LightSplit black;
       black.clear(w_.aovs.groups());
+      black.by_depth.wanted = w_.aovs.deep().count > 0;
       std::vector<LightSplit> splits(v_.covers.split ? pixels.size() : 0, black);
       v_.group(w_, pixels, s, splits, outcomes);
       for (std::size_t k = 0; k < pixels.size(); ++k) {
@@ -190,7 +191,7 @@ struct PixelSums {
 // The sums of a pixel besides its colour: none (NoAovs), or AOVs (AovPixel).
 struct NoAovs {
   static LightSplit* split() { return nullptr; }
-  static void begin_pixel() {}
+  static void begin_pixel(int, int) {}
   static void begin_sample() {}
   static void end_sample(int, int, std::uint64_t, bool) {}
   static void store(float*, std::size_t, std::size_t) {}
@@ -229,7 +230,7 @@ TileResult render_tile_with(const World& w, const Variant& v, PixelRect tile, Sa
       return r;
     }
     for (int x = tile.x0; x < tile.x1; ++x, ++i) {
-      aovs.begin_pixel();
+      aovs.begin_pixel(x, y);
       const PixelSums sums = render_pixel(samples, x, y, range, r.health, aovs);
       aovs.store(r.sums.data() + 6 * pixels, pixels, i);
       for (std::size_t h = 0; h < 2; ++h)

@@ -256,6 +256,7 @@ class SegmentNee {
     if (is_black(arriving)) return;
     const C3 through =
         transmittance<F>(medium, path.ray_.start, path.ray_.d, 0, at_point.t, RandomStream(stream.next()));
+    path.see(start);
     path.add(path.beta_ * scattering * through * arriving * (phase * weight / (light->pdf * own)),
              path.group_of(choice), true);
   }

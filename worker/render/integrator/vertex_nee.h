@@ -178,6 +178,7 @@ class VertexNee {
     if (is_black(arriving)) return;
     const C3 through = transmittance<F>(medium, path.ray_.start, path.ray_.d, 0, at_point.t,
                                         path.stream_.stream(path.segment_, Purpose::track_distance));
+    path.see(s.p);
     path.add(path.beta_ * (scattering * through) * arriving * (phase * weight / (light->pdf * s.pdf)),
              path.group_of(choice), true);
   }

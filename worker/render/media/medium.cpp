@@ -9,6 +9,7 @@
 // alone are unbounded.
 #include "worker/render/media/medium.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace ls::render {
@@ -177,6 +178,24 @@ C3 transmittance_channels(const Medium& m, const V3& o, const V3& d, float t0, f
   C3 t;
   for (int c = 0; c < 3; ++c) t[c] = std::exp(-control[c]) * factor[c];
   return t;
+}
+
+C3 transmittance_to_points(const Medium& m, const V3& o, const V3& d, float t1, RandomStream stream,
+                           std::span<const float> points, C3* through) {
+  if (m.grid && !m.by_channel[0]) {
+    // Without extinction nothing is watched.
+    std::fill_n(through, points.size(), C3(1));
+    const detail::WatchedPoints watch{points, through};
+    return m.density->filter() == VolumeFilter::nearest
+               ? detail::transmittance_grid<true, VolumeFilter::nearest>(m, o, d, 0, t1, stream, watch)
+               : detail::transmittance_grid<true, VolumeFilter::trilinear>(m, o, d, 0, t1, stream, watch);
+  }
+  const auto up_to = [&](float t) {
+    return m.grid ? transmittance_channels(m, o, d, 0, t, stream)
+                  : detail::transmittance_homogeneous<true>(m, t);
+  };
+  for (std::size_t i = 0; i < points.size(); ++i) through[i] = points[i] > 0 ? up_to(points[i]) : C3(1);
+  return up_to(t1);
 }
 
 namespace {

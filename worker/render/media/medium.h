@@ -12,6 +12,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "worker/render/base/features.h"
@@ -224,8 +225,28 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
 inline constexpr float kRouletteDepth = 4;
 inline constexpr float kRouletteTransmittance = .018315639f;
 
-template <bool kChromatic, VolumeFilter kFilter>
-C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream) {
+// What transmittance_grid() tells of points on the way: nothing.
+struct Unwatched {
+  static constexpr bool kWatches = false;
+};
+// The estimate up to each of some points, in ascending order of their distances from t = 0. The points up to
+// t0 must have been taken out, and there are none beyond t1.
+struct WatchedPoints {
+  static constexpr bool kWatches = true;
+  std::span<const float> t;
+  C3* through;
+  std::size_t next = 0;
+
+  // Sets the estimates up to the distance `end`, to value(t).
+  template <class Value>
+  void pass(double end, const Value& value) {
+    for (; next < t.size() && t[next] <= end; ++next) through[next] = value(t[next]);
+  }
+};
+
+template <bool kChromatic, VolumeFilter kFilter, class Watch = Unwatched>
+C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream,
+                      [[maybe_unused]] Watch watch = {}) {
   const float s_max = kChromatic ? max_component(m.sigma_t) : m.sigma_t.x;
   if (!(s_max > 0)) return {1, 1, 1};
   constexpr int kChannels = kChromatic ? 3 : 1;
@@ -235,21 +256,44 @@ C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float
   for (float& x : factor) x = 1;
   // The optical depth of the residual up to the next collision; it carries over from cell to cell.
   float left = stream.exponential();
+  // The estimate so far, with this much more control depth
+  [[maybe_unused]] const auto estimate = [&](float more) {
+    C3 t;
+    for (int c = 0; c < kChannels; ++c) t[c] = std::exp(-m.sigma_t[c] * (control + more)) * factor[c];
+    if constexpr (!kChromatic) t.y = t.z = t.x;
+    return t;
+  };
   for (CellWalk w(*m.density, o, d, t0, t1); w.next();) {
     const MacroCell& cell = w.cell();
     const float length = w.end() - w.begin(), rate = s_max * cell.residual, room = rate * length;
+    if constexpr (Watch::kWatches) watch.pass(w.entry() + w.begin(), [&](float) { return estimate(0); });
     if (room > kExactDepth) [[unlikely]] {
+      if constexpr (Watch::kWatches)
+        watch.pass(w.entry() + w.end(), [&](float t) {
+          const auto to = std::clamp(static_cast<float>(t - w.entry()), w.begin(), w.end());
+          return estimate(
+              static_cast<float>(m.density->pass(w.origin(), w.direction(), w.begin(), to).integral));
+        });
       control += static_cast<float>(m.density->pass(w.origin(), w.direction(), w.begin(), w.end()).integral);
     } else {
-      control += cell.control * length;
+      // The control depth up to t, which is not in `control` yet
+      [[maybe_unused]] const auto within = [&](float t) {
+        return estimate(cell.control * std::max(0.f, static_cast<float>(t - w.entry()) - w.begin()));
+      };
+      if constexpr (!Watch::kWatches) control += cell.control * length;
       if (rate > 0) {
         float gone = left;
         for (; gone < room; gone += stream.exponential()) {
           const float t = w.begin() + gone / rate;
+          if constexpr (Watch::kWatches) watch.pass(w.entry() + t, within);
           const float r = (m.density->value<kFilter>(w.index(t)) - cell.control) / cell.residual;
           for (int c = 0; c < kChannels; ++c) factor[c] *= 1 - r * (kChromatic ? m.sigma_t[c] / s_max : 1.f);
         }
         left = gone - room;
+      }
+      if constexpr (Watch::kWatches) {
+        watch.pass(w.entry() + w.end(), within);
+        control += cell.control * length;
       }
     }
     if (s_max * control > foldable) [[unlikely]] {
@@ -260,14 +304,19 @@ C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float
       }
       control = 0;
       foldable = 1;
-      if (!(largest > 0)) return {0, 0, 0};
+      [[maybe_unused]] const auto end_black = [&] {
+        if constexpr (Watch::kWatches) watch.pass(t1, [](float) { return C3(0); });
+        return C3(0);
+      };
+      if (!(largest > 0)) return end_black();
       if (largest < kRouletteTransmittance && rate > 0) {
         const float q = largest / kRouletteTransmittance;
-        if (!(stream.uniform() < q)) return {0, 0, 0};
+        if (!(stream.uniform() < q)) return end_black();
         for (float& x : factor) x /= q;
       }
     }
   }
+  if constexpr (Watch::kWatches) watch.pass(t1, [&](float) { return estimate(0); });
   C3 t;
   for (int c = 0; c < kChannels; ++c) t[c] = std::exp(-m.sigma_t[c] * control) * factor[c];
   if constexpr (!kChromatic) t.y = t.z = t.x;
@@ -325,6 +374,11 @@ Flight free_flight(const Medium& m, int hero, std::uint32_t bits, const V3& o, c
 // t, because another medium at the same place ended the flight there. In grids the exact optical depth is
 // used, so that the result does not depend on how that flight was sampled.
 Flight passed(const Medium& m, int hero, const V3& o, const V3& d, float t);
+
+// Returns the same as transmittance() from 0 to t1, with the same random numbers, and sets through[i] to an
+// unbiased estimate of the transmittance up to points[i]. The points are ascending, and not beyond t1.
+C3 transmittance_to_points(const Medium& m, const V3& o, const V3& d, float t1, RandomStream stream,
+                           std::span<const float> points, C3* through);
 
 // Returns an unbiased estimate of the transmittance along o + t d between t0 and t1; in homogeneous media the
 // exact value.

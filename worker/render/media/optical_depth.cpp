@@ -43,6 +43,21 @@ OpticalDepth::Point OpticalDepth::grid_at(float t) const {
   return t <= to_ ? last : Point{t, total_, 0, {0, 0, 0}};
 }
 
+void OpticalDepth::at_each(std::span<const float> t, std::span<double> x) const {
+  if (!medium_->grid) {
+    for (std::size_t i = 0; i < t.size(); ++i) x[i] = std::clamp(t[i], 0.f, t_max_);
+    return;
+  }
+  double passed = 0;
+  std::size_t i = 0;
+  for (CellWalk w(*medium_->density, o_, d_, 0, t_max_); w.next();) {
+    const double rate = rate_of(w.cell()), begin = w.entry() + w.begin(), end = w.entry() + w.end();
+    for (; i < t.size() && t[i] < end; ++i) x[i] = passed + rate * std::max(0., t[i] - begin);
+    passed += rate * (end - begin);
+  }
+  for (; i < t.size(); ++i) x[i] = passed;
+}
+
 OpticalDepth::Point OpticalDepth::grid_after(float x) const {
   double passed = 0;
   for (CellWalk w(*medium_->density, o_, d_, 0, t_max_); w.next();) {

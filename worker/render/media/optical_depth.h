@@ -6,6 +6,7 @@
 // again (a few nanoseconds per cell).
 #pragma once
 
+#include <span>
 #include <type_traits>
 
 #include "worker/render/base/features.h"
@@ -37,6 +38,9 @@ class OpticalDepth {
 
   Point at(float t) const { return medium_->grid ? grid_at(t) : Point{t, t, 1, {0, 0, 0}}; }
   Point after(float x) const { return medium_->grid ? grid_after(x) : Point{x, x, 1, {0, 0, 0}}; }
+
+  // Sets x[i] to the density integrated up to t[i], for ascending t, by one traversal.
+  void at_each(std::span<const float> t, std::span<double> x) const;
 
   // Returns the scattering coefficients [1/world unit] at `at_point`, whose position in the world is p.
   C3 scattering(const Point& at_point, const V3& p) const {

@@ -308,7 +308,9 @@ Result<std::shared_ptr<World>> make_world(const Scene& given, const RenderSettin
   w.overlaps = found.overlaps;
   if (w.overlaps) w.camera_media = camera_media(w);
   if (w.need.media) place_meters(w);
-  w.need.split = w.aovs.any_of(aovs_of(AovKind::light)) || w.aovs.any_of(aovs_of(AovKind::groups));
+  const DeepSlices deep = w.aovs.deep();
+  w.need.split = w.aovs.any_of(aovs_of(AovKind::light)) || w.aovs.any_of(aovs_of(AovKind::groups)) ||
+                 (deep.count > 0 && deep.colours);
   if (w.aovs.any_of(aovs_of(AovKind::ids))) name_surfaces(scene, w);
   bool homogeneous_media = false;
   for (const Medium& m : w.media) homogeneous_media = homogeneous_media || (!m.grid && !is_black(m.sigma_t));

@@ -22,10 +22,12 @@ inline constexpr double kClose = 0x1p-20;
 // over all its samples or over those that hit a surface.
 class Picture {
  public:
-  Picture(const test::SceneBuilder& builder, std::vector<std::string> names, std::uint64_t samples = kSamples)
+  Picture(const test::SceneBuilder& builder, std::vector<std::string> names, std::uint64_t samples = kSamples,
+          int deep = 0)
       : samples_(samples) {
     RenderSettings settings = test::settings_of(builder.scene);
     settings.aov = names_of(parse_aovs(names).value());
+    settings.deep = deep;
     aovs_ = planes_of(aovs_of(settings));
     size_ = settings.size;
     auto world = build_world(builder.scene, settings, builder.files, 1);
@@ -55,7 +57,7 @@ class Picture {
     return half(0, channel, pixel) + half(1, channel, pixel);
   }
   IdSlots ids(std::size_t which, std::size_t pixel = 0) const {
-    return load_slots(&sums_[(6 + aovs_.sums.size() + which * kIdPlanes) * pixels() + pixel], pixels());
+    return load_slots(&sums_[(6 + aovs_.all_sums() + which * kIdPlanes) * pixels() + pixel], pixels());
   }
 
  private:
