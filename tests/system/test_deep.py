@@ -242,3 +242,16 @@ def test_what_cannot_be_is_refused_with_its_name(image, tmp_path):
     assert not pathlib.Path(tmp_path / "no.exr").exists()
     assert digest(render(scene, tmp_path / "zero.exr", "--deep", 0))
     assert not (tmp_path / "zero.deep.exr").exists()
+
+
+def test_shadows_that_are_caught_have_no_deep_image(tmp_path):
+    """They are at no depth, so the deep image would flatten to another alpha than the picture's."""
+    floor = '<shape type="rectangle"><boolean name="shadow_catcher" value="true"/></shape>'
+    scene = write(tmp_path, "caught", floor + balls() + SKY, transparent="true")
+
+    refused = render(scene, tmp_path / "a.exr", "--deep", SLICES, code=2)
+
+    assert "shadow catchers" in refused.stderr and "leave deep out" in refused.stderr
+    assert not (tmp_path / "a.exr").exists()
+    render(write(tmp_path, "opaque", floor + balls() + SKY), tmp_path / "b.exr", "--deep", SLICES)
+    assert deep(tmp_path / "b.exr").exists(), "without a transparent film nothing is caught"
