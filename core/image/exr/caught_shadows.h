@@ -2,7 +2,9 @@
 // opacity.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 
 #include "core/image/aov/aov.h"
 #include "core/image/film/film.h"
@@ -40,7 +42,9 @@ class CaughtShadows {
   // Planes 0 to 2 are L, T and U of half A of the samples, 3 to 5 those of half B.
   double sum(std::size_t plane, std::size_t pixel) const { return sums_[(first_ + plane) * n_ + pixel]; }
   static double share(double light, double through, double unshadowed, double count) {
-    return unshadowed > 0 ? through / count * (1 - light / unshadowed) : 0;
+    const double opacity = through / count * (1 - light / unshadowed);
+    // Not finite without light, and for sums that no worker sends if it works as it should
+    return unshadowed > 0 && std::isfinite(opacity) ? opacity : 0;
   }
 
   const double* sums_;

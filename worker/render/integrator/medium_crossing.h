@@ -155,8 +155,10 @@ auto PathTracer<F, Light>::scatter_by_phase(const Medium& medium) -> Step {
   last_.pdf = s.pdf;
   ray_.d = s.w;
   if constexpr (F.visibility) {
-    like_mirror_ = false;
-    direct_due_ = direct_by_shadows();
+    if (world_.direct_by_shadows) [[unlikely]] {
+      like_mirror_ = false;
+      direct_due_ = direct_by_shadows();
+    }
   }
   if constexpr (F.reuse) {
     if (looks_for_second())

@@ -233,7 +233,7 @@ class PathTracer {
   }
   // True if what scatters rays of this kind (surfaces or media) receives the chosen light.
   bool receives(const LightChoice& choice, RayKind kind) const {
-    if constexpr (F.visibility) return !world_.lights.hidden(choice.light, kind);
+    if constexpr (F.visibility) return !world_.ray_flags || !world_.lights.hidden(choice.light, kind);
     return true;
   }
   [[gnu::cold, gnu::noinline]] void add_environment_times(const C3& beta);
@@ -533,12 +533,14 @@ void PathTracer<F, Light>::go_on(float t_max) {
     }
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     if constexpr (F.visibility) {
-      const bool hidden = surface.hidden.has(ray_kind());
-      if (hidden || (depth_ == 0 && surface.holdout)) {
-        if (!hidden && !sees_past(hit, surface)) break;
-        pass_boundary(hit, surface);
-        if (is_black(beta_)) break;
-        continue;
+      if (surface.hidden.any() || surface.holdout) [[unlikely]] {
+        const bool hidden = surface.hidden.has(ray_kind());
+        if (hidden || (depth_ == 0 && surface.holdout)) {
+          if (!hidden && !sees_past(hit, surface)) break;
+          pass_boundary(hit, surface);
+          if (is_black(beta_)) break;
+          continue;
+        }
       }
     }
     if constexpr (F.overlaps) {
@@ -625,10 +627,12 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   last_.pdf = s->pdf;
   last_.delta = s->delta;
   if constexpr (F.visibility) {
-    float pdf = s->pdf;
-    if constexpr (F.aimed) pdf *= aim_;
-    like_mirror_ = !s->delta && is_like_mirror(pdf);
-    direct_due_ = direct_by_shadows();
+    if (world_.direct_by_shadows) [[unlikely]] {
+      float pdf = s->pdf;
+      if constexpr (F.aimed) pdf *= aim_;
+      like_mirror_ = !s->delta && is_like_mirror(pdf);
+      direct_due_ = direct_by_shadows();
+    }
   }
   if constexpr (F.connected) {
     last_.ng = hit.ng;

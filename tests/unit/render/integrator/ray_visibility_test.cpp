@@ -352,6 +352,26 @@ TEST(RayVisibility, InstancesHaveTheFlagsOfTheirShapes) {
   expect_same_mean(lit, bare, "instances");
 }
 
+TEST(RayVisibility, TechniquesWithoutItAreLeftOut) {
+  const auto techniques = [](bool visible_shadow, bool visible_volume) {
+    SceneBuilder builder = hall(false, false);
+    builder.scene.shapes[1].visible_shadow = visible_shadow;
+    std::get<PointEmitter>(builder.scene.emitters[0]).visible_volume = visible_volume;
+    builder.scene.integrator.path_reuse = 16;
+    builder.scene.integrator.local_lights = builder.scene.integrator.sky_portals = 1;
+    return techniques_of(*test::world_of(builder));
+  };
+  const TechniqueSet usual = techniques(true, true);
+  EXPECT_TRUE(usual.has(Technique::path_reuse));
+  EXPECT_TRUE(usual.has(Technique::local_lights));
+  for (const auto& [shadow, volume] : {std::pair(false, true), std::pair(true, false)}) {
+    const TechniqueSet left = techniques(shadow, volume);
+    for (const Technique t : {Technique::path_reuse, Technique::local_lights, Technique::sky_portals,
+                              Technique::light_vertices, Technique::sky_samples})
+      EXPECT_FALSE(left.has(t)) << shadow << volume;
+  }
+}
+
 TEST(RayVisibility, LayersOfLightAddUpToTheColour) {
   SceneBuilder builder = hall(true, true);
   Shape& s = builder.shape(SphereShape{}, translate({-.5, 0, -.2}) * test::scale(.4), builder.diffuse(.8));
