@@ -22,8 +22,8 @@ constexpr std::uint64_t kSpp = 64;
 AovSet groups_of_both() { return AovSet{}.with(Aov::light_groups).with_groups(kGroups.size()); }
 
 // Returns a film of two groups with skewed noise. With `firefly`, the last round of the group "rare" has a
-// sample in one pixel that is far brighter than all others. With `faint`, the light of that group is faint, and
-// some pixels have it in one half of the samples only.
+// sample in one pixel that is far brighter than all others. With `faint`, the light of that group is faint,
+// and some pixels have it in one half of the samples only.
 Film two_groups(bool firefly, bool faint = false) {
   Film film(kMixGrid, groups_of_both());
   std::mt19937_64 random(7);
@@ -64,11 +64,10 @@ ImageError mixed_error(const Film& film, double calm, double rare) {
 
 TEST(MixedError, OfUnchangedGroupsIsThatOfTheColour) {
   const Film film = two_groups(false);
-  const ImageError colour = image_error(film.error()),
-                   mixed = mixed_error(film, 1, 1);
+  const ImageError colour = image_error(film.error()), mixed = mixed_error(film, 1, 1);
   ASSERT_TRUE(colour.trusted) << colour.verdict;
-  // The sums of two float32 values per pixel, in double and in float32, differ by a relative 2^-24; squares of
-  // differences that are at least 1/10 of the values by 2 * 10 times that.
+  // The sums of two float32 values per pixel, in double and in float32, differ by a relative 2^-24; squares
+  // of differences that are at least 1/10 of the values by 2 * 10 times that.
   constexpr double kClose = 20 * 0x1p-24;
   EXPECT_NEAR(mixed.relmse / colour.relmse, 1, kClose);
   EXPECT_LE(mixed.relmse_lo, colour.relmse_lo * (1 + kClose));
@@ -88,7 +87,8 @@ TEST(MixedError, IsNotCorrectedByAColourThatIsNotTrusted) {
   EXPECT_TRUE(mixed.trusted);
 }
 
-// All light of the group "rare" is in one half of the samples: whatever is trusted of it, its RMSE is not known.
+// All light of the group "rare" is in one half of the samples: whatever is trusted of it, its RMSE is not
+// known.
 TEST(MixedError, LeavesAnUnknownIntervalUnknown) {
   const Film film = two_groups(false, true);
   const ImageError alone = image_error(film.mixed(factors(0, 1)).error()), mixed = mixed_error(film, 0, 1);
