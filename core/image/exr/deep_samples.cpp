@@ -40,7 +40,7 @@ class SamplesBuilder {
     sample.z_back = std::max(sample.z, sample.z_back);
     // The least thickness. Where OpenImageIO 2.4 cuts fog at the depth of a surface, it puts a surface
     // without thickness behind the piece of fog that begins there.
-    if (surface) sample.z_back = std::nextafter(sample.z, std::numeric_limits<float>::infinity());
+    if (surface) sample.z_back = std::nextafter(sample.z, std::numeric_limits<float>::max());
     before_ = left_;
     light_ = light;
     is_surface_ = surface;

@@ -14,16 +14,16 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr const char* kScene =
+constexpr const char* kDeepScene =
     "<scene version=\"3.0.0\"><integrator type=\"volpath\"/><sensor type=\"perspective\"/>"
     "<shape type=\"sphere\"/></scene>";
-constexpr const char* kMeasuring =
+constexpr const char* kMeasuringScene =
     "<scene version=\"3.0.0\"><integrator type=\"volpath\"/><emitter type=\"constant\"/>"
     "<sensor type=\"irradiancemeter\"><string name=\"points\" value=\"0 0 0 0 0 1\"/></sensor></scene>";
 
 class DeepJobs : public testing::Test {
  protected:
-  Result<StoredJob> job(const JobSpec& spec, const char* scene = kScene) {
+  Result<StoredJob> job(const JobSpec& spec, const char* scene = kDeepScene) {
     auto taken = admit({"a.xml", scene, {}, spec}, coordinator_->blobs(), scenes_in_this_process());
     if (!taken) return tl::unexpected(taken.error().error);
     return taken->job;
@@ -78,15 +78,15 @@ TEST_F(DeepJobs, AreRefusedWithNumbersThatCannotBe) {
 }
 
 TEST_F(DeepJobs, MeasureNothing) {
-  const auto measuring = job({.spp = 4, .deep = 4}, kMeasuring);
+  const auto measuring = job({.spp = 4, .deep = 4}, kMeasuringScene);
   ASSERT_FALSE(measuring);
   EXPECT_THAT(measuring.error().message, HasSubstr("no deep image: leave deep out"));
-  EXPECT_TRUE(job({.spp = 4}, kMeasuring));
+  EXPECT_TRUE(job({.spp = 4}, kMeasuringScene));
 }
 
 TEST_F(DeepJobs, CanBeMadeOfJobsThatHadNone) {
   const auto first =
-      admit({"a.xml", kScene, {}, {.spp = 4}}, coordinator_->blobs(), scenes_in_this_process());
+      admit({"a.xml", kDeepScene, {}, {.spp = 4}}, coordinator_->blobs(), scenes_in_this_process());
   ASSERT_TRUE(first);
   ASSERT_TRUE(coordinator_->blobs().put(first->job.scene, std::as_bytes(std::span(first->scene_json))));
   const auto again = admit_again(first->job, {.deep = 8}, coordinator_->blobs());

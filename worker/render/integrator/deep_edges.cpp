@@ -29,7 +29,7 @@ constexpr float kGap = .01f;
 // A slice of surfaces is this share of its depths larger on both sides than the probes say, as samples are
 // met between and beside them; and at least by the rounding of depths.
 constexpr float kDeepMargin = .25f;
-constexpr float kRounding = 1e-5f;
+constexpr float kDeepRounding = 1e-5f;
 // Points on the way through the media of a pixel at which their transmittance is computed.
 constexpr int kSteps = 32;
 // The share of the slices that divides the way evenly, whatever the transmittance: media may shine or be
@@ -140,7 +140,7 @@ std::vector<Range> surfaces_of(std::span<const DeepProbe> probes, std::size_t mo
   for (std::size_t k = 0; k < begins.size(); ++k) {
     const float first = depths[begins[k]],
                 last = depths[(k + 1 < begins.size() ? begins[k + 1] : depths.size()) - 1];
-    const float margin = std::max(kDeepMargin * (last - first), kRounding * last);
+    const float margin = std::max(kDeepMargin * (last - first), kDeepRounding * last);
     // A range keeps at least half of the gap in front of it free.
     const float before = k > 0 ? depths[begins[k] - 1] : 0;
     ranges.push_back({std::max(first - margin, before + (first - before) / 2), last + margin});

@@ -89,7 +89,7 @@ TEST(DeepSlices, HaveTheEmissionOfTheirPartOfAMedium) {
     SceneBuilder builder = wall();
     builder.scene.film.transparent = true;
     fill(builder, builder.homogeneous({sigma, sigma, sigma}, {albedo, albedo, albedo}));
-    for (Medium& m : builder.scene.media) std::get<HomogeneousMedium>(m).emission = {3, 3, 3};
+    for (auto& m : builder.scene.media) std::get<HomogeneousMedium>(m).emission = {3, 3, 3};
     remove_wall(builder);
     builder.scene.emitters.clear();
     const Slices s = slices_of(Picture(builder, {"emission"}, kSamples, kSlices));
