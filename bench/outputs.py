@@ -67,7 +67,7 @@ def main():
     args.add_argument("--pairs", type=int, default=5)
     args.add_argument("--before", type=pathlib.Path)
     args.add_argument("--out", type=pathlib.Path)
-    options = args.parse_args()
+    options = args.parse_intermixed_args()
     bin, scene, more = bin_dir(), options.scene, ("--size", options.size, "--spp", options.spp, "--threads", 2)
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary)

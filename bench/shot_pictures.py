@@ -69,7 +69,7 @@ def steam(folder, options):
         (folder / f"{name}.xml").write_text(scene)
         images[name] = render(folder / f"{name}.xml", folder / f"{name}.exr", options, *more)
     over = folder / "over.exr"
-    run("oiiotool", images["element"], "--ch", "R,G,B,A", images["plate"], "--ch", "R,G,B,A=1", "--over", "-o", over)
+    run("oiiotool", images["element"], "--ch", "R,G,B,A", images["plate"], "--ch", "R,G,B,A=1", "--over", "--compression", "zip", "-d", "float", "-o", over)
     run("oiiotool", "--pattern", "checker:width=16:height=16:color1=0.05,0.05,0.05:color2=0.12,0.12,0.12", options.size, 3, "--ch", "R,G,B,A=1", "-o", folder / "checks.exr")
     run("oiiotool", images["element"], "--ch", "R,G,B,A", folder / "checks.exr", "--over", "-o", folder / "checked.exr")
     for name, image in (("plate", images["plate"]), ("element", folder / "checked.exr"), ("over", over), ("together", images["together"])):
@@ -134,7 +134,7 @@ def deep(folder, options):
     scene = write(folder / "alone.xml", fog_and_rings("seen", "absent"))
     render(scene, folder / "alone.exr", options, "--aov", "alpha", "--deep", 32)
     merged = folder / "merged.exr"
-    run("oiiotool", folder / "alone.deep.exr", folder / "rings.deep.exr", "--deepmerge", "--flatten", "-o", merged)
+    run("oiiotool", folder / "alone.deep.exr", folder / "rings.deep.exr", "--deepmerge", "--flatten", "--compression", "zip", "-d", "float", "-o", merged)
     run("oiiotool", "--pattern", "constant:color=0.015,0.018,0.024,1", options.size, 4, "-o", folder / "dark.exr")
     for name, image in (("fog", folder / "alone.exr"), ("rings", folder / "rings.exr"), ("merged", merged), ("together", folder / "both.exr")):
         run("oiiotool", image, "--ch", "R,G,B,A", folder / "dark.exr", "--ch", "R,G,B,A=1", "--over", "-o", folder / "shown.exr")

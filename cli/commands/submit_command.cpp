@@ -76,6 +76,14 @@ int wait_and_fetch(const std::string& id, const SubmitFlags& flags) {
   return code == kOk ? fetched : code;
 }
 
+// Asks the farm for the view of --view, so that a wrong name is not noticed when the job is done.
+FarmApi::Answer<void> check_view_of_farm(const SubmitFlags& flags) {
+  auto api = FarmApi::open(flags.farm);
+  if (!api) return coordinator::rejected(api.error());
+  const auto cube = api->text("/api/v1/views/cube" + query_of({{"view", flags.view}}));
+  return cube ? FarmApi::Answer<void>() : tl::unexpected(cube.error());
+}
+
 // Uploads the reference image, and stores its digest in `spec`. Must be called before the job is submitted.
 FarmApi::Answer<void> send_reference(const SubmitFlags& flags, JobSpec& spec) {
   if (spec.frames && spec.frames->count() > 1)
@@ -100,6 +108,8 @@ int run(const SubmitFlags& flags) {
     if (!file.empty())
       if (const auto ok = check_outputs(option, file, spec->frames); !ok) return print_error(ok.error());
   if (const auto ok = check_view(flags.view, flags.out); !ok) return print_error(ok.error());
+  if (!flags.view.empty())
+    if (const auto ok = check_view_of_farm(flags); !ok) return print_rejected(ok.error());
   if (!flags.reference.empty())
     if (const auto sent = send_reference(flags, *spec); !sent) return print_rejected(sent.error());
   const auto type = bundle_type(flags.scene);

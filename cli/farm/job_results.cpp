@@ -52,9 +52,11 @@ std::string image_of(const json& job, const Results& wanted) {
                    {"view", png ? wanted.view : ""}});
 }
 
-// True if the job's deep image is saved beside its image. A mix of light groups has none.
-bool wants_deep(const json& job, const Results& wanted) {
-  return !wanted.image.empty() && wanted.mix.empty() && int_field(job, "deep", 0) > 0;
+// True if the deep image of the job, or of a frame in this state, is saved beside its image. A mix of light
+// groups has none, and of a job that renders on it would be of other samples than the image.
+bool wants_deep(const json& job, const std::string& state, const Results& wanted) {
+  const bool over = state == "done" || state == "failed" || state == "cancelled";
+  return over && !wanted.image.empty() && wanted.mix.empty() && int_field(job, "deep", 0) > 0;
 }
 
 Result<Plan> plan_sequence(const std::string& id, const json& job, const json& frames,
@@ -85,7 +87,8 @@ Result<Plan> plan_sequence(const std::string& id, const json& job, const json& f
                                 numbered(name, *number)});
     };
     if (!wanted.image.empty()) add("-o", wanted.image, image_of(job, wanted));
-    if (wants_deep(job, wanted)) add("-o", deep_file(wanted.image).string(), "/deep.exr");
+    if (wants_deep(job, text_field(frame, "state"), wanted))
+      add("-o", deep_file(wanted.image).string(), "/deep.exr");
     if (reports) add("--report", wanted.report, "/report");
     if (!wanted.html.empty()) add("--html", wanted.html, "/report.html");
   }
@@ -98,7 +101,7 @@ Plan plan_image(const std::string& id, const json& job, const Results& wanted) {
   Plan plan;
   if (!wanted.image.empty())
     plan.downloads.push_back({job_path(id) + image_of(job, wanted), "-o", wanted.image});
-  if (wants_deep(job, wanted))
+  if (wants_deep(job, text_field(job, "state"), wanted))
     plan.downloads.push_back({job_path(id) + "/deep.exr", "-o", deep_file(wanted.image).string()});
   if (!wanted.report.empty()) plan.downloads.push_back({job_path(id) + "/report", "--report", wanted.report});
   if (!wanted.html.empty()) plan.downloads.push_back({job_path(id) + "/report.html", "--html", wanted.html});

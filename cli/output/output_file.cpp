@@ -59,7 +59,7 @@ Result<void> check_view(const std::string& view, const std::string& out) {
 Result<std::shared_ptr<const DisplayViews>> views_for(const std::string& view, const std::string& out) {
   if (view.empty()) return nullptr;
   if (const auto ok = check_view(view, out); !ok) return tl::unexpected(ok.error());
-  auto views = DisplayViews::of_environment();
+  auto views = view == kPlainView ? DisplayViews::built_in() : DisplayViews::of_environment();
   if (!views) return tl::unexpected(views.error());
   if (const auto found = views->view(view); !found) return bad_argument("--view: " + found.error().message);
   return std::make_shared<const DisplayViews>(std::move(*views));

@@ -125,6 +125,13 @@ void shrink_tiles(RenderSettings& settings) {
   while (settings.tile > kSmallest && too_large(settings.tile)) settings.tile /= 2;
 }
 
+tl::unexpected<Error> no_caught_shadows_in_deep() {
+  return invalid(
+      "the image has the shadows on shadow catchers, which are at no depth and have no place in a deep "
+      "image: "
+      "leave deep out, or shadow_catcher");
+}
+
 // Sets the AOVs: those of these names, and those that the denoiser needs. `light_groups` are the groups of
 // the scene's lights.
 Result<void> set_aovs(std::vector<std::string> names, bool denoise,
@@ -134,11 +141,6 @@ Result<void> set_aovs(std::vector<std::string> names, bool denoise,
   if (!aovs) return tl::unexpected(aovs.error());
   // The light of a group's surfaces is the difference between the two layers.
   if (aovs->has(Aov::volume_light_groups)) *aovs = aovs->with(Aov::light_groups);
-  if (settings.deep > 0 && aovs->has(Aov::shadow_catcher))
-    return invalid(
-        "the image has the shadows on shadow catchers, which are at no depth and have no place in a deep "
-        "image: "
-        "leave deep out, or shadow_catcher");
   settings.aov = names_of(*aovs);
   settings.light_groups.clear();
   if (!aovs->has(Aov::light_groups)) {
@@ -158,8 +160,10 @@ Result<void> set_aovs(std::vector<std::string> names, bool denoise,
 Result<void> choose_aovs(const Scene& scene, const JobSpec& spec, RenderSettings& settings) {
   std::vector<std::string> names = spec.aov;
   if (scene.film.transparent) names.emplace_back(row_of(Aov::alpha).name);
-  if (std::ranges::any_of(scene.shapes, [&](const Shape& s) { return catches_shadows(scene, s); }))
+  if (std::ranges::any_of(scene.shapes, [&](const Shape& s) { return catches_shadows(scene, s); })) {
+    if (settings.deep > 0) return no_caught_shadows_in_deep();
     names.emplace_back(row_of(Aov::shadow_catcher).name);
+  }
   for (std::string_view rest = scene.aovs; !rest.empty();) {
     const auto end = std::min(rest.find(','), rest.size());
     names.emplace_back(rest.substr(0, end));
@@ -182,7 +186,7 @@ Result<RenderSettings> settings_of(const Scene& scene, const JobSpec& spec, std:
     return invalid("the scene has meters and no camera, so there is no image with AOVs or denoised layers");
   if (settings.meters > 0 && spec.deep > 0)
     return invalid("the scene has meters and no camera, so there is no deep image: leave deep out");
-  settings.deep = spec.deep;
+  settings.deep = static_cast<int>(spec.deep.value_or(0));
   settings.deep_alpha = spec.deep_alpha;
   settings.seed = spec.seed.value_or(0) + frame;
   if (auto ok = choose_integrator(scene, spec, settings, warnings); !ok) return tl::unexpected(ok.error());
@@ -423,13 +427,18 @@ Result<Admission> admit_again(const StoredJob& before, const JobSpec& changes, c
   job.spec.priority = changes.priority;
   job.spec.after = changes.after;
   if (changes.seed) job.settings.seed = *(job.spec.seed = changes.seed) + frame.value_or(0);
-  if (changes.deep > 0) {
-    if (job.settings.meters > 0)
+  if (changes.deep) {
+    if (job.settings.meters > 0 && changes.deep > 0)
       return invalid("the job measures, so there is no deep image: leave deep out");
-    job.settings.deep = job.spec.deep = changes.deep;
+    // The scene is not read again, but shadows that it catches are layers of the earlier job.
+    if (changes.deep > 0 && before.settings.deep == 0 && aovs_of(before.settings).has(Aov::shadow_catcher))
+      return no_caught_shadows_in_deep();
+    job.spec.deep = changes.deep;
+    job.settings.deep = static_cast<int>(*changes.deep);
+    if (changes.deep == 0) job.settings.deep_alpha = job.spec.deep_alpha = false;
   }
   if (changes.denoise) job.spec.denoise = true;
-  if (job.spec.denoise != before.spec.denoise || changes.deep > 0) {
+  if (job.spec.denoise != before.spec.denoise || changes.deep) {
     const std::vector<std::string> groups = job.settings.light_groups;
     if (auto ok = set_aovs(job.settings.aov, job.spec.denoise, groups, job.settings); !ok)
       return tl::unexpected(ok.error());

@@ -229,12 +229,13 @@ Result<JobView> Coordinator::job(const JobId& id) const {
 
 Result<std::string> Coordinator::owner(const JobId& id) const { return parts_->core.lock()->jobs.owner(id); }
 
-std::uint64_t Coordinator::pixels_of(const JobId& id) const {
+std::uint64_t Coordinator::picture_bytes(const JobId& id, std::uint64_t more_per_pixel) const {
   const auto core = parts_->core.lock();
   const auto jobs = core->jobs.job_or_frames(id);
   std::uint64_t most = 0;
   if (jobs)
-    for (const EntryPtr& entry : *jobs) most = std::max(most, entry->stored.settings.size.pixels());
+    for (const EntryPtr& entry : *jobs)
+      most = std::max(most, entry->film_bytes + more_per_pixel * entry->stored.settings.size.pixels());
   return most;
 }
 
@@ -286,6 +287,9 @@ Result<std::vector<std::byte>> Coordinator::image_png(const JobId& id, const Loo
   return parts_->pictures.image_png(id, look, mix);
 }
 const DisplayViews* Coordinator::display_views() const { return parts_->options.views.get(); }
+Result<std::vector<std::uint16_t>> Coordinator::view_cube(const std::string& view) const {
+  return parts_->pictures.cube_of(view);
+}
 
 Result<std::vector<std::byte>> Coordinator::thumbnail_png(const JobId& id) const {
   return parts_->pictures.thumbnail_png(id);

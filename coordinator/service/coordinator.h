@@ -82,9 +82,10 @@ class Coordinator {
   std::vector<JobView> jobs() const;  // returns all jobs; a sequence is listed as one job, without its frames
   Result<JobView> job(const JobId& id) const;
   Result<std::string> owner(const JobId& id) const;  // returns JobView::owner; faster than job()
-  // Returns the number of pixels of the job's image, or of a sequence's largest frame; 0 if there is no such
+  // Returns the memory that an answer about the job's image takes while it is made, at most: its film, and
+  // `more_per_pixel` bytes for each pixel. Of a sequence, that of the largest frame; 0 if there is no such
   // job.
-  std::uint64_t pixels_of(const JobId& id) const;
+  std::uint64_t picture_bytes(const JobId& id, std::uint64_t more_per_pixel) const;
   Result<void> change(const JobId& id, const JobChange& change);
   Result<void> cancel(const JobId& id);
   // Removes an ended job with all its results; a job that has not ended is cancelled and kept. Frames are
@@ -113,6 +114,8 @@ class Coordinator {
                                            const std::optional<LightMix>& mix = {}) const;
   // The views that a Look may name; null: only sRGB.
   const DisplayViews* display_views() const;
+  // Returns the table of a view (DisplayView::cube()).
+  Result<std::vector<std::uint16_t>> view_cube(const std::string& view) const;
   // A small picture of the final or the current image, for lists
   Result<std::vector<std::byte>> thumbnail_png(const JobId& id) const;
   // Videos of sequences (service/videos.h)

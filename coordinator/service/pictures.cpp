@@ -91,11 +91,16 @@ Result<std::vector<std::byte>> Pictures::image_exr(const JobId& id,
 Result<std::vector<std::byte>> Pictures::deep_exr(const JobId& id) const {
   if (const auto file = final_file(id, "deep.exr"); !file.empty())
     if (auto bytes = read_file(file, std::uint64_t{1} << 36)) return bytes;
+  {
+    const auto core = core_.lock();
+    const auto entry = core->jobs.usable(id);
+    if (!entry) return tl::unexpected(entry.error());
+    if ((*entry)->stored.settings.deep == 0)
+      return fail(Errc::failed_precondition,
+                  fmt::format("job {} was submitted without \"deep\": it has no deep image", id.value));
+  }
   const auto shown = picture(id);
   if (!shown) return tl::unexpected(shown.error());
-  if (shown->facts.job.settings.deep == 0)
-    return fail(Errc::failed_precondition,
-                fmt::format("job {} was submitted without \"deep\": it has no deep image", id.value));
   return deep_exr_of(shown->film, provenance_of(shown->facts, blobs_), form_of(shown->facts.job.spec));
 }
 
@@ -138,13 +143,28 @@ Result<std::string> Pictures::mix_json(const JobId& id, const LightMix& mix) con
   return out.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
+// What a view lacks is a matter of this machine's files: it is for the log, and not for every token.
+Error Pictures::for_users(const Error& error, const std::string& view) const {
+  const auto& names = views_->names();
+  if (std::find(names.begin(), names.end(), view) == names.end()) return error;
+  log_warn("", error.message);
+  return {error.code, fmt::format("the view '{}' cannot be shown: the coordinator's log says why", view)};
+}
+
 Result<ToCodes> Pictures::codes_of(const std::string& view) const {
   if (view.empty() || view == kPlainView) return srgb_codes;
   if (views_ == nullptr)
     return bad_argument(fmt::format("there is no view '{}' here but {}", view, kPlainView));
   auto shown = views_->view(view);
-  if (!shown) return tl::unexpected(shown.error());
+  if (!shown) return tl::unexpected(for_users(shown.error(), view));
   return [shown = std::move(*shown)](std::span<const double> rgb) { return shown.codes(rgb); };
+}
+
+Result<std::vector<std::uint16_t>> Pictures::cube_of(const std::string& view) const {
+  if (views_ == nullptr) return fail(Errc::not_found, fmt::format("there is no view '{}' here", view));
+  const auto shown = views_->view(view);
+  if (!shown) return fail(Errc::not_found, for_users(shown.error(), view).message);
+  return shown->cube();
 }
 
 Result<std::vector<std::byte>> Pictures::image_png(const JobId& id, const Look& look,

@@ -51,6 +51,8 @@ class Pictures {
   Result<Shown> shown(const JobId& id, const Look& look, int most_side) const;
   // Returns the transform of a Look's view. Error: there is no such view.
   Result<ToCodes> codes_of(const std::string& view) const;
+  // Returns the table of a view (DisplayView::cube()). Error: there is no such view.
+  Result<std::vector<std::uint16_t>> cube_of(const std::string& view) const;
   Result<std::vector<std::byte>> error_png(const JobId& id) const;
   Result<std::vector<std::byte>> samples_png(const JobId& id) const;
   // The layers of an image, and their pixels as numbers (pictures_pixels.cpp)
@@ -82,6 +84,7 @@ class Pictures {
     Duration cost{};
     std::shared_ptr<const Denoised> image;  // null: no samples yet
   };
+  Error for_users(const Error& error, const std::string& view) const;
   Result<Picture> picture(const JobId& id, const std::optional<LightMix>& mix = {}) const;
   Result<std::shared_ptr<const Denoised>> denoised_view(const JobId& id) const;
   Result<LayerMosaic> mosaic_of(const JobId& id, const PixelLayer& layer, int level) const;

@@ -151,19 +151,20 @@ void describe(V& v, T& s) {
              .render = true,
              .always = true},
             s.aov);
-  v.setting({.name = "deep",
-             .doc = "The image also has a deep image, with at most this many slices in each pixel, and one "
-                    "behind them for the environment; 0: none (docs/guide/compositing.md).",
-             .more = "Each slice takes 20 bytes a pixel in every unit's result and 40 in the coordinator's "
-                     "memory.",
-             .range = {0, kMostDeepSlices},
-             .option = "--deep",
-             .placeholder = "SLICES",
-             .render = true,
-             .again = true,
-             .again_doc = "The image also has a deep image, with at most this many slices in each pixel. "
-                          "Without it, as the earlier job."},
-            s.deep);
+  v.setting(
+      {.name = "deep",
+       .doc = "The image also has a deep image, with at most this many slices in each pixel, and one "
+              "behind them for the environment; 0: none (docs/guide/compositing.md).",
+       .more = "Each slice takes 20 bytes a pixel in every unit's result and 40 in the coordinator's "
+               "memory.",
+       .range = {0, kMostDeepSlices},
+       .option = "--deep",
+       .placeholder = "SLICES",
+       .render = true,
+       .again = true,
+       .again_doc = "The image also has a deep image, with at most this many slices in each pixel; 0: none. "
+                    "Without it, as the earlier job."},
+      s.deep);
   v.setting(
       {.name = "deep_alpha",
        .doc = "The deep image has alpha and depths, but no colours, as holdouts need it.",

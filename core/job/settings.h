@@ -62,7 +62,7 @@ struct JobSpec {
   std::optional<std::string> integrator;
   std::optional<TechniqueChoice> techniques;  // instead of what the scene's integrator says
   std::vector<std::string> aov;
-  int deep = 0;                                // as in RenderSettings
+  std::optional<std::uint32_t> deep;           // as in RenderSettings; nullopt: none, or as the earlier job
   bool deep_alpha = false;                     // as in RenderSettings
   std::optional<LightMix> mix;                 // factors of the light of the scene's light groups
   std::map<std::string, std::string> defines;  // values of the $name parameters in Mitsuba scenes, by name

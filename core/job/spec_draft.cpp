@@ -86,7 +86,7 @@ Result<void> check_spec(const JobSpec& spec, Form form) {
                  fmt::format("is {}, which in one part would also change standard errors, positions and "
                              "identifiers: give exr_parts \"layers\", too, or choose a lossless one (zip)",
                              to_string(spec.exr_compression)));
-  if (spec.deep_alpha && spec.deep == 0)
+  if (spec.deep_alpha && !(spec.deep > 0))
     return wrong("deep_alpha", form, "says how the deep image is, and there is none: give deep, too");
   if (const auto aovs = parse_aovs(spec.aov); !aovs)
     return wrong("aov", form, "is not possible: " + aovs.error().message);

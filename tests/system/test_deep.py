@@ -1,5 +1,6 @@
 """Deep images end to end: they flatten to the picture, whoever renders it, and merge to the picture of both parts."""
 
+import json
 import os
 import pathlib
 import subprocess
@@ -242,6 +243,19 @@ def test_what_cannot_be_is_refused_with_its_name(image, tmp_path):
     assert not pathlib.Path(tmp_path / "no.exr").exists()
     assert digest(render(scene, tmp_path / "zero.exr", "--deep", 0))
     assert not (tmp_path / "zero.deep.exr").exists()
+
+
+def test_a_sequence_has_a_deep_image_for_each_frame(farm, tmp_path):
+    farm.add_worker(fake=False)
+    scene = write(tmp_path, "fog", fog() + balls())
+    job = lightshaft("submit", scene, "--spp", 4, "--deep", SLICES, "--frames", "1-2", "--wait", "-o", tmp_path / "a_#.exr", env=environment(farm)).stdout.split()[0]
+    lightshaft("fetch", job, "-o", tmp_path / "b_#.exr", env=environment(farm))
+
+    assert farm.get(f"/api/v1/jobs/{job}")["deep"] == SLICES
+    for frame in (1, 2):
+        assert (tmp_path / f"a_{frame}.deep.exr").read_bytes() == (tmp_path / f"b_{frame}.deep.exr").read_bytes()
+    without = json.loads(farm.request("POST", f"/api/v1/jobs/{job}/again", b'{"deep": 0, "spp": 2}'))["id"]
+    assert farm.get(f"/api/v1/jobs/{without}")["deep"] == 0
 
 
 def test_shadows_that_are_caught_have_no_deep_image(tmp_path):

@@ -119,10 +119,15 @@ def test_a_farm_shows_the_views_of_its_configuration(fog, config, tmp_path):
             # float16 has 11 bits; the shoulder's table has steps of 1/1024, whose straight lines miss it by less
             assert value == pytest.approx((light * row / (light * row + 0.5)) ** (1 / 2.2), rel=2 ** -11)
 
-        for path, status in ((f"jobs/{job}/image.png?view=Screen/Wram", 400), (f"jobs/{job}/image.png?view=Screen/Broken", 400), ("views/cube?view=x", 404), ("views/cube", 400)):
+        done = lightshaft("submit", fog, "--wait", "-o", tmp_path / "late.png", "--view", "Screen/Wram", env=to, code=2)
+        assert f"did you mean '{VIEW}'?" in done.stderr and farm.get("/api/v1/jobs")["total"] == 1, "before anything is sent"
+
+        for path, status in ((f"jobs/{job}/image.png?view=Screen/Wram", 400), (f"jobs/{job}/image.png?view=Screen/Broken", 400), ("views/cube?view=x", 404), ("views/cube?view=Screen/Broken", 404), ("views/cube", 400)):
             with pytest.raises(HttpError) as refused:
                 farm.request("GET", f"/api/v1/{path}")
             assert refused.value.status == status, path
+            assert str(config.parent) not in str(refused.value), "a matter of the operator, in the log"
+        assert "nowhere.cube" in (farm.folder / "coordinator.log").read_text()
 
 
 @pytest.mark.skipif(not shutil.which("ffmpeg"), reason="ffmpeg is not installed (apt-get install ffmpeg)")

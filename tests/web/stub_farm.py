@@ -90,6 +90,7 @@ class StubFarm:
         self.layers_of = {}  # by job, before `layers`
         self.mix = {"relmse": 0.02, "relmse_ci95": [0.018, 0.022], "trusted": True, "verdict": "trusted"}  # of every mix; or why there is none
         self.default_view = "sRGB"
+        self.broken_view = None  # one that no picture can be shown in
         self.cubes = {}  # view -> bytes of its table
         self.video = {"state": "none", "fps": None, "exposure": None, "layer": None, "frames": 0, "frames_done": 0, "bytes": None, "error": None}
         self.no_video = None  # why none is made
@@ -285,6 +286,8 @@ def _handler(farm):
                 return self._send(200, farm.video)
             if what == "thumbnail.png":
                 return self._send(200, farm.thumbnail, "image/png")
+            if what == "image.png" and farm.broken_view and f"view={urllib.parse.quote(farm.broken_view, safe='')}" in self.path:
+                return self._problem(400, f"the view '{farm.broken_view}' cannot be shown: the coordinator's log says why")
             if what == "image.png" and "layer=denoised" in self.path:
                 return self._send(200, farm.denoised, "image/png")
             if what == "image.png":

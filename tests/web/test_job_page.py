@@ -260,3 +260,13 @@ def test_a_coordinator_without_views_shows_the_curve_of_srgb(farm, dashboard):
     page.wait("document.querySelector('.stage live-image').dataset.painted")
 
     assert page.evaluate("[...document.getElementById('display').options].map((o) => o.value)") == ["sRGB"]
+
+
+def test_a_view_that_cannot_be_shown_gives_way_to_srgb(farm, dashboard):
+    farm.cubes["Screen/Broken"], farm.default_view, farm.broken_view = b"", "Screen/Broken", "Screen/Broken"
+    farm.jobs["j-1"] = job(state="done")
+    page = dashboard("#/jobs/j-1")
+
+    page.wait("document.querySelector('.stage live-image').dataset.painted")
+    assert page.evaluate("document.getElementById('display').value") == "sRGB"
+    assert "Screen/Broken" in page.text(".toast")

@@ -139,6 +139,32 @@ def test_the_viewer_opens_on_the_default_view_of_the_coordinator(farm, turned, v
     assert query(page) == "curve=srgb", "the next one, after the last the first"
 
 
+def test_of_two_views_the_one_chosen_later_holds(farm, turned, viewer):
+    """The table of the first comes after that of the second."""
+    farm.cubes["Screen/Green"] = cube(lambda r, g, b: (0, 1, 0))
+    farm.layers["rgb"] = Layer(["R", "G", "B"], lambda x, y: (0.5, 0.25, 2))
+    page = viewer()
+    page.evaluate("""(() => {
+      const fetched = window.fetch, late = new Promise((go) => { window.letGo = go; });
+      window.fetch = async (address, ...more) => {
+        const answer = await fetched(address, ...more);
+        if (String(address).includes("Turned")) { await late; window.cameLate = true; }
+        return answer;
+      };
+    })()""")
+
+    for name in (turned, "Screen/Green"):
+        page.evaluate(f"(() => {{ const s = document.getElementById('view-curve'); s.value = {json.dumps(name)}; s.dispatchEvent(new Event('change')); }})()")
+    green = f"(() => {{ const v = {VIEW}, at = v.windowPoint([10.5, 10.5]).map(Math.round); return String([...v.querySelector('canvas').getContext('2d').getImageData(at[0], at[1], 1, 1).data]) === '0,255,0,255'; }})()"
+    page.wait(green)
+    pictures = page.evaluate(f"{VIEW}.dataset.pictures")
+    page.evaluate("letGo()")
+    page.wait("window.cameLate")
+    page.evaluate(f"{VIEW}.press('+')")
+    page.wait(f"{VIEW}.dataset.pictures !== '{pictures}'")
+    assert page.evaluate(green)
+
+
 def test_a_view_that_cannot_be_had_leaves_the_picture(farm, turned, viewer):
     farm.cubes[turned] = None
     farm.layers["rgb"] = Layer(["R", "G", "B"], lambda x, y: (0.5, 0.5, 0.5))

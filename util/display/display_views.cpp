@@ -58,8 +58,11 @@ bool names_rec709(const char* name) {
 }
 
 std::optional<Entry> entry_of(const OCIO::Config& config) {
-  for (int i = 0; i < config.getNumColorSpaces(); ++i) {
-    const char* name = config.getColorSpaceNameByIndex(i);
+  // Inactive ones too, which menus hide and transforms can use.
+  const int spaces = config.getNumColorSpaces(OCIO::SEARCH_REFERENCE_SPACE_ALL, OCIO::COLORSPACE_ALL);
+  for (int i = 0; i < spaces; ++i) {
+    const char* name =
+        config.getColorSpaceNameByIndex(OCIO::SEARCH_REFERENCE_SPACE_ALL, OCIO::COLORSPACE_ALL, i);
     const auto space = config.getColorSpace(name);
     bool found = names_rec709(name);
     for (std::size_t k = 0; k < space->getNumAliases(); ++k) found |= names_rec709(space->getAlias(k));
@@ -179,7 +182,7 @@ std::vector<std::uint16_t> DisplayView::cube() const {
   return bits;
 }
 
-Result<DisplayViews> DisplayViews::of(std::shared_ptr<const Config> config, std::string standard) {
+DisplayViews DisplayViews::of(std::shared_ptr<const Config> config, std::string standard) {
   DisplayViews views;
   views.names_.emplace_back(kPlainView);
   const OCIO::Config& c = *config->config;
@@ -222,8 +225,12 @@ Result<DisplayViews> DisplayViews::read(const std::string& file) {
     const char* view = config->getDefaultView(display);
     if (*display == 0 || *view == 0)
       return bad_argument(fmt::format("{}: the configuration has no display with a view", file));
-    std::string standard = name_of(display, view);
-    return of(std::make_shared<const Config>(Config{config, std::move(*entry)}), std::move(standard));
+    auto views =
+        of(std::make_shared<const Config>(Config{config, std::move(*entry)}), name_of(display, view));
+    // The others are refused where they are asked for.
+    if (const auto first = views.view(views.standard()); !first)
+      return bad_argument(fmt::format("{}: its first view: {}", file, first.error().message));
+    return views;
   } catch (const OCIO::Exception& e) {
     return bad_argument(
         fmt::format("{}: OpenColorIO {} cannot use it: {}", file, OCIO::GetVersion(), e.what()));

@@ -41,7 +41,8 @@ class DisplayView {
 class DisplayViews {
  public:
   // Reads a configuration (config.ocio, or what OpenColorIO's version reads besides). Its warnings are
-  // logged. Error: it cannot be read, has no view, or does not say where linear Rec. 709 is in it.
+  // logged. Error: it cannot be read, has no view, its first view cannot be shown, or it does not say where
+  // linear Rec. 709 is in it.
   static Result<DisplayViews> read(const std::string& file);
   // The views that are built in, with the output transforms of ACES 1 as OpenColorIO has them.
   static Result<DisplayViews> built_in();
@@ -57,7 +58,7 @@ class DisplayViews {
 
  private:
   struct Config;
-  static Result<DisplayViews> of(std::shared_ptr<const Config> config, std::string standard);
+  static DisplayViews of(std::shared_ptr<const Config> config, std::string standard);
   std::shared_ptr<const Config> config_;
   std::vector<std::string> names_;
   std::string standard_;

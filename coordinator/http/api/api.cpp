@@ -177,8 +177,8 @@ Response Api::handle(const Match& match, const Request& request) {
     std::optional<coordinator::Gate::Place> turn;
     if (match.route->of_pixels) {
       const auto id = job_of(request, match.params);
-      const std::uint64_t pixels = id ? coordinator_.pixels_of(*id) : 0;
-      turn.emplace(pictures_, request.caller.token_id, pixels * kMemoryPerPixel);
+      turn.emplace(pictures_, request.caller.token_id,
+                   id ? coordinator_.picture_bytes(*id, kMemoryPerPixel) : 0);
     }
     Response response = match.route->handler(*this, request, match.params);
     if (request.method == Method::get) compress(response, request);

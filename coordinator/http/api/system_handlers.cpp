@@ -64,14 +64,11 @@ Response get_views(Api& api, const Request&, const Params&) {
 
 Response get_view_cube(Api& api, const Request& request, const Params&) {
   const auto name = request.parameter("view");
-  const DisplayViews* views = api.coordinator().display_views();
   if (!name) return problem(400, "'view' is missing: the name of a view of GET /api/v1/views");
-  if (views == nullptr) return problem(404, "this coordinator has no views but sRGB");
-  const auto view = views->view(*name);
-  if (!view) return problem(404, view.error().message);
-  const std::vector<std::uint16_t> cube = view->cube();
+  const auto cube = api.coordinator().view_cube(std::string(*name));
+  if (!cube) return problem(cube.error());
   static_assert(std::endian::native == std::endian::little);
-  std::string bytes(reinterpret_cast<const char*>(cube.data()), 2 * cube.size());
+  std::string bytes(reinterpret_cast<const char*>(cube->data()), 2 * cube->size());
   return {.content_type = "application/octet-stream", .body = std::move(bytes)};
 }
 

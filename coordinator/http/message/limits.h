@@ -50,8 +50,8 @@ inline constexpr std::size_t kWriteSlice = 256u << 10;
 // Greatest number of bytes of a body that are read and dropped after an early rejection (see linger_seconds)
 inline constexpr std::uint64_t kLingerBytes = 16u << 20;
 
-// Memory that an answer about an image takes for each of its pixels while it is made: report.html of 8192 x
-// 8192 pixels takes 14 bytes, image.exr with its error layers 32
+// Memory that an answer about an image takes for each of its pixels while it is made, beside its film:
+// report.html of 8192 x 8192 pixels takes 14 bytes, image.exr with its error layers 32
 inline constexpr std::uint64_t kMemoryPerPixel = 32;
 
 inline constexpr std::int64_t kSessionSeconds = 12 * 3600;

@@ -196,6 +196,8 @@ JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frame
     v.stopped = std::all_of(frames.begin(), frames.end(), same) ? first.stopped : "";
   }
   v.spp = first.spp;
+  v.denoise = first.denoise;
+  v.deep = first.deep;
   v.target_error = first.target_error;
   v.target_layer = first.target_layer;
   v.spp_asked = first.spp_asked;

@@ -83,7 +83,8 @@ Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_sto
   for (TileIndex t = 0; t < film.grid().count(); ++t) {
     const TilePixels tile = film.pixels(t);
     std::vector<float> alpha;
-    if (with_alpha && tile.spp > 0) alpha = TileLayers(film, t, true).values(pixel_layer(film.aovs(), "alpha").value());
+    if (with_alpha && tile.spp > 0)
+      alpha = TileLayers(film, t, true).values(pixel_layer(film.aovs(), "alpha").value());
     const auto alpha_at = [&](std::size_t from) {
       return alpha.empty() ? 1 : std::clamp(double{alpha[from]}, 0., 1.);
     };

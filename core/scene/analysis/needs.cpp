@@ -111,7 +111,9 @@ void Analyst::lights() {
   for (const Emitter& e : s_.emitters) {
     ++n_.lights[kind_of(e)];
     n_.ray_flags += std::visit([](const auto& l) { return !l.visible_reflection || !l.visible_volume; }, e);
-    extended = extended || !traits_of(e, s_.textures).delta;
+    const bool delta = traits_of(e, s_.textures).delta;
+    extended = extended || !delta;
+    n_.delta_lights += delta && std::visit([](const auto& l) { return l.visible_reflection; }, e);
   }
   n_.only_delta_lights = !extended && !s_.emitters.empty();
 }
@@ -258,20 +260,21 @@ class Words {
     say("environment light", constant + map > 0, map > 0 ? "an environment map" : "a constant surrounding",
         "black surroundings");
     say("environment map", map, "environment maps");
-    missing_light(sampled - n_.area_lights - map);
+    missing_light();
   }
   // Light that no path finds. It is said only of scenes that have it.
-  void missing_light(std::uint32_t lamps) {
+  void missing_light() {
     const std::uint32_t smooth = count<ConductorBsdf, DielectricBsdf, PlasticBsdf>(n_.materials);
-    if (lamps == 0 || smooth == 0) return;
+    if (n_.delta_lights == 0 || smooth == 0) return;
     out_.push_back(
         {"light of lamps without extent by way of smooth surfaces", false,
          fmt::format(
-             "missing in the image: {} lamps and {} smooth mirrors, glasses or glossy coats. No path can "
-             "follow light from such a surface to a point or a single direction; give the lamp an extent "
-             "(a sphere or rectangle with an area emitter), the surface a roughness, or make panes of "
-             "glass and sheets of water thindielectric",
-             lamps, smooth)});
+             "missing in the image. Lights without extent: {}; smooth mirrors, glasses and glossy coats: {}. "
+             "No path can follow light from such a surface to a point or a single direction. Give the "
+             "light an extent (angular_radius of a directional one; instead of a point or spot a small "
+             "sphere with an area emitter), the surface a roughness, or make panes of glass and sheets of "
+             "water thindielectric",
+             n_.delta_lights, smooth)});
   }
 
   const Needs& n_;

@@ -52,6 +52,8 @@ struct Needs {
   // True if the scene has lights, but none that a ray can hit: all are without extent, such as point, spot
   // and directional lights.
   bool only_delta_lights = false;
+  // Number of lights without extent that light surfaces. Not part of canonical_json(), as it decides nothing.
+  std::uint32_t delta_lights = 0;
   // The files that the scene needs, in the order of Scene::assets.
   std::vector<FileNeed> files;
   bool operator==(const Needs&) const = default;

@@ -155,6 +155,9 @@ TEST_F(Configurations, FindLinearRec709ByItsName) {
     EXPECT_EQ(views->standard(), "Screen/Halved");
     EXPECT_EQ(code(views->view("Screen/Halved").value(), {1, .5, 0}), (std::array{128, 64, 0})) << name;
   }
+  const auto inactive = DisplayViews::read(file("inactive_colorspaces: [Linear Rec.709]\n" +
+                                                config("", "  - !<ColorSpace>\n    name: Linear Rec.709\n")));
+  EXPECT_TRUE(inactive) << inactive.error().message;
   const auto alias = DisplayViews::read(
       file(config("", "  - !<ColorSpace>\n    name: lights\n    aliases: [x, lin_rec709]\n")));
   EXPECT_TRUE(alias);
@@ -201,13 +204,19 @@ TEST_F(Configurations, WithAMissingTableRefuseTheViewThatNeedsIt) {
   ASSERT_TRUE(views) << views.error().message;
   EXPECT_TRUE(views->view("Screen/Halved"));
 
-  std::string text = config("", "  - !<ColorSpace>\n    name: Linear Rec.709\n");
-  text.replace(text.find("colorspace: halved"), 18, "colorspace: broken");
-  const auto broken =
-      DisplayViews::read(file(text + "  - !<ColorSpace>\n    name: broken\n"
-                                     "    from_scene_reference: !<FileTransform> {src: nowhere.cube}\n"));
-  ASSERT_TRUE(broken) << broken.error().message;
-  EXPECT_THAT(broken->view("Screen/Halved").error().message, HasSubstr("nowhere.cube"));
+  std::string text = config("", "  - !<ColorSpace>\n    name: Linear Rec.709\n") +
+                     "  - !<ColorSpace>\n    name: broken\n"
+                     "    from_scene_reference: !<FileTransform> {src: nowhere.cube}\n";
+  const std::string halved = "    - !<View> {name: Halved, colorspace: halved}\n",
+                    broken = "    - !<View> {name: Broken, colorspace: broken}\n";
+  const auto at = text.find(halved);
+  const auto second = DisplayViews::read(file(std::string(text).insert(at + halved.size(), broken)));
+  ASSERT_TRUE(second) << second.error().message;
+  EXPECT_THAT(second->view("Screen/Broken").error().message, HasSubstr("nowhere.cube"));
+
+  // The first view is what people would see without choosing one.
+  const auto first = DisplayViews::read(file(std::string(text).insert(at, broken)));
+  EXPECT_THAT(first.error().message, HasSubstr("its first view"));
 }
 
 TEST_F(Configurations, ComeFromTheEnvironment) {

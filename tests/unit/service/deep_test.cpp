@@ -92,7 +92,11 @@ TEST_F(DeepJobs, CanBeMadeOfJobsThatHadNone) {
   const auto again = admit_again(first->job, {.deep = 8}, coordinator_->blobs());
   ASSERT_TRUE(again) << again.error().message;
   EXPECT_EQ(again->job.settings.deep, 8);
-  EXPECT_EQ(again->job.spec.deep, 8);
+  EXPECT_EQ(again->job.spec.deep, 8u);
+  const auto without = admit_again(again->job, {.deep = 0}, coordinator_->blobs());
+  ASSERT_TRUE(without) << without.error().message;
+  EXPECT_EQ(without->job.settings.deep, 0);
+  EXPECT_EQ(aovs_of(without->job.settings).deep().count, 0u);
 }
 
 }  // namespace

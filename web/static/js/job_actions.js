@@ -1,4 +1,5 @@
 // What the user can do with a job and its page.
+import { kOnlyPlain } from "./api.js";
 import { frameHref } from "./route.js";
 import { displayOf, doneFrames, layerOf, withJob, withOpen, withUi, withoutJob } from "./state.js";
 
@@ -71,9 +72,15 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
     if (video.state === "waiting" || video.state === "making") setTimeout(() => (get().open?.id === id ? watchVideo(id, api.video(id)) : null), kVideoPauseMs);
   }
 
+  /** A view that cannot be shown gives way to the curve of sRGB. */
+  function withoutView(error) {
+    if (error.status === 400 && get().open && displayOf(get()) !== kOnlyPlain.default) set(withUi(withOpen(get(), { display: kOnlyPlain.default }), { notice: error.message }));
+    throw error;
+  }
+
   const pictureOf = (id, exposure, signal) => {
     const layer = shownLayer();
-    return layer === "picture" || layer === "denoised" ? api.image(id, exposure, layer, displayOf(get()), signal) : api.map(id, layer, signal);
+    return layer === "picture" || layer === "denoised" ? api.image(id, exposure, layer, displayOf(get()), signal).catch(withoutView) : api.map(id, layer, signal);
   };
 
   return {

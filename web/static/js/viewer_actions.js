@@ -14,6 +14,7 @@ import { isOver, mayChange, withJob, withViewer } from "./state.js";
 const kLetters = { e: "exposure", c: "curve", l: "layer", o: "overlay", f: "falseColour", b: "by", k: "channel" };
 const kBins = 64; // of a histogram
 const kExposureStep = 0.5;
+const kMostCubes = 8; // tables of views that are kept, of 3.3 MB each
 
 const next = (list, value, by) => list[(list.indexOf(value) + by + list.length) % list.length];
 
@@ -21,6 +22,7 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
   const sources = { a: null, b: null };
   let mixing = null; // of the first picture, if it has light groups
   let pointing = 0;
+  const cubes = new Map(); // tables of views by name
 
   function change(more) {
     if (!get().viewer) return;
@@ -44,10 +46,18 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
 
   /** Fetches the table of the view that is shown. Until it is there, the curve of sRGB is shown. */
   async function needCube() {
-    const name = curveOf(get().viewer.view.curve, get().displays);
+    const wanted = () => get().viewer && curveOf(get().viewer.view.curve, get().displays);
+    const name = wanted();
     if (!isView(name) || get().viewer.cube?.name === name) return;
-    const buffer = await attempt(() => api.viewCube(name));
-    if (buffer && get().viewer) set(withViewer(get(), { cube: { name, values: cubeFrom(buffer) } }));
+    let values = cubes.get(name);
+    if (!values) {
+      const buffer = await attempt(() => api.viewCube(name));
+      if (!buffer) return;
+      values = cubeFrom(buffer);
+      if (cubes.size >= kMostCubes) cubes.delete(cubes.keys().next().value); // the oldest
+      cubes.set(name, values);
+    }
+    if (wanted() === name) set(withViewer(get(), { cube: { name, values } }));
   }
 
   /** Mixes light groups as the address says. */
