@@ -81,7 +81,9 @@ FarmApi::Answer<void> check_view_of_farm(const SubmitFlags& flags) {
   auto api = FarmApi::open(flags.farm);
   if (!api) return coordinator::rejected(api.error());
   const auto cube = api->text("/api/v1/views/cube" + query_of({{"view", flags.view}}));
-  return cube ? FarmApi::Answer<void>() : tl::unexpected(cube.error());
+  if (cube) return {};
+  if (cube.error().error.code != Errc::not_found) return tl::unexpected(cube.error());
+  return coordinator::rejected({Errc::invalid_argument, "--view: " + cube.error().error.message});
 }
 
 // Uploads the reference image, and stores its digest in `spec`. Must be called before the job is submitted.

@@ -114,7 +114,7 @@ TEST(SealedImage, FindsTheFirstChangedValueOfEachLayer) {
   const int x = 11, y = 9;  // in tile 5, whose first pixel is (8, 8)
   for (const bool floats : {false, true}) {
     const auto whole = read(sealed(film, floats)).value();
-    EXPECT_EQ(whole.picture.channels.size(), 82u + 2 * 2 * 6);
+    EXPECT_EQ(whole.picture.channels.size(), 85u + 2 * 2 * 6);
     for (const auto& [layer, values] : whole.picture.channels) {
       auto image = whole;
       change(image.picture.channels.at(layer), static_cast<std::size_t>(y * 25 + x));
