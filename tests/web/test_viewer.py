@@ -160,7 +160,7 @@ def test_of_two_views_the_one_chosen_later_holds(farm, turned, viewer):
     pictures = page.evaluate(f"{VIEW}.dataset.pictures")
     page.evaluate("letGo()")
     page.wait("window.cameLate")
-    page.evaluate(f"{VIEW}.press('+')")
+    page.evaluate(f"{VIEW}.press('e')")
     page.wait(f"{VIEW}.dataset.pictures !== '{pictures}'")
     assert page.evaluate(green)
 
