@@ -67,7 +67,11 @@ def steam(folder, options):
     images = {}
     for name, scene, more in (("plate", without_steam(text), ()), ("element", held_out(text), ("--aov", "alpha")), ("together", text, ())):
         (folder / f"{name}.xml").write_text(scene)
-        images[name] = render(folder / f"{name}.xml", folder / f"{name}.exr", options, *more)
+        image = render(folder / f"{name}.xml", folder / f"{name}.exr", options, *more, *(["--denoise"] if options.denoise else []))
+        colours = "denoised.R,denoised.G,denoised.B" if options.denoise else "R,G,B"
+        images[name] = folder / f"{name}-shown.exr"
+        alpha = ",A" if name == "element" else ""
+        run("oiiotool", image, "--ch", colours + alpha, "--chnames", "R,G,B" + alpha, "--compression", "zip", "-d", "float", "-o", images[name])
     over = folder / "over.exr"
     run("oiiotool", images["element"], "--ch", "R,G,B,A", images["plate"], "--ch", "R,G,B,A=1", "--over", "--compression", "zip", "-d", "float", "-o", over)
     run("oiiotool", "--pattern", "checker:width=16:height=16:color1=0.05,0.05,0.05:color2=0.12,0.12,0.12", options.size, 3, "--ch", "R,G,B,A=1", "-o", folder / "checks.exr")
