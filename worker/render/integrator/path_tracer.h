@@ -512,7 +512,8 @@ void PathTracer<F, Light>::go_on(float t_max) {
     const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, t_max);
     const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
     if constexpr (F.overlaps) {
-      if (met && world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity, ray_kind());
+      if (met && world_.coincident)
+        prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity, F.visibility ? ray_kind() : RayKind::camera);
     }
     if constexpr (F.media) {
       if (medium_.any()) {
