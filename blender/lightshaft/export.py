@@ -129,7 +129,7 @@ class Exporter:
         mesh = item.type in MESHES
         if (visible.holdout or visible.catcher) and not mesh:
             self.problems.unsupported(
-                f"{kind} '{item.name}': Holdout or Shadow Catcher. Switch it off in {where}"
+                f"{kind} '{item.name}': Holdout or Shadow Catcher. Switch it off in {where}, and Holdout of its collections and of what instances it"
             )
         if visible.holdout and mesh and not self.scene.render.film_transparent:
             self.problems.warning(
@@ -139,7 +139,8 @@ class Exporter:
             self.problems.warning(
                 f"object '{item.name}': Shadow Catcher has no effect. Set Render Properties > Film > Transparent"
             )
-        self.catchers = self.catchers or visible.catcher
+        elif visible.catcher:
+            self.catchers = True
         if kind == "light" and not item.is_shadow_catcher:
             self.dim.append(item.name)
         if kind == "object" and not mesh and visible.hidden():

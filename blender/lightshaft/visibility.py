@@ -62,7 +62,11 @@ def visibility_of_world(problems, owner, world):
 
 def visibility_of(problems, item, parent, layer):
     """Returns the visibility of an object or a light of a view layer. An instance is also hidden from what its parent,
-    which may be None, is hidden from."""
+    which may be None, is hidden from. As in Cycles, Holdout and Indirect Only of an instance are those of its parent,
+    what is held out is not hidden from the camera, and lights are not held out."""
+    owner = (parent or item).original
+    holdout = owner.holdout_get(view_layer=layer)
+    indirect_only = owner.indirect_only_get(view_layer=layer)
     kind = "light" if item.type == "LIGHT" else "object"
     family = [item] if parent is None else [item, parent]
 
@@ -73,10 +77,10 @@ def visibility_of(problems, item, parent, layer):
         problems, f"{kind} '{item.name}'", "Object properties > Visibility > Ray Visibility", sees
     )
     return Visibility(
-        camera=sees("camera") and not item.original.indirect_only_get(view_layer=layer),
+        camera=sees("camera") and (holdout or not indirect_only),
         shadow=kind == "light" or sees("shadow"),
         reflection=reflection,
         volume=sees("volume_scatter"),
-        holdout=item.original.holdout_get(view_layer=layer),
+        holdout=kind == "object" and holdout,
         catcher=kind == "object" and any(one.is_shadow_catcher for one in family),
     )

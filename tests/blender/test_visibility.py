@@ -147,6 +147,58 @@ def test_instances_are_hidden_from_what_their_parent_is_hidden_from(lit):
         bpy.data.collections.remove(model)
 
 
+@pytest.mark.parametrize("instanced", [False, True])
+@pytest.mark.parametrize(
+    "switches", [("indirect_only",), ("holdout",), ("holdout", "indirect_only"), ("is_holdout",), ("inner",)]
+)
+def test_holdout_and_indirect_only_are_those_of_cycles(stage, instanced, switches):
+    """Of a collection, of what instances a ball, or of the ball, alone and together."""
+    import bpy
+    from stage import diffuse
+
+    stage.scene.render.film_transparent = True
+    stage.sky(0.5)
+    stage.plane(diffuse((0.5, 0.5, 0.5), "Floor"))
+    ball = stage.ball(diffuse(), (0, 0, 1))
+    made = [bpy.data.collections.new(name) for name in ("Inside", "Model")]
+    stage.scene.collection.children.link(made[0])
+    for other in list(ball.users_collection):
+        other.objects.unlink(ball)
+    made[instanced].objects.link(ball)
+    owner = ball
+    if instanced:
+        owner = bpy.data.objects.new("Instancer", None)
+        made[0].objects.link(owner)
+        owner.instance_type, owner.instance_collection = "COLLECTION", made[1]
+    layer = bpy.context.view_layer.layer_collection.children["Inside"]
+    for switch in switches:
+        on = {"is_holdout": (owner, switch), "inner": (ball, "is_holdout")}.get(switch, (layer, switch))
+        setattr(*on, True)
+    try:
+        differ_by_noise(stage)
+    finally:
+        for collection in made:
+            bpy.data.collections.remove(collection)
+
+
+def test_lights_in_a_collection_with_holdout_are_not_held_out(stage):
+    import bpy
+    from stage import diffuse
+
+    stage.scene.render.film_transparent = True
+    stage.plane(diffuse((0.5, 0.5, 0.5), "Floor"))
+    lamp = stage.light("AREA", 300, size=1)
+    inside = bpy.data.collections.new("Inside")
+    stage.scene.collection.children.link(inside)
+    stage.scene.collection.objects.unlink(lamp)
+    inside.objects.link(lamp)
+    bpy.context.view_layer.layer_collection.children["Inside"].holdout = True
+    try:
+        differ_by_noise(stage)
+    finally:
+        bpy.data.collections.remove(inside)
+
+
 def test_some_surface_rays_alone_are_refused(stage):
     from stage import diffuse
 
@@ -199,6 +251,9 @@ def test_lights_that_do_not_light_shadow_catchers_are_refused_beside_one(lit):
     exported(lit)
 
     lit.cube(diffuse()).is_shadow_catcher = True
+    exported(lit)  # nothing is caught
+
+    lit.scene.render.film_transparent = True
     with pytest.raises(Exception) as error:
         exported(lit)
 

@@ -2,6 +2,7 @@
 // opacity.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -41,10 +42,13 @@ class CaughtShadows {
  private:
   // Planes 0 to 2 are L, T and U of half A of the samples, 3 to 5 those of half B.
   double sum(std::size_t plane, std::size_t pixel) const { return sums_[(first_ + plane) * n_ + pixel]; }
+  // In [0, 1], but for sums that no worker sends if it works as it should. Those give a number that is finite
+  // as a float, also when it is added to another finite one.
   static double share(double light, double through, double unshadowed, double count) {
+    constexpr double kMost = 0x1p64;
     const double opacity = through / count * (1 - light / unshadowed);
-    // Not finite without light, and for sums that no worker sends if it works as it should
-    return unshadowed > 0 && std::isfinite(opacity) ? opacity : 0;
+    // Not a number without light
+    return unshadowed > 0 && !std::isnan(opacity) ? std::clamp(opacity, -kMost, kMost) : 0;
   }
 
   const double* sums_;

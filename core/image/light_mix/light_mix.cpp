@@ -12,6 +12,11 @@ Result<std::vector<GroupFactors>> factors_of(const LightMix& mix, AovSet aovs,
   if (!aovs.has(Aov::light_groups))
     return fail(Errc::failed_precondition,
                 "the image has no light groups: render it with --aov light_groups to mix them");
+  if (!mix.groups.empty() && aovs.has(Aov::shadow_catcher) && aovs.has(Aov::alpha))
+    return fail(
+        Errc::failed_precondition,
+        "the image has shadow catchers: the shadows in its alpha are those of all lights as they are. "
+        "Render the mix as a job of its own: lightshaft again ID --mix ...");
   std::vector<GroupFactors> out(groups.size());
   for (const auto& [group, of] : mix.groups) {
     const auto at = std::ranges::find(groups, group);

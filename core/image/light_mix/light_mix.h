@@ -15,7 +15,8 @@ namespace ls {
 
 // Returns the factors of each light group of an image with these AOVs. `groups` are the names of its groups.
 // failed_precondition: the image has no light groups, or factors differ between `surface` and `volume` and it
-// has not the AOV volume_light_groups. invalid_argument: a name in the mix is not in `groups`.
+// has not the AOV volume_light_groups, or its alpha has the shadows on shadow catchers and the mix is not
+// empty. invalid_argument: a name in the mix is not in `groups`.
 Result<std::vector<GroupFactors>> factors_of(const LightMix& mix, AovSet aovs,
                                              std::span<const std::string> groups);
 

@@ -1,5 +1,6 @@
 """Which rays meet a prim, by the primvars of Arnold, RenderMan and Karma."""
 
+import math
 import xml.etree.ElementTree as ElementTree
 
 import lightshaft.usd
@@ -19,7 +20,7 @@ def stage(tmp_path):
 
 
 def say(prim, name, value):
-    kind = {bool: "Bool", int: "Int", str: "String"}[type(value)]
+    kind = {bool: "Bool", int: "Int", float: "Float", str: "String"}[type(value)]
     made = UsdGeom.PrimvarsAPI(prim).CreatePrimvar(name, getattr(Sdf.ValueTypeNames, kind), "constant")
     made.Set(value)
 
@@ -113,6 +114,8 @@ def test_lights_follow_the_flags_that_they_have(stage):
         ("arnold:visibility:diffuse_reflect", False, "hidden from some of the rays"),
         ("karma:object:rendervisibility", "-caustic", "it names 'caustic'"),
         ("arnold:visibility:camera", "no", "it is not a number"),
+        ("arnold:visibility:camera", math.nan, "arnold:visibility:camera has no effect: it is not a number"),
+        ("arnold:visibility", math.inf, "arnold:visibility has no effect: it is not a number"),
     ],
 )
 def test_what_has_no_effect_is_told_with_its_prim(stage, name, value, told):

@@ -11,8 +11,8 @@ struct Features {
   bool grids = false;      // there are heterogeneous media
   bool chromatic = false;  // the extinction of some medium differs between channels
   bool emission = false;   // some medium emits light
-  // The scene has nested or intersecting media (medium_stack.h), or coincident surfaces of which at least
-  // one is null, that is, index-matched (coincident.h).
+  // The scene has nested or intersecting media (medium_stack.h), or coincident surfaces of which some rays
+  // pass one, since it is null, that is, index-matched, or hidden (coincident.h).
   bool overlaps = false;
   // The scene has surfaces that light passes straight through: index-matched boundaries, masks, thin
   // dielectrics.

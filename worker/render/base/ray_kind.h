@@ -14,6 +14,7 @@ enum class RayKind : std::uint8_t {
 
 class RayKinds {
  public:
+  bool operator==(const RayKinds&) const = default;
   constexpr bool any() const { return bits_ != 0; }
   constexpr bool has(RayKind kind) const { return (bits_ & bit(kind)) != 0; }
   constexpr void set(RayKind kind, bool on) {

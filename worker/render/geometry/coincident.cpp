@@ -87,10 +87,10 @@ class Finder {
   // Searches for coincident surfaces and marks them. If there are too many pairs to compare, it marks all
   // surfaces and stops.
   void search() {
-    const auto null = surface_boxes(g_, [](const SurfaceInfo& s) { return s.null; });
+    const auto passable = surface_boxes(g_, [](const SurfaceInfo& s) { return s.passable; });
     const auto all = surface_boxes(g_, [](const SurfaceInfo&) { return true; });
-    if (!null || !all) return mark_all();
-    for (const SurfaceBox& n : *null)
+    if (!passable || !all) return mark_all();
+    for (const SurfaceBox& n : *passable)
       for (const SurfaceBox& o : *all) {
         if (spent_) return;
         compare(n, o);
@@ -125,10 +125,13 @@ class Finder {
 
   void compare(const SurfaceBox& n, const SurfaceBox& o) {
     if (spent(1) || !n.touches(o)) return;
+    const SurfaceInfo &mine = g_.surfaces[n.surface], &other = g_.surfaces[o.surface];
+    // The same rays pass both, and none enters a medium.
+    if (!mine.null && !other.null && mine.hidden == other.hidden && !mine.transition && !other.transition)
+      return;
     if (n.surface == o.surface && n.instance == o.instance) return twice_in_itself(n);
-    // Each pair of two null (index-matched) surfaces is found twice, once in each order, but compared only
-    // once.
-    if (g_.surfaces[o.surface].null && o.surface < n.surface) return;
+    // Each pair of two passable surfaces is found twice, once in each order, but compared only once.
+    if (other.passable && o.surface < n.surface) return;
     if (n.instance != kNone || o.instance != kNone) {
       mark(n.surface, 1, n.instance == kNone);
       mark(o.surface, 1, o.instance == kNone);
@@ -201,9 +204,9 @@ class Finder {
 }  // namespace
 
 Coincidence find_coincident(Geometry& g) {
-  const bool any_null =
-      std::any_of(g.surfaces.begin(), g.surfaces.end(), [](const SurfaceInfo& s) { return s.null; });
-  return any_null ? Finder(g).run() : Coincidence{};
+  const bool any =
+      std::any_of(g.surfaces.begin(), g.surfaces.end(), [](const SurfaceInfo& s) { return s.passable; });
+  return any ? Finder(g).run() : Coincidence{};
 }
 
 }  // namespace ls::render

@@ -37,10 +37,11 @@ struct SurfaceInfo {
   // True if the surface is not closed: it has an edge, or it encloses a volume only together with other
   // surfaces.
   bool sheet = false;
-  bool null = false;     // index-matched: rays pass straight through
-  RayKinds hidden;       // rays of these kinds pass straight through the surface
-  bool holdout = false;  // camera rays that do not pass the surface end there without light
-  bool catcher = false;  // true for some holdouts: shadows on the surface are seen (AOV shadow_catcher)
+  bool null = false;      // index-matched: rays pass straight through
+  RayKinds hidden;        // rays of these kinds pass straight through the surface
+  bool passable = false;  // true if the surface is null or hidden from rays of some kind
+  bool holdout = false;   // camera rays that do not pass the surface end there without light
+  bool catcher = false;   // true for some holdouts: shadows on the surface are seen (AOV shadow_catcher)
   // True if part of the light passes straight through (BsdfTable::null_transmission)
   bool null_transmission = false;
   // For meshes: `normals` is true if the vertices have normals, `uvs` if they have uvs.
@@ -60,8 +61,9 @@ struct SurfaceInfo {
   // -1 if normals are opposite to the mesh's winding or to the shape's outward side, else 1
   float orientation = 1;
   // The surface may coincide with others in some places. If it or one of these others is index-matched
-  // (`null`), this is at least the largest reach (see SurfaceHit::reach) of all of them, so that one step
-  // moves a ray past all of them. 0: find_coincident() has found no such surfaces.
+  // (`null`), or if they are hidden from different rays, this is at least the largest reach (see
+  // SurfaceHit::reach) of all of them, so that one step moves a ray past all of them. 0: find_coincident()
+  // has found no such surfaces.
   float coincident_reach = 0;
   // For triangles: the reach (see SurfaceHit::reach) of every hit, if the reaches of all triangles of the
   // surface are within a factor of 16; 0 if each triangle has its own. For other shapes: a lower bound for

@@ -214,6 +214,7 @@ SurfaceInfo surface_info(const Scene& scene, const std::vector<scene::BsdfTraits
   info.null_transmission = !info.null && traits.at(s.bsdf.value).passes;
   info.transition = s.is_medium_transition;
   info.hidden = hidden_from(s);
+  info.passable = info.null || info.hidden.any();
   info.catcher = catches_shadows(scene, s);
   info.holdout = s.holdout || info.catcher;
   info.crossed = info.null || info.hidden.any() || traits.at(s.bsdf.value).transmits;

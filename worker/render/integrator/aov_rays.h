@@ -24,7 +24,7 @@ std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay&
   for (segment_ = 0; segment_ < kMaxSegments; ++segment_, t_max = kInfinity) {
     const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, t_max);
     if (!primitive || !world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit)) return std::nullopt;
-    if (world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
+    if (world_.coincident) prefer_scatterer<true>(hit, ray_.origin, ray_.d, kInfinity, RayKind::camera);
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     beta_ = C3(1);
     if (!sees_past(hit, surface)) {
@@ -53,7 +53,9 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
     SurfaceHit hit;
     const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, reach);
     const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
-    if (met && world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
+    if (met && world_.coincident)
+      prefer_scatterer<true>(hit, ray_.origin, ray_.d, kInfinity,
+                             direct ? RayKind::camera : RayKind::surface);
     if (medium_.any()) {
       const float t = met ? ray_.length_to(hit) : reach;
       RandomStream tracker = stream_.stream(segment_, Purpose::track_guide);
@@ -114,7 +116,8 @@ Opacity PathTracer<F, Light>::opacity(const CameraRay& ray, const DeepTransmitta
     SurfaceHit hit;
     const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, reach);
     const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
-    if (met && world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
+    if (met && world_.coincident)
+      prefer_scatterer<true>(hit, ray_.origin, ray_.d, kInfinity, RayKind::camera);
     if (medium_.any()) {
       const float t = met ? ray_.length_to(hit) : reach;
       RandomStream tracker = stream_.stream(segment_, Purpose::track_opacity);
@@ -213,6 +216,7 @@ bool PathTracer<F, Light>::meets_catcher(const V3& p, const LightSample& light) 
     SurfaceHit hit;
     const auto primitive = world_.accel.nearest(o, d, left);
     if (!primitive || !world_.geometry.complete(*primitive, o, d, hit)) return false;
+    if (world_.coincident) prefer_scatterer<true>(hit, o, d, left, RayKind::shadow);
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     if (surface.catcher && !surface.null && !surface.hidden.has(RayKind::shadow)) return true;
     const V3 next = offset_point(hit, d);
@@ -237,7 +241,8 @@ DeepProbe PathTracer<F, Light>::deep_probe(const CameraRay& ray) {
     SurfaceHit hit;
     const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, reach);
     const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
-    if (met && world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
+    if (met && world_.coincident)
+      prefer_scatterer<true>(hit, ray_.origin, ray_.d, kInfinity, RayKind::camera);
     if (medium_.any()) {
       const float begin = depth_of(ray_.start);
       DeepSegment& segment = probe.segments.emplace_back();

@@ -342,8 +342,8 @@ auto PathTracer<F, Light>::start_medium(const CameraRay& ray) const -> Within {
 }
 
 // Returns the media on the side of the surface that w points to, for a path that arrives along `from` through
-// the media `in`. Null surfaces that coincide with this surface are crossed together with it; there are such
-// surfaces only with F.overlaps.
+// the media `in`. Null and hidden surfaces that coincide with this surface are crossed together with it;
+// there are such surfaces only with F.overlaps.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::beyond(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& w,
                                   const V3& from, Within in) const -> Within {
@@ -381,7 +381,7 @@ CoincidentHits PathTracer<F, Light>::others_at(const SurfaceHit& hit, const V3& 
   return all;
 }
 
-// Returns the media after crossing the hit surface and all null surfaces that coincide with it. The
+// Returns the media after crossing the hit surface and all null or hidden surfaces that coincide with it. The
 // boundaries that the path leaves are handled before those that it enters. Otherwise, where two cells of one
 // mesh share a wall, the path would for a moment be inside the mesh's boundary twice, as it is at no point of
 // the scene.
@@ -397,7 +397,7 @@ auto PathTracer<F, Light>::through_all(const SurfaceHit& hit, const V3& w, const
       SurfaceHit other;
       if (!world_.geometry.complete(others.ids[static_cast<std::size_t>(i)], o, d, other)) continue;
       const SurfaceInfo& s = world_.geometry.surfaces[other.surface];
-      if (s.null && (dot(d, other.ng) > 0) == outside) stand(s, outside, true, in);
+      if (s.passable && (dot(d, other.ng) > 0) == outside) stand(s, outside, true, in);
     }
   }
   return in;
@@ -408,19 +408,30 @@ auto PathTracer<F, Light>::through_all(const SurfaceHit& hit, const V3& w, const
 // used, the boundary of fog on a floor would let light through the floor, and a pane of glass on a null
 // boundary would not attenuate the light. Surfaces beyond t_max are ignored: shadow rays end there, in front
 // of the surface of their light.
+//
+// With kHidden, surfaces that are hidden from rays of this kind are treated like null surfaces, and a ray
+// that hits one of them gets its hit on a null surface that it meets, if no other scatters it: such a
+// surface may give off light.
 template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max) const {
+template <bool kHidden>
+void PathTracer<F, Light>::prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max,
+                                            [[maybe_unused]] RayKind kind) const {
+  const auto is_hidden = [&](const SurfaceInfo& s) {
+    if constexpr (kHidden) return s.hidden.has(kind);
+    return false;
+  };
   const SurfaceInfo& s = world_.geometry.surfaces[hit.surface];
-  if (!s.null || !(s.coincident_reach > 0)) return;
+  if (!(s.null || is_hidden(s)) || !(s.coincident_reach > 0)) return;
+  const bool hidden = is_hidden(s);
   const CoincidentHits others = others_at(hit, d, d);
   for (int i = 0; i < others.count; ++i) {
     SurfaceHit other;
     const PrimitiveId id = others.ids[static_cast<std::size_t>(i)];
-    if (!world_.geometry.complete(id, o, d, other) || world_.geometry.surfaces[other.surface].null ||
-        other.t > t_max)
-      continue;
+    if (!world_.geometry.complete(id, o, d, other)) continue;
+    const SurfaceInfo& info = world_.geometry.surfaces[other.surface];
+    if ((info.null && !hidden) || is_hidden(info) || other.t > t_max) continue;
     hit = other;
-    return;
+    if (!info.null) return;
   }
 }
 

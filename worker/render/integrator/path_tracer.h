@@ -254,7 +254,9 @@ class PathTracer {
   void stand(const SurfaceInfo& s, bool outside, bool through, Within& in) const;
   CoincidentHits others_at(const SurfaceHit& hit, const V3& from, const V3& w) const;
   [[gnu::noinline]] Within through_all(const SurfaceHit& hit, const V3& w, const V3& from, Within in) const;
-  [[gnu::noinline]] void prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max) const;
+  template <bool kHidden = F.visibility>
+  [[gnu::noinline]] void prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max,
+                                          RayKind kind) const;
   [[gnu::noinline]] void add_emission_of_others(const SurfaceHit& hit);
   bool survives(float u);
   // Returns the throughput by which survives() decides whether Russian roulette may end the path.
@@ -510,7 +512,8 @@ void PathTracer<F, Light>::go_on(float t_max) {
     const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, t_max);
     const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
     if constexpr (F.overlaps) {
-      if (met && world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
+      if (met && world_.coincident)
+        prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity, F.visibility ? ray_kind() : RayKind::camera);
     }
     if constexpr (F.media) {
       if (medium_.any()) {

@@ -51,7 +51,7 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
     const auto primitive = world_.accel.nearest_boundary(ray.origin, d, left);
     const bool met = primitive && world_.geometry.complete(*primitive, ray.origin, d, hit);
     if constexpr (F.overlaps) {
-      if (met && world_.coincident) prefer_scatterer(hit, ray.origin, d, left);
+      if (met && world_.coincident) prefer_scatterer(hit, ray.origin, d, left, RayKind::shadow);
     }
     if constexpr (F.media) {
       if (medium.any()) {

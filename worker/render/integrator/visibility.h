@@ -36,7 +36,7 @@ void PathTracer<F, Light>::add_direct() {
     const auto primitive = world_.accel.nearest(ray.origin, ray.d, kInfinity);
     const bool met = primitive && world_.geometry.complete(*primitive, ray.origin, ray.d, hit);
     if constexpr (F.overlaps) {
-      if (met && world_.coincident) prefer_scatterer(hit, ray.origin, ray.d, kInfinity);
+      if (met && world_.coincident) prefer_scatterer(hit, ray.origin, ray.d, kInfinity, RayKind::shadow);
     }
     if constexpr (F.media) {
       if (medium.any()) {
@@ -55,9 +55,9 @@ void PathTracer<F, Light>::add_direct() {
         for (int k = 0; k < others.count; ++k) {
           SurfaceHit other;
           const PrimitiveId id = others.ids[static_cast<std::size_t>(k)];
-          if (world_.geometry.complete(id, ray.origin, ray.d, other) &&
-              world_.geometry.surfaces[other.surface].null)
-            add_light_of(other);
+          if (!world_.geometry.complete(id, ray.origin, ray.d, other)) continue;
+          const SurfaceInfo& s = world_.geometry.surfaces[other.surface];
+          if (s.null || s.hidden.has(RayKind::shadow)) add_light_of(other);
         }
       }
     }

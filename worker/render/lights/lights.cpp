@@ -35,9 +35,9 @@ void Lights::add_area(const Scene& scene, std::uint32_t shape, const SurfacePrim
   const auto finish = [&](auto& l) {
     const LightBounds box = l.bounds(world());
     l.reach = std::max(largest(box.low), largest(box.high));
-    // If the light's surface is null (light passes straight through it), other surfaces may coincide with it.
-    // Shadow rays must then end in front of all of these surfaces.
-    if (g.surfaces[shape].null) l.reach = std::max(l.reach, g.surfaces[shape].coincident_reach);
+    // If the light's surface is null or hidden (some light passes straight through it), other surfaces may
+    // coincide with it. Shadow rays must then end in front of all of these surfaces.
+    if (g.surfaces[shape].passable) l.reach = std::max(l.reach, g.surfaces[shape].coincident_reach);
     add(std::move(l));
   };
   auto light = make_area_light(scene.shapes[shape], shape, primitives, world());

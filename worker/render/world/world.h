@@ -52,8 +52,8 @@ class World {
   scene::Needs needs;       // what the scene contains; `need` is derived from this
   bool overlaps = false;    // true if media may be nested or intersect; each path then keeps a MediaState
   MediaState camera_media;  // if `overlaps`: the media state with which camera paths start
-  bool coincident = false;  // true if surfaces coincide and at least one of them is null (coincident.h)
-  // True if a null surface that emits light coincides with another surface
+  bool coincident = false;  // true if surfaces coincide that some rays pass (coincident.h)
+  // True if a null or hidden surface that emits light coincides with another surface
   bool lights_on_others = false;
   Features need;
   bool use_media = true;  // false for the integrators `path` and `whitted`, which ignore media

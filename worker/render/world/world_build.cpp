@@ -281,7 +281,7 @@ Result<std::shared_ptr<World>> make_world(const Scene& given, const RenderSettin
     s.transition = s.transition && w.use_media;
     s.borders = s.transition || s.coincident_reach > 0;
     s.plain = s.light == kNone && !s.null && !s.null_transmission;
-    w.lights_on_others = w.lights_on_others || (s.null && s.light != kNone && s.coincident_reach > 0);
+    w.lights_on_others = w.lights_on_others || (s.passable && s.light != kNone && s.coincident_reach > 0);
   }
   auto accel = Accel::build(w.geometry, threads, w.coincident);
   if (!accel) return tl::unexpected(accel.error());

@@ -90,7 +90,7 @@ WorldReport describe(const World& w) {
   feature(w.need.chromatic, "spectral weights for extinction that differs between channels");
   feature(w.need.emission, "light given off by media");
   feature(w.overlaps, "media within or across each other");
-  feature(w.coincident, "a search for surfaces that lie on null ones");
+  feature(w.coincident, "a search for surfaces that lie on null or hidden ones");
   feature(w.need.split, "AOVs of light");
   feature(w.needs.flagged_shapes > 0, "surfaces hidden from the camera, held out or that catch shadows");
   feature(w.ray_flags, "surfaces and lights hidden from shadow or scattered rays");

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
@@ -63,7 +64,7 @@ class Visibility:
         value = self._value(name)
         if value is None:
             return None
-        if isinstance(value, (bool, int, float)):
+        if isinstance(value, (bool, int, float)) and math.isfinite(value):
             return int(value)
         self._problems.warn(self._prim, f"its primvar {name} has no effect: it is not a number")
         return None

@@ -328,21 +328,30 @@ TEST(FinalExr, AddsTheShadowsOnShadowCatchersToAlphaAndOpacity) {
   EXPECT_EQ(viewed("volume_opacity"), .375f);
 }
 
+// Of a partial that no worker sends. A of the image is a half, which is clamped; the layer is a float.
 TEST(FinalExr, HasAFiniteAlphaForAnySumsOfShadows) {
-  for (const float unshadowed : {0.f, 1e-45f, -1.f}) {
-    Partial p = flat(kFinalGrid, 0, {1, 1, 1});
-    p.aovs = AovSet{}.with(Aov::alpha).with(Aov::shadow_catcher);
-    const auto n = static_cast<std::size_t>(p.header.tile.pixels());
-    for (const std::string& name : planes_of(p.aovs).names)
-      p.sums.insert(p.sums.end(), n, name.ends_with(".U") ? unshadowed : name.ends_with(".L") ? 3e38f : 0.f);
-    Film film(kFinalGrid, p.aovs);
-    ASSERT_TRUE(film.fold(0, 0, p));
+  for (const float through : {0.f, 1.f, 3e38f})
+    for (const float unshadowed : {0.f, 1e-45f, -1e-45f, -1.f}) {
+      Partial p = flat(kFinalGrid, 0, {1, 1, 1});
+      p.aovs = AovSet{}.with(Aov::alpha).with(Aov::shadow_catcher);
+      const auto n = static_cast<std::size_t>(p.header.tile.pixels());
+      for (const std::string& name : planes_of(p.aovs).names)
+        p.sums.insert(p.sums.end(), n,
+                      name.ends_with(".U")                  ? unshadowed
+                      : name.ends_with(".A.L")              ? 3e38f
+                      : name.ends_with(".B.L")              ? -3e38f
+                      : name.ends_with(".T") && through > 0 ? through
+                                                            : 0.f);
+      Film film(kFinalGrid, p.aovs);
+      ASSERT_TRUE(film.fold(0, 0, p));
 
-    const auto image = read_final_exr(final_exr(film, some_provenance(), {})->exr, "no light").value();
+      const auto image = read_final_exr(final_exr(film, some_provenance(), {})->exr, "no light").value();
+      const auto viewed = TileLayers(film, 0, true).values(pixel_layer(film.aovs(), "alpha").value());
 
-    EXPECT_TRUE(std::isfinite(std::get<ExrHalf>(image.channels.at("A")).values[0])) << unshadowed;
-    EXPECT_TRUE(std::isfinite(std::get<ExrFloat>(image.channels.at("stderr.A")).values[0])) << unshadowed;
-  }
+      EXPECT_TRUE(std::isfinite(std::get<ExrHalf>(image.channels.at("A")).values[0])) << unshadowed;
+      EXPECT_TRUE(std::isfinite(std::get<ExrFloat>(image.channels.at("stderr.A")).values[0])) << unshadowed;
+      EXPECT_TRUE(std::isfinite(viewed[0])) << unshadowed;
+    }
 }
 
 struct Decoded {

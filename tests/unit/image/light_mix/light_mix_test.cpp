@@ -125,6 +125,11 @@ TEST(LightMixFactors, AreThoseOfTheImagesGroups) {
   EXPECT_THAT(error("calm.volume=2", whole), HasSubstr("--aov volume_light_groups"));
   EXPECT_EQ(error("calm.volume=2", whole.with(Aov::volume_light_groups)), "");
   EXPECT_THAT(error("", AovSet{}), HasSubstr("the image has no light groups"));
+  // The shadows in alpha are those of the lights that are not mixed.
+  const AovSet caught = whole.with(Aov::shadow_catcher);
+  EXPECT_THAT(error("calm=2", caught.with(Aov::alpha)), HasSubstr("lightshaft again ID --mix"));
+  EXPECT_EQ(error("", caught.with(Aov::alpha)), "");
+  EXPECT_EQ(error("calm=2", caught), "");
 }
 
 }  // namespace

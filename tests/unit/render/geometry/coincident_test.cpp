@@ -4,8 +4,11 @@
 
 #include <cmath>
 #include <string_view>
+#include <utility>
+#include <vector>
 
-#include "tests/support/render_check.h"
+#include "tests/support/significance.h"
+#include "tests/unit/render/integrator/aov_picture.h"
 #include "worker/render/geometry/coincident.h"
 #include "worker/render/world/world.h"
 
@@ -258,6 +261,159 @@ TEST(LightThatLetsLightPass, LightsTheMediumBoundaryThatItCoincidesWith) {
       EXPECT_NEAR(e.mean[1], seen, 5 * e.standard_error[1] + 1e-5);
       EXPECT_LT(e.standard_error[1], .004);
     }
+}
+
+// ---- shapes that are hidden from different rays
+
+using test::Estimate;
+using test::estimate;
+
+enum Rays { kAll, kNotCamera, kCameraAlone, kNotShadow, kNoRays };
+void show_to(Shape& s, Rays rays) {
+  s.visible_camera = rays != kNotCamera && rays != kNoRays;
+  s.visible_shadow = rays != kCameraAlone && rays != kNotShadow && rays != kNoRays;
+  s.visible_reflection = s.visible_volume = rays != kCameraAlone && rays != kNoRays;
+}
+
+// Two walls in the same place, of different brightness, that the sun lights; or one of them alone.
+SceneBuilder walls(const ls::Geometry& g, std::vector<std::pair<double, Rays>> of, bool instanced = false) {
+  SceneBuilder builder({4, 4});
+  const Transform turn = test::rotate_x(17) * test::rotate_y(31);
+  if (instanced) {
+    builder.scene.groups.emplace_back();
+    builder.scene.instances = {{GroupIndex{0}, turn}};
+  }
+  for (const auto& [reflectance, rays] : of) {
+    Shape& s = builder.shape(g, instanced ? Transform{} : turn, builder.diffuse(reflectance));
+    if (instanced) s.group = GroupIndex{0};
+    show_to(s, rays);
+  }
+  builder.scene.emitters.push_back(DirectionalEmitter{{.3, .2, -1}, {3, 3, 3}});
+  builder.look({0, 0, 10}, {0, 0, 0}, 4, {0, 1, 0});
+  return builder;
+}
+
+TEST(CoincidentHidden, ShapesAreFoundOnlyIfDifferentRaysPassThem) {
+  const auto found = [](Rays a, Rays b) {
+    return test::world_of(walls(RectangleShape{}, {{.2, a}, {.8, b}}))->coincident;
+  };
+  EXPECT_FALSE(found(kAll, kAll));
+  EXPECT_FALSE(found(kNotCamera, kNotCamera));
+  EXPECT_TRUE(found(kNotCamera, kAll));
+  EXPECT_TRUE(found(kAll, kNotShadow));
+  EXPECT_TRUE(found(kNotCamera, kCameraAlone));
+}
+
+// In either order of the two. The rounding of the shaded points differs, since rays are moved past both.
+TEST(CoincidentHidden, CameraSeesTheShapeThatIsNotHidden) {
+  for (const bool ball : {false, true})
+    for (const char* integrator : {"volpath", "path", "whitted", "volpath_distant_mis"})
+      for (const bool instanced : {false, true})
+        for (const bool first : {false, true})
+          for (const auto& [hidden, seen] : {std::pair(kNotCamera, kCameraAlone), std::pair(kNoRays, kAll)}) {
+            const std::string where =
+                fmt::format("{}, {}, {}, {}, {}", ball, integrator, instanced, first, seen == kAll);
+            const ls::Geometry g = ball ? ls::Geometry(SphereShape{}) : ls::Geometry(RectangleShape{});
+            SceneBuilder alone = walls(g, {{.8, seen}}, instanced);
+            SceneBuilder both = first ? walls(g, {{.8, seen}, {.2, hidden}}, instanced)
+                                      : walls(g, {{.2, hidden}, {.8, seen}}, instanced);
+            for (SceneBuilder* b : {&alone, &both}) {
+              b->scene.integrator.name = integrator;
+              b->scene.integrator.max_depth = 2;
+            }
+            const Estimate x = estimate(both, 4), y = estimate(alone, 4);
+            EXPECT_NEAR(x.mean[1], y.mean[1], 0x1p-16 * y.mean[1]) << where;
+            EXPECT_GT(y.mean[1], .1) << where;
+          }
+}
+
+TEST(CoincidentHidden, AovsDescribeTheShapeThatIsNotHidden) {
+  for (const bool first : {false, true}) {
+    SceneBuilder both = first ? walls(RectangleShape{}, {{.8, kCameraAlone}, {.2, kNotCamera}})
+                              : walls(RectangleShape{}, {{.2, kNotCamera}, {.8, kCameraAlone}});
+    both.scene.film.transparent = true;
+
+    const Picture p(both, {"alpha", "coverage", "albedo", "shape_id"});
+
+    for (std::size_t i = 0; i < p.pixels(); ++i) {
+      EXPECT_EQ(p.sum("aov.alpha.A.A", i) + p.sum("aov.alpha.B.A", i), kSamples) << first;
+      EXPECT_EQ(p.sum("aov.coverage.A", i), kSamples) << first;
+      EXPECT_EQ(p.ids(0, i).slots[0].id, cryptomatte_id(first ? "shape_0" : "shape_1"));
+    }
+  }
+}
+
+// A floor under the sun, and a mask in the same place as a shape that casts no shadow.
+TEST(CoincidentHidden, ShadowRaysMeetTheShapeThatIsNotHidden) {
+  const auto floor = [](int which) {
+    SceneBuilder builder({4, 4});
+    builder.shape(RectangleShape{}, test::scale(4), builder.diffuse(.5));
+    builder.scene.emitters.push_back(DirectionalEmitter{{.3, .2, -1}, {3, 3, 3}});
+    const BsdfIndex half = builder.bsdf(MaskBsdf{builder.texture({.5, .5, .5}), builder.diffuse(0)});
+    const auto add = [&](BsdfIndex bsdf, bool shadow) {
+      Shape& s = builder.shape(RectangleShape{}, translate({0, 0, 1}) * test::scale(3), bsdf);
+      s.visible_camera = false;
+      s.visible_shadow = shadow;
+    };
+    if (which == 1) add(half, true);
+    if (which != 0) add(builder.diffuse(0), false);
+    if (which != 1) add(half, true);
+    builder.look({0, 0, 9}, {0, 0, 0}, 4, {0, 1, 0});
+    builder.scene.integrator.max_depth = 2;
+    return estimate(builder, 4).mean[1];
+  };
+  const double alone = floor(0);
+  EXPECT_GT(alone, .05);
+  for (const int order : {1, 2}) EXPECT_NEAR(floor(order), alone, 0x1p-16 * alone) << order;
+}
+
+// A lamp that shadow rays pass, in the place of a black plate that they meet: it lights as without the plate.
+TEST(CoincidentHidden, LampInThePlaceOfAnotherShapeGivesItsLight) {
+  const auto floor = [](bool plate, bool first) {
+    SceneBuilder builder({6, 6});
+    builder.shape(RectangleShape{}, test::scale(4), builder.diffuse(.5));
+    const Transform at = translate({0, 0, 1}) * test::rotate_x(180);
+    const auto add_plate = [&] {
+      builder.shape(RectangleShape{}, at, builder.diffuse(0)).visible_camera = false;
+    };
+    if (plate && first) add_plate();
+    Shape& lamp = builder.lamp(RectangleShape{}, at, {5, 4, 3});
+    lamp.visible_camera = lamp.visible_shadow = false;
+    if (plate && !first) add_plate();
+    builder.look({0, 0, 9}, {0, 0, 0}, 20, {0, 1, 0});
+    builder.scene.integrator.max_depth = 2;
+    return builder;
+  };
+  const Estimate alone = estimate(floor(false, false), 256, 1);
+  for (const bool first : {false, true}) {
+    const Estimate both = estimate(floor(true, first), 256, 2);
+    EXPECT_NEAR(both.mean[1], alone.mean[1],
+                test::kStandardErrors * std::hypot(both.standard_error[1], alone.standard_error[1]))
+        << first;
+  }
+}
+
+// The camera passes both walls of a hidden box and is in the medium of the one that has some.
+TEST(CoincidentHidden, MediumInOneOfTwoHiddenBodiesIsSeen) {
+  for (const auto& [first, alike] :
+       {std::pair(false, false), std::pair(false, true), std::pair(true, false), std::pair(true, true)}) {
+    SceneBuilder builder({1, 1});
+    const auto box = [&](bool fog) {
+      Shape& s = fog ? builder.container(CubeShape{}, {}, builder.diffuse(.5),
+                                         builder.homogeneous({.5, .5, .5}, {0, 0, 0}))
+                     : builder.shape(CubeShape{}, {}, builder.diffuse(.5));
+      s.visible_camera = false;
+      if (!fog) s.visible_shadow = alike;
+    };
+    box(first);
+    box(!first);
+    builder.scene.film.transparent = true;
+    builder.look({0, 0, 5}, {0, 0, 0}, 1e-3, {0, 1, 0});
+
+    const Picture p(builder, {"alpha"});
+
+    EXPECT_NEAR(p.of_all("aov.alpha.A.A") + p.of_all("aov.alpha.B.A"), 1 - std::exp(-1.), kClose) << first;
+  }
 }
 
 }  // namespace
