@@ -23,6 +23,7 @@
 #include "core/base/safe_text.h"
 #include "core/image/film/film.h"
 #include "core/image/frame/rounds.h"
+#include "core/job/limits.h"
 #include "core/job/sealed_image.h"
 #include "core/scene/analysis/prune.h"
 #include "core/scene/json/serialize.h"
@@ -59,21 +60,25 @@ Result<DeepFile> open_deep(const std::string& image, const SealedImage& sealed) 
   DeepFile deep{deep_file(image).string(), {}, {}};
   const auto bytes = coordinator::read_file(deep.path, std::uint64_t{1} << 36);
   if (!bytes) return tl::unexpected(bytes.error());
-  auto picture = read_deep_exr(*bytes, deep.path);
+  const auto check = [&](const DeepPicture& header) -> Result<void> {
+    if (header.rows.size != sealed.picture.size)
+      return bad_argument(fmt::format("{}: it has another size than {}", deep.path, image));
+    for (const char* name : {"lightshaft:scene", "lightshaft:job", "lightshaft:class", "lightshaft:tiles"}) {
+      const auto ours = sealed.picture.strings.find(name);
+      const auto theirs = header.strings.find(name);
+      if (ours == sealed.picture.strings.end() || theirs == header.strings.end() ||
+          ours->second != theirs->second)
+        return bad_argument(
+            fmt::format("{}: its header \"{}\" is not that of {}: it is the deep image of other "
+                        "samples",
+                        deep.path, name, image));
+    }
+    return {};
+  };
+  auto picture = read_deep_exr(*bytes, deep.path,
+                               {static_cast<std::uint32_t>(sealed.settings.deep), kMaxFilmBytes, check});
   if (!picture) return tl::unexpected(picture.error());
   deep.picture = std::move(*picture);
-  if (deep.picture.rows.size != sealed.picture.size)
-    return bad_argument(fmt::format("{}: it has another size than {}", deep.path, image));
-  for (const char* name : {"lightshaft:scene", "lightshaft:job", "lightshaft:class", "lightshaft:tiles"}) {
-    const auto ours = sealed.picture.strings.find(name);
-    const auto theirs = deep.picture.strings.find(name);
-    if (ours == sealed.picture.strings.end() || theirs == deep.picture.strings.end() ||
-        ours->second != theirs->second)
-      return bad_argument(
-          fmt::format("{}: its header \"{}\" is not that of {}: it is the deep image of other "
-                      "samples",
-                      deep.path, name, image));
-  }
   std::size_t first = 0;
   for (const std::uint32_t count : deep.picture.rows.counts) {
     deep.first.push_back(first);

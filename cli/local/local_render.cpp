@@ -215,7 +215,7 @@ class LocalRender {
       if (!image) return tl::unexpected(image.error());
       saved = save_result(options_.out, *image);
       if (saved && options_.spec.deep > 0) {
-        const auto deep = coordinator.deep_exr(job_);
+        const auto deep = coordinator.deep_exr(job_, /*while_rendering=*/true);
         if (!deep) return tl::unexpected(deep.error());
         saved = save_result(deep_file(options_.out), *deep);
       }

@@ -67,6 +67,7 @@ Result<std::shared_ptr<const DisplayViews>> views_for(const std::string& view, c
 
 fs::path deep_file(const fs::path& image) {
   fs::path deep = image;
+  if (image_format(image) == ImageFormat::png) return deep += ".deep.exr";
   return deep.replace_extension(".deep.exr");
 }
 

@@ -274,8 +274,8 @@ Result<std::vector<std::byte>> Coordinator::image_exr(const JobId& id,
   return parts_->pictures.image_exr(id, mix);
 }
 
-Result<std::vector<std::byte>> Coordinator::deep_exr(const JobId& id) const {
-  return parts_->pictures.deep_exr(id);
+Result<std::vector<std::byte>> Coordinator::deep_exr(const JobId& id, bool while_rendering) const {
+  return parts_->pictures.deep_exr(id, while_rendering);
 }
 
 Result<std::string> Coordinator::mix_json(const JobId& id, const LightMix& mix) const {

@@ -105,7 +105,7 @@ class Coordinator {
   // light groups.
   Result<std::vector<std::byte>> image_exr(const JobId& id, const std::optional<LightMix>& mix = {}) const;
   // The deep image, final or current, of a job with JobSpec::deep.
-  Result<std::vector<std::byte>> deep_exr(const JobId& id) const;
+  Result<std::vector<std::byte>> deep_exr(const JobId& id, bool while_rendering = false) const;
   // Returns the error of a mix of light groups as JSON.
   Result<std::string> mix_json(const JobId& id, const LightMix& mix) const;
   // The image as an 8-bit PNG, also while the job renders. One image is denoised at a time, which takes

@@ -88,7 +88,7 @@ Result<std::vector<std::byte>> Pictures::image_exr(const JobId& id,
   return std::move(image->exr);
 }
 
-Result<std::vector<std::byte>> Pictures::deep_exr(const JobId& id) const {
+Result<std::vector<std::byte>> Pictures::deep_exr(const JobId& id, bool while_rendering) const {
   if (const auto file = final_file(id, "deep.exr"); !file.empty())
     if (auto bytes = read_file(file, std::uint64_t{1} << 36)) return bytes;
   {
@@ -98,7 +98,13 @@ Result<std::vector<std::byte>> Pictures::deep_exr(const JobId& id) const {
     if ((*entry)->stored.settings.deep == 0)
       return fail(Errc::failed_precondition,
                   fmt::format("job {} was submitted without \"deep\": it has no deep image", id.value));
+    if (!while_rendering && !is_terminal((*entry)->stored.state))
+      return fail(Errc::failed_precondition,
+                  fmt::format("job {} has not ended: the deep image is there when it has", id.value));
   }
+  const std::unique_lock one(deep_mutex_, std::try_to_lock);
+  if (!one)
+    return fail(Errc::unavailable, "another deep image is being written, which takes memory: ask again soon");
   const auto shown = picture(id);
   if (!shown) return tl::unexpected(shown.error());
   return deep_exr_of(shown->film, provenance_of(shown->facts, blobs_), form_of(shown->facts.job.spec));

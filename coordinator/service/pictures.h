@@ -36,7 +36,9 @@ class Pictures {
 
   // `mix`: the image with other factors of its light groups, instead of the image itself.
   Result<std::vector<std::byte>> image_exr(const JobId& id, const std::optional<LightMix>& mix) const;
-  Result<std::vector<std::byte>> deep_exr(const JobId& id) const;
+  // Writing a large deep image takes minutes and gigabytes, so of jobs that go on there is one only if
+  // `while_rendering`; and one is written at a time.
+  Result<std::vector<std::byte>> deep_exr(const JobId& id, bool while_rendering) const;
   Result<std::vector<std::byte>> image_png(const JobId& id, const Look& look,
                                            const std::optional<LightMix>& mix) const;
   Result<std::string> mix_json(const JobId& id, const LightMix& mix) const;  // the error of a mix
@@ -98,6 +100,7 @@ class Pictures {
   const DisplayViews* const views_;  // null: only sRGB
   const Clock& clock_;
   mutable StoredImages stored_images_;
+  mutable std::mutex deep_mutex_;      // held while a deep image is written
   mutable std::mutex denoised_mutex_;  // held while an image is denoised
   mutable DenoisedView denoised_;
 };

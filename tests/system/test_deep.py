@@ -72,7 +72,11 @@ def flat(image):
 
 def sealed(path):
     """Digests of all samples, by channel."""
-    header, _ = read_header(path.read_bytes())
+    return sealed_in(path.read_bytes())
+
+
+def sealed_in(data):
+    header, _ = read_header(data)
     return sorted(line for line in header["lightshaft:seal"][1].decode().splitlines() if " layer " in line)
 
 
@@ -157,6 +161,27 @@ def test_mutual_holdouts_merge_to_the_picture_of_both(tmp_path):
     assert np.quantile(wrong, .9) <= 1e-5 and wrong.max() <= .26
 
 
+def test_nothing_shines_through_a_surface_that_is_merged_between_two_others(tmp_path):
+    """The rims of a black rectangle, with a floor that shines far behind it, and a black plane between them."""
+    def plane(z, scale, angle=0, radiance="0"):
+        place = f'<scale value="{scale}"/><rotate z="1" angle="{angle}"/><translate z="{z}"/>'
+        return f'''<shape type="rectangle"><transform name="to_world">{place}</transform>
+            <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>
+            <emitter type="area"><rgb name="radiance" value="{radiance}"/></emitter></shape>'''
+
+    for name, shapes in {"far": plane(-4, 9, radiance="9") + plane(2, .6, 20), "between": plane(0, 9)}.items():
+        render(write(tmp_path, name, shapes, transparent="true"), tmp_path / f"{name}.exr", "--deep", 8, "--float", spp=64)
+    merged = tmp_path / "merged.exr"
+    oiiotool(deep(tmp_path / "far.exr"), deep(tmp_path / "between.exr"), "--deepmerge", "-o", merged)
+
+    together = flat(merged)
+
+    # Alphas of float32 add up to 1 but for a few roundings. Where 16 probes all meet the rectangle, the floor beside it is at the
+    # rectangle's depth: less than two probes' share of it.
+    assert together["A"].min() >= 1 - 1e-6 and layers(tmp_path / "far.exr")["R"].max() > 8
+    assert all(together[c].max() <= 9 * 2 / 16 for c in "RGB")
+
+
 @pytest.fixture(scope="module")
 def image(tmp_path_factory):
     folder = tmp_path_factory.mktemp("image")
@@ -203,6 +228,27 @@ def test_a_farm_that_is_killed_and_a_job_that_is_extended_give_the_same_deep_ima
     assert farm.job(job)["deep"] == SLICES and farm.job(other)["deep"] == 0
     with pytest.raises(HttpError, match="409"):
         farm.request("GET", f"/api/v1/jobs/{other}/deep.exr")
+
+
+def test_a_job_has_no_deep_image_before_it_ends(farm, image):
+    scene, _ = image
+    job = lightshaft("submit", scene, "--spp", 2, "--deep", SLICES, env=environment(farm)).stdout.split()[0]
+    with pytest.raises(HttpError, match="has not ended"):
+        farm.request("GET", f"/api/v1/jobs/{job}/deep.exr")
+    farm.add_worker(fake=False)
+    farm.wait_for_job(job)
+    assert sealed_in(farm.request("GET", f"/api/v1/jobs/{job}/deep.exr"))
+
+
+def test_a_png_does_not_replace_the_deep_image_of_an_exr_of_the_same_name(tmp_path):
+    scene = write(tmp_path, "balls", balls())
+    render(scene, tmp_path / "a.exr", "--deep", SLICES)
+    before = deep(tmp_path / "a.exr").read_bytes()
+
+    render(scene, tmp_path / "a.png", "--deep", SLICES, "--seed", 9)
+
+    assert deep(tmp_path / "a.exr").read_bytes() == before
+    assert sealed(tmp_path / "a.png.deep.exr")
 
 
 def test_verify_tells_a_deep_image_that_was_changed_or_is_of_other_samples(image, tmp_path):

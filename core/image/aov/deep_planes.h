@@ -6,9 +6,9 @@
 // front of it, the last one what lies behind it. The planes of a partial and of the film have for each record
 //   B, G, R  the light that was first scattered, emitted or reflected in the slice, seen from the camera;
 //   E        its edge, in the scene's units, counted as the AOV depth. Every unit states the same edge for a
-//            pixel, so the mean over rounds is this edge. It is negative (its magnitude counts) if the slice
-//            has a surface and nothing else. The record of what is infinitely far has the end of the last
-//            slice as its edge;
+//            pixel, so the mean over rounds is this edge. It is negative if the slice has surfaces and
+//            nothing else; its magnitude is then the depth of the surfaces, wherever the slice begins. The
+//            record of what is infinitely far has the end of the last slice as its edge;
 //   T        the transmittance of the camera ray up to the end of the slice, mean of the three channels; of
 //            the last record 1 - alpha, in which an environment that the camera sees is opaque.
 #pragma once

@@ -34,8 +34,7 @@ class SamplesBuilder {
     const float alpha = alpha_towards(through, left_, more_behind);
     if (is_black(light) && alpha < kNoAlpha) return;
     if (!samples_.empty() && !fits(light, left_)) return join(z_back, light, through, more_behind);
-    const double middle = z + (z_back - z) / 2;
-    DeepSample sample{as_float(surface ? middle : z), as_float(surface ? middle : z_back), alpha, {}};
+    DeepSample sample{as_float(z), as_float(surface ? z : z_back), alpha, {}};
     if (!samples_.empty()) sample.z = std::max(sample.z, samples_.back().z_back);
     sample.z_back = std::max(sample.z, sample.z_back);
     // The least thickness. Where OpenImageIO 2.4 cuts fog at the depth of a surface, it puts a surface

@@ -20,6 +20,7 @@
 
 #include "core/base/error.h"
 #include "core/base/light/colour_space.h"
+#include "core/image/aov/deep_planes.h"
 #include "core/image/exr/deep_samples.h"
 #include "core/image/frame/camera_matrices.h"
 #include "core/image/frame/frame.h"
@@ -166,13 +167,20 @@ struct DeepBands {
 // ZIPS. Its seal has each channel as a layer of the values of all samples, and the layer "samples" with the
 // numbers of samples.
 Result<void> write_sealed_deep_exr(const DeepBands& bands, ByteSink& sink);
-// Reads such a file from untrusted bytes, in one band. `changed` is as in FinalPicture.
 struct DeepPicture {
   DeepRows rows;
   std::map<std::string, std::string> strings;
   bool colours = true, floats = false;
   std::optional<std::vector<std::string>> changed;
 };
-Result<DeepPicture> read_deep_exr(std::span<const std::byte> bytes, const std::string& name);
+// What a reader of a deep image expects of it: a small file can claim very many samples.
+struct DeepExpected {
+  std::uint32_t slices = kMostDeepSlices;                 // a pixel has at most one sample more than slices
+  std::uint64_t max_bytes = std::uint64_t{8} << 30;       // of all samples, in memory
+  std::function<Result<void>(const DeepPicture&)> check;  // called with the size and headers, before pixels
+};
+// Reads such a file from untrusted bytes, in one band. `changed` is as in FinalPicture.
+Result<DeepPicture> read_deep_exr(std::span<const std::byte> bytes, const std::string& name,
+                                  const DeepExpected& expected = {});
 
 }  // namespace ls

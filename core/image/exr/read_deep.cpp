@@ -24,6 +24,8 @@ namespace {
 
 // Rows that are read at a time: a small file that claims a large size then costs little memory.
 constexpr int kDeepBand = 16;
+// No compression packs more bytes into one (headers.cpp).
+constexpr std::uint64_t kMostDeepPacking = 4096;
 
 tl::unexpected<Error> refuse_deep(const std::string& name, std::string_view what) {
   return bad_argument(fmt::format("{}: {}", name, what));
@@ -52,8 +54,16 @@ Result<void> check_deep_header(const Imf::Header& header, const std::string& nam
   return {};
 }
 
+// The least number of bytes that a sample has before it is packed.
+std::uint64_t packed_sample(const DeepPicture& picture) {
+  const std::uint64_t value = picture.floats ? 4 : 2;
+  return 2 * sizeof(float) + value * (picture.colours ? 4 : 1);
+}
+
+// Reads the rows from y0 up to y1. Nothing is allocated for samples that `expected` or the length of the file
+// rules out.
 Result<void> read_deep_band(Imf::DeepScanLineInputFile& file, int y0, int y1, const std::string& name,
-                            DeepPicture& picture) {
+                            std::uint64_t file_bytes, const DeepExpected& expected, DeepPicture& picture) {
   const auto width = static_cast<std::size_t>(picture.rows.size.width);
   const std::size_t pixels = static_cast<std::size_t>(y1 - y0) * width;
   std::vector<std::uint32_t> counts(pixels);
@@ -85,9 +95,17 @@ Result<void> read_deep_band(Imf::DeepScanLineInputFile& file, int y0, int y1, co
   file.readPixelSampleCounts(y0, y1 - 1);
   std::size_t total = 0;
   for (const std::uint32_t count : counts) {
-    if (count > kMostDeepSlices + 1) return refuse_deep(name, fmt::format("a pixel has {} samples", count));
+    if (count > expected.slices + 1)
+      return refuse_deep(
+          name, fmt::format("a pixel has {} samples, and there can be {}", count, expected.slices + 1));
     total += count;
   }
+  const std::uint64_t all = picture.rows.samples.size() + total;
+  if (all * packed_sample(picture) > kMostDeepPacking * file_bytes)
+    return refuse_deep(name, fmt::format("its {} bytes cannot hold {} samples", file_bytes, all));
+  if (all * sizeof(DeepSample) > expected.max_bytes)
+    return fail(Errc::resource_exhausted,
+                fmt::format("{}: its samples need more than {} bytes", name, expected.max_bytes));
   std::vector<DeepSample> samples(total);
   for (Column& column : columns) {
     char* at = reinterpret_cast<char*>(samples.data()) + column.offset;
@@ -102,7 +120,8 @@ Result<void> read_deep_band(Imf::DeepScanLineInputFile& file, int y0, int y1, co
 
 }  // namespace
 
-Result<DeepPicture> read_deep_exr(std::span<const std::byte> bytes, const std::string& name) {
+Result<DeepPicture> read_deep_exr(std::span<const std::byte> bytes, const std::string& name,
+                                  const DeepExpected& expected) {
   const ExrLimits limits{.max_bytes = std::uint64_t{1} << 36,
                          .max_pixels = static_cast<std::uint64_t>(kMaxFramePixels),
                          .max_side = kMaxFrameSide};
@@ -121,9 +140,11 @@ Result<DeepPicture> read_deep_exr(std::span<const std::byte> bytes, const std::s
         for (auto at = header.begin(); at != header.end(); ++at)
           if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&at.attribute()))
             picture.strings.emplace(at.name(), text->value());
+        if (expected.check)
+          if (const auto ok = expected.check(picture); !ok) return tl::unexpected(ok.error());
         for (int y0 = 0; y0 < picture.rows.size.height; y0 += kDeepBand)
-          if (auto ok =
-                  read_deep_band(file, y0, std::min(y0 + kDeepBand, picture.rows.size.height), name, picture);
+          if (auto ok = read_deep_band(file, y0, std::min(y0 + kDeepBand, picture.rows.size.height), name,
+                                       bytes.size(), expected, picture);
               !ok)
             return tl::unexpected(ok.error());
         exr::Seal seal;

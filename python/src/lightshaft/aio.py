@@ -166,7 +166,7 @@ class AsyncJob(JobState):
         await self._transport.run(jobs_of.save(self.id, path, mix))
 
     async def save_deep(self, path: str | os.PathLike[str]) -> None:
-        """Writes the deep image of a job with `deep` as OpenEXR."""
+        """Writes the deep image of a job with `deep` that has ended as OpenEXR."""
         await self._transport.run(jobs_of.save_deep(self.id, path))
 
     async def mix(self, factors: Mix) -> models.MixError:

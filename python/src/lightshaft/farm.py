@@ -166,7 +166,7 @@ class Job(JobState):
         self._transport.run(jobs_of.save(self.id, path, mix))
 
     def save_deep(self, path: str | os.PathLike[str]) -> None:
-        """Writes the deep image of a job with `deep` as OpenEXR."""
+        """Writes the deep image of a job with `deep` that has ended as OpenEXR."""
         self._transport.run(jobs_of.save_deep(self.id, path))
 
     def mix(self, factors: Mix) -> models.MixError:

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "worker/render/integrator/deep_edges.h"
 #include "worker/render/integrator/variant.h"
 #include "worker/render/math/math.h"
 
@@ -76,10 +75,9 @@ AovPixel::AovPixel(const World& world)
 
 void AovPixel::begin_pixel(int x, int y) {
   if (slices_.records() > 0) {
-    edges_ = deep_edges(world_, x + world_.origin_x, y + world_.origin_y);
-    between_.clear();
-    for (std::size_t k = 1; k + 1 < edges_.size(); ++k) between_.push_back(std::abs(edges_[k]));
-    split_.by_depth.edges = between_;
+    const int fx = x + world_.origin_x, fy = y + world_.origin_y;
+    edges_ = world_.deep_edges.get(fx, fy, [&] { return deep_edges(world_, fx, fy); });
+    split_.by_depth.edges = edges_.between;
     slice_light_.assign(slices_.records(), Sums{});
     slice_through_.assign(slices_.records(), 0);
   }
@@ -169,7 +167,7 @@ void AovPixel::add_guide(const CameraRay& ray, const SampleStream& stream, std::
 void AovPixel::add_opacity(const CameraRay& ray, const SampleStream& stream, std::size_t half) {
   constexpr Features kFeatures = kEveryScene.with(&Features::visibility);
   const bool deep = slices_.records() > 0;
-  const DeepTransmittance slices{between_, through_};
+  const DeepTransmittance slices{edges_.between, edges_.surfaces, through_};
   if (deep) std::ranges::fill(through_, 0.0);
   const Opacity opacity = PathTracer<kFeatures>(world_, stream).opacity(ray, deep ? &slices : nullptr);
   const bool finite = is_finite(opacity.all) && is_finite(opacity.media);
@@ -190,9 +188,10 @@ void AovPixel::add_opacity(const CameraRay& ray, const SampleStream& stream, std
 void AovPixel::add_slices() {
   for (const LightByDepth::Event& event : split_.by_depth.events) {
     if (!is_finite(event.light)) continue;
-    const auto at = std::ranges::upper_bound(between_, event.depth);
-    const std::size_t slice =
-        std::isinf(event.depth) ? slices_.records() - 1 : static_cast<std::size_t>(at - between_.begin());
+    const float depth = event.surface ? depth_in(edges_.surfaces, event.depth) : event.depth;
+    const auto at = std::ranges::upper_bound(edges_.between, depth);
+    const std::size_t slice = std::isinf(event.depth) ? slices_.records() - 1
+                                                      : static_cast<std::size_t>(at - edges_.between.begin());
     for (std::size_t c = 0; c < 3; ++c) slice_light_[slice][c] += double{event.light[static_cast<int>(c)]};
   }
 }
@@ -216,7 +215,7 @@ void AovPixel::store(float* planes, std::size_t pixels, std::size_t i) const {
   }
   float* deep = planes + planes_.sums.size() * pixels + i;
   for (std::size_t k = 0; k < slices_.records(); ++k) {
-    deep[slices_.edge(k) * pixels] = rounded(edges_[k] / world_.geometry.scale);
+    deep[slices_.edge(k) * pixels] = rounded(edges_.stated[k] / world_.geometry.scale);
     deep[slices_.transmittance(k) * pixels] = rounded(slice_through_[k]);
     if (!world_.aovs.deep().colours) continue;
     for (std::size_t c = 0; c < 3; ++c) deep[slices_.light(k, c) * pixels] = rounded(slice_light_[k][c]);

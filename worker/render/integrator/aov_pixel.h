@@ -8,6 +8,7 @@
 
 #include "core/image/aov/deep_planes.h"
 #include "core/image/aov/identifiers.h"
+#include "worker/render/integrator/deep_edges.h"
 #include "worker/render/integrator/path_tracer.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/world/world.h"
@@ -48,10 +49,10 @@ class AovPixel {
   // Sums of light_groups [0] and volume_light_groups [1], by half and group
   std::array<std::array<std::vector<Sums>, 2>, 2> group_sums_;
   double hits_ = 0;
-  // With a deep image: the edges of the pixel's slices, the depths between its slices, and by record
-  // (DeepPlanes) the sums of light and transmittance. `through_` is that of the current sample.
+  // With a deep image: the edges of the pixel's slices, and by record (DeepPlanes) the sums of light and
+  // transmittance. `through_` is that of the current sample.
   DeepPlanes slices_;
-  std::vector<float> edges_, between_;
+  DeepEdges edges_;
   std::vector<Sums> slice_light_;
   std::vector<double> slice_through_, through_;
   std::vector<IdSlot> shapes_, materials_;

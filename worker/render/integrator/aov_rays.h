@@ -118,11 +118,18 @@ Opacity PathTracer<F, Light>::opacity(const CameraRay& ray, const DeepTransmitta
     const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
     if (met && world_.coincident)
       prefer_scatterer<true>(hit, ray_.origin, ray_.d, kInfinity, RayKind::camera);
+    // The depth at which the hit counts
+    float at = kInfinity;
+    if (deep && met) [[unlikely]] {
+      const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+      const bool seen = !surface.null && !surface.hidden.has(RayKind::camera);
+      at = seen ? depth_in(deep->surfaces, depth_of(hit.p)) : depth_of(hit.p);
+    }
     if (medium_.any()) {
       const float t = met ? ray_.length_to(hit) : reach;
       RandomStream tracker = stream_.stream(segment_, Purpose::track_opacity);
       if (deep) [[unlikely]] {
-        const float begin = depth_of(ray_.start), end = met ? depth_of(hit.p) : begin + reach;
+        const float begin = depth_of(ray_.start), end = met ? at : begin + reach;
         std::array<float, kMostDeepSlices> points;
         std::array<C3, kMostDeepSlices> through, all;
         std::size_t count = 0;
@@ -144,7 +151,7 @@ Opacity PathTracer<F, Light>::opacity(const CameraRay& ray, const DeepTransmitta
       }
     }
     if (deep) [[unlikely]]
-      pass_edges(met ? depth_of(hit.p) : kInfinity, [&](float) { return media * surfaces; });
+      pass_edges(at, [&](float) { return media * surfaces; });
     if (!met && deep) [[unlikely]]
       deep->through.back() = mean_of(media * surfaces);
     if (!met && world_.lights.has_sky() && !world_.hide_environment) surfaces = C3(0);
@@ -255,6 +262,10 @@ DeepProbe PathTracer<F, Light>::deep_probe(const CameraRay& ray) {
       probe.surface = depth_of(hit.p);
       return probe;
     }
+    const bool others_shine = world_.lights_on_others && surface.coincident_reach > 0;
+    const bool shines = surface.light != kNone && !is_black(world_.lights.emitted(hit, -ray_.d));
+    if ((shines || others_shine) && !world_.hide_emitters && !surface.hidden.has(RayKind::camera))
+      probe.lamps.push_back(depth_of(hit.p));
     probe.reaches = std::max(0.f, mean(beta_));
     pass_boundary(hit, surface);
   }

@@ -1,9 +1,9 @@
 // Slices are placed by probes: camera rays through fixed points of the pixel, its filter and the lens. Where
-// probes meet surfaces there is a slice of their own for each range of depths without large gaps. The other
-// slices divide the media before, between and behind them, so that each takes about the same share of the
-// light: equal parts of what is scattered on the way to the camera, not of optical depth, of which most can
-// lie where nothing is seen. So no slice is seen through less than about one over the number of slices, and
-// colours divided by that stay small and free of noise.
+// probes meet surfaces, also such that only shine, there is a slice of their own for each range of depths
+// without large gaps. The other slices divide the media before, between and behind them, so that each takes
+// about the same share of the light: equal parts of what is scattered on the way to the camera, not of
+// optical depth, of which most can lie where nothing is seen. So no slice is seen through less than about one
+// over the number of slices, and colours divided by that stay small and free of noise.
 #include "worker/render/integrator/deep_edges.h"
 
 #include <algorithm>
@@ -97,9 +97,19 @@ struct Prepared {
   }
 };
 
-// Where media are on the probes' ways.
-Range prepare(std::span<const DeepProbe> probes, std::vector<Prepared>& out) {
-  Range media;
+// Where media are on the probes' ways: all of them, and each.
+struct MediaRanges {
+  Range all;
+  std::vector<Range> each;
+  bool any() const { return all.any(); }
+  // True if a medium lies between these depths.
+  bool between(float from, float to) const {
+    return from < to &&
+           std::ranges::any_of(each, [&](const Range& r) { return r.begin < to && r.end > from; });
+  }
+};
+MediaRanges prepare(std::span<const DeepProbe> probes, std::vector<Prepared>& out) {
+  MediaRanges media;
   for (const DeepProbe& probe : probes) {
     Prepared& prepared = out.emplace_back();
     prepared.of = probe.segments;
@@ -112,7 +122,10 @@ Range prepare(std::span<const DeepProbe> probes, std::vector<Prepared>& out) {
         float to = c.depth.to();
         if (!std::isfinite(to))
           to = c.depth.from() + (c.sigma > 0 ? kDeepest / c.sigma : std::max(1.f, s.begin));
-        if (std::isfinite(to)) media.add(s.begin + c.depth.from(), s.begin + to);
+        if (std::isfinite(to)) {
+          media.all.add(s.begin + c.depth.from(), s.begin + to);
+          media.each.push_back({s.begin + c.depth.from(), s.begin + to});
+        }
         crossings.push_back(std::move(c));
       }
     }
@@ -120,14 +133,26 @@ Range prepare(std::span<const DeepProbe> probes, std::vector<Prepared>& out) {
   return media;
 }
 
-// Returns the ranges of the depths at which probes end on surfaces, at most `most` of them, separated where
-// the gaps are largest.
-std::vector<Range> surfaces_of(std::span<const DeepProbe> probes, std::size_t most) {
+// Returns the depths, sorted, of the surfaces that probes end on, and of those that shine on their ways.
+std::vector<float> depths_of(std::span<const DeepProbe> probes) {
   std::vector<float> depths;
-  for (const DeepProbe& probe : probes)
+  for (const DeepProbe& probe : probes) {
     if (std::isfinite(probe.surface)) depths.push_back(probe.surface);
-  if (depths.empty() || most == 0) return {};
+    for (const float depth : probe.lamps)
+      if (std::isfinite(depth)) depths.push_back(depth);
+  }
   std::ranges::sort(depths);
+  return depths;
+}
+
+// Depths of surfaces that share a slice, with its margins.
+struct Surfaces {
+  Range range;
+  float middle;  // where the image has them
+};
+// Returns at most `most` ranges of these depths, separated where the gaps are largest.
+std::vector<Surfaces> surfaces_of(std::span<const float> depths, std::size_t most) {
+  if (depths.empty() || most == 0) return {};
   std::vector<std::pair<float, std::size_t>> gaps;  // the share of a gap, negative, and the depth behind it
   for (std::size_t i = 1; i < depths.size(); ++i)
     if (const float gap = (depths[i] - depths[i - 1]) / depths[i]; gap > kGap) gaps.push_back({-gap, i});
@@ -136,15 +161,16 @@ std::vector<Range> surfaces_of(std::span<const DeepProbe> probes, std::size_t mo
   std::vector<std::size_t> begins{0};
   for (const auto& gap : gaps) begins.push_back(gap.second);
   std::ranges::sort(begins);
-  std::vector<Range> ranges;
+  std::vector<Surfaces> ranges;
   for (std::size_t k = 0; k < begins.size(); ++k) {
     const float first = depths[begins[k]],
                 last = depths[(k + 1 < begins.size() ? begins[k + 1] : depths.size()) - 1];
     const float margin = std::max(kDeepMargin * (last - first), kDeepRounding * last);
     // A range keeps at least half of the gap in front of it free.
     const float before = k > 0 ? depths[begins[k] - 1] : 0;
-    ranges.push_back({std::max(first - margin, before + (first - before) / 2), last + margin});
-    if (k > 0) ranges[k - 1].end = std::min(ranges[k - 1].end, ranges[k].begin);
+    const Range range{std::max(first - margin, before + (first - before) / 2), last + margin};
+    if (k > 0) ranges[k - 1].range.end = std::min(ranges[k - 1].range.end, range.begin);
+    ranges.push_back({range, first + (last - first) / 2});
   }
   return ranges;
 }
@@ -178,59 +204,73 @@ std::vector<float> divisions(std::span<const Prepared> probes, const Range& medi
 
 }  // namespace
 
-std::vector<float> deep_edges(const World& w, int x, int y) {
+DeepEdges deep_edges(const World& w, int x, int y) {
   const std::size_t slices = w.aovs.deep().count;
   std::vector<DeepProbe> probes;
   std::vector<Prepared> prepared;
-  Range media;
-  bool met = false;
+  MediaRanges media;
+  std::vector<float> depths;
   for (const std::uint32_t count : {kProbes, kMoreProbes}) {
     probes = probes_of(w, x, y, count);
     prepared.clear();
     media = prepare(probes, prepared);
-    met = media.any() || std::ranges::any_of(probes, [](const auto& p) { return std::isfinite(p.surface); });
-    if (met) break;
+    depths = depths_of(probes);
+    if (media.any() || !depths.empty()) break;
   }
-  if (!met) return std::vector<float>(slices + 1, static_cast<float>(kDeepFar * w.geometry.scale));
+  if (!media.any() && depths.empty()) {
+    const auto far = static_cast<float>(kDeepFar * w.geometry.scale);
+    return {std::vector<float>(slices + 1, far), std::vector<float>(slices - 1, far), {}};
+  }
 
   struct Edge {
-    float depth;
+    float depth;   // where the slice begins
+    float stated;  // what the image says
     bool surface;  // true if the slice that begins here has surfaces only
   };
   std::vector<Edge> edges;
+  const auto add_edge = [&](float depth) { edges.push_back({depth, depth, false}); };
   for (std::size_t most = std::max<std::size_t>(1, slices / 2);; --most) {
-    const std::vector<Range> surfaces = surfaces_of(probes, most);
+    const std::vector<Surfaces> surfaces = surfaces_of(depths, most);
     edges.clear();
-    if (media.any() && (surfaces.empty() || media.begin < surfaces[0].begin))
-      edges.push_back({media.begin, false});
-    for (const Range& surface : surfaces) {
-      if (!edges.empty() && edges.back().depth == surface.begin)
-        edges.back().surface = true;
-      else
-        edges.push_back({surface.begin, true});
-      edges.push_back({surface.end, false});
+    float end = 0;  // of the last surfaces
+    for (const auto& [range, middle] : surfaces) {
+      const bool first = edges.empty();
+      if (first ? media.any() && media.all.begin < range.begin : media.between(end, range.begin)) {
+        add_edge(first ? media.all.begin : end);
+        edges.push_back({range.begin, middle, true});
+      } else {
+        // Without a medium between them the slices of surfaces meet halfway. A slice with thickness there
+        // would turn surfaces that no probe met into fog.
+        edges.push_back({first ? range.begin : end + (range.begin - end) / 2, middle, true});
+      }
+      end = range.end;
     }
-    if (media.any() && media.end > edges.back().depth) edges.push_back({media.end, false});
+    if (surfaces.empty()) {  // all that there is, as fog
+      Range all = media.all;
+      if (!depths.empty()) all.add(depths.front(), depths.back());
+      add_edge(all.begin);
+      add_edge(all.end);
+    } else {
+      add_edge(end);
+      if (media.any() && media.all.end > end) add_edge(media.all.end);
+    }
     if (edges.size() <= slices + 1) break;
-    if (most > 0) continue;
-    // One slice of everything
-    Range all = media;
-    for (const DeepProbe& probe : probes)
-      if (std::isfinite(probe.surface)) all.add(probe.surface, probe.surface);
-    edges = {{all.begin, false}, {all.end, false}};
-    break;
   }
-  if (edges.size() == 1) edges.push_back(edges.back());
   if (edges.size() <= slices && media.any()) {
-    for (const float depth : divisions(prepared, media, slices + 1 - edges.size())) {
+    for (const float depth : divisions(prepared, media.all, slices + 1 - edges.size())) {
       const auto next = std::ranges::upper_bound(edges, depth, {}, &Edge::depth);
       if (next == edges.begin() || next == edges.end() || std::prev(next)->surface) continue;
-      edges.insert(next, {depth, false});
+      edges.insert(next, {depth, depth, false});
     }
   }
-  std::vector<float> out;
-  for (const Edge& edge : edges) out.push_back(edge.surface ? -edge.depth : edge.depth);
-  out.resize(slices + 1, edges.back().depth);
+  DeepEdges out;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    out.stated.push_back(edges[k].surface ? -edges[k].stated : edges[k].stated);
+    if (k > 0) out.between.push_back(edges[k].depth);
+    if (edges[k].surface) out.surfaces.push_back({edges[k].depth, edges[k + 1].depth});
+  }
+  out.stated.resize(slices + 1, edges.back().stated);
+  out.between.resize(slices - 1, edges.back().depth);
   return out;
 }
 

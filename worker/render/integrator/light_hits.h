@@ -17,7 +17,7 @@ template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_emission_times(const C3& beta, const SurfaceHit& hit) {
   const C3 emitted = world_.lights.emitted(hit, -ray_.d);
   if (is_black(emitted)) return;
-  see(hit.p);
+  see_surface(hit.p);
   float weight = 1;
   if (!hits_count_fully()) {
     const float p_l =

@@ -57,11 +57,27 @@ struct DeepSegment {
 struct DeepProbe {
   std::vector<DeepSegment> segments;
   float surface = kInfinity;  // depth of the surface at which it ends; infinite: it leaves the scene
+  std::vector<float> lamps;   // depths of the surfaces that it passes and that shine
   float reaches = 1;          // transmittance of the surfaces that it passed
 };
+// Returns the depth, inside the nearest of the ranges, at which a surface at this depth counts. Between the
+// probes that found the ranges a pixel's surfaces can be at any depth, and none may become part of the fog.
+inline float depth_in(std::span<const SurfaceRange> ranges, float depth) {
+  float nearest = depth, least = kInfinity;
+  for (const SurfaceRange& range : ranges) {
+    if (depth >= range.begin && depth < range.end) return depth;
+    const float away = depth < range.begin ? range.begin - depth : depth - range.end;
+    if (away < least) {
+      least = away;
+      nearest = range.begin + (range.end - range.begin) / 2;  // its end is of the next slice
+    }
+  }
+  return nearest;
+}
 // What PathTracer::opacity() finds between the slices of a deep image.
 struct DeepTransmittance {
   std::span<const float> edges;  // depths between slices, in ascending order
+  std::span<const SurfaceRange> surfaces;
   // The transmittance up to each of them, and behind everything but the environment: mean of the channels
   std::span<double> through;
 };
@@ -99,7 +115,8 @@ constexpr bool in_volume(LightPart part) {
 // from then on all light counts at that depth.
 struct LightByDepth {
   struct Event {
-    float depth;  // distance from the camera, as that of the AOV depth; infinite for the environment
+    float depth;   // distance from the camera, as that of the AOV depth; infinite for the environment
+    bool surface;  // true if a surface scattered or emitted the light
     C3 light;
   };
   bool wanted = false;
@@ -114,18 +131,21 @@ struct LightByDepth {
     near_ = near_distance;
   }
   float depth(const V3& p, const V3& d) const { return near_ + dot(p - camera_, d); }
-  void see(const V3& p, const V3& d) { at_ = depth(p, d); }
-  void see(float depth) { at_ = depth; }
+  void see(float depth, bool surface = false) {
+    at_ = depth;
+    surface_ = surface;
+  }
   void add(const C3& light) {
-    if (!events.empty() && events.back().depth == at_)
+    if (!events.empty() && events.back().depth == at_ && events.back().surface == surface_)
       events.back().light += light;
     else
-      events.push_back({at_, light});
+      events.push_back({at_, surface_, light});
   }
 
  private:
   V3 camera_{0, 0, 0};
   float near_ = 0, at_ = 0;
+  bool surface_ = false;
 };
 
 struct LightSplit {

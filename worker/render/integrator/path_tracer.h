@@ -372,7 +372,12 @@ class PathTracer {
   // at p or finds light there.
   void see([[maybe_unused]] const V3& p) {
     if constexpr (F.split)
-      if (depth_ == 0 && split_->by_depth.wanted) split_->by_depth.see(p, ray_.d);
+      if (depth_ == 0 && split_->by_depth.wanted) split_->by_depth.see(split_->by_depth.depth(p, ray_.d));
+  }
+  void see_surface([[maybe_unused]] const V3& p) {
+    if constexpr (F.split)
+      if (depth_ == 0 && split_->by_depth.wanted)
+        split_->by_depth.see(split_->by_depth.depth(p, ray_.d), true);
   }
   void see_environment() {
     if constexpr (F.split)
@@ -577,7 +582,7 @@ void PathTracer<F, Light>::go_on(float t_max) {
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   if (!may_go_on(depth_ + 1, passed_)) return {Collision::absorbed};
-  see(hit.p);
+  see_surface(hit.p);
   ++depth_;
   if constexpr (F.visibility) left_medium_ = false;
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];

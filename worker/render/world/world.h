@@ -21,6 +21,7 @@
 #include "worker/render/media/medium_stack.h"
 #include "worker/render/render.h"
 #include "worker/render/texture/texture.h"
+#include "worker/render/world/deep_cache.h"
 
 namespace ls::render {
 
@@ -129,6 +130,7 @@ class World {
   int origin_x = 0, origin_y = 0;
 
   AovSet aovs;
+  mutable DeepEdgesCache deep_edges;  // with a deep image; several threads may use it at once
   // For the AOVs of identifiers (Cryptomatte): by surface, the identifiers of its shape and its material; and
   // the identifiers of the instances. For a hit inside an instance, the instance's identifier replaces the
   // shape's.

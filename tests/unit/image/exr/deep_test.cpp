@@ -118,7 +118,7 @@ TEST(DeepSamples, GiveSurfacesTheLeastThicknessAndPutTheEnvironmentFarAway) {
   const auto samples = deep_samples({{-2, 2.5, 4}, {.5, .5, 0}, {{1, 2, 3}, {0, 0, 0}, {4, 4, 4}}}, true);
 
   ASSERT_EQ(samples.size(), 2u);
-  EXPECT_EQ(samples[0], (DeepSample{2.25f, std::nextafter(2.25f, 3.f), .5f, {1, 2, 3}}));
+  EXPECT_EQ(samples[0], (DeepSample{2, std::nextafter(2.f, 3.f), .5f, {1, 2, 3}}));
   EXPECT_EQ(samples[1],
             (DeepSample{static_cast<float>(kDeepFar), static_cast<float>(kDeepFar), 1, {8, 8, 8}}));
 }
@@ -332,6 +332,28 @@ TEST(DeepExr, IsRefusedWhereItIsDamaged) {
   const auto flat = final_exr(deep_film(2), provenance(), {});
   ASSERT_TRUE(flat);
   EXPECT_FALSE(read_deep_exr(flat->exr, "flat.exr"));
+}
+
+// A small file can claim very many samples, which deflate packs a thousand to one.
+TEST(DeepExr, IsRefusedBeforeItsSamplesTakeMemory) {
+  const auto exr = deep_exr_of(deep_film(2), provenance(), {});
+  ASSERT_TRUE(exr);
+  const auto error_of = [&](const DeepExpected& expected) {
+    const auto read = read_deep_exr(*exr, "deep.exr", expected);
+    return read ? std::string() : read.error().message;
+  };
+  // It has 20 x 13 pixels with 4 samples each.
+  constexpr std::uint64_t kBytes = 20 * 13 * 4 * sizeof(DeepSample);
+  EXPECT_EQ(error_of({.slices = 3, .max_bytes = kBytes}), "");
+  EXPECT_THAT(error_of({.slices = 2}), HasSubstr("a pixel has 4 samples, and there can be 3"));
+  EXPECT_THAT(error_of({.max_bytes = kBytes - 1}), HasSubstr("its samples need more than"));
+  const auto check = [](const DeepPicture& header) -> Result<void> {
+    EXPECT_EQ(header.rows.size, (FrameSize{20, 13}));
+    EXPECT_EQ(header.strings.at("lightshaft:deep"), "3");
+    EXPECT_TRUE(header.rows.counts.empty()) << "no pixel was read";
+    return bad_argument("it is not wanted");
+  };
+  EXPECT_THAT(error_of({.check = check}), HasSubstr("it is not wanted"));
 }
 
 TEST(DeepExr, IsNotMadeOfAFilmWithoutSlices) {

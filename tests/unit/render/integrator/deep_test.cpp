@@ -200,6 +200,84 @@ TEST(DeepSlices, OfAGridLetThroughWhatItsDensitySays) {
   }
 }
 
+// Lamps of Blender and USD let light through.
+TEST(DeepSlices, HaveALampThatIsLookedThroughInASliceOfItsOwn) {
+  for (const bool with_wall : {true, false}) {
+    SceneBuilder builder = wall();
+    builder.scene.film.transparent = true;
+    builder.shape(RectangleShape{}, translate({0, 0, 2}) * test::scale(2), builder.null()).emitter =
+        AreaEmitter{builder.texture({5, 5, 5})};
+    if (!with_wall) remove_wall(builder);
+    const Slices s = slices_of(Picture(builder, {}, kSamples, kSlices));
+
+    // The edge is the middle of probes' depths, which are accurate to 4 kClose.
+    EXPECT_NEAR(s.edges[0], -3, 3 * 4 * kClose);
+    EXPECT_NEAR(s.light[0][1], 5, 5 * kClose);
+    EXPECT_EQ(s.through[0], 1);
+    EXPECT_EQ(s.light[kSlices][1], 0) << "nothing is infinitely far";
+    EXPECT_EQ(s.through[kSlices], with_wall ? 0 : 1);
+    if (with_wall) {
+      EXPECT_NEAR(s.edges[1], -5, 5 * 4 * kClose);
+    }
+  }
+}
+
+// A small black rectangle, seen turned by 20 degrees, in front of a floor that shines: at its rims, samples
+// meet surfaces beside the probes.
+SceneBuilder rims() {
+  SceneBuilder builder({16, 16});
+  const BsdfIndex black = builder.diffuse(0);
+  builder.shape(RectangleShape{}, test::scale(5), black).emitter = AreaEmitter{builder.texture({9, 9, 9})};
+  builder.shape(RectangleShape{}, translate({0, 0, 4}) * test::scale(.5), black);
+  builder.scene.film.transparent = true;
+  builder.look({0, 0, 10}, {0, 0, 0}, 20, {.342, .94, 0});
+  return builder;
+}
+
+TEST(DeepSlices, HaveNoFogBetweenSurfaces) {
+  const Picture p(rims(), {}, 64, kSlices);
+  std::size_t at_rims = 0;
+  for (std::size_t i = 0; i < p.pixels(); ++i) {
+    const Slices s = slices_of(p, i);
+    double before = 1;
+    std::size_t surfaces = 0;
+    for (std::size_t k = 0; k <= kSlices; before = s.through[k++]) {
+      if (s.light[k][0] == 0 && s.through[k] == before) continue;
+      ++surfaces;
+      ASSERT_LT(k, std::size_t{kSlices}) << i;
+      // Rays in the corners are longer by 1 / cos(14 degrees), 3.1 %.
+      const bool front = s.edges[k] <= -5.99 && s.edges[k] >= -6.2, floor = s.edges[k] <= -9.99;
+      EXPECT_TRUE(front || floor) << "pixel " << i << ": " << s.edges[k];
+      // Where all 16 probes meet the rectangle, the floor beside it counts there: less than two probes'
+      // share.
+      EXPECT_TRUE(floor || s.light[k][0] < 9 * 2 / 16.) << s.light[k][0];
+    }
+    at_rims += surfaces > 1;
+  }
+  EXPECT_GT(at_rims, 10u);
+}
+
+// What fog takes on its way through a slice is not less, but the rays that surfaces end are taken away in the
+// slices of surfaces.
+TEST(DeepSlices, OfFogHaveNoSurfaceInThem) {
+  SceneBuilder builder = rims();
+  const double sigma = .05;
+  builder.container(CubeShape{}, translate({0, 0, 4}) * test::scale(3), builder.null(),
+                    builder.homogeneous({sigma, sigma, sigma}, {.5, .5, .5}));
+  const Picture p(builder, {}, 64, kSlices);
+  for (std::size_t i = 0; i < p.pixels(); ++i) {
+    const Slices s = slices_of(p, i);
+    double before = 1;
+    for (std::size_t k = 0; k < kSlices; before = s.through[k++]) {
+      if (s.edges[k] < 0 || before == 0) continue;
+      // Rays differ in length by less than 3.1 %, and so do the ends of a slice for surfaces.
+      const double length = std::abs(s.edges[k + 1]) - s.edges[k];
+      EXPECT_GE(s.through[k] / before, std::exp(-sigma * (length + .031 * 10)) - 64 * kClose)
+          << "pixel " << i << ", slice " << k;
+    }
+  }
+}
+
 TEST(DeepSlices, CostNothingWhereNobodyAsks) {
   const Picture plain(hall(true, true), {}), deep(hall(true, true), {}, kSamples, kSlices);
   EXPECT_EQ(plain.beauty(), deep.beauty());

@@ -117,7 +117,7 @@ function downloadLinks(job, state) {
   return h("nav", { class: "downloads", "aria-label": "Downloads" },
     taken && job.meters > 0 ? link(downloads.meters(job.id), "Values", "JSON", `${stem}.json`) : null,
     taken ? link(downloads.exr(job.id), "EXR", "image", `${stem}.exr`) : null,
-    taken && job.deep > 0 ? link(downloads.deep(job.id), "EXR", "deep image", `${stem}.deep.exr`) : null,
+    taken && isOver(job) && job.deep > 0 ? link(downloads.deep(job.id), "EXR", "deep image", `${stem}.deep.exr`) : null,
     taken ? link(downloads.png(job.id, open.exposure, shown, displayOf(state)), "PNG", shown === "denoised" ? "denoised" : "as shown", `${stem}.png`) : null,
     h("a", { key: "page", class: "button", href: downloads.page(job.id), target: "_blank", rel: "noopener" }, "Report", h("small", null, "page")),
     link(downloads.report(job.id), "Report", "JSON", `${stem}.report.json`),
