@@ -9,6 +9,7 @@
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <limits>
 #include <optional>
 
@@ -207,6 +208,9 @@ Result<DisplayViews> DisplayViews::built_in() {
 }
 
 Result<DisplayViews> DisplayViews::read(const std::string& file) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored))
+    return bad_argument(fmt::format("{}: there is no such file with a configuration of OpenColorIO", file));
   OCIO::SetLoggingFunction([](const char* message) {
     std::string_view text = message;
     while (!text.empty() && text.back() == '\n') text.remove_suffix(1);
