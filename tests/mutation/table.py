@@ -21,7 +21,7 @@ TABLE = ("validate:seed*", "validate:N41*", "validate:N22*", "validate:7.6[abcg]
 
 ROWS = [
     # ---- render
-    (1, "worker/render/integrator/path_tracer.h", "light->delta ? 1 : «balance_weight(light->pdf, sampled)»;", "1.f",
+    (1, "worker/render/integrator/surface_nee.h", "light->delta ? 1 : «balance_weight(light->pdf, sampled)»;", "1.f",
      "next-event estimation at surfaces counts in full beside the directions that hit the light", RENDER),
     (2, "worker/render/integrator/path_tracer.h", "if (!(u < q)) return false;\n  «beta_ /= q;»", ";", "survivors of roulette are not weighted up", RENDER),
     (3, "worker/render/integrator/path_tracer.h", "if («(dot(w, hit.ng) > 0) != (s->wi.z > 0)») return {Collision::absorbed};", "false",
@@ -118,7 +118,7 @@ ROWS = [
     (60, "coordinator/http/api/job_handlers.cpp", "if (caller.role != Role::submit || «priority <= api.limits().user_priority») return std::nullopt;", "true",
      "a user may go before all others", HTTP),
     # ---- terms
-    (101, "worker/render/integrator/path_tracer.h", "if («!world_.lights.can_sample() || !surface.smooth») return;\n  const Group g", "true", "no next-event estimation at surfaces", TABLE),
+    (101, "worker/render/integrator/surface_nee.h", "if («!world_.lights.can_sample() || !surface.smooth») return;\n  const Group g", "true", "no next-event estimation at surfaces", TABLE),
     (102, "worker/render/integrator/vertex_nee.h", "const Lights& lights = path.world_.lights;\n    if («!lights.can_sample()») return;", "true",
      "no next-event estimation at vertices in media", TABLE),
     (103, "worker/render/integrator/vertex_nee.h", "if («!choice.has_place || (points_only(medium) && !choice.is_point)») return;", "true",
@@ -140,7 +140,7 @@ ROWS = [
     (113, "worker/render/integrator/path_tracer.h", "«beta_ *= s->weight;»\n  }\n  if (s->transmitted)", ";", "surfaces take nothing of the light that they scatter", TABLE),
     (114, "worker/render/integrator/shadow_ray.h", "«value *= through;»", ";", "media throw no shadow", TABLE),
     (115, "worker/render/integrator/path_tracer.h", "bool may_scatter() const { return world_.depth_allows(depth_ + «1»); }", "2", "the last scattering in media is left out", TABLE),
-    (116, "worker/render/integrator/path_tracer.h", "if (!may_go_on(depth_ + «1», passed_)) return {Collision::absorbed};\n  ++depth_;", "2", "the last scattering on surfaces is left out", TABLE),
+    (116, "worker/render/integrator/path_tracer.h", "if (!may_go_on(depth_ + «1», passed_)) return {Collision::absorbed};\n  see(hit.p);\n  ++depth_;", "2", "the last scattering on surfaces is left out", TABLE),
     (117, "worker/render/integrator/path_tracer.h", "if (s->transmitted) eta_scale_ *= «s->eta * s->eta»;", "1.f", "roulette forgets what refraction does to radiance; unbiased", TABLE),
     (118, "worker/render/integrator/mis.h", "heuristic == MisHeuristic::power ? «ratio * ratio» : ratio", "ratio", "the power heuristic has the exponent 1; unbiased", ("render_test",)),
 ]
