@@ -140,7 +140,7 @@ ROWS = [
     (113, "worker/render/integrator/path_tracer.h", "«beta_ *= s->weight;»\n  }\n  if (s->transmitted)", ";", "surfaces take nothing of the light that they scatter", TABLE),
     (114, "worker/render/integrator/shadow_ray.h", "«value *= through;»", ";", "media throw no shadow", TABLE),
     (115, "worker/render/integrator/path_tracer.h", "bool may_scatter() const { return world_.depth_allows(depth_ + «1»); }", "2", "the last scattering in media is left out", TABLE),
-    (116, "worker/render/integrator/path_tracer.h", "if (!may_go_on(depth_ + «1», passed_)) return {Collision::absorbed};\n  see(hit.p);\n  ++depth_;", "2", "the last scattering on surfaces is left out", TABLE),
+    (116, "worker/render/integrator/path_tracer.h", "if (!may_go_on(depth_ + «1», passed_)) return {Collision::absorbed};\n  see_surface(hit.p);\n  ++depth_;", "2", "the last scattering on surfaces is left out", TABLE),
     (117, "worker/render/integrator/path_tracer.h", "if (s->transmitted) eta_scale_ *= «s->eta * s->eta»;", "1.f", "roulette forgets what refraction does to radiance; unbiased", TABLE),
     (118, "worker/render/integrator/mis.h", "heuristic == MisHeuristic::power ? «ratio * ratio» : ratio", "ratio", "the power heuristic has the exponent 1; unbiased", ("render_test",)),
 ]
