@@ -114,16 +114,15 @@ def write(path, text):
 
 
 def fog_and_rings(fog, rings):
-    """A cube of fog among rings of balls; fog, rings: "seen", "held out" or "absent"."""
-    hold = '<boolean name="holdout" value="true"/>'
+    """A cube of fog, a ring of balls, or both."""
     out = '<scene version="3.0.0"><integrator type="volpath"><integer name="max_depth" value="8"/></integrator>'
-    if fog == "seen":
+    if fog:
         out += ('<medium type="homogeneous" id="fog"><float name="sigma_t" value="0.9"/><rgb name="albedo" value="0.95, 0.9, 0.8"/><phase type="hg"><float name="g" value="0.4"/></phase></medium>'
                 '<shape type="cube"><transform name="to_world"><scale value="1.3"/><rotate y="1" angle="35"/></transform><bsdf type="null"/><ref name="interior" id="fog"/></shape>')
-    if rings != "absent":
+    if rings:
         for i in range(14):
             out += (f'<shape type="sphere"><float name="radius" value="0.22"/><transform name="to_world"><translate x="1.6"/><rotate y="1" angle="{i * 360 / 14}"/>'
-                    f'<rotate x="1" angle="14"/></transform><bsdf type="diffuse"><rgb name="reflectance" value="0.15, 0.35, 0.7"/></bsdf>{hold if rings == "held out" else ""}</shape>')
+                    f'<rotate x="1" angle="14"/></transform><bsdf type="diffuse"><rgb name="reflectance" value="0.15, 0.35, 0.7"/></bsdf></shape>')
     return out + ('<emitter type="directional"><vector name="direction" x="-0.6" y="-1" z="0.7"/><rgb name="irradiance" value="5, 4.6, 4"/></emitter>'
                   '<emitter type="constant"><rgb name="radiance" value="0.12, 0.14, 0.2"/></emitter>'
                   '<sensor type="perspective"><float name="fov" value="34"/><transform name="to_world"><lookat origin="0, 2.2, -7" target="0, 0, 0" up="0, 1, 0"/></transform>'
@@ -131,16 +130,13 @@ def fog_and_rings(fog, rings):
 
 
 def deep(folder, options):
-    for name, fog, rings in (("fog", "seen", "held out"), ("rings", "absent", "seen"), ("both", "seen", "seen")):
+    for name, fog, rings in (("fog", True, False), ("rings", False, True), ("both", True, True)):
         scene = write(folder / f"{name}.xml", fog_and_rings(fog, rings))
         render(scene, folder / f"{name}.exr", options, "--aov", "alpha", *(["--deep", 32] if name != "both" else []))
-    # Without the holdout the fog's slices go on behind the balls; the merge puts them in front and behind by depth.
-    scene = write(folder / "alone.xml", fog_and_rings("seen", "absent"))
-    render(scene, folder / "alone.exr", options, "--aov", "alpha", "--deep", 32)
     merged = folder / "merged.exr"
-    run("oiiotool", folder / "alone.deep.exr", folder / "rings.deep.exr", "--deepmerge", "--flatten", "--compression", "zip", "-d", "float", "-o", merged)
+    run("oiiotool", folder / "fog.deep.exr", folder / "rings.deep.exr", "--deepmerge", "--flatten", "--compression", "zip", "-d", "float", "-o", merged)
     run("oiiotool", "--pattern", "constant:color=0.015,0.018,0.024,1", options.size, 4, "-o", folder / "dark.exr")
-    for name, image in (("fog", folder / "alone.exr"), ("rings", folder / "rings.exr"), ("merged", merged), ("together", folder / "both.exr")):
+    for name, image in (("fog", folder / "fog.exr"), ("rings", folder / "rings.exr"), ("merged", merged), ("together", folder / "both.exr")):
         run("oiiotool", image, "--ch", "R,G,B,A", folder / "dark.exr", "--ch", "R,G,B,A=1", "--over", "-o", folder / "shown.exr")
         picture(folder / "shown.exr", options.out / f"shot-deep-{name}.jpg")
     mean, apart = difference(merged, folder / "both.exr")

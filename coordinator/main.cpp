@@ -133,6 +133,8 @@ Result<std::shared_ptr<const ls::DisplayViews>> views_of(const Flags& flags) {
     views = ls::DisplayViews::built_in();
   }
   if (!views) return tl::unexpected(views.error());
+  for (const auto& [name, why] : views->left_out())
+    ls::log_warn("", fmt::format("the view '{}' is left out: {}", name, why));
   return std::make_shared<const ls::DisplayViews>(std::move(*views));
 }
 

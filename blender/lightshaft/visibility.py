@@ -15,7 +15,7 @@ class Visibility:
             "visible_volume": only_if_off(volume),
         }
         self.holdout = True if holdout else None
-        # What is held out shows no shadow in Blender, either.
+        # Blender shows no shadow on a held-out object, either.
         self.catcher = True if catcher and not holdout else None
 
     def of_shape(self):

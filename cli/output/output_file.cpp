@@ -61,6 +61,8 @@ Result<std::shared_ptr<const DisplayViews>> views_for(const std::string& view, c
   if (const auto ok = check_view(view, out); !ok) return tl::unexpected(ok.error());
   auto views = view == kPlainView ? DisplayViews::built_in() : DisplayViews::of_environment();
   if (!views) return tl::unexpected(views.error());
+  if (const auto found = views->left_out().find(view); found != views->left_out().end())
+    return bad_argument(fmt::format("--view: the view '{}' cannot be shown: {}", view, found->second));
   if (const auto found = views->view(view); !found) return bad_argument("--view: " + found.error().message);
   return std::make_shared<const DisplayViews>(std::move(*views));
 }

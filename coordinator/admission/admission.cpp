@@ -128,8 +128,7 @@ void shrink_tiles(RenderSettings& settings) {
 tl::unexpected<Error> no_caught_shadows_in_deep() {
   return invalid(
       "the image has the shadows on shadow catchers, which are at no depth and have no place in a deep "
-      "image: "
-      "leave deep out, or shadow_catcher");
+      "image: leave deep out, or shadow_catcher");
 }
 
 // Sets the AOVs: those of these names, and those that the denoiser needs. `light_groups` are the groups of

@@ -104,7 +104,8 @@ class Coordinator {
   // The final image if there is one, else the current image. With `mix`, that image with other factors of its
   // light groups.
   Result<std::vector<std::byte>> image_exr(const JobId& id, const std::optional<LightMix>& mix = {}) const;
-  // The deep image, final or current, of a job with JobSpec::deep.
+  // The deep image of a job with JobSpec::deep that has ended; with `while_rendering` also of one that
+  // renders.
   Result<std::vector<std::byte>> deep_exr(const JobId& id, bool while_rendering = false) const;
   // Returns the error of a mix of light groups as JSON.
   Result<std::string> mix_json(const JobId& id, const LightMix& mix) const;

@@ -149,27 +149,19 @@ Result<std::string> Pictures::mix_json(const JobId& id, const LightMix& mix) con
   return out.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
-// What a view lacks is a matter of this machine's files: it is for the log, and not for every token.
-Error Pictures::for_users(const Error& error, const std::string& view) const {
-  const auto& names = views_->names();
-  if (std::find(names.begin(), names.end(), view) == names.end()) return error;
-  log_warn("", error.message);
-  return {error.code, fmt::format("the view '{}' cannot be shown: the coordinator's log says why", view)};
-}
-
 Result<ToCodes> Pictures::codes_of(const std::string& view) const {
   if (view.empty() || view == kPlainView) return srgb_codes;
   if (views_ == nullptr)
     return bad_argument(fmt::format("there is no view '{}' here but {}", view, kPlainView));
   auto shown = views_->view(view);
-  if (!shown) return tl::unexpected(for_users(shown.error(), view));
+  if (!shown) return tl::unexpected(shown.error());
   return [shown = std::move(*shown)](std::span<const double> rgb) { return shown.codes(rgb); };
 }
 
 Result<std::vector<std::uint16_t>> Pictures::cube_of(const std::string& view) const {
   if (views_ == nullptr) return fail(Errc::not_found, fmt::format("there is no view '{}' here", view));
   const auto shown = views_->view(view);
-  if (!shown) return fail(Errc::not_found, for_users(shown.error(), view).message);
+  if (!shown) return fail(Errc::not_found, shown.error().message);
   return shown->cube();
 }
 

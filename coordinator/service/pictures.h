@@ -86,7 +86,6 @@ class Pictures {
     Duration cost{};
     std::shared_ptr<const Denoised> image;  // null: no samples yet
   };
-  Error for_users(const Error& error, const std::string& view) const;
   Result<Picture> picture(const JobId& id, const std::optional<LightMix>& mix = {}) const;
   Result<std::shared_ptr<const Denoised>> denoised_view(const JobId& id) const;
   Result<LayerMosaic> mosaic_of(const JobId& id, const PixelLayer& layer, int level) const;

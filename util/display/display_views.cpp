@@ -128,11 +128,6 @@ struct DisplayView::Transform {
   OCIO::ConstCPUProcessorRcPtr processor;  // null: kPlainView
 };
 
-struct DisplayViews::Config {
-  OCIO::ConstConfigRcPtr config;
-  Entry entry;
-};
-
 void DisplayView::apply(std::span<float> rgb) const {
   if (rgb.empty()) return;  // which OpenColorIO refuses
   for (float& v : rgb) v = std::isnan(v) ? 0 : std::clamp(v, -kLargest, kLargest);
@@ -183,17 +178,42 @@ std::vector<std::uint16_t> DisplayView::cube() const {
   return bits;
 }
 
-DisplayViews DisplayViews::of(std::shared_ptr<const Config> config, std::string standard) {
+struct DisplayViews::Config {
+  OCIO::ConstConfigRcPtr config;
+  Entry entry;
+};
+
+DisplayViews DisplayViews::of(const Config& config, std::string standard) {
   DisplayViews views;
-  views.names_.emplace_back(kPlainView);
-  const OCIO::Config& c = *config->config;
+  views.standard_ = std::move(standard);
+  const auto add = [&](std::string name, DisplayView::Transform transform) {
+    views.names_.push_back(std::move(name));
+    DisplayView view;
+    view.transform_ = std::make_shared<const DisplayView::Transform>(std::move(transform));
+    views.views_.push_back(std::move(view));
+  };
+  add(std::string(kPlainView), {});
+  const OCIO::Config& c = *config.config;
   for (int d = 0; d < c.getNumDisplays(); ++d) {
     const std::string display = c.getDisplay(d);
-    for (int v = 0; v < c.getNumViews(display.c_str()); ++v)
-      views.names_.push_back(name_of(display, c.getView(display.c_str(), v)));
+    for (int v = 0; v < c.getNumViews(display.c_str()); ++v) {
+      const std::string view = c.getView(display.c_str(), v);
+      auto shown = OCIO::DisplayViewTransform::Create();
+      shown->setSrc(config.entry.space.c_str());
+      shown->setDisplay(display.c_str());
+      shown->setView(view.c_str());
+      auto all = OCIO::GroupTransform::Create();
+      if (config.entry.matrix) all->appendTransform(config.entry.matrix);
+      all->appendTransform(shown);
+      try {
+        add(name_of(display, view),
+            {c.getProcessor(all)->getOptimizedCPUProcessor(OCIO::BIT_DEPTH_F32, OCIO::BIT_DEPTH_F32,
+                                                           OCIO::OPTIMIZATION_DEFAULT)});
+      } catch (const OCIO::Exception& e) {
+        views.left_out_.emplace(name_of(display, view), e.what());
+      }
+    }
   }
-  views.config_ = std::move(config);
-  views.standard_ = std::move(standard);
   return views;
 }
 
@@ -201,7 +221,7 @@ Result<DisplayViews> DisplayViews::built_in() {
   try {
     const auto config = built_in_config();
     config->validate();
-    return of(std::make_shared<const Config>(Config{config, *entry_of(*config)}), std::string(kPlainView));
+    return of({config, *entry_of(*config)}, std::string(kPlainView));
   } catch (const OCIO::Exception& e) {
     return fail(Errc::internal, fmt::format("the built-in views: {}", e.what()));
   }
@@ -214,7 +234,7 @@ Result<DisplayViews> DisplayViews::read(const std::string& file) {
   OCIO::SetLoggingFunction([](const char* message) {
     std::string_view text = message;
     while (!text.empty() && text.back() == '\n') text.remove_suffix(1);
-    log_warn("", std::string(text));
+    log_warn("", text);
   });
   try {
     // Not validate(): it refuses all views for one missing file that a single view needs.
@@ -229,11 +249,10 @@ Result<DisplayViews> DisplayViews::read(const std::string& file) {
     const char* view = config->getDefaultView(display);
     if (*display == 0 || *view == 0)
       return bad_argument(fmt::format("{}: the configuration has no display with a view", file));
-    auto views =
-        of(std::make_shared<const Config>(Config{config, std::move(*entry)}), name_of(display, view));
-    // The others are refused where they are asked for.
-    if (const auto first = views.view(views.standard()); !first)
-      return bad_argument(fmt::format("{}: its first view: {}", file, first.error().message));
+    auto views = of({config, std::move(*entry)}, name_of(display, view));
+    if (const auto first = views.left_out_.find(views.standard_); first != views.left_out_.end())
+      return bad_argument(
+          fmt::format("{}: its first view, '{}', cannot be shown: {}", file, first->first, first->second));
     return views;
   } catch (const OCIO::Exception& e) {
     return bad_argument(
@@ -250,28 +269,7 @@ Result<DisplayView> DisplayViews::view(std::string_view name) const {
   const auto found = std::find(names_.begin(), names_.end(), name);
   if (found == names_.end())
     return bad_argument(fmt::format("there is no view '{}'{}", name, suggestion(name, names_)));
-  auto transform = std::make_shared<DisplayView::Transform>();
-  if (found != names_.begin()) {
-    try {
-      const OCIO::Config& c = *config_->config;
-      auto at = static_cast<int>(found - names_.begin()) - 1, d = 0;
-      for (; at >= c.getNumViews(c.getDisplay(d)); ++d) at -= c.getNumViews(c.getDisplay(d));
-      auto shown = OCIO::DisplayViewTransform::Create();
-      shown->setSrc(config_->entry.space.c_str());
-      shown->setDisplay(c.getDisplay(d));
-      shown->setView(c.getView(c.getDisplay(d), at));
-      auto all = OCIO::GroupTransform::Create();
-      if (config_->entry.matrix) all->appendTransform(config_->entry.matrix);
-      all->appendTransform(shown);
-      transform->processor = c.getProcessor(all)->getOptimizedCPUProcessor(
-          OCIO::BIT_DEPTH_F32, OCIO::BIT_DEPTH_F32, OCIO::OPTIMIZATION_DEFAULT);
-    } catch (const OCIO::Exception& e) {
-      return bad_argument(fmt::format("view '{}': OpenColorIO {}: {}", name, OCIO::GetVersion(), e.what()));
-    }
-  }
-  DisplayView view;
-  view.transform_ = std::move(transform);
-  return view;
+  return views_[static_cast<std::size_t>(found - names_.begin())];
 }
 
 }  // namespace ls

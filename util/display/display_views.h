@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -37,7 +38,7 @@ class DisplayView {
   std::shared_ptr<const Transform> transform_;
 };
 
-// The views of one OpenColorIO configuration.
+// The views of one OpenColorIO configuration. Their transforms are built when it is read.
 class DisplayViews {
  public:
   // Reads a configuration (config.ocio, or what OpenColorIO's version reads besides). Its warnings are
@@ -53,14 +54,17 @@ class DisplayViews {
   const std::vector<std::string>& names() const { return names_; }
   // The view that the configuration shows first; kPlainView for the built-in views.
   const std::string& standard() const { return standard_; }
-  // Error: there is no such view, with the nearest name, or OpenColorIO cannot build its transform.
+  // The names of the views that cannot be shown, which names() lacks, and why: such as a missing file.
+  const std::map<std::string, std::string>& left_out() const { return left_out_; }
+  // Error: there is no such view, with the nearest name.
   Result<DisplayView> view(std::string_view name) const;
 
  private:
   struct Config;
-  static DisplayViews of(std::shared_ptr<const Config> config, std::string standard);
-  std::shared_ptr<const Config> config_;
+  static DisplayViews of(const Config& config, std::string standard);
   std::vector<std::string> names_;
+  std::vector<DisplayView> views_;  // of each name
+  std::map<std::string, std::string> left_out_;
   std::string standard_;
 };
 

@@ -173,7 +173,7 @@ struct DeepPicture {
   bool colours = true, floats = false;
   std::optional<std::vector<std::string>> changed;
 };
-// What a reader of a deep image expects of it: a small file can claim very many samples.
+// Limits of a deep image that is read: a small file can claim very many samples.
 struct DeepExpected {
   std::uint32_t slices = kMostDeepSlices;                 // a pixel has at most one sample more than slices
   std::uint64_t max_bytes = std::uint64_t{8} << 30;       // of all samples, in memory

@@ -195,28 +195,25 @@ TEST_F(Configurations, AreRefusedWithWhatIsMissing) {
   }
 }
 
-// The file of a look-up table that a view needs is missing.
-TEST_F(Configurations, WithAMissingTableRefuseTheViewThatNeedsIt) {
-  const auto views =
-      DisplayViews::read(file(config("", "  - !<ColorSpace>\n    name: Linear Rec.709\n") +
-                              "  - !<ColorSpace>\n    name: broken\n"
-                              "    from_scene_reference: !<FileTransform> {src: nowhere.cube}\n"));
-  ASSERT_TRUE(views) << views.error().message;
-  EXPECT_TRUE(views->view("Screen/Halved"));
-
-  std::string text = config("", "  - !<ColorSpace>\n    name: Linear Rec.709\n") +
-                     "  - !<ColorSpace>\n    name: broken\n"
-                     "    from_scene_reference: !<FileTransform> {src: nowhere.cube}\n";
+// The file of a look-up table is missing.
+TEST_F(Configurations, LeaveOutViewsThatCannotBeShown) {
+  const std::string text = config("", "  - !<ColorSpace>\n    name: Linear Rec.709\n") +
+                           "  - !<ColorSpace>\n    name: broken\n"
+                           "    from_scene_reference: !<FileTransform> {src: nowhere.cube}\n";
   const std::string halved = "    - !<View> {name: Halved, colorspace: halved}\n",
                     broken = "    - !<View> {name: Broken, colorspace: broken}\n";
   const auto at = text.find(halved);
   const auto second = DisplayViews::read(file(std::string(text).insert(at + halved.size(), broken)));
   ASSERT_TRUE(second) << second.error().message;
-  EXPECT_THAT(second->view("Screen/Broken").error().message, HasSubstr("nowhere.cube"));
+  EXPECT_EQ(second->names(), (std::vector<std::string>{"sRGB", "Screen/Halved"}));
+  ASSERT_EQ(second->left_out().size(), 1u);
+  EXPECT_EQ(second->left_out().begin()->first, "Screen/Broken");
+  EXPECT_THAT(second->left_out().begin()->second, HasSubstr("nowhere.cube"));
+  EXPECT_FALSE(second->view("Screen/Broken"));
 
   // The first view is what people would see without choosing one.
   const auto first = DisplayViews::read(file(std::string(text).insert(at, broken)));
-  EXPECT_THAT(first.error().message, HasSubstr("its first view"));
+  EXPECT_THAT(first.error().message, AllOf(HasSubstr("its first view"), HasSubstr("nowhere.cube")));
 }
 
 TEST_F(Configurations, ComeFromTheEnvironment) {

@@ -57,6 +57,23 @@ TEST_F(DeepJobs, HaveTilesWhoseResultsFitIntoAMessage) {
             ls::limits::kPartialBytes);
 }
 
+// Answers about images wait for their memory (coordinator/base/gate.h), of which a deep film takes most: 40
+// bytes for each slice and pixel.
+TEST_F(DeepJobs, CountTheirSlicesAsMemoryOfAnswers) {
+  const auto bytes = [&](const JobSpec& spec, std::uint64_t more) {
+    const auto id = coordinator_->submit({"a.xml", kDeepScene, {}, spec});
+    return id ? coordinator_->picture_bytes(*id, more) : 0;
+  };
+  const FrameSize size{64, 32};
+  const std::uint64_t plain = bytes({.spp = 4, .size = size}, 32),
+                      deep = bytes({.spp = 4, .size = size, .deep = 16}, 32);
+
+  EXPECT_GE(plain, 32 * size.pixels());
+  EXPECT_GE(deep, plain + 16 * 40 * size.pixels());
+  EXPECT_EQ(bytes({.spp = 4, .size = size}, 33), plain + size.pixels());
+  EXPECT_EQ(coordinator_->picture_bytes(JobId{"j-none"}, 32), 0u);
+}
+
 TEST_F(DeepJobs, AreRefusedIfTheirFilmIsTooLarge) {
   const auto large = job({.spp = 4, .size = FrameSize{3840, 2160}, .deep = 64});
   ASSERT_FALSE(large);

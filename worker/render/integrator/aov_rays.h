@@ -12,6 +12,16 @@
 
 namespace ls::render {
 
+// Finds the surface that the current ray meets, not farther than `reach`. Where several coincide it is one
+// that scatters a ray of this kind, if there is one.
+template <Features F, template <Features> class Light>
+bool PathTracer<F, Light>::meet(SurfaceHit& hit, float reach, RayKind kind) const {
+  const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, reach);
+  if (!primitive || !world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit)) return false;
+  if (world_.coincident) prefer_scatterer<true>(hit, ray_.origin, ray_.d, kInfinity, kind);
+  return true;
+}
+
 // The path passes every index-matched or hidden surface, and each null-transmitting surface with that
 // surface's probability. As long as the ray hits the same surfaces as the path of the sample, the decisions
 // use the same random numbers as in trace().
@@ -22,9 +32,7 @@ std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay&
   FirstSurface first;
   SurfaceHit& hit = first.hit;
   for (segment_ = 0; segment_ < kMaxSegments; ++segment_, t_max = kInfinity) {
-    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, t_max);
-    if (!primitive || !world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit)) return std::nullopt;
-    if (world_.coincident) prefer_scatterer<true>(hit, ray_.origin, ray_.d, kInfinity, RayKind::camera);
+    if (!meet(hit, t_max, RayKind::camera)) return std::nullopt;
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     beta_ = C3(1);
     if (!sees_past(hit, surface)) {
@@ -51,11 +59,7 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
   float reach = ray.t_max;
   for (segment_ = 0; segment_ < kGuideSegments; ++segment_, reach = kInfinity) {
     SurfaceHit hit;
-    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, reach);
-    const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
-    if (met && world_.coincident)
-      prefer_scatterer<true>(hit, ray_.origin, ray_.d, kInfinity,
-                             direct ? RayKind::camera : RayKind::surface);
+    const bool met = meet(hit, reach, direct ? RayKind::camera : RayKind::surface);
     if (medium_.any()) {
       const float t = met ? ray_.length_to(hit) : reach;
       RandomStream tracker = stream_.stream(segment_, Purpose::track_guide);
@@ -114,10 +118,7 @@ Opacity PathTracer<F, Light>::opacity(const CameraRay& ray, const DeepTransmitta
   float reach = ray.t_max;
   for (segment_ = 0; segment_ < kMaxSegments; ++segment_, reach = kInfinity) {
     SurfaceHit hit;
-    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, reach);
-    const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
-    if (met && world_.coincident)
-      prefer_scatterer<true>(hit, ray_.origin, ray_.d, kInfinity, RayKind::camera);
+    const bool met = meet(hit, reach, RayKind::camera);
     // The depth at which the hit counts
     float at = kInfinity;
     if (deep && met) [[unlikely]] {
@@ -246,10 +247,7 @@ DeepProbe PathTracer<F, Light>::deep_probe(const CameraRay& ray) {
   float reach = ray.t_max;
   for (segment_ = 0; segment_ < kProbeSegments; ++segment_, reach = kInfinity) {
     SurfaceHit hit;
-    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, reach);
-    const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
-    if (met && world_.coincident)
-      prefer_scatterer<true>(hit, ray_.origin, ray_.d, kInfinity, RayKind::camera);
+    const bool met = meet(hit, reach, RayKind::camera);
     if (medium_.any()) {
       const float begin = depth_of(ray_.start);
       DeepSegment& segment = probe.segments.emplace_back();

@@ -53,7 +53,7 @@ struct DeepSegment {
   float surfaces = 1;  // transmittance of the surfaces in front of it
   std::vector<const Medium*> media;
 };
-// What a camera ray passes and meets: of a few such rays, the slices of a deep image are made.
+// Describes what a camera ray passes and meets. A few such rays determine the slices of a deep image.
 struct DeepProbe {
   std::vector<DeepSegment> segments;
   float surface = kInfinity;  // depth of the surface at which it ends; infinite: it leaves the scene
@@ -74,7 +74,7 @@ inline float depth_in(std::span<const SurfaceRange> ranges, float depth) {
   }
   return nearest;
 }
-// What PathTracer::opacity() finds between the slices of a deep image.
+// The transmittances that PathTracer::opacity() finds at the edges of a deep image's slices.
 struct DeepTransmittance {
   std::span<const float> edges;  // depths between slices, in ascending order
   std::span<const SurfaceRange> surfaces;
@@ -86,9 +86,9 @@ struct DeepTransmittance {
 // and of the media up to the first surface that scatters (`media`).
 struct Opacity {
   C3 all{0, 0, 0}, media{0, 0, 0};
-  // Of the AOV shadow_catcher, if the ray ends on a shadow catcher: its direct light, the share of the light
-  // behind the scene that reaches the camera, and the direct light without other shapes and media. The first
-  // and the last are multiplied by the share.
+  // For the AOV shadow_catcher. If the ray ends on a shadow catcher, these are the catcher's direct light,
+  // the share of the light behind the scene that reaches the camera, and the direct light without other
+  // shapes and media. The first and the last are multiplied by the share.
   C3 shadow{0, 0, 0};
 };
 

@@ -205,6 +205,7 @@ class PathTracer {
   void add_emission_times(const C3& beta, const SurfaceHit& hit);
   void add_environment();
   [[gnu::cold, gnu::noinline]] void add_environment_seen();
+  bool meet(SurfaceHit& hit, float reach, RayKind kind) const;
   // True if a camera ray passes straight through the surface; false if it ends there.
   bool sees_past(const SurfaceHit& hit, const SurfaceInfo& surface) {
     return surface.hidden.has(RayKind::camera) || surface.null ||

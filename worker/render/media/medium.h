@@ -225,7 +225,7 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
 inline constexpr float kRouletteDepth = 4;
 inline constexpr float kRouletteTransmittance = .018315639f;
 
-// What transmittance_grid() tells of points on the way: nothing.
+// Tells transmittance_grid() that nobody asks for transmittances at points on the way.
 struct Unwatched {
   static constexpr bool kWatches = false;
 };

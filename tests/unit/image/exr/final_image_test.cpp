@@ -328,7 +328,7 @@ TEST(FinalExr, AddsTheShadowsOnShadowCatchersToAlphaAndOpacity) {
   EXPECT_EQ(viewed("volume_opacity"), .375f);
 }
 
-// Of a partial that no worker sends. A of the image is a half, which is clamped; the layer is a float.
+// No worker sends such sums. The image stores A as a half, which is clamped; the layer is a float.
 TEST(FinalExr, HasAFiniteAlphaForAnySumsOfShadows) {
   for (const float through : {0.f, 1.f, 3e38f})
     for (const float unshadowed : {0.f, 1e-45f, -1e-45f, -1.f}) {

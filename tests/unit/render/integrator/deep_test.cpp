@@ -257,8 +257,7 @@ TEST(DeepSlices, HaveNoFogBetweenSurfaces) {
   EXPECT_GT(at_rims, 10u);
 }
 
-// What fog takes on its way through a slice is not less, but the rays that surfaces end are taken away in the
-// slices of surfaces.
+// The fog of a slice takes its share of the light, and rays end on surfaces only in the slices of surfaces.
 TEST(DeepSlices, OfFogHaveNoSurfaceInThem) {
   SceneBuilder builder = rims();
   const double sigma = .05;

@@ -172,8 +172,8 @@ TEST(RayVisibility, MirrorDoesNotShowAShapeHiddenFromScatteredRays) {
   expect_same_samples(shadowless, seen, "hidden from shadow rays");
 }
 
-// Of a Beckmann lobe of roughness .02, the share of 4 pi .02^2 = .5 % lies where the density is below 1, and
-// there shadows count.
+// A share of 4 pi .02^2 = .5 % of a Beckmann lobe of roughness .02 lies where the density is below 1. Shadows
+// count there.
 TEST(RayVisibility, GlossyFloorShowsNeitherAHiddenShapeNorItsShadow) {
   SceneBuilder bare = floor_under(kLights[4]);
   bare.scene.shapes[0].bsdf = metal(bare, .02);

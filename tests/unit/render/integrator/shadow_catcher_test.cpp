@@ -20,8 +20,8 @@ constexpr std::uint64_t kManySamples = 1024;
 struct Alpha {
   double value = 0, error = 0;  // mean over the pixels, and its standard error
 };
-// Of a picture with the layers alpha and shadow_catcher, as an image has it: the opacity without shadows, and
-// T (1 - L / U).
+// Returns the alpha that an image has of the layers alpha and shadow_catcher: the opacity without shadows,
+// and T (1 - L / U).
 Alpha alpha_of(const Picture& p, std::uint64_t samples) {
   const auto of = [&](std::size_t i, std::string_view halves) {
     double light = 0, through = 0, unshadowed = 0, opacity = 0;
@@ -84,7 +84,7 @@ TEST(ShadowCatcher, IsOpaqueInAShadowAndClearBesideIt) {
     }
 }
 
-// Of two lights of one strength one is in the shadow.
+// There are two equal lights, and the floor is in the shadow of one.
 TEST(ShadowCatcher, IsHalfOpaqueWhereHalfOfTheLightIsMissing) {
   SceneBuilder builder = floor_at(0);
   roof(builder);
