@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """What each output costs beside a job without it: instructions, seconds of the cores, bytes. Writes a table in Markdown.
 
-usage: outputs.py SCENE.xml [--size WxH] [--spp N] [--pairs 5] [--before BIN] [--out FILE.md] [OUTPUT...]
+usage: outputs.py SCENE.xml [--size WxH] [--spp N] [--pairs 5] [--before BIN [--also SCENE.xml]...] [--out FILE.md] [OUTPUT...]
 For each output, `lightshaft render` with it and without it take turns on the same cores, with the same seed, and the median of the
 ratios of core seconds is told, the interval being that of all pairs. Instructions are counted by callgrind within render_tile, in
 a small image with one thread, and do not depend on what else runs. Bytes are those of the results that a worker sends (as
---partial-dir keeps them) and of the image. `--before BIN`: the folder of another build's programs, whose instructions and pixels
-without any output are told beside ours. An OUTPUT is the options that ask for it, such as "--aov alpha"; without any, those of
-OUTPUTS are measured. Needs valgrind. A bench, not a test.
+--partial-dir keeps them) and of the image. `--before BIN`: the folder of another build's programs. A second table then compares
+instructions and pixels without any output between that build and this one, for SCENE.xml and those of --also. An OUTPUT is the options
+that ask for it, such as "--aov alpha"; without any, those of OUTPUTS are measured. Needs valgrind. A bench, not a test.
 """
 import argparse
 import json
@@ -58,6 +58,13 @@ def percent(ratio):
     return f"{100 * (ratio - 1):+.1f} %"
 
 
+def compared(before, now, scene, folder):
+    """The row of a scene without outputs, in the build before and in this one."""
+    old, new = [instructions(bin, scene, folder, "") for bin in (before, now)]
+    pixels = {render(bin, scene, folder, "", "--size", COUNTED_SIZE, "--spp", COUNTED_SPP)["pixels_sha256"] for bin in (before, now)}
+    return f"| {scene.stem} | {old:,.0f} | {new:,.0f} ({percent(new / old)}) | {'the same' if len(pixels) == 1 else 'others'} |"
+
+
 def main():
     args = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     args.add_argument("scene", type=pathlib.Path)
@@ -66,6 +73,7 @@ def main():
     args.add_argument("--spp", type=int, default=16)
     args.add_argument("--pairs", type=int, default=5)
     args.add_argument("--before", type=pathlib.Path)
+    args.add_argument("--also", type=pathlib.Path, action="append", default=[])
     args.add_argument("--out", type=pathlib.Path)
     options = args.parse_intermixed_args()
     bin, scene, more = bin_dir(), options.scene, ("--size", options.size, "--spp", options.spp, "--threads", 2)
@@ -74,10 +82,6 @@ def main():
         bare = instructions(bin, scene, folder, "")
         sent, stored = sizes(bin, scene, folder, "", *more)
         rows = [f"| none | {bare:,.0f} | | {sent:,} | {stored:,} |"]
-        if options.before:
-            before = instructions(options.before, scene, folder, "")
-            same = render(bin, scene, folder, "", *more)["pixels_sha256"] == render(options.before, scene, folder, "", *more)["pixels_sha256"]
-            rows.insert(0, f"| none, before | {before:,.0f} (now {percent(bare / before)}; the pixels are {'the same' if same else 'others'}) | | | |")
         for output in options.outputs or OUTPUTS:
             counted = instructions(bin, scene, folder, output)
             ratios = []
@@ -91,7 +95,10 @@ def main():
             rows.append(f"| `{output}` | {counted:,.0f} ({percent(counted / bare)}) | {percent(statistics.median(ratios))} ({percent(min(ratios))} to {percent(max(ratios))}) | "
                         f"{with_sent:,} ({with_sent / sent:.1f} x) | {with_stored:,} ({with_stored / stored:.1f} x) |")
             print(rows[-1], file=sys.stderr)
+        others = [compared(options.before, bin, each, folder) for each in [scene, *options.also]] if options.before else []
     text = "| output | instructions of a path | core seconds | bytes of all results | bytes of the image |\n|---|---|---|---|---|\n" + "\n".join(rows) + "\n"
+    if others:
+        text += "\n| scene, without outputs | instructions of a path before | now | pixels |\n|---|---|---|---|\n" + "\n".join(others) + "\n"
     options.out.write_text(text) if options.out else print(text, end="")
 
 
