@@ -22,6 +22,9 @@ inline constexpr std::size_t kMaxUnfinishedUploads = 1024;
 // A job is paused while a blob that it needs is missing. This is the time between two checks whether missing
 // blobs have arrived
 inline constexpr Duration kMissingBlobLook = std::chrono::seconds(1);
+// Time after which the files of a job's end are written again, if they could not be written (the disk was
+// full)
+inline constexpr Duration kWriteAgain = std::chrono::seconds(10);
 
 // Submission
 inline constexpr std::size_t kMaxAssets = 100'000;  // files that one submission may name

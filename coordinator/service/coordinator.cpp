@@ -151,6 +151,7 @@ void Coordinator::Parts::tick() {
   locked->records.retry();
   locked->driver.run(Tick{});
   blob_watch.look_if_due(*locked);
+  images.write_again_if_due(*locked);
   locked->publisher.publish_due();
 }
 

@@ -235,8 +235,11 @@ void ImageWriter::write_final(const EntryPtr& entry, std::uint64_t number) {
   if (entry->trace) entry->trace->step("write image", begin, clock_.now(), {}, !written);
   if (entry->finishing != number) return;  // the job was extended or removed meanwhile
   if (!written) {
-    entry->trouble =
-        "the final image cannot be written: " + written.error().message + "; then resume the job";
+    entry->trouble = fmt::format(
+        "the final image cannot be written: {}; this is tried again every {:.0f} s, and at once when the job "
+        "is resumed",
+        written.error().message, seconds(limits::kWriteAgain));
+    unwritten_.push_back({entry, number, clock_.now() + limits::kWriteAgain});
     log_error(fmt::format("job={}", facts.job.id.value), entry->trouble);
     core->publisher.job(*entry);
     return;
@@ -302,14 +305,31 @@ void ImageWriter::write_retired(const EntryPtr& entry) {
   const auto written = write_snapshot(entry, folded);
   core.lock();
   if (!entry->assembly || entry->removed) return;
-  if (!written) {  // the image stays in memory, so that writing can be repeated
+  if (!written) {  // the image stays in memory until it is written
     log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
+    unwritten_.push_back({entry, 0, clock_.now() + limits::kWriteAgain});
     return;
   }
   entry->stored.totals.spp_done = facts_of(*entry, clock_.now()).job.totals.spp_done;
   count_units(entry->stored.totals, core->driver.farm(), entry->stored.id);
   core->records.put(entry);
   core->driver.unload(*entry);
+}
+
+void ImageWriter::write_again_if_due(Core& core) {
+  std::vector<Unwritten> due;
+  std::erase_if(unwritten_, [&](Unwritten& one) {
+    if (clock_.now() < one.again) return false;
+    due.push_back(std::move(one));
+    return true;
+  });
+  for (const Unwritten& one : due) {
+    // A job that was extended, removed or resumed meanwhile has another number.
+    if (one.final_number == 0)
+      retire(core, one.entry);
+    else if (one.entry->finishing == one.final_number)
+      finish_again(core, one.entry);
+  }
 }
 
 LayerNames layer_names_of(const StoredJob& job, const BlobStore& blobs) {

@@ -39,12 +39,19 @@ class ImageWriter {
   void finish_again(Core&, const EntryPtr& entry);  // repeats finish() after it failed
   // Starts writing the current image of a failed or cancelled job, and frees the job's memory afterwards.
   void retire(Core&, const EntryPtr& entry);
+  // Repeats finish() and retire() where the files could not be written limits::kWriteAgain ago
+  void write_again_if_due(Core&);
 
  private:
   struct Folded {  // a cheap copy of the job's image so far, for use outside the lock
     Film film;
     RoundErrors errors;
     HealthTable health;
+  };
+  struct Unwritten {  // files of a job's end that could not be written
+    EntryPtr entry;
+    std::uint64_t final_number;  // of the request for a final image; 0: the image of a job that was retired
+    TimePoint again;
   };
   // The following functions run on the writer thread, except denoise() and note_check(), which run on the
   // thread of the ReferenceComparer.
@@ -65,7 +72,8 @@ class ImageWriter {
   ReferenceComparer& comparer_;
   BackgroundWrites& writes_;
   const Clock& clock_;
-  std::uint64_t last_final_ = 0;  // number of the latest request for a final image; guarded by the lock
+  std::uint64_t last_final_ = 0;      // number of the latest request for a final image; guarded by the lock
+  std::vector<Unwritten> unwritten_;  // guarded by the lock
 };
 
 // Returns the attributes for the header of a final image, which describe the job. If the image has

@@ -60,8 +60,9 @@ void Records::not_saved(std::set<EntryPtr> entries, const Error& why) {
 
 Result<void> Records::put_pin(const EntryPtr& entry) {
   if (!entry->pin_unsaved || put(entry)) return {};
-  entry->trouble = fmt::format("the job's numeric class cannot be stored: {}; then resume the job", trouble_);
-  return fail(Errc::unavailable, entry->trouble);
+  const std::string why = "the job's numeric class cannot be stored: " + trouble_;
+  entry->trouble = why + "; then resume the job";
+  return fail(Errc::unavailable, why);
 }
 
 Result<void> Records::put_quarantined() {
@@ -69,9 +70,7 @@ Result<void> Records::put_quarantined() {
     if (const auto kept = store_.quarantine(quarantined_.back()); !kept) {
       trouble_ = kept.error().message;
       log_error(fmt::format("worker={}", quarantined_.back().worker.value), kept.error().message);
-      return fail(
-          Errc::unavailable,
-          fmt::format("that a worker is quarantined cannot be stored: {}; then resume the job", trouble_));
+      return fail(Errc::unavailable, "that a worker is quarantined cannot be stored: " + trouble_);
     }
     quarantined_.pop_back();
   }

@@ -297,7 +297,7 @@ TEST(Done, JobWaitsUntilItsSnapshotIsWritten) {
     std::this_thread::yield();
 
   EXPECT_EQ(coordinator->job(job)->state, JobState::running);
-  EXPECT_THAT(coordinator->job(job)->error, HasSubstr("then resume the job"));
+  EXPECT_THAT(coordinator->job(job)->error, HasSubstr("when the job is resumed"));
   fs::remove_all(in_the_way.parent_path());
   ASSERT_TRUE(resume(*coordinator, job));
   ASSERT_TRUE(coordinator->wait(job));
