@@ -8,6 +8,16 @@ from . import exr
 from .document import element
 from .nodes import constant
 
+# Blender's colour spaces, and `color_space` of the textures that have them. Files with these are read as they are.
+COLOR_SPACES = {
+    "ACEScg": "acescg",
+    "ACES2065-1": "aces2065-1",
+    "Linear Rec.2020": "rec2020",
+    "Linear DCI-P3 D65": "p3-d65",
+    "Linear CIE-XYZ D65": "xyz",
+    "Rec.1886": "g24_rec709",
+    "Display P3": "srgb_p3d65",
+}
 READ_AS_THEY_ARE = {".png", ".jpg", ".jpeg", ".bmp", ".exr", ".hdr"}
 UPSIDE_DOWN = np.array([[1, 0, 0, 0], [0, -1, 0, 1], [0, 0, 1, 0], [0, 0, 0, 1]], float)
 WRAP = {"REPEAT": "repeat", "EXTEND": "clamp", "MIRROR": "mirror"}
@@ -90,6 +100,7 @@ class Textures:
         name, raw = self.file(image, owner, alpha)
         if name is None:
             return None
+        color_space = None if alpha else COLOR_SPACES.get(image.colorspace_settings.name)
         to_uv = (
             None
             if mapping is None or np.allclose(mapping, np.eye(4))
@@ -100,7 +111,8 @@ class Textures:
             "bitmap",
             None,
             filename=name,
-            raw=raw,
+            raw=raw if color_space is None else False,
+            color_space=color_space,
             wrap_mode=wrap,
             filter_type=filter_type,
             to_uv=to_uv,
@@ -116,9 +128,10 @@ class Textures:
 
     def write(self, image, owner, alpha):
         space = image.colorspace_settings
-        if not (space.is_data or space.name in ("sRGB", "Linear Rec.709", "Non-Color")):
+        if not (space.is_data or space.name in ("sRGB", "Linear Rec.709", "Non-Color", *COLOR_SPACES)):
             self.problems.error(
-                f"{owner}, image '{image.name}': colour space {space.name}. Choose sRGB, Linear Rec.709 or Non-Color"
+                f"{owner}, image '{image.name}': colour space {space.name}. "
+                f"Choose sRGB, Linear Rec.709, Non-Color, {', '.join(COLOR_SPACES)}"
             )
             return None, None
         if image.source not in ("FILE", "GENERATED"):
@@ -135,12 +148,18 @@ class Textures:
             and path.suffix.lower() in READ_AS_THEY_ARE
         ):
             float_file = path.suffix.lower() in (".exr", ".hdr")
-            if float_file != (
+            if space.name in COLOR_SPACES or float_file != (
                 space.name == "sRGB"
             ):  # what an ending says of the coding of colours is what Blender takes it for
                 if image.packed_file:
                     return self.document.write(bytes(image.packed_file.data), path.suffix.lower()), raw
                 return self.document.take(path, f"{owner}, image '{image.name}'"), raw
+        if space.name in COLOR_SPACES and not alpha:
+            self.problems.error(
+                f"{owner}, image '{image.name}': colour space {space.name} of an image that is not a PNG, JPEG, BMP, "
+                "EXR or HDR file. Save it as one of these, or choose sRGB, Linear Rec.709 or Non-Color"
+            )
+            return None, None
         if not image.has_data and not image.pixels:
             self.problems.error(
                 f"{owner}, image '{image.name}': Blender cannot load {image.filepath}. Find or replace the file"

@@ -4,6 +4,7 @@ import numpy as np
 
 from .document import element
 from .nodes import Place, constant, output_node
+from .textures import COLOR_SPACES, mapping_matrix
 from .visibility import visibility_of_world
 
 # The middle of a world image is the direction +x in Blender and +z in the scene format; the point a quarter from its
@@ -59,7 +60,8 @@ def add_world(document, problems, textures, world, groups):
         problems.error(f"{where}: projection {source.node.projection.title()}. Choose Equirectangular")
         return
     turn = direction_mapping(problems, source, where)
-    name, _ = textures.file(source.node.image, owner)
+    image = source.node.image
+    name, _ = textures.file(image, owner)
     if turn is not None and name is not None:
         document.add(
             element(
@@ -67,6 +69,7 @@ def add_world(document, problems, textures, world, groups):
                 "envmap",
                 None,
                 filename=name,
+                color_space=COLOR_SPACES.get(image.colorspace_settings.name),
                 scale=strength,
                 to_world=np.linalg.inv(turn) @ AXES,
                 light_group=group,
@@ -76,8 +79,6 @@ def add_world(document, problems, textures, world, groups):
 
 
 def direction_mapping(problems, place, where):
-    from .textures import mapping_matrix
-
     source, output = place.source(place.input("Vector"))
     if source is None or (source.node.type == "TEX_COORD" and output.name == "Generated"):
         return np.eye(4)

@@ -22,8 +22,30 @@ enum class Wrap { repeat, mirror, clamp };
 enum class Channel { all, red, green, blue, alpha };
 // The colour space of an image's stored values. automatic: the file's type decides. Values of 8 and 16 bits
 // are encoded by the curve of sRGB; others are linear, with the primaries in the file's header or, without
-// those, of sRGB. srgb: encoded by the curve of sRGB. The others are linear, in the ColourSpace of that name.
-enum class ImageColours { automatic, srgb, rec709, rec2020, p3_d65, acescg, aces2065_1, xyz };
+// those, of sRGB. srgb: encoded by the curve of sRGB. rec709 to adobe_linear: linear. The others are encoded:
+// g18_rec709 to adobe by a power (1.8, 2.2, 2.4; 563/256 for Adobe RGB (1998)), srgb_ap1 and srgb_p3_d65 by
+// the curve of sRGB with other primaries, acescc and acescct by the curves of S-2014-003 and S-2016-001 with
+// the primaries AP1.
+enum class ImageColours {
+  automatic,
+  srgb,
+  rec709,
+  rec2020,
+  p3_d65,
+  acescg,
+  aces2065_1,
+  xyz,
+  adobe_linear,
+  g18_rec709,
+  g22_rec709,
+  g24_rec709,
+  g22_ap1,
+  adobe,
+  srgb_ap1,
+  srgb_p3_d65,
+  acescc,
+  acescct
+};
 
 struct ConstantTexture {
   Rgb value{.5, .5, .5};

@@ -86,6 +86,10 @@ class Params {
       }
       names.emplace_back(name);
     }
+    if (const auto other = also_named<E>(*text)) {
+      value = *other;
+      return;
+    }
     not_one_of(f.name, e, *text, names);
   }
 

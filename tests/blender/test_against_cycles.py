@@ -211,6 +211,39 @@ def test_an_image_turned_scaled_and_moved(stage):
     differ(stage, EXACT, 16)
 
 
+@pytest.mark.parametrize(
+    "space, suffix",
+    [
+        ("ACEScg", ".exr"),
+        ("ACES2065-1", ".exr"),
+        ("Linear Rec.2020", ".exr"),
+        ("Linear DCI-P3 D65", ".exr"),
+        ("Linear CIE-XYZ D65", ".exr"),
+        ("Rec.1886", ".png"),
+        ("Display P3", ".png"),
+    ],
+)
+def test_a_file_in_another_colour_space(stage, tmp_path, space, suffix):
+    import bpy
+    from lightshaft import exr
+    from stage import feed, material
+
+    pixels = 0.3 + 0.3 * gradient()[:, :, :3]  # within Rec. 709 in all of these spaces
+    path = tmp_path / f"painted{suffix}"
+    path.write_bytes(
+        exr.write(pixels.astype(np.float32))
+        if suffix == ".exr"
+        else exr.write_png(np.rint(pixels * 255).astype(np.uint8))
+    )
+    stage.sky(1)
+    painted = material("Painted", "ShaderNodeBsdfDiffuse")
+    loaded = bpy.data.images.load(str(path))
+    loaded.colorspace_settings.name = space
+    feed(painted, "Color", "ShaderNodeTexImage", image=loaded)
+    stage.plane(painted)
+    differ(stage, EXACT, 16)
+
+
 @pytest.mark.parametrize("metallic", [0.5, 1.0])
 def test_an_image_on_metal(stage, metallic):
     from stage import feed, image, principled

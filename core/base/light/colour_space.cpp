@@ -83,9 +83,13 @@ std::string_view to_string(ColourSpace space) { return row_of(space).name; }
 const Chromaticities& chromaticities_of(ColourSpace space) { return row_of(space).chromaticities; }
 
 ColourMatrix from_rec709(ColourSpace space) {
+  if (space == ColourSpace::xyz) return to_xyz(chromaticities_of(ColourSpace::rec709));
+  return from_rec709(chromaticities_of(space));
+}
+
+ColourMatrix from_rec709(const Chromaticities& c) {
   ColourMatrix m = to_xyz(chromaticities_of(ColourSpace::rec709));
-  const Chromaticities& c = chromaticities_of(space);
-  if (space != ColourSpace::xyz && c.white != kD65) m = adaptation(kD65, c.white) * m;
+  if (c.white != kD65) m = adaptation(kD65, c.white) * m;
   return inverse(to_xyz(c)) * m;
 }
 

@@ -45,5 +45,9 @@ const Chromaticities& chromaticities_of(ColourSpace space);
 // that of Rec. 709 is adapted. X, Y, Z have no white of their own, so a white of Rec. 709 becomes that of
 // D65.
 ColourMatrix from_rec709(ColourSpace space);
+// The same for a space with these primaries and a white of its own
+ColourMatrix from_rec709(const Chromaticities& c);
+// Primaries of Adobe RGB (1998), with the white D65
+inline constexpr Chromaticities kAdobeRgb{{.64, .33}, {.21, .71}, {.15, .06}, {.3127, .3290}};
 
 }  // namespace ls

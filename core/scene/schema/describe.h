@@ -15,6 +15,7 @@
 #include <cmath>
 #include <concepts>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -128,8 +129,11 @@ inline Field image_colours_field() {
       .name = "color_space",
       .doc =
           "of the image: `auto` is as the file says (sRGB in 8- and 16-bit files; otherwise linear, with the "
-          "primaries in its header), `srgb` is encoded by the curve of sRGB, the others are linear, and a "
-          "white of theirs becomes white. No effect on `raw` values. Not in Mitsuba",
+          "primaries in its header), `srgb` is encoded by the curve of sRGB, `rec709` to `lin_adobergb` are "
+          "linear, the others are encoded; a white of theirs becomes white. Also the names of these spaces "
+          "in "
+          "the configurations of ACES for OpenColorIO and in MaterialX, such as `ACES - ACEScg`, `lin_ap1`, "
+          "`sRGB - Texture`. No effect on `raw` values. Not in Mitsuba",
       .elided = true};
 }
 
@@ -194,7 +198,10 @@ LS_NAMES(TextureFilter, {"nearest", nearest}, {"bilinear", bilinear})
 LS_NAMES(Wrap, {"repeat", repeat}, {"mirror", mirror}, {"clamp", clamp})
 LS_NAMES(Channel, {"all", all}, {"red", red}, {"green", green}, {"blue", blue}, {"alpha", alpha})
 LS_NAMES(ImageColours, {"auto", automatic}, {"srgb", srgb}, {"rec709", rec709}, {"rec2020", rec2020},
-         {"p3-d65", p3_d65}, {"acescg", acescg}, {"aces2065-1", aces2065_1}, {"xyz", xyz})
+         {"p3-d65", p3_d65}, {"acescg", acescg}, {"aces2065-1", aces2065_1}, {"xyz", xyz},
+         {"lin_adobergb", adobe_linear}, {"g18_rec709", g18_rec709}, {"g22_rec709", g22_rec709},
+         {"g24_rec709", g24_rec709}, {"g22_ap1", g22_ap1}, {"adobergb", adobe}, {"srgb_ap1", srgb_ap1},
+         {"srgb_p3d65", srgb_p3_d65}, {"acescc", acescc}, {"acescct", acescct})
 LS_NAMES(Microfacet, {"beckmann", beckmann}, {"ggx", ggx})
 LS_NAMES(VolumeFilter, {"nearest", nearest}, {"trilinear", trilinear})
 LS_NAMES(GridOrder, {"x_fastest", x_fastest}, {"z_fastest", z_fastest})
@@ -207,6 +214,17 @@ LS_NAMES(FovAxis, {"x", x}, {"y", y}, {"diagonal", diagonal}, {"smaller", smalle
 LS_NAMES(SkyMapping, {"latlong", latlong}, {"equal_area", equal_area})
 LS_NAMES(DistanceSampling, {"exponential", exponential}, {"equiangular", equiangular}, {"mis", mis})
 LS_NAMES(MisHeuristic, {"power", power}, {"balance", balance})
+
+// Returns the enumerator that has this name elsewhere: only files of users have such names, and canonical
+// JSON never.
+template <class E>
+std::optional<E> also_named(std::string_view) {
+  return std::nullopt;
+}
+// The names of colour spaces in the configurations of ACES for OpenColorIO (cg-config 1.0 to 2.1 and ACES
+// 1.0.3, with their aliases) and in MaterialX 1.38. Upper and lower case are the same, as in OpenColorIO.
+template <>
+std::optional<ImageColours> also_named(std::string_view name);
 
 template <class E>
 std::string_view name_of(E e) {

@@ -302,6 +302,76 @@ TEST(Bitmap, ColourSpaceOfTheSceneReplacesThatOfTheFile) {
   EXPECT_EQ(seen_as(ImageColours::acescg, codes, true), C3(.2f, .4f, .2f)) << "`raw` values are no colours";
 }
 
+struct Encoded {
+  ImageColours colours;
+  std::array<float, 3> stored;
+  C3 linear;  // in Rec. 709
+};
+// The linear values are those of OpenColorIO 2.4.2 with its cg-config 2.1.0 of ACES 1.3. Those of Adobe RGB,
+// which it does not have, follow from the primaries and the exponent 563/256 of Adobe RGB (1998) in double
+// precision.
+const Encoded kEncoded[] = {
+    {ImageColours::rec2020, {.4f, .5f, .45f}, {.3375933f, .5128725f, .4458786f}},
+    {ImageColours::p3_d65, {.4f, .5f, .45f}, {.3775059f, .5042056f, .4470501f}},
+    {ImageColours::acescg, {.4f, .5f, .45f}, {.3336579f, .513553f, .4447517f}},
+    {ImageColours::aces2065_1, {.4f, .5f, .45f}, {.2672092f, .53246f, .4431202f}},
+    {ImageColours::adobe_linear, {.4f, .5f, .45f}, {.3601644f, .5f, .4478536f}},
+    {ImageColours::g18_rec709, {.4f, .5f, .45f}, {.1921799f, .2871746f, .237565f}},
+    {ImageColours::g22_rec709, {.4f, .5f, .45f}, {.1332085f, .2176376f, .1726106f}},
+    {ImageColours::g24_rec709, {.4f, .5f, .45f}, {.1109032f, .1894646f, .147133f}},
+    {ImageColours::g22_ap1, {.4f, .5f, .45f}, {.07743052f, .22911f, .1677493f}},
+    {ImageColours::adobe, {.4f, .5f, .45f}, {.09966212f, .2177555f, .1707849f}},
+    {ImageColours::srgb_ap1, {.4f, .5f, .45f}, {.07925036f, .2250722f, .1659549f}},
+    {ImageColours::srgb_p3_d65, {.4f, .5f, .45f}, {.1146092f, .217455f, .1679742f}},
+    {ImageColours::acescc, {.45f, .48f, .46f}, {.2005371f, .4201635f, .3059195f}},
+    {ImageColours::acescc, {-.31f, -.305f, -.308f}, {2.219279e-5f, 2.83556e-5f, 2.55591e-5f}},
+    {ImageColours::acescct, {.45f, .48f, .46f}, {.200536f, .4201621f, .3059185f}},
+    {ImageColours::acescct, {.12f, .13f, .125f}, {.003838643f, .005545391f, .004892642f}},
+};
+
+// OpenColorIO computes in floats, its curve of ACEScc by a table: relative errors up to 5e-6 were seen
+// between its ACEScc and ACEScct, which are the same function there. Matrices rounded to seven digits add
+// 1e-6.
+constexpr float kOfOpenColorIo = 1e-5f;
+
+TEST(Bitmap, ColoursAreThoseOfOpenColorIo) {
+  for (const Encoded& e : kEncoded) {
+    SCOPED_TRACE(scene::name_of(e.colours));
+    const C3 c = seen_as(e.colours, {1, 1, 3, {}, {e.stored[0], e.stored[1], e.stored[2]}, false});
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(c[k], e.linear[k], kOfOpenColorIo * e.linear[1]);
+  }
+}
+
+TEST(Bitmap, EncodedBytesAreDecodedLikeFloats) {
+  const ImageData bytes{1, 1, 3, {102, 153, 51}, {}, true}, floats{1, 1, 3, {}, {.4f, .6f, .2f}, false};
+  for (const Encoded& e : kEncoded) {
+    SCOPED_TRACE(scene::name_of(e.colours));
+    EXPECT_EQ(seen_as(e.colours, bytes), seen_as(e.colours, floats));
+  }
+}
+
+TEST(Bitmap, AlphaAndSingleChannelsAreNotEncoded) {
+  const ImageData image{1, 1, 4, {}, {.4f, .5f, .45f, .25f}, false};
+  BitmapTexture opacity{.file = {0}, .alpha = true, .colours = ImageColours::g22_ap1};
+  EXPECT_EQ(table(with(opacity), image).eval({0}, {.5f, .5f}), C3(.25f));
+  for (const auto& [channel, value] : {std::pair(Channel::green, .5f), std::pair(Channel::alpha, .25f)}) {
+    BitmapTexture one{.file = {0}, .channel = channel, .colours = ImageColours::acescct};
+    EXPECT_EQ(table(with(one), image).eval({0}, {.5f, .5f}), C3(value));
+  }
+}
+
+TEST(Bitmap, NumbersAtTheEndsOfACurveAreFinite) {
+  for (const Encoded& e : kEncoded)
+    for (const float v : {-1.f, -0.f, 0.f, 1e-40f, 1.f}) {
+      SCOPED_TRACE(scene::name_of(e.colours));
+      const C3 c = seen_as(e.colours, {1, 1, 3, {}, {v, v, v}, false});
+      for (int k = 0; k < 3; ++k) EXPECT_GE(c[k], 0) << v;
+    }
+  for (const ImageColours aces : {ImageColours::acescc, ImageColours::acescct})
+    EXPECT_NEAR(seen_as(aces, {1, 1, 3, {}, {1e30f, 1e30f, 1e30f}, false}).y, 65504, 1)
+        << "the largest value of ACEScc";
+}
+
 TEST(Bitmap, NumbersAndNormalsAreNotColourConverted) {
   Scene normals = with(BitmapTexture{.file = {0}});
   normals.textures.push_back(ConstantTexture{{.5, .5, .5}});

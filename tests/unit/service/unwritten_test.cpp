@@ -26,9 +26,7 @@ struct Unwritten : ::testing::Test {
     options.audit_rate = 0;
     return Coordinator::open(std::move(options)).value();
   }
-  std::filesystem::path file(const std::string& name) const {
-    return dir.path() / "jobs" / job.value / name;
-  }
+  std::filesystem::path file(const std::string& name) const { return dir.path() / "jobs" / job.value / name; }
   // A folder that is not empty has the file's name, so that it cannot be written.
   void put_in_the_way_of(const std::string& name) const {
     std::filesystem::create_directories(file(name) / "in the way");

@@ -111,6 +111,80 @@ bool has_alpha(const ImageData& image) {
   return transparent(image.u8, std::uint8_t{128}) || transparent(image.f32, .5f);
 }
 
+// How the colours of an image are stored, other than in linear Rec. 709 or by the curve of sRGB.
+using Matrix9 = std::array<float, 9>;
+constexpr Matrix9 kIdentity{1, 0, 0, 0, 1, 0, 0, 0, 1};
+struct Encoding {
+  Matrix9 matrix = kIdentity;               // from its linear colours to linear Rec. 709
+  double (*to_linear)(double v) = nullptr;  // null: the values are linear
+};
+
+// A power of the value, mirrored below 0
+template <int numerator, int denominator>
+double power(double v) {
+  return std::copysign(std::pow(std::abs(v), static_cast<double>(numerator) / denominator), v);
+}
+double mirrored_srgb(double v) { return std::copysign(srgb_to_linear(std::abs(v)), v); }
+
+constexpr double kLargestAces = 65504;  // of ACEScc and ACEScct: the largest number of a half float
+double stops(double v) { return std::min(std::exp2(v * 17.52 - 9.72), kLargestAces); }
+// ACEScc: S-2014-003, section 4.4.2
+double acescc_to_linear(double v) {
+  return v <= (9.72 - 15) / 17.52 ? (std::exp2(v * 17.52 - 9.72) - 0x1p-16) * 2 : stops(v);
+}
+// ACEScct: S-2016-001, section 4.4.2
+double acescct_to_linear(double v) {
+  return v <= .155251141552511 ? (v - .0729055341958355) / 10.5402377416545 : stops(v);
+}
+
+Matrix9 to_rec709(const ColourMatrix& from) {
+  const ColourMatrix m = inverse(from);
+  Matrix9 matrix;
+  for (std::size_t i = 0; i < 9; ++i) matrix[i] = static_cast<float>(m(i / 3, i % 3));
+  return matrix;
+}
+Matrix9 to_rec709(ColourSpace space) { return to_rec709(from_rec709(space)); }
+
+Encoding encoding_of(ImageColours colours) {
+  switch (colours) {
+    case ImageColours::automatic:
+    case ImageColours::srgb:
+    case ImageColours::rec709:
+      return {};
+    case ImageColours::rec2020:
+      return {to_rec709(ColourSpace::rec2020)};
+    case ImageColours::p3_d65:
+      return {to_rec709(ColourSpace::p3_d65)};
+    case ImageColours::acescg:
+      return {to_rec709(ColourSpace::acescg)};
+    case ImageColours::aces2065_1:
+      return {to_rec709(ColourSpace::aces2065_1)};
+    case ImageColours::xyz:
+      return {to_rec709(ColourSpace::xyz)};
+    case ImageColours::adobe_linear:
+      return {to_rec709(from_rec709(kAdobeRgb))};
+    case ImageColours::g18_rec709:
+      return {kIdentity, power<18, 10>};
+    case ImageColours::g22_rec709:
+      return {kIdentity, power<22, 10>};
+    case ImageColours::g24_rec709:
+      return {kIdentity, power<24, 10>};
+    case ImageColours::g22_ap1:
+      return {to_rec709(ColourSpace::acescg), power<22, 10>};
+    case ImageColours::adobe:  // 2.19921875: Adobe RGB (1998) Color Image Encoding, section 4.3.4.2
+      return {to_rec709(from_rec709(kAdobeRgb)), power<563, 256>};
+    case ImageColours::srgb_ap1:
+      return {to_rec709(ColourSpace::acescg), mirrored_srgb};
+    case ImageColours::srgb_p3_d65:
+      return {to_rec709(ColourSpace::p3_d65), mirrored_srgb};
+    case ImageColours::acescc:
+      return {to_rec709(ColourSpace::acescg), acescc_to_linear};
+    case ImageColours::acescct:
+      return {to_rec709(ColourSpace::acescg), acescct_to_linear};
+  }
+  return {};
+}
+
 // Replaces the colours of t, which has three channels of floats, by those of linear sRGB.
 Result<void> convert(std::string_view name, Texels& t, const std::array<float, 9>& m) {
   if (!std::ranges::all_of(m, [](float x) { return std::isfinite(x); }))
@@ -149,17 +223,19 @@ ImageData with_colours(ImageData image, ImageColours colours) {
   if (colours == ImageColours::automatic) return image;
   image.srgb = colours == ImageColours::srgb;
   image.to_srgb.reset();
-  const std::string_view name = scene::name_of(colours);
-  const auto spaces = colour_spaces();
-  const auto space = std::ranges::find(spaces, name, [](ColourSpace s) { return to_string(s); });
-  if (space == spaces.end() || *space == ColourSpace::rec709) return image;
-  const ColourMatrix m = inverse(from_rec709(*space));
-  auto& matrix = image.to_srgb.emplace();
-  for (std::size_t i = 0; i < 9; ++i) matrix[i] = static_cast<float>(m(i / 3, i % 3));
+  const Encoding encoding = encoding_of(colours);
+  if (encoding.matrix == kIdentity && !encoding.to_linear) return image;
   image.f32.insert(image.f32.end(), image.u8.begin(), image.u8.end());
   if (!image.u8.empty())
     for (float& v : image.f32) v /= 255;
   image.u8.clear();
+  if (encoding.to_linear) {
+    const bool alpha = image.channels % 2 == 0;
+    for (std::size_t i = 0; i < image.f32.size(); ++i)
+      if (!alpha || (i + 1) % image.channels != 0)
+        image.f32[i] = static_cast<float>(encoding.to_linear(image.f32[i]));
+  }
+  if (encoding.matrix != kIdentity) image.to_srgb = encoding.matrix;
   return image;
 }
 

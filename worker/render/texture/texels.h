@@ -43,7 +43,8 @@ struct Texels {
   V2 slope(const V2& uv, Wrap wrap) const;
 };
 
-// Returns the image with these colours instead of those that its file says (ImageColours).
+// Returns the image with these colours instead of those that its file says (ImageColours). Curves other than
+// that of sRGB are undone here, alpha excepted; the others by make_texels().
 ImageData with_colours(ImageData image, ImageColours colours);
 
 // Makes texels of `image`; `name` is for messages. Drops the alpha channel, decodes sRGB unless `raw` is set,

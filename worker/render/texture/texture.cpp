@@ -119,7 +119,7 @@ class TexelsLoader {
     const Asset& asset = scene_.assets[b.file.value];
     auto image = image_of(b.file.value, asset);
     if (!image) return tl::unexpected(image.error());
-    if (!b.raw) *image = with_colours(std::move(*image), b.colours);
+    if (!b.raw && b.channel == Channel::all) *image = with_colours(std::move(*image), b.colours);
     const bool is_bytes = image->f32.empty();
     auto texels = make_texels(asset.name, std::move(*image), b.raw, b.alpha, b.channel, content);
     if (!texels) return tl::unexpected(texels.error());
