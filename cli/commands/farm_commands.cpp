@@ -32,7 +32,7 @@ using nlohmann::json;
 struct FarmFlags {
   FarmOptions farm;
   std::string id, frame, spp, target_error, out, report, html, region, fps, exposure, role, user, mix, view;
-  std::string state, search, owner, sort, limit, offset, priority, name;
+  std::string state, search, owner, sort, limit, offset, priority, name, worker;
   std::vector<std::string> after;
   JobOptions job;
   bool quiet = false, none = false, denoised = false;
@@ -61,7 +61,34 @@ int jobs(FarmApi& api, const FarmFlags& flags) {
     print_note(fmt::format("{} of {:.0f} jobs; --limit and --offset select others", shown, *total));
   return code;
 }
+int print_lines(const FarmApi::Answer<std::string>& text) {
+  if (!text) return print_rejected(text.error());
+  for (std::size_t at = 0; at < text->size();) {
+    const std::size_t end = std::min(text->find('\n', at), text->size());
+    print(plain_text(text->substr(at, end - at)));
+    at = end + 1;
+  }
+  return kOk;
+}
+// Prints the log of the worker with this name or id. Of several workers with the name each log is printed.
+int worker_log(FarmApi& api, const FarmFlags& flags) {
+  const auto answer = api.get("/api/v1/workers");
+  if (!answer) return print_rejected(answer.error());
+  bool found = false;
+  for (const json& worker : objects_field(*answer, "workers")) {
+    const std::string id = text_field(worker, "id");
+    if (id != flags.worker && text_field(worker, "name") != flags.worker) continue;
+    found = true;
+    if (const int code = print_lines(api.text("/api/v1/workers/" + percent_encode(id) + "/log")); code != kOk)
+      return code;
+  }
+  if (found) return kOk;
+  return print_error(
+      {Errc::not_found,
+       fmt::format("there is no worker \"{}\"; `lightshaft workers` lists them", plain_text(flags.worker))});
+}
 int workers(FarmApi& api, const FarmFlags& flags) {
+  if (!flags.worker.empty()) return worker_log(api, flags);
   return show_answer(api.get("/api/v1/workers"), flags, workers_table);
 }
 int views(FarmApi& api, const FarmFlags& flags) {
@@ -117,16 +144,7 @@ int priority(FarmApi& api, const FarmFlags& flags) { return change(api, flags, "
 
 int after(FarmApi& api, const FarmFlags& flags) { return change(api, flags, {{"after", flags.after}}); }
 
-int log(FarmApi& api, const FarmFlags& flags) {
-  const auto text = api.text(job_path(flags.id) + "/log");
-  if (!text) return print_rejected(text.error());
-  for (std::size_t at = 0; at < text->size();) {
-    const std::size_t end = std::min(text->find('\n', at), text->size());
-    print(plain_text(text->substr(at, end - at)));
-    at = end + 1;
-  }
-  return kOk;
-}
+int log(FarmApi& api, const FarmFlags& flags) { return print_lines(api.text(job_path(flags.id) + "/log")); }
 
 // Removes a job that has ended. HTTP's DELETE of a job that has not ended cancels it: who asks to remove a
 // job may not know that it still renders.
@@ -374,7 +392,9 @@ void add_farm_commands(CLI::App& app, Action& action) {
   add_option(*video_command, "--exposure", filming->exposure, "STOPS", "exposure in stops; default: 0");
   add_view(*video_command, filming->view);
   video_command->add_flag("--denoised", filming->denoised, "show the denoised images");
-  add(app, action, "workers", "list the workers of a farm", workers);
+  const auto [workers_command, asking] = add(app, action, "workers", "list the workers of a farm", workers);
+  add_option(*workers_command, "--log", asking->worker, "NAME",
+             "print the latest events of the worker with this name or id instead");
   add(app, action, "views", "list the views in which a farm can show colours", views);
 }
 

@@ -26,6 +26,10 @@ inline constexpr Duration kMissingBlobLook = std::chrono::seconds(1);
 // full)
 inline constexpr Duration kWriteAgain = std::chrono::seconds(10);
 
+// Workers
+inline constexpr std::size_t kWorkerLogLines = 40;   // latest events kept for each worker, in memory
+inline constexpr std::size_t kWorkerLogBytes = 256;  // length of one of them
+
 // Submission
 inline constexpr std::size_t kMaxAssets = 100'000;  // files that one submission may name
 inline constexpr std::size_t kMaxWarnings = 100;    // warnings kept per job

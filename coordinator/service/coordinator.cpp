@@ -354,6 +354,14 @@ std::vector<WorkerView> Coordinator::workers() const {
   return all;
 }
 
+Result<std::string> Coordinator::worker_log(const WorkerId& id) const {
+  const auto core = parts_->core.lock();
+  const auto worker = core->workers.find(id);
+  if (worker == core->workers.end())
+    return fail(Errc::not_found, fmt::format("there is no worker \"{}\"", id.value));
+  return log_text(worker->second.log);
+}
+
 Result<void> Coordinator::drain_worker(const WorkerId& id, bool withdrawn) {
   return parts_->sessions.drain(id, withdrawn);
 }

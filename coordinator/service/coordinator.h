@@ -142,6 +142,8 @@ class Coordinator {
   // Workers
 
   std::vector<WorkerView> workers() const;
+  // The latest events of a worker since this coordinator knows it, a line each: states, failures, refusals
+  Result<std::string> worker_log(const WorkerId& id) const;
   Result<void> drain_worker(const WorkerId& id, bool withdrawn = false);  // WorkerSessions::drain
   // `principal`: who answers for the worker (WorkerJoined::principal)
   Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink,

@@ -77,6 +77,7 @@ class FarmDriver {
   void notify_waiting_for(const JobId& id);
   Result<WaitingPartial> partial_for(JobEntry& entry, const Fold& e) const;
   void note_leased(const Lease& lease, const WorkerId& worker);
+  void note_worker(const WorkerId& worker, const std::string& text);  // WorkerEntry::note
   void end_image(const EntryPtr& entry);
   void end_curve(const EntryPtr& entry);
 

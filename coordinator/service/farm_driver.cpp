@@ -423,18 +423,26 @@ void FarmDriver::on(const WorkerStateChanged& e) {
     log_error(fmt::format("worker={}", e.worker.value), "unhealthy: " + e.why);
   if (const auto w = core_.workers.find(e.worker); w != core_.workers.end())
     w->second.trouble = e.to == WorkerState::unhealthy ? e.why : "";
+  note_worker(e.worker, fmt::format("{}: {}", to_string(e.to), e.why));
   core_.publisher.worker(e.worker, true);
+}
+
+void FarmDriver::note_worker(const WorkerId& worker, const std::string& text) {
+  if (const auto w = core_.workers.find(worker); w != core_.workers.end()) w->second.note(text);
 }
 
 void FarmDriver::on(const WorkerBlocked& e) {
   log_warn(fmt::format("worker={} job={}", e.worker.value, e.job.value),
            "gets no more of this job: " + e.why);
+  note_worker(e.worker, fmt::format("gets no more of job {}: {}", e.job.value, e.why));
   core_.records.log(e.job, fmt::format("worker {} gets no more of it: {}", e.worker.value, e.why));
 }
 
 void FarmDriver::on(const WorkerFruitless& e) {
   log_warn(fmt::format("worker={} job={}", e.worker.value, e.job.value),
            "renders nothing of this job and is not waited for: " + e.why);
+  note_worker(e.worker,
+              fmt::format("renders nothing of job {} and is not waited for: {}", e.job.value, e.why));
   core_.records.log(
       e.job, fmt::format("worker {} renders nothing of it and is not waited for: {}", e.worker.value, e.why));
 }
@@ -447,6 +455,7 @@ void FarmDriver::on(const WorkerFoundFaulty& e) {
   log_error(fmt::format("worker={} job={} tile={} round={}", e.worker.value, e.unit.job.value, e.unit.tile,
                         e.unit.round),
             "quarantined: " + e.evidence);
+  note_worker(e.worker, "quarantined: " + e.evidence);
   core_.records.add_quarantined({e.worker, e.evidence});
   if (const auto saved = core_.records.put_quarantined(); !saved)
     for (const auto& [id, entry] : core_.jobs.all()) {

@@ -18,14 +18,6 @@ namespace {
 
 using nlohmann::json;
 
-std::string log_text(const std::vector<LogLine>& lines) {
-  std::string text;
-  for (const LogLine& line : lines)
-    text += fmt::format("{:%Y-%m-%dT%H:%M:%SZ} {}\n", fmt::gmtime(static_cast<std::time_t>(line.unix_time)),
-                        line.text);
-  return text;
-}
-
 // Sorts the lines by time and keeps only the latest `most` lines.
 void shorten(std::vector<LogLine>& lines, std::size_t most) {
   std::stable_sort(lines.begin(), lines.end(),

@@ -224,8 +224,11 @@ void ResultPipeline::refuse(Core& core, const Arrived& a, const Error& error) {
   log_warn(fmt::format("job={} tile={} round={} worker={}", unit.job.value, unit.tile, unit.round,
                        a.from->worker.value),
            error.message);
-  if (core.driver.farm().failure_is_new(a.from->worker, unit))
+  if (core.driver.farm().failure_is_new(a.from->worker, unit)) {
     core.records.log(unit.job, fmt::format("{} (worker {})", error.message, a.from->worker.value));
+    if (const auto w = core.workers.find(a.from->worker); w != core.workers.end())
+      w->second.note(fmt::format("a result of job {} is refused: {}", unit.job.value, error.message));
+  }
   UnitFailure failure;
   failure.unit = unit;
   failure.lease = a.result.lease;

@@ -178,10 +178,13 @@ void WorkerSessions::handle(Core& core, Connection& from, FromWorker message) {
                    // If the acknowledgement came after that lease, the worker could mistake it for the answer
                    // to its new attempt.
                    from.sink->send(ResultAck{m.unit, std::nullopt});
-                   if (core.driver.farm().failure_is_new(from.worker, m.unit))
+                   if (core.driver.farm().failure_is_new(from.worker, m.unit)) {
                      core.records.log(m.unit.job,
                                       fmt::format("tile {} round {} failed on {}: {}", m.unit.tile,
                                                   m.unit.round, from.worker.value, m.reason));
+                     found->second.note(fmt::format("job {} tile {} round {} failed: {}", m.unit.job.value,
+                                                    m.unit.tile, m.unit.round, m.reason));
+                   }
                    core.driver.run(UnitFailed{from.worker, m});
                  },
                  [&](const LeaseReturned& m) {

@@ -215,7 +215,11 @@ def test_a_job_is_changed_and_removed(farm, local_farm):
         with pytest.raises(lightshaft.NotFound):
             farm.job(gone.id)
     assert not {job.id, short.id, running.id} & {other.id for other in farm.jobs()}
-    assert [worker["name"] for worker in farm.workers()] == ["worker-1"]
+    (worker,) = farm.workers()
+    assert worker["name"] == "worker-1"
+    assert " connected: " in farm.worker_log(worker["id"])
+    with pytest.raises(lightshaft.NotFound):
+        farm.worker_log("w-0-0-nobody/..")
 
 
 def test_figures_come_as_arrays_and_text(farm):

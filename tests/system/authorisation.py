@@ -81,6 +81,7 @@ ROUTES = {
     "get /api/v1/events": known(200, "to a submit token events of its own jobs, and of workers without what they do for others"),
     "get /api/v1/workers": known(200, "to a submit token without what they do for others"),
     "patch /api/v1/workers/{worker}": admins(404, "404: there is no such worker in this test"),
+    "get /api/v1/workers/{worker}/log": row(401, 401, 403, 404, 403, 403, 404, "it names jobs of all users; 404: there is no such worker in this test"),
     "get /api/v1/views": known(200),
     "get /api/v1/views/cube": known(400, "400: this test names no view"),
     "get /api/v1/tokens": admins(200, "ids, roles and users; no secret is kept that could be told"),

@@ -147,6 +147,8 @@ def test_a_job_is_shown_paused_resumed_extended_and_cancelled(farm, tmp_path):
     assert json.loads(watched[-1])["state"] == "done" and json.loads(watched[-1])["spp_done"] == 8
     assert "worker-1" in call(farm, "workers").stdout
     assert json.loads(call(farm, "workers", "--json").stdout)["workers"][0]["name"] == "worker-1"
+    assert " connected: " in call(farm, "workers", "--log", "worker-1").stdout
+    assert "lightshaft workers` lists them" in call(farm, "workers", "--log", "nobody", code=1).stderr
 
     endless = call(farm, "submit", scene, "--spp", 1_000_000).stdout.strip()
     assert "cancelled" in call(farm, "cancel", endless).stdout

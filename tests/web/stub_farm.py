@@ -75,6 +75,7 @@ class StubFarm:
         self.lock = threading.Lock()
         self.jobs = {}
         self.workers = {}
+        self.worker_logs = {}
         self.tiles = []
         self.report = {"convergence": []}
         self.image = png(64, 48, (200, 120, 40))
@@ -328,6 +329,8 @@ def _handler(farm):
             return self._send(201, {"id": "j-new", "url": "/api/v1/jobs/j-new"})
 
         def _get_workers(self, parts, body):
+            if parts[1:] == ["log"]:
+                return self._send(200, farm.worker_logs[parts[0]].encode(), "text/plain") if parts[0] in farm.worker_logs else self._problem(404, "there is no such worker")
             return self._send(200, {"workers": list(farm.workers.values()), **({"join": farm.join} if farm.join else {})})
 
         def _patch_workers(self, parts, body):

@@ -83,6 +83,33 @@ def test_only_an_admin_sends_workers_away(some, dashboard, role):
     assert (page.count(".add-worker") == 1) == (role == "submit")
 
 
+def test_the_log_of_a_worker_is_below_its_row(some, dashboard):
+    some.worker_logs = {"w-3": "2026-01-01T00:00:00Z connected: joined\n<b>unhealthy</b>: 3 failures\n"}
+    page = dashboard("#/workers")
+    page.click("[data-worker=w-3] .open-log")
+    page.wait("document.querySelector('[data-worker=w-3] + .worker-log pre')")
+    assert page.text(".worker-log pre") == "2026-01-01T00:00:00Z connected: joined <b>unhealthy</b>: 3 failures"
+    assert page.evaluate("document.querySelector('[data-worker=w-3] .open-log').getAttribute('aria-expanded')") == "true"
+
+    page.click("[data-worker=w-3] .open-log")
+    page.wait("!document.querySelector('.worker-log')")
+
+
+def test_the_log_of_a_worker_that_is_gone_ends_in_an_error(some, dashboard):
+    page = dashboard("#/workers")
+    page.click("[data-worker=w-5] .open-log")
+    page.wait("document.body.innerText.includes('there is no such worker')")
+    assert page.count(".worker-log") == 0
+
+
+@pytest.mark.parametrize("role, seen", [("submit", 0), ("read", 12), ("admin", 12)])
+def test_logs_of_workers_are_for_those_who_see_all_jobs(some, dashboard, role, seen):
+    some.role = role
+    page = dashboard("#/workers")
+    page.wait("document.querySelector('[data-worker]')")
+    assert page.count(".open-log") == seen
+
+
 TLS = " --tls-ca ca.pem --tls-cert worker.pem --tls-key worker.key"
 
 

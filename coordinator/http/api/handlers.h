@@ -23,6 +23,7 @@ Response post_token(Api&, const Request&, const Params&);
 Response delete_token(Api&, const Request&, const Params&);
 Response get_workers(Api&, const Request&, const Params&);
 Response patch_worker(Api&, const Request&, const Params&);
+Response get_worker_log(Api&, const Request&, const Params&);
 Response get_events(Api&, const Request&, const Params&);
 Response get_job_events(Api&, const Request&, const JobId&);
 

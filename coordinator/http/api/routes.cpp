@@ -85,6 +85,7 @@ constexpr auto kRoutes = [] {
       plain(del, "/api/v1/tokens/{token}", admin, slow, delete_token),
       plain(get, "/api/v1/workers", token, quick, get_workers),
       Route{patch, "/api/v1/workers/{worker}", admin, quick, buffered, kMaxControlJson, patch_worker, kJson},
+      plain(get, "/api/v1/workers/{worker}/log", see, quick, get_worker_log),
       Route{post, "/api/v1/blobs/missing", token, remote, buffered, kMaxDigestList, post_blobs_missing,
             kJson},
       plain(head, "/api/v1/blobs/{sha256}", token, remote, head_blob),

@@ -135,6 +135,13 @@ Response patch_worker(Api& api, const Request& request, const Params& params) {
   return {.status = 202};
 }
 
+Response get_worker_log(Api& api, const Request&, const Params& params) {
+  const WorkerId id{params.empty() ? std::string() : params[0]};
+  if (!plausible_id(id.value)) return problem(404, "there is no such worker");
+  auto log = api.coordinator().worker_log(id);
+  return log ? text_response(200, "text/plain; charset=utf-8", std::move(*log)) : problem(log.error());
+}
+
 Response get_events(Api&, const Request& request, const Params&) { return event_stream(request, {}); }
 
 Response get_job_events(Api& api, const Request& request, const JobId& id) {

@@ -8,9 +8,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "coordinator/domain/event.h"
+#include "coordinator/store/jobs/job_store.h"
 #include "coordinator/views/worker_session.h"
 #include "core/base/clock.h"
 
@@ -54,6 +57,10 @@ struct Connection {
 };
 
 struct WorkerEntry {
+  // Adds an event to the log. Texts come from workers, so that control characters are removed and long texts
+  // cut.
+  void note(std::string_view text);
+
   WorkerHello hello;
   std::shared_ptr<Connection> connection;
   TimePoint last_seen{}, last_event{};
@@ -61,6 +68,7 @@ struct WorkerEntry {
   double cpu_seconds = 0;
   std::uint64_t rss_bytes = 0;
   JobId last_job;
+  std::vector<LogLine> log;  // what happened to the worker, the latest last
 };
 using WorkerTable = std::map<WorkerId, WorkerEntry>;
 

@@ -135,6 +135,8 @@ std::string points_json(const std::vector<ConvergencePoint>& points);
 Result<std::vector<ConvergencePoint>> parse_points(std::string_view json);
 std::string log_json(const std::vector<LogLine>& lines);
 Result<std::vector<LogLine>> parse_log(std::string_view json);
+// Returns the lines as text, each with its time in UTC.
+std::string log_text(std::span<const LogLine> lines);
 
 // A worker that rendered wrong pixels, and the evidence for this as text
 struct QuarantinedWorker {

@@ -1,3 +1,4 @@
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <cmath>
@@ -332,6 +333,14 @@ Result<std::vector<LogLine>> parse_log(std::string_view text) {
     for (const json& line : all) lines.push_back({line.at(0), line.at(1)});
     return lines;
   });
+}
+
+std::string log_text(std::span<const LogLine> lines) {
+  std::string text;
+  for (const LogLine& line : lines)
+    text += fmt::format("{:%Y-%m-%dT%H:%M:%SZ} {}\n", fmt::gmtime(static_cast<std::time_t>(line.unix_time)),
+                        line.text);
+  return text;
 }
 
 }  // namespace ls::coordinator

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import urllib.parse
 import warnings
 from collections.abc import Iterable, Mapping
 from types import TracebackType
@@ -113,6 +114,13 @@ class AsyncFarm:
     async def workers(self) -> list[models.Worker]:
         """Lists the workers of the farm and their present work."""
         return await self._transport.run(steps.listed("/api/v1/workers", "workers"))
+
+    async def worker_log(self, worker: str) -> str:
+        """Returns the latest events of a worker, a line each: when it came and left, what failed on it. `worker`
+        is its id. For tokens with the role admin or read."""
+        return await self._transport.run(
+            steps.text_at(f"/api/v1/workers/{urllib.parse.quote(worker, safe='')}/log")
+        )
 
     async def views(self) -> list[str]:
         """Lists the views in which the farm can show colours, those of its OpenColorIO configuration."""

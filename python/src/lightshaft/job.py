@@ -15,7 +15,19 @@ from . import models
 from .errors import NotFound, RequestRejected
 from .images import Array, decode_layers, layer_of
 from .light_groups import Mix
-from .steps import Call, Steps, ask_json, change_job, fetch, get_job, job_path, listed, succeed, work
+from .steps import (
+    Call,
+    Steps,
+    ask_json,
+    change_job,
+    fetch,
+    get_job,
+    job_path,
+    listed,
+    succeed,
+    text_at,
+    work,
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -165,8 +177,7 @@ def tiles(job: str) -> Steps[list[models.Tile]]:
 
 
 def log(job: str) -> Steps[str]:
-    reply = yield from succeed(Call("GET", job_path(job, "/log")))
-    return reply.body.decode("utf-8", "replace")
+    return text_at(job_path(job, "/log"))
 
 
 def extend(job: str, spp: int | None, target_error: float | None) -> Steps[models.Job]:

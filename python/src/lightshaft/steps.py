@@ -181,6 +181,11 @@ def listed(path: str, key: str, kind: type = dict) -> Steps[list[Any]]:
     return found
 
 
+def text_at(path: str) -> Steps[str]:
+    reply = yield from succeed(Call("GET", path))
+    return reply.body.decode("utf-8", "replace")
+
+
 def get_job(job: str) -> Steps[models.Job]:
     return _checked(ask_json(Call("GET", job_path(job))))
 

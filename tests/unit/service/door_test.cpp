@@ -1,10 +1,14 @@
 // Which workers and submissions are accepted, and the errors for those that are not.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <thread>
 
 #include "coordinator/admission/admission.h"
+#include "coordinator/base/limits.h"
+#include "coordinator/service/state/worker_entry.h"
 #include "core/image/frame/render_limits.h"
 #include "core/scene/schema/integrators.h"
 #include "formats/read.h"
@@ -14,6 +18,9 @@
 
 namespace ls::coordinator {
 namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 TEST(Service, OnlyWorkersWithTheJoinTokenMayJoin) {
   Coordinator::Options options;
@@ -189,6 +196,28 @@ TEST(Service, FailureOfAUnitThatTheWorkerDoesNotHoldIsNotLogged) {
   EXPECT_EQ(lines("forged"), 0u);
   EXPECT_EQ(lines("crashed 2026-01-01T00:00:00Z cancelled by the administrator "), 1u)
       << coordinator->job_log(job).value();
+
+  const auto log_of = [&](const std::string& name) {
+    for (const WorkerView& worker : coordinator->workers())
+      if (worker.name == name) return coordinator->worker_log(WorkerId{worker.id}).value();
+    return std::string("there is no such worker");
+  };
+  EXPECT_THAT(log_of("honest"), HasSubstr(" connected: "));
+  EXPECT_THAT(log_of("honest"), HasSubstr("crashed 2026-01-01T00:00:00Z cancelled by the administrator "));
+  EXPECT_THAT(log_of("stranger"), Not(HasSubstr("forged")));
+  EXPECT_EQ(coordinator->worker_log(WorkerId{"w-nobody"}).error().code, Errc::not_found);
+}
+
+TEST(WorkerEntry, KeepsItsLatestEventsEachNoLongerThanOneLine) {
+  WorkerEntry worker;
+  for (std::size_t i = 0; i < 2 * limits::kWorkerLogLines; ++i)
+    worker.note(fmt::format("event {}\nforged {}", i, std::string(1'000'000, 'x')));
+
+  ASSERT_EQ(worker.log.size(), limits::kWorkerLogLines);
+  EXPECT_THAT(worker.log.front().text, HasSubstr(fmt::format("event {} forged", limits::kWorkerLogLines)));
+  for (const LogLine& line : worker.log) EXPECT_LE(line.text.size(), limits::kWorkerLogBytes);
+  const std::string text = log_text(worker.log);
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), limits::kWorkerLogLines);
 }
 
 TEST(Service, SceneMayOnlyNameItsOwnFiles) {

@@ -59,6 +59,7 @@ export const api = {
   workers: async () => (await call("GET", "/workers")).json(),
   /** state: "draining", or "connected" for one that drains and is to stay. */
   setWorkerState: (id, state) => call("PATCH", `/workers/${encodeURIComponent(id)}`, json({ state })),
+  workerLog: async (id) => (await call("GET", `/workers/${encodeURIComponent(id)}/log`)).text(),
   remove: (id) => call("DELETE", jobPath(id)),
   again: async (id, changes) => (await call("POST", `${jobPath(id)}/again`, json(changes))).json(),
   thumbnail: async (id, signal) => createImageBitmap(await (await call("GET", `${jobPath(id)}/thumbnail.png`, { signal })).blob()),

@@ -18,6 +18,7 @@ export function initialState() {
     jobs: null, // Map id -> job JSON; of frames only the one that is shown; null: not known yet
     workers: null, // Map id -> worker JSON
     join: null, // how further workers join: {address, tls, token_file}
+    workerLog: null, // of the worker whose log is open: {id, text}; text is null until it is there
     workerList: { search: "", tag: "", sort: "Worker", descending: false },
     colours: new Map(), // worker name -> index into the palette, in order of appearance
     open: null, // the state of the job that is open, see openJob()

@@ -7,6 +7,13 @@ export function makeWorkerActions({ get, set, attempt, api }) {
     searchWorkers: (search) => list({ search }),
     chooseTag: (tag) => list({ tag }),
     sortWorkers: (sort, descending) => list({ sort, descending }),
+    /** Opens the log of a worker, or closes it if it is the one that is open. */
+    showWorkerLog: async (id) => {
+      if (get().workerLog?.id === id) return set({ ...get(), workerLog: null });
+      set({ ...get(), workerLog: { id, text: null } });
+      const text = await attempt(() => api.workerLog(id));
+      if (get().workerLog?.id === id) set({ ...get(), workerLog: text === undefined ? null : { id, text } });
+    },
     /** The event stream tells when the worker has heard of it. */
     setWorkerState: async (id, state) => {
       set(withUi(get(), { busy: `worker ${id}`, confirming: null }));

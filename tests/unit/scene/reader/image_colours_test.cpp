@@ -1,4 +1,5 @@
-// Names of colour spaces of images: our own, and those of OpenColorIO's configurations of ACES and of MaterialX.
+// Names of colour spaces of images: our own, and those of OpenColorIO's configurations of ACES and of
+// MaterialX.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,9 +12,10 @@ namespace {
 using ::testing::HasSubstr;
 
 std::string bitmap_in(std::string_view space) {
-  return with_sensor(fmt::format(R"(<shape type="sphere"><bsdf type="diffuse"><texture type="bitmap" name="reflectance">
+  return with_sensor(
+      fmt::format(R"(<shape type="sphere"><bsdf type="diffuse"><texture type="bitmap" name="reflectance">
 <string name="filename" value="wood.png"/><string name="color_space" value="{}"/></texture></bsdf></shape>)",
-                                 space));
+                  space));
 }
 ImageColours read_as(std::string_view space) {
   const Scene scene = must_read(bitmap_in(space));
@@ -34,10 +36,12 @@ const std::pair<ImageColours, std::vector<std::string>> kOfOpenColorIo[] = {
      {"Linear Rec.709 (sRGB)", "lin_rec709_srgb", "Utility - Linear - Rec.709", "lin_rec709", "lin_srgb",
       "Utility - Linear - sRGB"}},
     {ImageColours::g18_rec709,
-     {"Gamma 1.8 Rec.709 - Texture", "g18_rec709_tx", "Utility - Gamma 1.8 - Rec.709 - Texture", "g18_rec709"}},
+     {"Gamma 1.8 Rec.709 - Texture", "g18_rec709_tx", "Utility - Gamma 1.8 - Rec.709 - Texture",
+      "g18_rec709"}},
     {ImageColours::g22_ap1, {"Gamma 2.2 AP1 - Texture", "g22_ap1_tx", "g22_ap1"}},
     {ImageColours::g22_rec709,
-     {"Gamma 2.2 Rec.709 - Texture", "g22_rec709_tx", "Utility - Gamma 2.2 - Rec.709 - Texture", "g22_rec709"}},
+     {"Gamma 2.2 Rec.709 - Texture", "g22_rec709_tx", "Utility - Gamma 2.2 - Rec.709 - Texture",
+      "g22_rec709"}},
     {ImageColours::g24_rec709,
      {"Gamma 2.4 Rec.709 - Texture", "g24_rec709_tx", "g24_rec709", "rec709_display",
       "Utility - Rec.709 - Display"}},

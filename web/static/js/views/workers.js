@@ -1,6 +1,6 @@
 // The list of workers, and how to add one.
 import { h } from "../dom.js";
-import { colourOf, mayChange } from "../state.js";
+import { colourOf, mayChange, seesOthers } from "../state.js";
 import { bytes, count, duration, jobName, plural } from "../format.js";
 import { frameOf, jobHref } from "../route.js";
 import { safeClass, workerMark } from "./pieces.js";
@@ -24,7 +24,7 @@ export function workersView(state, actions) {
     narrowing(state, workers, actions),
     shown.length === 0 ? h("p", { key: "nothing", class: "waiting" }, "No worker matches.") : h("table", { key: "list", class: "list worker-list" },
       h("thead", null, h("tr", null, kColumns.map((column) => head(column, state.workerList, actions)), mayDrain(state) ? h("th", { key: "actions", scope: "col" }, h("span", { class: "unseen" }, "Actions")) : null)),
-      h("tbody", null, shown.map((worker) => row(state, worker, actions)))),
+      h("tbody", null, shown.flatMap((worker) => [row(state, worker, actions), logRow(state, worker)]))),
     mayChange(state) ? h("details", { key: "add", class: "panel add-worker" }, h("summary", null, "Add a worker"), howToJoin(state)) : null);
 }
 
@@ -77,7 +77,8 @@ function row(state, worker, actions) {
       h("b", null, workerMark(colourOf(state, worker.name), worker.name)), worker.state === "connected" ? null : h("span", { key: "state", class: "pill" }, worker.state),
       worker.fake === true ? h("span", { key: "fake", class: "pill", title: "It invents pixels instead of rendering, for tests" }, "fake") : null,
       worker.tags?.length ? h("p", { class: "tags" }, worker.tags.map((tag) => h("span", { key: tag, class: "tag" }, tag))) : null),
-    h("td", { class: "doing" }, alive(worker) ? worker.activity || "idle" : "not connected", worker.job ? [" · ", h("a", { key: "job", href: jobHref(worker.job) }, name)] : null),
+    h("td", { class: "doing" }, alive(worker) ? worker.activity || "idle" : "not connected", worker.job ? [" · ", h("a", { key: "job", href: jobHref(worker.job) }, name)] : null,
+      seesOthers(state) ? h("button", { key: "log", type: "button", class: "small quiet open-log", "aria-label": `Log: ${worker.name}`, "aria-expanded": String(state.workerLog?.id === worker.id), onclick: () => actions.showWorkerLog(worker.id) }, "Log") : null),
     cell("Threads", count(worker.threads)),
     cell("Done", count(worker.units_done)),
     cell("CPU time", duration(worker.cpu_seconds)),
@@ -86,6 +87,11 @@ function row(state, worker, actions) {
     cell("Class", h("code", { title: worker.platform || null }, String(worker.numeric_class ?? "–").slice(0, 8))),
     mayDrain(state) ? h("td", { key: "acts", class: "acts" }, drain(state, worker, actions)) : null);
 }
+
+/** What happened to a worker, the latest last, below its row. */
+const logRow = ({ workerLog, me }, worker) => (workerLog?.id !== worker.id ? null : h("tr", { key: `log ${worker.id}`, class: "worker-log" },
+  h("td", { colspan: kColumns.length + (me.role === "admin" ? 1 : 0) },
+    workerLog.text === null ? h("p", { key: "waiting", class: "help" }, "Fetching the log …") : h("pre", { key: "lines", tabindex: 0, "aria-label": `Log of ${worker.name}` }, workerLog.text || "Nothing has happened yet."))));
 
 /** Once it has ended it can't be taken back, so it asks once more. */
 function drain(state, worker, actions) {
