@@ -83,8 +83,7 @@ class Exporter:
             return
         visible = visibility_of(self.problems, item, parent, self.depsgraph.view_layer)
         self.check_visibility(item, visible)
-        owner = (parent or item).original
-        links = self.links.of_light(owner)
+        links, owner = self.links.of_light(item), self.links.owner_of(item, parent)
         if item.type == "LIGHT":
             marks = {"light_group": self.groups.of(item), **links}
             add_light(self.document, self.problems, item, matrix, Matrix, self.may_see, marks, visible)

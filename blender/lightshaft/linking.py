@@ -16,6 +16,7 @@ class Linked:
         for objects, state in states(collection):
             (included if state == INCLUDE else excluded).update(objects)
         self.list = name if included else f"-{name}"
+        self.named = included | excluded
         self.name, self.members = name, included - excluded if included else excluded
 
     def __contains__(self, item):
@@ -31,33 +32,40 @@ def states(collection):
 
 
 class Linking:
-    """The link sets of an evaluated scene. Objects that instance others stand for them, as in Cycles."""
+    """The link sets of an evaluated scene."""
 
     def __init__(self, depsgraph):
         self.sets = {}  # by the full name of the collection
         self.blockers = {}  # by the names of lights
         for instance in depsgraph.object_instances:
-            owner = owner_of(instance)
-            linking = owner.light_linking
+            light = instance.object.original
+            linking = light.light_linking
             for collection in (linking.receiver_collection, linking.blocker_collection):
                 if collection is not None and collection.name_full not in self.sets:
                     self.sets[collection.name_full] = Linked(self.fresh_name(collection.name), collection)
             if linking.blocker_collection is not None:
-                self.blockers[owner.name] = self.sets[linking.blocker_collection.name_full]
+                self.blockers[light.name] = self.sets[linking.blocker_collection.name_full]
 
     def fresh_name(self, wanted):
         base = re.sub(r"[^A-Za-z0-9_-]", "_", wanted)[:50].lstrip("-") or "set"
         names = {linked.name for linked in self.sets.values()} | {NONE}
         return next(name for name in numbered(base) if name not in names)
 
-    def of_light(self, owner):
+    def of_light(self, item):
         """Returns the parameters `receivers` and `blockers` of what an object emits."""
-        linking = owner.light_linking
+        linking = item.original.light_linking
         collections = (linking.receiver_collection, linking.blocker_collection)
         return {
             name: self.sets[collection.name_full].list if collection is not None else None
             for name, collection in zip(LISTS, collections)
         }
+
+    def owner_of(self, item, parent):
+        """Returns the object whose link sets an object has. As in Cycles it is what instances the object, if the
+        collection of some light names that."""
+        if parent is not None and any(parent.original in linked.named for linked in self.sets.values()):
+            return parent.original
+        return item.original
 
     def sets_of(self, owner):
         """Returns the value of `link_sets` of an object, or None."""
@@ -67,11 +75,6 @@ class Linking:
     def lights_past(self, owner):
         """Returns the names of the lights of which the object is no blocker."""
         return [name for name, linked in self.blockers.items() if owner not in linked]
-
-
-def owner_of(instance):
-    """Returns the object whose links an instance has."""
-    return (instance.parent if instance.is_instance else instance.object).original
 
 
 def numbered(base):

@@ -201,8 +201,8 @@ class Reader {
   Memo<MediumIndex> media_;
   // The indices of the shape groups read so far; nullopt: the group has no shape, or is wrong.
   std::unordered_map<const Element*, std::optional<GroupIndex>> groups_;
-  std::optional<GroupIndex> group_;            // group whose shapes are being read; nullopt: none
-  std::unordered_set<const Element*> merges_;  // the shapes "merge" that were read so far
+  std::optional<GroupIndex> group_;               // group whose shapes are being read; nullopt: none
+  std::unordered_set<const Element*> merges_;     // the shapes "merge" that were read so far
   std::set<std::string, std::less<>> link_sets_;  // the link sets of the objects read so far
   struct LinkedTo {
     const Element* element;

@@ -69,8 +69,8 @@ Signed by_sign(std::string_view text) {
 
 bool LinkList::has(const std::vector<std::string>& sets) const {
   const auto any_of = [&](const std::vector<std::string>& names) {
-    return std::ranges::any_of(sets,
-                               [&](const std::string& set) { return std::ranges::binary_search(names, set); });
+    return std::ranges::any_of(
+        sets, [&](const std::string& set) { return std::ranges::binary_search(names, set); });
   };
   return !any_of(without) && (with.empty() || any_of(with));
 }
@@ -79,9 +79,10 @@ std::string wrong_link_sets(std::string_view text) {
   const auto names = split(text);
   if (std::string wrong = wrong_name(names); !wrong.empty()) return wrong;
   if (std::ranges::find(names, kNoLinkSet) == names.end()) return {};
-  return fmt::format("nothing can be in the link set \"{0}\": lights are linked to \"{0}\" if they have no "
-                     "receivers or no blockers. Choose another name",
-                     kNoLinkSet);
+  return fmt::format(
+      "nothing can be in the link set \"{0}\": lights are linked to \"{0}\" if they have no "
+      "receivers or no blockers. Choose another name",
+      kNoLinkSet);
 }
 
 std::string wrong_link_list(std::string_view text) {

@@ -64,7 +64,7 @@ struct Field {
   // For a number or colour that Mitsuba does not have: if the field has this value, it is not written in
   // files. NaN: there is no such value.
   double unwritten = std::numeric_limits<double>::quiet_NaN();
-  bool number = false;       // true: the field is a texture that is read as a scalar, not as a colour
+  bool number = false;  // true: the field is a texture that is read as a scalar, not as a colour
   // For a text: returns why a value is wrong, or an empty text. Null: every value is right.
   std::string (*wrong)(std::string_view text) = nullptr;
   // True for fields that Mitsuba does not have or that older scenes lack. If such a field has its default

@@ -20,7 +20,8 @@ std::vector<std::string> sets_of(const std::string& text) {
 
 template <class T>
 auto& link_sets_of(T& medium) {
-  return std::visit([](auto& m) -> auto& { return m.link_sets; }, medium);
+  return std::visit(
+      [](auto& m) -> auto& { return m.link_sets; }, medium);
 }
 
 }  // namespace

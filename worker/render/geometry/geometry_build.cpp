@@ -278,8 +278,7 @@ Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
 
 // True if shadow rays may pass the surface.
 bool lets_light_pass(const SurfaceInfo& s) {
-  return s.null || s.null_transmission || s.hidden.has(RayKind::shadow) ||
-         s.hidden.has(RayKind::some_shadow);
+  return s.null || s.null_transmission || s.hidden.has(RayKind::shadow) || s.hidden.has(RayKind::some_shadow);
 }
 
 // Appends to g the shapes of one space, opaque ones first. `shapes` holds the indices of these shapes in

@@ -196,8 +196,7 @@ C3 PathTracer<F, Light>::shadow_at(const SurfaceHit& hit) {
   if (world_.lights.can_sample()) {
     const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, {hit.p, n});
     const auto light = world_.lights.sample(choice, hit.p);
-    if (light && turn_to(choice, hit))
-      receive(*light, dot(light->direction, n) / light->pdf, 0);
+    if (light && turn_to(choice, hit)) receive(*light, dot(light->direction, n) / light->pdf, 0);
   }
   if (!is_black(world_.lights.constant_environment()) &&
       turn_to(world_.lights.sky_reach(), RayKind::surface, world_.surface_links[hit.surface])) {

@@ -246,7 +246,8 @@ class PathTracer {
   bool turn_to(const LightChoice& choice, const SurfaceHit& hit) {
     if constexpr (F.visibility) {
       if (world_.ray_flags)
-        return turn_to(world_.lights.reach(choice.light), RayKind::surface, world_.surface_links[hit.surface]);
+        return turn_to(world_.lights.reach(choice.light), RayKind::surface,
+                       world_.surface_links[hit.surface]);
     }
     return true;
   }
@@ -481,7 +482,7 @@ class PathTracer {
   float aim_ = 1;
   struct Nothing {};
   struct Links {
-    scene::LinkMask receiver = 0;  // the lists that have what the last vertex is on or in
+    scene::LinkMask receiver = 0;                    // the lists that have what the last vertex is on or in
     scene::LinkIndex blockers = scene::kEverything;  // the list of the light of shadow rays
   };
   std::conditional_t<F.visibility, Links, Nothing> links_;

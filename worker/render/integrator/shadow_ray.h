@@ -37,9 +37,9 @@ C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSam
 }
 
 // Returns `value` times the transmittance of everything along the ray from p in the direction d, of length
-// `left`: of the media, and of the surfaces that light passes straight through (null transmission). No surface
-// that is opaque to all lights may block the ray. `medium` contains the media at the start of the ray. `start` is p before it was
-// moved off its surface; lengths in media are measured from there.
+// `left`: of the media, and of the surfaces that light passes straight through (null transmission). No
+// surface that is opaque to all lights may block the ray. `medium` contains the media at the start of the
+// ray. `start` is p before it was moved off its surface; lengths in media are measured from there.
 template <Features F, template <Features> class Light>
 C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left,
                                             Within medium, RandomStream stream) {

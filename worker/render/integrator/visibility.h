@@ -10,7 +10,7 @@
 // estimation as usual. Excepted are mirrors and, for lights without blockers, those directions of glossy
 // surfaces that have a high density (kLikeMirror): there the scattered ray's hit alone counts, and next-event
 // estimation adds nothing. Otherwise a glossy floor would show the shadow of a shape that is missing in its
-// reflections. Lights with blockers are as in Cycles: their light passes the same shapes everywhere.
+// reflections. The light of lights with blockers passes the same shapes everywhere but in mirrors.
 #pragma once
 
 #include <cmath>

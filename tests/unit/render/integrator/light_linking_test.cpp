@@ -20,7 +20,8 @@ using test::translate;
 
 // The lights that a scene has had added since it was counted.
 struct AddedLight {
-  explicit AddedLight(const SceneBuilder& b) : shapes(b.scene.shapes.size()), emitters(b.scene.emitters.size()) {}
+  explicit AddedLight(const SceneBuilder& b)
+      : shapes(b.scene.shapes.size()), emitters(b.scene.emitters.size()) {}
   std::size_t shapes, emitters;
 
   void link(SceneBuilder& b, const LightLinks& links) const {
@@ -50,11 +51,13 @@ TEST(LightLinking, EachLampLightsTheFloorThatItIsLinkedTo) {
             x == 0 ? "left, both" : "both, right";
       for (const double x : {0., 10.}) {
         builder.scene.emitters.emplace_back(PointEmitter{{x, 0, 2}, {1, 1, 1}, {}, true, true, {"left", ""}});
-        builder.scene.emitters.emplace_back(PointEmitter{{x, 0, 2}, {2, 2, 2}, {}, true, true, {"-left", ""}});
+        builder.scene.emitters.emplace_back(
+            PointEmitter{{x, 0, 2}, {2, 2, 2}, {}, true, true, {"-left", ""}});
         builder.scene.emitters.emplace_back(
             PointEmitter{{x, 0, 2}, {4, 4, 4}, {}, true, true, {"both, -right", ""}});
         builder.scene.emitters.emplace_back(PointEmitter{{x, 0, 2}, {8, 8, 8}, {}, true, true, {"none", ""}});
-        builder.scene.emitters.emplace_back(PointEmitter{{x, 0, 2}, {16, 16, 16}, {}, true, true, {"both", ""}});
+        builder.scene.emitters.emplace_back(
+            PointEmitter{{x, 0, 2}, {16, 16, 16}, {}, true, true, {"both", ""}});
       }
       builder.look({10. * floor, 0, 9}, {10. * floor, 0, 0}, 1e-3, {0, 1, 0});
       builder.scene.integrator.name = integrator;
@@ -62,7 +65,8 @@ TEST(LightLinking, EachLampLightsTheFloorThatItIsLinkedTo) {
 
       const Estimate e = estimate(builder, 1024);
 
-      // The lamps above the other floor are sqrt(104) away, and their light arrives at a cosine of 2 / sqrt(104)
+      // The lamps above the other floor are sqrt(104) away, and their light arrives at a cosine of 2 /
+      // sqrt(104)
       const double own = reflected(floor == 0 ? 1 + 4 + 16 : 2 + 16), others = 8 / std::pow(104, 1.5);
       EXPECT_NEAR(e.mean[1], own * (1 + others), test::kStandardErrors * e.standard_error[1]) << integrator;
       EXPECT_LT(e.standard_error[1], .02 * own);

@@ -1,5 +1,5 @@
-// Small scenes under one light of each kind, and comparisons of their pictures, for tests of what rays meet and
-// of what lights are linked to.
+// Small scenes under one light of each kind, and comparisons of their pictures, for tests of what rays meet
+// and of what lights are linked to.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -18,14 +18,15 @@ inline constexpr std::uint64_t kMany = 64;
 using test::operator*;
 
 // The same samples, up to rounding: another shape moves the origin of the world's coordinates.
-inline void expect_same_samples(const test::SceneBuilder& a, const test::SceneBuilder& b, const std::string& where) {
+inline void expect_same_samples(const test::SceneBuilder& a, const test::SceneBuilder& b,
+                                const std::string& where) {
   const test::Estimate x = test::estimate(a, 4), y = test::estimate(b, 4);
   for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(x.mean[c], y.mean[c], 0x1p-16 * y.mean[c]) << where;
   EXPECT_GT(y.mean[1], 0) << where;
 }
 // The rounding of float32 sums is far below 2^-16 of the mean.
-inline void expect_same_mean(const test::SceneBuilder& a, const test::SceneBuilder& b, const std::string& where,
-                      std::uint64_t samples = kMany) {
+inline void expect_same_mean(const test::SceneBuilder& a, const test::SceneBuilder& b,
+                             const std::string& where, std::uint64_t samples = kMany) {
   const test::Estimate x = test::estimate(a, samples, 1), y = test::estimate(b, samples, 2);
   for (std::size_t c = 0; c < 3; ++c)
     EXPECT_NEAR(
@@ -33,7 +34,8 @@ inline void expect_same_mean(const test::SceneBuilder& a, const test::SceneBuild
         test::kStandardErrors * std::hypot(x.standard_error[c], y.standard_error[c]) + 0x1p-16 * y.mean[c])
         << where << ", channel " << c;
 }
-inline void expect_darker(const test::SceneBuilder& a, const test::SceneBuilder& b, const std::string& where) {
+inline void expect_darker(const test::SceneBuilder& a, const test::SceneBuilder& b,
+                          const std::string& where) {
   const test::Estimate x = test::estimate(a, kMany, 1), y = test::estimate(b, kMany, 2);
   EXPECT_LT(x.mean[1],
             y.mean[1] - test::kStandardErrors * std::hypot(x.standard_error[1], y.standard_error[1]))
@@ -68,7 +70,8 @@ inline constexpr NamedLight kLights[] = {
     {"constant", false, [](test::SceneBuilder& b) { b.environment(); }},
     {"rectangle", false,
      [](test::SceneBuilder& b) {
-       b.lamp(RectangleShape{}, test::translate({0, 0, 3}) * test::rotate_x(180), {5, 4, 3}).visible_camera = false;
+       b.lamp(RectangleShape{}, test::translate({0, 0, 3}) * test::rotate_x(180), {5, 4, 3}).visible_camera =
+           false;
      }},
     {"ball", false,
      [](test::SceneBuilder& b) {
@@ -101,7 +104,8 @@ inline BsdfIndex metal(test::SceneBuilder& builder, double alpha) {
 }
 
 // A cube of fog of side 2 around the origin, alone with the light.
-inline test::SceneBuilder fog_under(const NamedLight& light, const char* integrator, bool grid, bool chromatic = false) {
+inline test::SceneBuilder fog_under(const NamedLight& light, const char* integrator, bool grid,
+                                    bool chromatic = false) {
   test::SceneBuilder builder({6, 6});
   light.add(builder);
   const Rgb albedo{.9, .8, .7};

@@ -25,8 +25,9 @@ std::string point_light(std::string_view inside) {
 }
 const std::string kLinkedHero = "<shape type=\"sphere\">" + listed("link_sets", "hero, all") + "</shape>\n";
 const std::string kLinkedFloor = "<shape type=\"rectangle\">" + listed("link_sets", "floor") + "</shape>\n";
-const std::string kLinkedFog = R"(<shape type="cube"><bsdf type="null"/><medium type="homogeneous" name="interior">)" +
-                         listed("link_sets", "fog") + "</medium></shape>\n";
+const std::string kLinkedFog =
+    R"(<shape type="cube"><bsdf type="null"/><medium type="homogeneous" name="interior">)" +
+    listed("link_sets", "fog") + "</medium></shape>\n";
 
 std::string why_refused(const std::string& objects) {
   const ReadResult r = read(with_sensor(objects));
@@ -56,7 +57,8 @@ TEST(LinkNames, ListsHaveWhatIsInASetAndInNoneThatIsTakenOut) {
 
 TEST(Links, OfLightsShapesAndMediaAreReadAndWritten) {
   const Scene s = must_read(with_sensor(
-      kLinkedHero + kLinkedFloor + kLinkedFog + point_light(listed("receivers", "hero, fog, -floor") + listed("blockers", "none")) +
+      kLinkedHero + kLinkedFloor + kLinkedFog +
+      point_light(listed("receivers", "hero, fog, -floor") + listed("blockers", "none")) +
       "<shape type=\"disk\"><emitter type=\"area\">" + listed("receivers", "-all") + "</emitter></shape>"));
 
   EXPECT_EQ(s.shapes.at(0).link_sets, "hero, all");
@@ -77,7 +79,8 @@ TEST(Links, NameMustBeOfASetThatSomethingIsIn) {
                     HasSubstr("did you mean 'hero'?")));
   EXPECT_THAT(why_refused(kLinkedHero + point_light(listed("blockers", "hero, -floor"))),
               HasSubstr("no shape or medium is in the link set \"floor\""));
-  EXPECT_THAT(why_refused(point_light(listed("receivers", "hero"))), HasSubstr("give some of them the parameter 'link_sets'"));
+  EXPECT_THAT(why_refused(point_light(listed("receivers", "hero"))),
+              HasSubstr("give some of them the parameter 'link_sets'"));
   EXPECT_EQ(why_refused(kLinkedHero + point_light(listed("receivers", "none"))), "");
 }
 
@@ -85,7 +88,9 @@ TEST(Links, NamesInListsMustBeRight) {
   const std::string name = "the name of a link set has 1 to 63 ASCII letters";
   for (const char* wrong : {"a b", "a,,b", "a,", "\xc3\xa9", "--a", "a;b", "*"}) {
     EXPECT_THAT(why_refused(point_light(listed("receivers", wrong))), HasSubstr(name)) << wrong;
-    EXPECT_THAT(why_refused("<shape type=\"cube\">" + listed("link_sets", wrong) + "</shape>"), HasSubstr(name)) << wrong;
+    EXPECT_THAT(why_refused("<shape type=\"cube\">" + listed("link_sets", wrong) + "</shape>"),
+                HasSubstr(name))
+        << wrong;
   }
   EXPECT_THAT(why_refused(point_light(listed("receivers", ""))), HasSubstr("has 1 to 64 names, not 0"));
   EXPECT_THAT(why_refused("<shape type=\"cube\">" + listed("link_sets", "-a") + "</shape>"), HasSubstr(name));
@@ -103,15 +108,18 @@ TEST(Links, ListsAreLimitedInNumber) {
   const auto with_lists = [](int count) {
     std::string objects;
     for (int i = 0; i < 1000; ++i)
-      objects += fmt::format("<shape type=\"sphere\">{}</shape>\n", listed("link_sets", fmt::format("s{}", i)));
+      objects +=
+          fmt::format("<shape type=\"sphere\">{}</shape>\n", listed("link_sets", fmt::format("s{}", i)));
     for (int i = 0; i < count; ++i)
-      for (int twice = 0; twice < 2; ++twice) objects += point_light(listed("receivers", fmt::format("s{}, s0", i)));
+      for (int twice = 0; twice < 2; ++twice)
+        objects += point_light(listed("receivers", fmt::format("s{}, s0", i)));
     return objects;
   };
 
   EXPECT_EQ(why_refused(with_lists(64)), "");
-  EXPECT_THAT(why_refused(with_lists(65)),
-              AllOf(HasSubstr("test.xml:1130:"), HasSubstr("64 different lists of receivers and blockers at most")));
+  EXPECT_THAT(
+      why_refused(with_lists(65)),
+      AllOf(HasSubstr("test.xml:1130:"), HasSubstr("64 different lists of receivers and blockers at most")));
 
   Scene s = must_read(with_sensor(with_lists(64)));
   EXPECT_EQ(scene::find_inconsistency(s), "");
@@ -136,31 +144,38 @@ TEST(Links, ToAllThatThereIsAreLeftOut) {
   const std::string light = point_light("");
   const Scene bare = linked_and_pruned(objects + light);
 
-  EXPECT_EQ(linked_and_pruned("<shape type=\"sphere\">" + listed("link_sets", "a") +
-                         "</shape>\n<shape type=\"rectangle\">" + listed("link_sets", "b") + "</shape>\n" +
-                         point_light(listed("receivers", "a, b") + listed("blockers", "b, a"))),
-            bare);
+  EXPECT_EQ(
+      linked_and_pruned("<shape type=\"sphere\">" + listed("link_sets", "a") +
+                        "</shape>\n<shape type=\"rectangle\">" + listed("link_sets", "b") + "</shape>\n" +
+                        point_light(listed("receivers", "a, b") + listed("blockers", "b, a"))),
+      bare);
   // The two receivers of the other light stay.
-  const Scene some = linked_and_pruned(kLinkedHero + kLinkedFloor + point_light(listed("receivers", "hero, floor")) +
-                                  point_light(listed("receivers", "hero")));
+  const Scene some =
+      linked_and_pruned(kLinkedHero + kLinkedFloor + point_light(listed("receivers", "hero, floor")) +
+                        point_light(listed("receivers", "hero")));
   EXPECT_EQ(links_of(some, 0), LightLinks{});
   EXPECT_EQ(links_of(some, 1), (LightLinks{"hero", ""}));
   EXPECT_EQ(some.shapes[0].link_sets, "hero, all");
 }
 
 TEST(Links, ToAllShapesButNotToAMediumStay) {
-  const Scene s = linked_and_pruned(kLinkedHero + kLinkedFog + point_light(listed("receivers", "hero") + listed("blockers", "hero")));
+  const Scene s = linked_and_pruned(kLinkedHero + kLinkedFog +
+                                    point_light(listed("receivers", "hero") + listed("blockers", "hero")));
 
   EXPECT_EQ(links_of(s), (LightLinks{"hero", ""}));
 }
 
 TEST(Links, CountAmongTheNeeds) {
-  const auto needs = [](const std::string& objects) { return scene::needs_of(linked_and_pruned(objects), true); };
-  const scene::Needs some = needs(kLinkedHero + kLinkedFloor + point_light(listed("receivers", "hero")) + point_light(""));
+  const auto needs = [](const std::string& objects) {
+    return scene::needs_of(linked_and_pruned(objects), true);
+  };
+  const scene::Needs some =
+      needs(kLinkedHero + kLinkedFloor + point_light(listed("receivers", "hero")) + point_light(""));
 
   EXPECT_EQ(some.linked_lights, 1u);
   EXPECT_THAT(scene::canonical_json(some), HasSubstr("\"linked_lights\":1"));
-  EXPECT_EQ(scene::canonical_json(needs(kLinkedHero + point_light(""))).find("linked_lights"), std::string::npos);
+  EXPECT_EQ(scene::canonical_json(needs(kLinkedHero + point_light(""))).find("linked_lights"),
+            std::string::npos);
 }
 
 // A medium in an opaque body is kept if light passes the body: it attenuates this light.
@@ -170,7 +185,8 @@ TEST(Links, MediumInWhatLightPassesStays) {
                            R"(<bsdf type="diffuse"/><medium type="homogeneous" name="interior"/></shape>)";
 
   EXPECT_TRUE(linked_and_pruned(body + kLinkedFloor + point_light(listed("blockers", "body"))).media.empty());
-  EXPECT_EQ(linked_and_pruned(body + kLinkedFloor + point_light(listed("blockers", "-body"))).media.size(), 1u);
+  EXPECT_EQ(linked_and_pruned(body + kLinkedFloor + point_light(listed("blockers", "-body"))).media.size(),
+            1u);
 }
 
 }  // namespace
