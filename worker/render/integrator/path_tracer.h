@@ -243,38 +243,14 @@ class PathTracer {
   }
   // Returns whether a surface or a medium receives the chosen light. From this call on shadow rays are those
   // of this light.
-  bool turn_to(const LightChoice& choice, const SurfaceHit& hit) {
-    if constexpr (F.visibility) {
-      if (world_.ray_flags)
-        return turn_to(world_.lights.reach(choice.light), RayKind::surface,
-                       world_.surface_links[hit.surface]);
-    }
-    return true;
-  }
-  bool turn_to(const LightChoice& choice, const Medium& medium) {
-    if constexpr (F.visibility) {
-      if (world_.ray_flags)
-        return turn_to(world_.lights.reach(choice.light), RayKind::medium,
-                       world_.medium_links[index_of(medium)]);
-    }
-    return true;
-  }
-  bool turn_to(const LightReach& reach, RayKind kind, scene::LinkMask links) {
-    links_.blockers = reach.blockers;
-    return reach.lights(kind, links);
-  }
+  bool turn_to(const LightChoice& choice, const SurfaceHit& hit);
+  bool turn_to(const LightChoice& choice, const Medium& medium);
+  bool turn_to(const LightReach& reach, RayKind kind, scene::LinkMask links);
   std::size_t index_of(const Medium& medium) const {
     return static_cast<std::size_t>(&medium - world_.media.data());
   }
   // True if rays of this kind pass straight through the surface because it is hidden from them.
-  bool is_hidden(std::uint32_t surface, RayKind kind) const {
-    const RayKinds hidden = world_.geometry.surfaces[surface].hidden;
-    if (hidden.has(kind)) return true;
-    if constexpr (F.visibility)
-      return kind == RayKind::shadow && hidden.has(RayKind::some_shadow) &&
-             !scene::linked(links_.blockers, world_.surface_links[surface]);
-    return false;
-  }
+  bool is_hidden(std::uint32_t surface, RayKind kind) const;
   [[gnu::cold, gnu::noinline]] void add_environment_times(const C3& beta, bool by_shadows);
   [[gnu::cold, gnu::noinline]] void add_direct();
   void add_direct_past(scene::LinkIndex blockers);

@@ -21,6 +21,43 @@
 namespace ls::render {
 
 template <Features F, template <Features> class Light>
+bool PathTracer<F, Light>::turn_to([[maybe_unused]] const LightChoice& choice,
+                                   [[maybe_unused]] const SurfaceHit& hit) {
+  if constexpr (F.visibility) {
+    if (world_.ray_flags)
+      return turn_to(world_.lights.reach(choice.light), RayKind::surface, world_.surface_links[hit.surface]);
+  }
+  return true;
+}
+
+template <Features F, template <Features> class Light>
+bool PathTracer<F, Light>::turn_to([[maybe_unused]] const LightChoice& choice,
+                                   [[maybe_unused]] const Medium& medium) {
+  if constexpr (F.visibility) {
+    if (world_.ray_flags)
+      return turn_to(world_.lights.reach(choice.light), RayKind::medium,
+                     world_.medium_links[index_of(medium)]);
+  }
+  return true;
+}
+
+template <Features F, template <Features> class Light>
+bool PathTracer<F, Light>::turn_to(const LightReach& reach, RayKind kind, scene::LinkMask links) {
+  links_.blockers = reach.blockers;
+  return reach.lights(kind, links);
+}
+
+template <Features F, template <Features> class Light>
+bool PathTracer<F, Light>::is_hidden(std::uint32_t surface, RayKind kind) const {
+  const RayKinds hidden = world_.geometry.surfaces[surface].hidden;
+  if (hidden.has(kind)) return true;
+  if constexpr (F.visibility)
+    return kind == RayKind::shadow && hidden.has(RayKind::some_shadow) &&
+           !scene::linked(links_.blockers, world_.surface_links[surface]);
+  return false;
+}
+
+template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_direct() {
   direct_due_ = false;
   for (const scene::LinkIndex list : world_.shadow_lists)
