@@ -31,10 +31,6 @@ def add_light(document, problems, item, matrix, matrix_class, may_see, marks, vi
         )
     if not data.normalize:
         problems.unsupported(f"light '{name}': Normalize off. Switch it on in Light properties")
-    if not data.use_shadow:
-        problems.unsupported(
-            f"light '{name}': Shadow off. Lightshaft's lights all cast shadows: switch it on"
-        )
     if not any(colour) or data.cycles.is_portal:
         return
     if data.cycles.max_bounces < 1024:  # Blender's default

@@ -43,7 +43,9 @@ class Linking:
             for collection in (linking.receiver_collection, linking.blocker_collection):
                 if collection is not None and collection.name_full not in self.sets:
                     self.sets[collection.name_full] = Linked(self.fresh_name(collection.name), collection)
-            if linking.blocker_collection is not None:
+            if light.type == "LIGHT" and not light.data.use_shadow:
+                self.blockers[light.name] = ()
+            elif linking.blocker_collection is not None:
                 self.blockers[light.name] = self.sets[linking.blocker_collection.name_full]
 
     def fresh_name(self, wanted):
@@ -53,12 +55,13 @@ class Linking:
 
     def of_light(self, item):
         """Returns the parameters `receivers` and `blockers` of what an object emits."""
-        linking = item.original.light_linking
+        light = item.original
+        linking = light.light_linking
         collections = (linking.receiver_collection, linking.blocker_collection)
-        return {
-            name: self.sets[collection.name_full].list if collection is not None else None
-            for name, collection in zip(LISTS, collections)
-        }
+        lists = [self.sets[c.name_full].list if c is not None else None for c in collections]
+        if light.type == "LIGHT" and not light.data.use_shadow:
+            lists[1] = NONE
+        return dict(zip(LISTS, lists))
 
     def owner_of(self, item, parent):
         """Returns the object whose link sets an object has. As in Cycles it is what instances the object, if the

@@ -191,6 +191,14 @@ def test_an_empty_collection_leaves_nothing_out(scene, collections):
     differ_by_noise(stage)
 
 
+@pytest.mark.parametrize("kind", ["SUN", "POINT", "SPOT", "AREA"])
+def test_a_light_without_shadows(scene, kind):
+    stage, _, _ = scene
+    lamp(stage, kind).data.use_shadow = False
+
+    differ_by_noise(stage)
+
+
 def test_a_volume_that_is_no_blocker_is_warned_of(scene, collections):
     from stage import fog
 

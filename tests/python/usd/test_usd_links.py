@@ -101,6 +101,15 @@ def test_instances_of_a_prototype_have_links_of_their_own(stage):
     assert len(texts(root, "link_sets")) == 1
 
 
+def test_a_light_without_shadows_has_no_blockers(stage):
+    UsdLux.ShadowAPI.Apply(stage.GetPrimAtPath("/key")).CreateShadowEnableAttr(False)
+    light(stage).GetShadowLinkCollectionAPI().ExcludePath("/far")
+
+    root = scene(stage)
+
+    assert texts(root, "blockers") == {"/key": "none"}
+
+
 def test_a_membership_expression_is_warned_of(stage):
     links = light(stage).GetLightLinkCollectionAPI()
     links.CreateIncludeRootAttr(False)

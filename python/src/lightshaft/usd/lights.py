@@ -12,7 +12,7 @@ from .document import Document, colour
 from .gprims import cylinder_part, sphere_part
 from .ignored import tell_light
 from .images import Images, exr, scaled
-from .links import Links
+from .links import NONE, Links
 from .meshes import Part
 from .problems import Problems
 from .shading import plain
@@ -102,14 +102,17 @@ class Lights:
         for name in ("diffuse", "specular"):
             if self.number(prim, name, 1.0) != 1:
                 self._problems.warn(prim, f"inputs:{name} has no effect: light is reflected as the surface's material says")
-        if self.value(prim, "shadow:enable", True) is False:
-            self._problems.warn(prim, "inputs:shadow:enable has no effect: all lights cast shadows")
         filters = prim.GetRelationship("light:filters")
         if filters and filters.GetTargets():
             self._problems.warn(prim, "light filters are left out")
         ies = self.value(prim, "shaping:ies:file", None)
         if ies is not None and ies.path:
             self._problems.warn(prim, "an IES profile is left out")
+
+    def _linked(self, prim: Usd.Prim) -> Dict:
+        """Returns the parameters of what the light lights, and of what shades it."""
+        shades = self.value(prim, "shadow:enable", True) is not False
+        return {**self._links.of_light(prim), **({} if shades else {"blockers": NONE})}
 
     def distant(self, prim: Usd.Prim, matrix: Matrix) -> None:
         luminance = self.luminance(prim, 50000.0)
@@ -129,7 +132,7 @@ class Lights:
                 "irradiance": colour([x * (1 if whole else size) for x in luminance]),
                 "angular_radius": half,
                 **self._visible.of_sky(),
-                **self._links.of_light(prim),
+                **self._linked(prim),
             },
         )
 
@@ -139,7 +142,7 @@ class Lights:
         if not any(luminance):
             return
         if file is None or not file.path:
-            flags = {**self._visible.of_sky(), **self._links.of_light(prim)}
+            flags = {**self._visible.of_sky(), **self._linked(prim)}
             self._sky.append((prim, luminance, flags))
             return
         kind = str(self.value(prim, "texture:format", "automatic"))
@@ -172,7 +175,7 @@ class Lights:
                 # USD's map lies as the scene format's: its middle is +z, a quarter from its left edge is +x.
                 "to_world": _turned(matrix) @ (turn if stands else np.eye(4)),
                 **self._visible.of_sky(),
-                **self._links.of_light(prim),
+                **self._linked(prim),
             },
         )
 
@@ -243,7 +246,7 @@ class Lights:
             name = self._document.files.write(scaled(asset, luminance), ".exr")
             radiance = {"type": "bitmap", "filename": name, "raw": True, "to_uv": mirror}
             radiance["wrap_mode"] = "clamp"
-        emitter = {"type": "area", "radiance": radiance, **self._beam(prim, flat), **self._links.of_light(prim)}
+        emitter = {"type": "area", "radiance": radiance, **self._beam(prim, flat), **self._linked(prim)}
         placed = {**shape, "to_world": to_world, "bsdf": {"type": "null"}, "emitter": emitter}
         self._document.define(str(prim.GetPath()), {**placed, **self._visible.of_sky()})
 
@@ -277,7 +280,7 @@ class Lights:
     def _point(self, prim: Usd.Prim, matrix: Matrix, radius: float, cone: float) -> None:
         """Replaces a tiny sphere by a point that emits the light of its cross-section in each direction."""
         luminance = self.luminance(prim)
-        flags = {**self._visible.of_light(), **self._links.of_light(prim)}
+        flags = {**self._visible.of_light(), **self._linked(prim)}
         if self.value(prim, "normalize", False):
             intensity = [x / 4 for x in luminance]  # pi r^2 of 4 pi r^2
         else:
