@@ -25,8 +25,8 @@ class Composer {
     film();
     visibility();
     integrator();
-    links();
     if (draw_.wild()) scene_.sample_count = static_cast<std::uint64_t>(dice_.extreme({1, 1e6}));
+    links();
   }
 
  private:
@@ -220,6 +220,7 @@ class Composer {
       s.link_sets = sets();
       if (s.emitter) s.emitter->links = {list(), list()};
     }
+    scene_.shapes.front().link_sets = "one, two";  // so that something is in each set
     for (Medium& m : scene_.media) std::visit([&](auto& medium) { medium.link_sets = sets(); }, m);
     for (Emitter& e : scene_.emitters) std::visit([&](auto& light) { light.links = {list(), list()}; }, e);
   }
