@@ -9,6 +9,7 @@ from .camera import add_camera, may_see
 from .document import Document, element, reference
 from .light_groups import LightGroups
 from .lights import add_light
+from .linking import Linking, drop_empty_sets
 from .materials import Materials, Owner
 from .problems import Problems
 from .textures import Textures
@@ -24,9 +25,9 @@ SHEET = 1e-5  # the back of a sheet that gives off light stands this share of it
 class Shape:
     """A part of a mesh that can be placed in the scene."""
 
-    def __init__(self, filenames, bsdf, emission, medium, flags, group):
+    def __init__(self, filenames, bsdf, emission, medium, flags, marks):
         self.filenames, self.bsdf, self.emission, self.medium = filenames, bsdf, emission, medium
-        self.group = group  # light group of the emission, or None
+        self.marks = marks  # light group and links of the emission
         self.flags = flags  # parameters about what rays meet the shape
         self.tree = None
 
@@ -46,7 +47,7 @@ class Exporter:
         self.materials = Materials(self.document, self.problems, textures)
         self.layer = depsgraph.view_layer_eval
         self.override = self.layer.material_override
-        self.groups = LightGroups(self.problems)
+        self.groups, self.links = LightGroups(self.problems), Linking(depsgraph)
         self.known, self.places, self.bodies = {}, {}, []
         self.catchers, self.dim = False, []  # whether objects catch shadows; lights that do not light those
 
@@ -73,6 +74,7 @@ class Exporter:
         around = next((medium for medium, contains in self.bodies if contains(eye)), None)
         add_camera(self.document, self.problems, camera, self.scene, self.size, around, Matrix)
         self.problems.raise_errors()
+        drop_empty_sets(self.document.root)
         return self.document.save(), self.document, self.problems.warnings
 
     def add(self, item, parent, matrix):
@@ -81,11 +83,13 @@ class Exporter:
             return
         visible = visibility_of(self.problems, item, parent, self.depsgraph.view_layer)
         self.check_visibility(item, visible)
+        links, owner = self.links.of_light(item), self.links.owner_of(item, parent)
         if item.type == "LIGHT":
-            group = self.groups.of(item)
-            add_light(self.document, self.problems, item, matrix, Matrix, self.may_see, group, visible)
+            marks = {"light_group": self.groups.of(item), **links}
+            add_light(self.document, self.problems, item, matrix, Matrix, self.may_see, marks, visible)
         elif item.type == "VOLUME":
-            self.add_grid(item, matrix)
+            self.add_grid(item, matrix, self.links.sets_of(owner))
+            self.warn_of_shade(name, owner)
         elif item.type in MESHES:
             if any(
                 system.settings.type == "HAIR" and system.settings.render_type == "PATH"
@@ -109,10 +113,14 @@ class Exporter:
                 tuple(material_name(s) for s in item.material_slots),
                 visible.key(),
                 item.lightgroup,
+                sets := self.links.sets_of(owner),
+                tuple(links.values()),
             )
             if key not in self.known:
-                self.known[key] = self.shapes_of(item, visible)
+                self.known[key] = self.shapes_of(item, visible, links, sets)
             self.places.setdefault(key, []).append((name, matrix))
+            if any(shape.medium for shape in self.known[key]):
+                self.warn_of_shade(name, owner)
         else:
             self.problems.unsupported(
                 f"object '{name}': Lightshaft renders no {item.type.replace('_', ' ').title()}. Convert it to a mesh (Object > Convert)"
@@ -147,19 +155,20 @@ class Exporter:
             self.problems.unsupported(
                 f"{kind} '{item.name}': hidden from rays ({', '.join(visible.hidden())}). Media are seen by all rays: switch all on in {where}"
             )
-        linking = item.light_linking
-        if linking and (linking.receiver_collection or linking.blocker_collection):
-            self.problems.unsupported(
-                f"{kind} '{item.name}': Light Linking or Shadow Linking. Clear it in Object properties > Shading"
+
+    def warn_of_shade(self, name, owner):
+        for light in self.links.lights_past(owner):
+            self.problems.warning(
+                f"object '{name}': the volume in it shades light '{light}', of which it is no blocker"
             )
 
-    def shapes_of(self, item, visible):
+    def shapes_of(self, item, visible, links, sets):
         mesh = item.to_mesh()
         if mesh is None:
             return []
         try:
             extent = max((v for corner in item.bound_box for v in (abs(c) for c in corner)), default=1) or 1
-            shapes = [self.shape(item, visible, part, extent) for part in meshes.parts(mesh)]
+            shapes = [self.shape(item, visible, links, sets, part, extent) for part in meshes.parts(mesh)]
             if any(shape.medium for shape in shapes):
                 tree = BVHTree.FromPolygons(
                     [v.co for v in mesh.vertices], [p.vertices for p in mesh.polygons]
@@ -170,7 +179,7 @@ class Exporter:
         finally:
             item.to_mesh_clear()
 
-    def shape(self, item, visible, part, extent):
+    def shape(self, item, visible, links, sets, part, extent):
         slots = item.material_slots
         material = self.override
         if material is None and len(slots):
@@ -190,16 +199,16 @@ class Exporter:
                 self.problems.unsupported(
                     f"{owner}: hidden from rays ({', '.join(visible.hidden())}) with a volume in it. Switch all on in Object properties > Visibility"
                 )
-            medium = self.volumes.homogeneous(f"{item.name}-{material.name}", found, group)
+            medium = self.volumes.homogeneous(f"{item.name}-{material.name}", found, group, sets)
         sides = [part.front()]
         if emission is not None and not part.closed:  # Blender's sheets give off light on both sides
             sides.append(part.back(SHEET * extent))
         files = [self.document.write(side, ".ply") for side in sides]
-        flags = visible.of_shape()
+        flags = {**visible.of_shape(), "link_sets": sets}
         if bsdf in self.materials.passing and emission is None:
             names = ("visible_camera", "holdout", "shadow_catcher")
             flags = {name: flags[name] for name in names}
-        return Shape(files, bsdf, emission, medium, flags, group)
+        return Shape(files, bsdf, emission, medium, flags, {"light_group": group, **links})
 
     def place_meshes(self):
         for key, places in self.places.items():
@@ -229,9 +238,7 @@ class Exporter:
         inside_medium = reference(shape.medium, "interior") if shape.medium else None
         emitter = None
         if shape.emission is not None:
-            emitter = element(
-                "emitter", "area", None, radiance=shape.emission, light_group=shape.group
-            )
+            emitter = element("emitter", "area", None, radiance=shape.emission, **shape.marks)
         return element(
             "shape",
             "ply",
@@ -244,7 +251,7 @@ class Exporter:
             **shape.flags,
         )
 
-    def add_grid(self, item, matrix):
+    def add_grid(self, item, matrix, sets):
         data = item.data
         own = item.material_slots[0].material if len(item.material_slots) else None
         owner = Owner(item.name, self.override or own)
@@ -269,7 +276,7 @@ class Exporter:
             return
         path = bpy.path.abspath(data.grids.frame_filepath, library=data.library)
         added = self.volumes.grid(
-            item, owner, found, path, matrix, [tuple(corner) for corner in item.bound_box]
+            item, owner, found, path, matrix, [tuple(corner) for corner in item.bound_box], sets
         )
         if added is not None:
             medium, box = added

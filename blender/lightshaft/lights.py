@@ -11,9 +11,10 @@ FLIP = ((1, 0, 0, 0), (0, -1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1))  # Blender's l
 PROFILE = 512  # pixels of the image that a spot light throws
 
 
-def add_light(document, problems, item, matrix, matrix_class, may_see, group, visible):
-    """Adds a light object at `matrix`, in a light group or None. Its power is in W, as in the Light properties. `may_see`:
-    a function of a centre and a radius, False if the camera does not see the ball. `visible`: its Visibility."""
+def add_light(document, problems, item, matrix, matrix_class, may_see, marks, visible):
+    """Adds a light object at `matrix`. Its power is in W, as in the Light properties. `may_see`: a function of a centre and
+    a radius, False if the camera does not see the ball. `marks`: the light group and the links of its emitter. `visible`:
+    its Visibility."""
     data, name = item.data, item.name
     colour = light_colour(data)
     if (
@@ -30,10 +31,6 @@ def add_light(document, problems, item, matrix, matrix_class, may_see, group, vi
         )
     if not data.normalize:
         problems.unsupported(f"light '{name}': Normalize off. Switch it on in Light properties")
-    if not data.use_shadow:
-        problems.unsupported(
-            f"light '{name}': Shadow off. Lightshaft's lights all cast shadows: switch it on"
-        )
     if not any(colour) or data.cycles.is_portal:
         return
     if data.cycles.max_bounces < 1024:  # Blender's default
@@ -50,7 +47,7 @@ def add_light(document, problems, item, matrix, matrix_class, may_see, group, vi
             irradiance=colour,
             angular_radius=math.degrees(data.angle / 2),
             visible_camera=visible.camera,
-            light_group=group,
+            **marks,
             **visible.receivers,
         )
         sun.append(vector("direction", direction))
@@ -60,19 +57,19 @@ def add_light(document, problems, item, matrix, matrix_class, may_see, group, vi
         if radius > 0:
             ball = matrix_class.Translation(matrix.translation) @ matrix_class.Scale(radius, 4)
             radiance = [c / (4 * math.pi**2 * radius**2) for c in colour]
-            document.add(lamp("sphere", ball, radiance, visible, may_see, group))
+            document.add(lamp("sphere", ball, radiance, visible, may_see, marks))
         else:
             intensity = [c / (4 * math.pi) for c in colour]
             point = element(
-                "emitter", "point", None, intensity=intensity, light_group=group, **visible.receivers
+                "emitter", "point", None, intensity=intensity, **marks, **visible.receivers
             )
             point.append(vector("position", matrix.translation, "point"))
             document.add(point)
     elif data.type == "SPOT":
-        add_spot(document, problems, item, colour, rigid @ matrix_class(FLIP), group, visible)
+        add_spot(document, problems, item, colour, rigid @ matrix_class(FLIP), marks, visible)
     else:
         placed = matrix @ matrix_class(FLIP)
-        add_area(document, problems, item, colour, placed, matrix_class, may_see, group, visible)
+        add_area(document, problems, item, colour, placed, matrix_class, may_see, marks, visible)
 
 
 def light_colour(data):
@@ -90,12 +87,12 @@ def vector(name, values, kind="vector"):
     )
 
 
-def lamp(shape, to_world, radiance, visible, may_see, group):
+def lamp(shape, to_world, radiance, visible, may_see, marks):
     """Makes a shape that emits light and lets the light of others pass, like Blender's lamps. They are hidden from the
     camera by default; a lamp that is out of sight anyway is not marked, because marked shapes cost render time."""
     radius = to_world.col[0].xyz.length + to_world.col[1].xyz.length
     hidden = visible.camera if may_see(to_world.translation, radius) else None
-    emitter = element("emitter", "area", None, radiance=radiance, light_group=group)
+    emitter = element("emitter", "area", None, radiance=radiance, **marks)
     return element(
         "shape",
         shape,
@@ -108,7 +105,7 @@ def lamp(shape, to_world, radiance, visible, may_see, group):
     )
 
 
-def add_spot(document, problems, item, colour, to_world, group, visible):
+def add_spot(document, problems, item, colour, to_world, marks, visible):
     data, name = item.data, item.name
     if data.shadow_soft_size > 0:
         problems.unsupported(f"light '{name}': a spot's Radius. Lightshaft's spots are points: set it to 0")
@@ -138,7 +135,7 @@ def add_spot(document, problems, item, colour, to_world, group, visible):
             cutoff_angle=angle,
             beam_width=angle * 0.9999,
             texture=texture,
-            light_group=group,
+            **marks,
             **visible.receivers,
         )
     )
@@ -155,7 +152,7 @@ def spot_profile(half, blend):
     return step * step * (3 - 2 * step)
 
 
-def add_area(document, problems, item, colour, to_world, matrix_class, may_see, group, visible):
+def add_area(document, problems, item, colour, to_world, matrix_class, may_see, marks, visible):
     data, name = item.data, item.name
     if data.spread < math.pi - 1e-4:
         problems.unsupported(
@@ -171,4 +168,4 @@ def add_area(document, problems, item, colour, to_world, matrix_class, may_see, 
         problems.error(f"light '{name}': its size is 0. Give it a size, or make it a point light")
         return
     radiance = [c / (math.pi * area) for c in colour]
-    document.add(lamp("disk" if round_one else "rectangle", placed, radiance, visible, may_see, group))
+    document.add(lamp("disk" if round_one else "rectangle", placed, radiance, visible, may_see, marks))

@@ -132,12 +132,12 @@ class Volumes:
             one.grid,
         )
 
-    def homogeneous(self, name, found, group):
+    def homogeneous(self, name, found, group, link_sets):
         return self.document.define(
-            name, medium("homogeneous", found, total(found), any(found.emission), group)
+            name, medium("homogeneous", found, total(found), any(found.emission), group, link_sets)
         )
 
-    def grid(self, item, owner, found, path, matrix, box):
+    def grid(self, item, owner, found, path, matrix, box, link_sets):
         """Makes a medium of a grid's file in the box (in object space). Returns its id, and the position of its
         box [-1, 1]^3. Returns None if it is empty or if an error was reported."""
         data = item.data
@@ -164,7 +164,7 @@ class Volumes:
         grid = element(
             "volume", "gridvolume", "sigma_t", filename=filename, grid_name=found.grid, to_world=matrix
         )
-        fog = medium("heterogeneous", found, None, False)
+        fog = medium("heterogeneous", found, None, False, None, link_sets)
         fog.append(ElementTree.Element("float", name="scale", value=repr(float(peak))))
         fog.append(grid)
         identifier = self.document.define(item.name, fog)
@@ -182,7 +182,7 @@ def total(found):
     return [s + a for s, a in zip(found.scattering, found.absorption)]
 
 
-def medium(plugin, found, sigma_t, glows, group=None):
+def medium(plugin, found, sigma_t, glows, group, link_sets):
     albedo = [s / (s + a) if s + a > 0 else 0.0 for s, a in zip(found.scattering, found.absorption)]
     phase = element("phase", "hg", None, g=found.g) if found.g else element("phase", "isotropic")
     return element(
@@ -194,6 +194,7 @@ def medium(plugin, found, sigma_t, glows, group=None):
         albedo=albedo,
         emission=list(found.emission) if glows else None,
         light_group=group if glows else None,
+        link_sets=link_sets,
     )
 
 

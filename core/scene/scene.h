@@ -298,6 +298,7 @@ struct HomogeneousMedium {
   Rgb source_radiance{0, 0, 0};  // radiance of an infinitely deep medium without scattering
   int priority = 0;              // where media overlap, only the media of the highest priority exist
   std::string light_group;       // of the light that the medium gives off (Emitter)
+  std::string link_sets;         // the names of the link sets that the medium is in (LightLinks)
   bool operator==(const HomogeneousMedium&) const = default;
 };
 // A medium whose properties vary in space. The extinction is sigma_t * scale * tint. At most one of emission,
@@ -319,6 +320,7 @@ struct HeterogeneousMedium {
   std::optional<VolumeIndex> emission_weight;  // factor on the black-body emission
   int priority = 0;         // where media overlap, only the media of the highest priority exist
   std::string light_group;  // of the light that the medium gives off (Emitter)
+  std::string link_sets;    // the names of the link sets that the medium is in (LightLinks)
   bool operator==(const HeterogeneousMedium&) const = default;
 };
 using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
@@ -330,12 +332,13 @@ using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
 //
 // Camera rays that leave the scene before they are scattered do not see an emitter whose visible_camera is
 // false. Surfaces receive no light from an emitter whose visible_reflection is false, and media none from one
-// whose visible_volume is false.
+// whose visible_volume is false. `links` says which shapes and media receive its light and which shade it.
 struct ConstantEmitter {  // the same radiance from all directions
   Rgb radiance{1, 1, 1};
   bool visible_camera = true;
   std::string light_group;
   bool visible_reflection = true, visible_volume = true;
+  LightLinks links;
   bool operator==(const ConstantEmitter&) const = default;
 };
 // Parallel light. `direction` is the direction in which the light travels, in world space. `irradiance` is
@@ -349,6 +352,7 @@ struct DirectionalEmitter {
   bool visible_camera = true;
   std::string light_group;
   bool visible_reflection = true, visible_volume = true;
+  LightLinks links;
   bool operator==(const DirectionalEmitter&) const = default;
 };
 struct PointEmitter {
@@ -356,6 +360,7 @@ struct PointEmitter {
   Rgb intensity{1, 1, 1};  // W/sr
   std::string light_group;
   bool visible_reflection = true, visible_volume = true;
+  LightLinks links;
   bool operator==(const PointEmitter&) const = default;
 };
 struct SpotEmitter {  // a spot light at the origin of to_world, which emits along its +z axis
@@ -368,6 +373,7 @@ struct SpotEmitter {  // a spot light at the origin of to_world, which emits alo
   std::optional<TextureIndex> texture;  // factor on the intensity, projected along +z as by Mitsuba
   std::string light_group;
   bool visible_reflection = true, visible_volume = true;
+  LightLinks links;
   bool operator==(const SpotEmitter&) const = default;
 };
 // How an environment map's image covers the directions, in the map's own space.
@@ -387,6 +393,7 @@ struct EnvmapEmitter {
   std::string light_group;
   ImageColours colours = ImageColours::automatic;
   bool visible_reflection = true, visible_volume = true;
+  LightLinks links;
   bool operator==(const EnvmapEmitter&) const = default;
 };
 
@@ -403,6 +410,7 @@ struct ProjectorEmitter {
   bool as_intensity = false;
   std::string light_group;
   bool visible_reflection = true, visible_volume = true;
+  LightLinks links;
   bool operator==(const ProjectorEmitter&) const = default;
 };
 // A light at the origin of to_world, whose intensity is multiplied by an image of all directions: a square in
@@ -415,6 +423,7 @@ struct GoniometricEmitter {
   TextureIndex texture;
   std::string light_group;
   bool visible_reflection = true, visible_volume = true;
+  LightLinks links;
   bool operator==(const GoniometricEmitter&) const = default;
 };
 using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter, EnvmapEmitter,

@@ -46,6 +46,14 @@ struct MeshShape {
 };
 using Geometry = std::variant<RectangleShape, CubeShape, SphereShape, DiskShape, MeshShape, CylinderShape>;
 
+// What a light is linked to: lists of link sets (core/base/light/link_names.h). Only the shapes and media in
+// `receivers` receive its light, and of the shapes only those in `blockers` stop or attenuate it on its way.
+// An empty text is a list of everything.
+struct LightLinks {
+  std::string receivers, blockers;
+  bool operator==(const LightLinks&) const = default;
+};
+
 // Light from a shape's surface, emitted on the side of the normal or, if two_sided, on both sides. If
 // beam_width is set, the light is a beam: at an angle a from the normal, in degrees, it has the full radiance
 // for a within beam_width and zero beyond cutoff_angle; in between it is the full radiance times s^falloff
@@ -55,6 +63,7 @@ struct AreaEmitter {
   double cutoff_angle = 90, beam_width = 90, falloff = 1;
   bool two_sided = false;
   std::string light_group;  // as of the emitters without a shape (scene.h)
+  LightLinks links;
   bool operator==(const AreaEmitter&) const = default;
 };
 
@@ -86,6 +95,8 @@ struct Shape {
   // scattered (reflected or refracted). visible_volume: rays that a medium scattered. If the shape emits
   // light, vertices on surfaces (visible_reflection) or in media (visible_volume) receive none of it.
   bool visible_shadow = true, visible_reflection = true, visible_volume = true;
+  // The names of the link sets that the shape is in (LightLinks), separated by commas.
+  std::string link_sets;
   std::optional<MeterIndex> meter;  // a meter measures the light that reaches the shape
   bool operator==(const Shape&) const = default;
 };

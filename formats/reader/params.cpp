@@ -5,7 +5,6 @@
 #include <map>
 #include <utility>
 
-#include "core/base/light/light_group.h"
 #include "core/base/text/suggest.h"
 #include "core/scene/schema/materials.h"
 #include "formats/reader/reader.h"
@@ -199,8 +198,10 @@ void Params::convert(const Field& f, const Element& e, bool& value) {
 void Params::convert(const Field& f, const Element& e, std::string& value) {
   auto text = string_value(f.name, e);
   if (!text) return;
-  if (const std::string wrong = f.light_group ? wrong_light_group(*text) : ""; !wrong.empty())
+  if (const std::string wrong = f.wrong ? f.wrong(*text) : ""; !wrong.empty())
     return reader_.report().error(e.at, wrong);
+  if (f.wrong == wrong_link_list || f.wrong == wrong_link_sets)
+    reader_.note_links(e, *text, f.wrong == wrong_link_list);
   value = std::move(*text);
 }
 

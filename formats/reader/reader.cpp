@@ -9,6 +9,7 @@
 #include "core/base/text/suggest.h"
 #include "core/scene/analysis/shape_place.h"
 #include "core/scene/limits.h"
+#include "core/scene/schema/light_links.h"
 #include "core/scene/schema/validate.h"
 #include "formats/file_names.h"
 #include "formats/gltf/asset.h"
@@ -41,12 +42,44 @@ Scene Reader::read() {
     read_child(child);
   }
   read_idle_parts();
+  check_links();
   warn_of_media_around_camera();
   if (!meters_.empty())
     finish_meters();
   else if (!sensor_)
     report_.error(document_.root.at, "the scene has no <sensor>: nothing to see it with");
   return std::move(scene_);
+}
+
+void Reader::note_links(const Element& e, const std::string& names, bool of_light) {
+  if (of_light)
+    links_.push_back({&e, link_list(names)});
+  else
+    for (std::string& name : link_sets(names)) link_sets_.insert(std::move(name));
+}
+
+// Checks that something is in each set to which a light is linked, since the name may be misspelt, and that
+// there are not too many lists.
+void Reader::check_links() {
+  const std::vector<std::string> known(link_sets_.begin(), link_sets_.end());
+  std::vector<LinkList> lists;
+  for (const auto& [element, list] : links_) {
+    for (const auto* names : {&list.with, &list.without})
+      for (const std::string& name : *names)
+        if (name != kNoLinkSet && !link_sets_.contains(name))
+          return report_.error(value_place(*element, "value"),
+                               fmt::format("no shape or medium is in the link set \"{}\"{}", name,
+                                           known.empty() ? ": give some of them the parameter 'link_sets'"
+                                                         : suggestion(name, known)));
+    if (std::ranges::find(lists, list) != lists.end()) continue;
+    lists.push_back(list);
+    if (lists.size() > kMostLinkLists)
+      return report_.error(element->at,
+                           fmt::format("the lights of a scene have {} different lists of receivers and "
+                                       "blockers at most, and this is one more: link lights to sets that "
+                                       "they share",
+                                       kMostLinkLists));
+  }
 }
 
 // Warns if the camera is inside a shape with an interior medium but has no `medium` itself: as in Mitsuba,

@@ -2,15 +2,18 @@
 // for each kind of object, and the data that these functions share.
 #pragma once
 
+#include <functional>
 #include <initializer_list>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
 #include <variant>
 #include <vector>
 
+#include "core/base/light/link_names.h"
 #include "core/scene/schema/traits.h"
 #include "core/scene/spectrum.h"
 #include "formats/reader/params.h"
@@ -27,6 +30,8 @@ class Reader {
   Scene read();  // valid only if the report has no errors afterwards
 
   Report& report() { return report_; }
+  // Notes the link sets that an object is in or, if `of_light`, to which a light is linked.
+  void note_links(const Element& e, const std::string& names, bool of_light);
   // Returns the object that `child` is or refers to. nullptr: there is none, which has been reported.
   const Element* resolve(const Element& child);
 
@@ -80,6 +85,7 @@ class Reader {
   std::string hint_for(const Element& reference) const;
   void read_child(const Element& child);
   void read_idle_parts();
+  void check_links();
 
   std::optional<TextureIndex> read_texture(const Element& e);
   template <class T>
@@ -195,8 +201,14 @@ class Reader {
   Memo<MediumIndex> media_;
   // The indices of the shape groups read so far; nullopt: the group has no shape, or is wrong.
   std::unordered_map<const Element*, std::optional<GroupIndex>> groups_;
-  std::optional<GroupIndex> group_;            // group whose shapes are being read; nullopt: none
-  std::unordered_set<const Element*> merges_;  // the shapes "merge" that were read so far
+  std::optional<GroupIndex> group_;               // group whose shapes are being read; nullopt: none
+  std::unordered_set<const Element*> merges_;     // the shapes "merge" that were read so far
+  std::set<std::string, std::less<>> link_sets_;  // the link sets of the objects read so far
+  struct LinkedTo {
+    const Element* element;
+    LinkList list;
+  };
+  std::vector<LinkedTo> links_;  // what the lights read so far are linked to
   std::map<std::string, AssetIndex> assets_by_name_;
   std::unordered_set<const Element*> in_progress_;
   std::unordered_set<const Element*> bad_refs_;  // references whose errors have been reported

@@ -44,6 +44,7 @@ class Draw {
   template <class T>
   void field(const scene::Field& f, T& x) {
     if (f.derived && f.given_as.empty()) return;
+    if (f.wrong == wrong_link_sets || f.wrong == wrong_link_list) return;  // drawn for the scene as a whole
     // Half of what can be left out is.
     if (!f.required && dice_.chance(.4) && !is_index(x)) return;
     draw(f, x);

@@ -1,6 +1,7 @@
 #include "tests/property/random_scene.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "core/scene/schema/validate.h"
 #include "tests/property/draw.h"
@@ -25,6 +26,7 @@ class Composer {
     visibility();
     integrator();
     if (draw_.wild()) scene_.sample_count = static_cast<std::uint64_t>(dice_.extreme({1, 1e6}));
+    links();
   }
 
  private:
@@ -205,6 +207,22 @@ class Composer {
       s.visible_reflection = seen();
       s.visible_volume = seen();
     }
+  }
+  // In some scenes, lights are linked to receivers and blockers.
+  void links() {
+    if (!dice_.chance(.15)) return;
+    const auto sets = [&] { return dice_.chance(.5) ? "one" : dice_.chance(.5) ? "two" : "one, two"; };
+    const auto list = [&]() -> std::string {
+      static constexpr const char* kLists[] = {"", "", "", "one", "-one", "two, -one", "none"};
+      return kLists[dice_.below(std::size(kLists))];
+    };
+    for (Shape& s : scene_.shapes) {
+      s.link_sets = sets();
+      if (s.emitter) s.emitter->links = {list(), list()};
+    }
+    scene_.shapes.front().link_sets = "one, two";  // so that something is in each set
+    for (Medium& m : scene_.media) std::visit([&](auto& medium) { medium.link_sets = sets(); }, m);
+    for (Emitter& e : scene_.emitters) std::visit([&](auto& light) { light.links = {list(), list()}; }, e);
   }
   void film() {
     FilmSettings& f = scene_.film;

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/scene/schema/describe_fields.h"
+#include "core/scene/schema/light_links.h"
 #include "core/scene/schema/traits.h"
 #include "core/scene/schema/validate.h"
 
@@ -116,6 +117,7 @@ void Analyst::lights() {
     n_.delta_lights += delta && std::visit([](const auto& l) { return l.visible_reflection; }, e);
   }
   n_.only_delta_lights = !extended && !s_.emitters.empty();
+  n_.linked_lights = ls::scene::linked_lights(s_);
 }
 
 void Analyst::files() {
@@ -217,6 +219,11 @@ class Words {
     say("visibility by the camera", n_.flagged_shapes,
         "shapes hidden from the camera, held out or that catch shadows");
     say("visibility by other rays", n_.ray_flags, "shapes and lamps hidden from shadow or scattered rays");
+    say("light linking", n_.linked_lights > 0,
+        fmt::format("{} lights have receivers or blockers; path_reuse, light_vertices, sky_portals, "
+                    "local_lights and sky_samples, which do not know of it, are left out",
+                    n_.linked_lights),
+        "all receive the light of all lights");
     say("normal maps", count<NormalMapBsdf, BumpMapBsdf>(n_.materials), "normal and bump maps");
   }
   void media() {
@@ -309,6 +316,7 @@ std::string canonical_json(const Needs& n) {
   if (n.meters > 0) j["meters"] = n.meters;
   if (n.flagged_shapes > 0) j["flagged_shapes"] = n.flagged_shapes;
   if (n.ray_flags > 0) j["ray_flags"] = n.ray_flags;
+  if (n.linked_lights > 0) j["linked_lights"] = n.linked_lights;
   return j.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 

@@ -40,7 +40,8 @@ struct Needs {
   // Number of shapes that shadow rays or scattered rays do not meet, and of emitters whose light does not
   // reach all surfaces and media
   std::uint32_t ray_flags = 0;
-  std::uint32_t meters = 0;  // number of values that are measured; 0: the scene has a camera
+  std::uint32_t linked_lights = 0;  // number of lights that are linked to receivers or blockers
+  std::uint32_t meters = 0;         // number of values that are measured; 0: the scene has a camera
   // Number of objects of each type. The key is the name of the type (describe.h). Types without objects are
   // left out.
   std::map<std::string, std::uint32_t> shapes, materials, textures, lights, media_kinds;

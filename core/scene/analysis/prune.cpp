@@ -9,6 +9,7 @@
 #include "core/scene/analysis/unreachable.h"
 #include "core/scene/limits.h"
 #include "core/scene/schema/integrators.h"
+#include "core/scene/schema/light_links.h"
 #include "core/scene/schema/traits.h"
 #include "core/scene/schema/validate.h"
 
@@ -47,6 +48,7 @@ class Pruner {
       note("shape of the lens", "the camera is a pinhole");
     }
     Pruned out{compacted(s_), {}};
+    note("light linking", "its list has all that there is", drop_idle_links(out.scene));
     files(out.scene.assets);
     out.left_out = std::move(left_out_);
     return out;

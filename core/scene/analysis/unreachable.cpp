@@ -4,6 +4,7 @@
 
 #include "core/scene/analysis/shape_place.h"
 #include "core/scene/limits.h"
+#include "core/scene/schema/light_links.h"
 #include "core/scene/schema/traits.h"
 #include "core/scene/transform.h"
 
@@ -39,7 +40,8 @@ bool camera_is_outside(const Sensor& s, const Box& tight) {
 
 class Search {
  public:
-  Search(const Scene& scene, const std::vector<BsdfTraits>& traits) : s_(scene), traits_(traits) {
+  Search(const Scene& scene, const std::vector<BsdfTraits>& traits)
+      : s_(scene), traits_(traits), links_(scene) {
     for (std::size_t i = 0; i < s_.shapes.size(); ++i)
       if (is_entrance(s_.shapes[i])) entrances_.push_back({i, place_in_scene(s_.shapes[i])});
   }
@@ -59,9 +61,11 @@ class Search {
     std::size_t shape;
     std::optional<Box> box;  // bounding box in the scene; nullopt: unknown
   };
-  // True if some rays pass the shape because they do not see it.
-  static bool lets_rays_in(const Shape& s) {
-    return !s.visible_camera || !s.visible_shadow || !s.visible_reflection || !s.visible_volume;
+  // True if some rays pass the shape because they do not see it, or shadow rays because it does not shade
+  // their light.
+  bool lets_rays_in(const Shape& s) const {
+    return !s.visible_camera || !s.visible_shadow || !s.visible_reflection || !s.visible_volume ||
+           (links_.blockers() & ~links_.having(s.link_sets)) != 0;
   }
   bool emits(MediumIndex m) const { return traits_of(s_.media[m.value], s_.volumes).emits; }
   static std::optional<Box> place_in_scene(const Shape& s) { return s.group ? std::nullopt : box_of(s); }
@@ -116,6 +120,7 @@ class Search {
 
   const Scene& s_;
   const std::vector<BsdfTraits>& traits_;
+  const LinkLists links_;
   std::vector<Entrance> entrances_;
   std::uint64_t compared_ = 0;
 };

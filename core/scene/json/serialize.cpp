@@ -11,7 +11,6 @@
 #include <variant>
 
 #include "core/base/check.h"
-#include "core/base/light/light_group.h"
 #include "core/scene/schema/describe_fields.h"
 #include "core/scene/schema/validate.h"
 
@@ -90,8 +89,8 @@ class ObjectReader {
   void read(const Field& f, const Json& j, std::string& x) {
     if (!j.is_string()) return fail(f.name, "is not a string");
     x = j.get<std::string>();
-    if (f.light_group && !x.empty() && !wrong_light_group(x).empty())
-      fail(f.name, "is not the name of a light group");
+    if (f.wrong && !x.empty())
+      if (const std::string why = f.wrong(x); !why.empty()) fail(f.name, "is wrong: " + why);
   }
   void read(const Field& f, const Json& j, Digest& x) {
     const auto digest = j.is_string() ? Digest::parse(j.get_ref<const std::string&>()) : std::nullopt;

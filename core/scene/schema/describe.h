@@ -22,6 +22,8 @@
 #include <variant>
 
 #include "core/base/check.h"
+#include "core/base/light/light_group.h"
+#include "core/base/light/link_names.h"
 #include "core/scene/limits.h"
 #include "core/scene/scene.h"
 
@@ -63,8 +65,9 @@ struct Field {
   // For a number or colour that Mitsuba does not have: if the field has this value, it is not written in
   // files. NaN: there is no such value.
   double unwritten = std::numeric_limits<double>::quiet_NaN();
-  bool number = false;       // true: the field is a texture that is read as a scalar, not as a colour
-  bool light_group = false;  // true: the text must be the name of a light group (wrong_light_group())
+  bool number = false;  // true: the field is a texture that is read as a scalar, not as a colour
+  // For a text: returns why a value is wrong, or an empty text. Null: every value is right.
+  std::string (*wrong)(std::string_view text) = nullptr;
   // True for fields that Mitsuba does not have or that older scenes lack. If such a field has its default
   // value, it is written neither in files nor in JSON, so that the files and digests of scenes that do not
   // use it stay the same. The default is `unwritten` for a colour or a boolean (0: false, 1: true) whose
@@ -112,8 +115,29 @@ inline constexpr Field kLightGroup{
     .doc =
         "the light group whose layer of the AOV `light_groups` has this light; letters, digits, `_` and `-`; "
         "if not given, the group is `other`. Not in Mitsuba",
-    .light_group = true,
+    .wrong = wrong_light_group,
     .elided = true};
+// The field of the link sets of a shape or a medium.
+inline Field link_sets_field(std::string_view doc) {
+  return {.name = "link_sets", .doc = doc, .wrong = wrong_link_sets, .elided = true};
+}
+// Describes what a light is linked to.
+template <class V, class T>
+void describe_links(V& v, T& e) {
+  v.field({.name = "receivers",
+           .doc = "link sets (`link_sets` of shapes and media) that receive its light: names, separated by "
+                  "commas; a `-` before a name takes the set out of the others or, if no name is without a "
+                  "`-`, out of everything. Not in Mitsuba",
+           .wrong = wrong_link_list,
+           .elided = true},
+          e.links.receivers);
+  v.field({.name = "blockers",
+           .doc = "link sets of the shapes that shade its light, as a list like `receivers`; it passes all "
+                  "others. Not in Mitsuba",
+           .wrong = wrong_link_list,
+           .elided = true},
+          e.links.blockers);
+}
 // Returns the field of a texture that is read as a scalar. `fallback` replaces a missing texture.
 inline Field number_field(std::string_view name, std::string_view doc, const Range& range, double fallback) {
   return {

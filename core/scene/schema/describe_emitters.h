@@ -31,6 +31,7 @@ void describe(V& v, T& e) {
           e.falloff);
   v.field({.name = "two_sided", .doc = "the back shines like the front", .elided = true}, e.two_sided);
   v.field(kLightGroup, e.light_group);
+  describe_links(v, e);
 }
 
 LS_TYPE(ConstantEmitter, "emitter", "constant", "", "the same radiance from everywhere around")
@@ -41,6 +42,7 @@ void describe(V& v, T& e) {
           e.visible_camera);
   describe_receivers(v, e);
   v.field(kLightGroup, e.light_group);
+  describe_links(v, e);
 }
 
 LS_TYPE(DirectionalEmitter, "emitter", "directional", "",
@@ -63,6 +65,7 @@ void describe(V& v, T& e) {
           e.visible_camera);
   describe_receivers(v, e);
   v.field(kLightGroup, e.light_group);
+  describe_links(v, e);
 }
 
 LS_TYPE(PointEmitter, "emitter", "point", "",
@@ -74,6 +77,7 @@ void describe(V& v, T& e) {
   v.field(quantity("intensity", "radiant intensity", "W/sr", kNonNegative), e.intensity);
   describe_receivers(v, e);
   v.field(kLightGroup, e.light_group);
+  describe_links(v, e);
 }
 
 LS_TYPE(SpotEmitter, "emitter", "spot", "",
@@ -90,6 +94,7 @@ void describe(V& v, T& e) {
   v.field({.name = "texture", .doc = "an image projected by the light", .range = kNonNegative}, e.texture);
   describe_receivers(v, e);
   v.field(kLightGroup, e.light_group);
+  describe_links(v, e);
 }
 
 LS_TYPE(EnvmapEmitter, "emitter", "envmap", "",
@@ -112,6 +117,7 @@ void describe(V& v, T& e) {
           e.visible_camera);
   describe_receivers(v, e);
   v.field(kLightGroup, e.light_group);
+  describe_links(v, e);
   v.field(image_colours_field(), e.colours);
 }
 
@@ -135,6 +141,7 @@ void describe(V& v, T& e) {
           e.as_intensity);
   describe_receivers(v, e);
   v.field(kLightGroup, e.light_group);
+  describe_links(v, e);
 }
 
 LS_TYPE(GoniometricEmitter, "emitter", "goniometric", "",
@@ -151,6 +158,7 @@ void describe(V& v, T& e) {
           e.texture);
   describe_receivers(v, e);
   v.field(kLightGroup, e.light_group);
+  describe_links(v, e);
 }
 
 }  // namespace ls::scene

@@ -102,6 +102,9 @@ void describe(V& v, T& m) {
           m.source_radiance);
   describe_priority(v, m.priority);
   v.field(kLightGroup, m.light_group);
+  v.field(link_sets_field("link sets that the medium is in, for `receivers` of lights: names, separated by "
+                          "commas; letters, digits, `_` and `-`. Not in Mitsuba"),
+          m.link_sets);
 }
 
 LS_TYPE(HeterogeneousMedium, "medium", "heterogeneous", "", "varies in space by volumes")
@@ -164,6 +167,9 @@ void describe(V& v, T& m) {
           m.emission_weight);
   describe_priority(v, m.priority);
   v.field(kLightGroup, m.light_group);
+  v.field(link_sets_field("link sets that the medium is in, for `receivers` of lights: names, separated by "
+                          "commas; letters, digits, `_` and `-`. Not in Mitsuba"),
+          m.link_sets);
 }
 
 }  // namespace ls::scene

@@ -112,6 +112,9 @@ void describe(V& v, T& s) {
                           "whether rays meet it that a medium scattered; if not, its lamp lights no medium. "
                           "Not in Mitsuba"),
           s.visible_volume);
+  v.field(link_sets_field("link sets that the shape is in, for `receivers` and `blockers` of lights: names, "
+                          "separated by commas; letters, digits, `_` and `-`. Not in Mitsuba"),
+          s.link_sets);
   v.field({.name = "meter", .doc = "what is measured on it", .derived = true, .elided = true}, s.meter);
 }
 

@@ -11,6 +11,7 @@
 #include "core/image/frame/meter_blocks.h"
 #include "core/scene/limits.h"
 #include "core/scene/schema/describe_fields.h"
+#include "core/scene/schema/light_links.h"
 #include "core/scene/schema/traits.h"
 
 namespace ls::scene {
@@ -37,6 +38,9 @@ class ValueChecker {
     if (wrong_.empty()) check_crop();
     if (wrong_.empty()) check_labels();
     if (wrong_.empty()) check_meters();
+    if (wrong_.empty() && LinkLists(s_).too_many())
+      wrong_ = fmt::format("scene: the lights have more than {} different lists of receivers and blockers",
+                           kMostLinkLists);
     if (wrong_.empty() && std::int64_t{s_.film.size.width} * s_.film.size.height > kMaxFramePixels)
       wrong_ = fmt::format("scene.film has more than {} pixels", kMaxFramePixels);
     return wrong_;

@@ -10,6 +10,9 @@ enum class RayKind : std::uint8_t {
   shadow,   // from a vertex to a point of a light
   surface,  // scattered by a surface, or at a meter
   medium,   // scattered by a medium
+  // Shadow rays of some lights only: those that are linked to other blockers (LightReach). No ray has this
+  // kind; it marks the surfaces for which the light decides.
+  some_shadow,
 };
 
 class RayKinds {

@@ -127,7 +127,8 @@ class Finder {
     if (spent(1) || !n.touches(o)) return;
     const SurfaceInfo &mine = g_.surfaces[n.surface], &other = g_.surfaces[o.surface];
     // The same rays pass both, and none enters a medium.
-    if (!mine.null && !other.null && mine.hidden == other.hidden && !mine.transition && !other.transition)
+    if (!mine.null && !other.null && mine.hidden == other.hidden && !mine.hidden.has(RayKind::some_shadow) &&
+        !mine.transition && !other.transition)
       return;
     if (n.surface == o.surface && n.instance == o.instance) return twice_in_itself(n);
     // Each pair of two passable surfaces is found twice, once in each order, but compared only once.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/scene/schema/light_links.h"
 #include "core/scene/schema/traits.h"
 #include "worker/render/geometry/geometry.h"
 #include "worker/render/geometry/shape_import.h"
@@ -207,13 +208,14 @@ void append(Geometry& g, const Placed& p, std::uint32_t surface, const Space& sp
 }
 
 SurfaceInfo surface_info(const Scene& scene, const std::vector<scene::BsdfTraits>& traits, const Shape& s,
-                         bool vertex_normals) {
+                         const scene::LinkLists& links, bool vertex_normals) {
   SurfaceInfo info;
   info.bsdf = s.bsdf;
   info.null = std::holds_alternative<NullBsdf>(scene.bsdfs.at(s.bsdf.value));
   info.null_transmission = !info.null && traits.at(s.bsdf.value).passes;
   info.transition = s.is_medium_transition;
   info.hidden = hidden_from(s);
+  info.hidden.set(RayKind::some_shadow, (links.blockers() & ~links.having(s.link_sets)) != 0);
   info.passable = info.null || info.hidden.any();
   info.catcher = catches_shadows(scene, s);
   info.holdout = s.holdout || info.catcher;
@@ -276,7 +278,7 @@ Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
 
 // True if shadow rays may pass the surface.
 bool lets_light_pass(const SurfaceInfo& s) {
-  return s.null || s.null_transmission || s.hidden.has(RayKind::shadow);
+  return s.null || s.null_transmission || s.hidden.has(RayKind::shadow) || s.hidden.has(RayKind::some_shadow);
 }
 
 // Appends to g the shapes of one space, opaque ones first. `shapes` holds the indices of these shapes in
@@ -344,8 +346,10 @@ Result<Geometry> Geometry::build(const Scene& scene, const AssetLoader& files) {
                 "emits light in a group");
   const auto parts = place_all(scene, files);
   if (!parts) return tl::unexpected(parts.error());
+  const scene::LinkLists links(scene);
   for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
-    g.surfaces.push_back(surface_info(scene, *traits, scene.shapes[i], parts->shapes[i].normals_given));
+    g.surfaces.push_back(
+        surface_info(scene, *traits, scene.shapes[i], links, parts->shapes[i].normals_given));
     g.surfaces.back().wants_attributes = !parts->shapes[i].mesh.attributes.empty();
   }
   g.attributes = attributes_of(scene);

@@ -196,10 +196,10 @@ C3 PathTracer<F, Light>::shadow_at(const SurfaceHit& hit) {
   if (world_.lights.can_sample()) {
     const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, {hit.p, n});
     const auto light = world_.lights.sample(choice, hit.p);
-    if (light && receives(choice, RayKind::surface))
-      receive(*light, dot(light->direction, n) / light->pdf, 0);
+    if (light && turn_to(choice, hit)) receive(*light, dot(light->direction, n) / light->pdf, 0);
   }
-  if (!is_black(world_.lights.constant_environment()) && !world_.lights.hides_sky(RayKind::surface)) {
+  if (!is_black(world_.lights.constant_environment()) &&
+      turn_to(world_.lights.sky_reach(), RayKind::surface, world_.surface_links[hit.surface])) {
     LightSample light;
     light.direction = normalize(Frame(n).to_world(cosine_hemisphere({sky.u(0), sky.u(1)})));
     light.distance = kInfinity;
@@ -226,7 +226,7 @@ bool PathTracer<F, Light>::meets_catcher(const V3& p, const LightSample& light) 
     if (!primitive || !world_.geometry.complete(*primitive, o, d, hit)) return false;
     if (world_.coincident) prefer_scatterer<true>(hit, o, d, left, RayKind::shadow);
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    if (surface.catcher && !surface.null && !surface.hidden.has(RayKind::shadow)) return true;
+    if (surface.catcher && !surface.null && !is_hidden(hit.surface, RayKind::shadow)) return true;
     const V3 next = offset_point(hit, d);
     if (std::isfinite(left)) left -= dot(next - o, d);
     if (!(left > 0)) return false;

@@ -9,7 +9,13 @@ namespace ls::render {
 
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
-  if ((depth_ == 0 && world_.hide_emitters) || direct_by_shadows()) return;
+  if (depth_ == 0 && world_.hide_emitters) return;
+  if constexpr (F.visibility) {
+    if (depth_ > 0 && world_.ray_flags) {
+      const LightReach& reach = reach_of(hit);
+      if (!scene::linked(reach.receivers, links_.receiver) || found_by_shadows(reach)) return;
+    }
+  }
   add_emission_times(beta_, hit);
 }
 
@@ -19,7 +25,7 @@ void PathTracer<F, Light>::add_emission_times(const C3& beta, const SurfaceHit& 
   if (is_black(emitted)) return;
   see_surface(hit.p);
   float weight = 1;
-  if (!hits_count_fully()) {
+  if (!hits_count_fully(hit)) {
     const float p_l =
         world_.lights.pdf(hit, last_.p, ray_.d, last_.place, last_.in_medium.light_chosen_first());
     if constexpr (F.reuse) {
@@ -40,7 +46,7 @@ void PathTracer<F, Light>::add_environment() {
   if (depth_ == 0 && world_.hide_environment) return add_environment_seen();
   if constexpr (F.visibility) {
     if (depth_ > 0 && world_.ray_flags) {
-      if (!direct_by_shadows()) add_environment_times(beta_);
+      add_environment_times(beta_, false);
       return;
     }
   }

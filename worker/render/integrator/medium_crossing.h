@@ -155,9 +155,10 @@ auto PathTracer<F, Light>::scatter_by_phase(const Medium& medium) -> Step {
   last_.pdf = s.pdf;
   ray_.d = s.w;
   if constexpr (F.visibility) {
-    if (world_.direct_by_shadows) [[unlikely]] {
+    if (world_.ray_flags) [[unlikely]] {
+      links_.receiver = world_.medium_links[index_of(medium)];
       like_mirror_ = false;
-      direct_due_ = direct_by_shadows();
+      direct_due_ = !world_.shadow_lists.empty();
     }
   }
   if constexpr (F.reuse) {
@@ -217,7 +218,7 @@ template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::light_vertex_by(const LightChoice& choice, const Medium& medium, const V3& p,
                                            const V3& d) {
   const auto light = world_.lights.sample(choice, p);
-  if (!light || !receives(choice, RayKind::medium)) return;
+  if (!light || !turn_to(choice, medium)) return;
   const float phase = medium.phase.value(d, light->direction);
   const float sampled = direction_pdf(p, phase, light->direction);
   const float weight = light->delta ? 1 : light->pdf / (light->pdf + sampled);
@@ -416,20 +417,20 @@ template <Features F, template <Features> class Light>
 template <bool kHidden>
 void PathTracer<F, Light>::prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max,
                                             [[maybe_unused]] RayKind kind) const {
-  const auto is_hidden = [&](const SurfaceInfo& s) {
-    if constexpr (kHidden) return s.hidden.has(kind);
+  const auto is_passed = [&](std::uint32_t surface) {
+    if constexpr (kHidden) return is_hidden(surface, kind);
     return false;
   };
   const SurfaceInfo& s = world_.geometry.surfaces[hit.surface];
-  if (!(s.null || is_hidden(s)) || !(s.coincident_reach > 0)) return;
-  const bool hidden = is_hidden(s);
+  if (!(s.null || is_passed(hit.surface)) || !(s.coincident_reach > 0)) return;
+  const bool hidden = is_passed(hit.surface);
   const CoincidentHits others = others_at(hit, d, d);
   for (int i = 0; i < others.count; ++i) {
     SurfaceHit other;
     const PrimitiveId id = others.ids[static_cast<std::size_t>(i)];
     if (!world_.geometry.complete(id, o, d, other)) continue;
     const SurfaceInfo& info = world_.geometry.surfaces[other.surface];
-    if ((info.null && !hidden) || is_hidden(info) || other.t > t_max) continue;
+    if ((info.null && !hidden) || is_passed(other.surface) || other.t > t_max) continue;
     hit = other;
     if (!info.null) return;
   }

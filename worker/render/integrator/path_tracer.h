@@ -216,29 +216,44 @@ class PathTracer {
     if (depth_ == 0) return RayKind::camera;
     return left_medium_ ? RayKind::medium : RayKind::surface;
   }
-  // True if shadow rays alone find the light that arrives at the last vertex.
-  bool direct_by_shadows() const {
+  // The same: what receives the light of the surface that was hit, and what shades it.
+  const LightReach& reach_of(const SurfaceHit& hit) const {
+    return world_.lights.reach(world_.geometry.surfaces[hit.surface].light);
+  }
+  // True if shadow rays alone find the light of a light of this reach that arrives at the last vertex.
+  bool found_by_shadows(const LightReach& reach) const {
+    return depth_ > 0 && !last_.delta &&
+           (reach.has_blockers() || (world_.direct_by_shadows && !like_mirror_));
+  }
+  // True if light of the chosen light from a direction that a surface samples with this density is not looked
+  // for by shadow rays.
+  bool is_like_mirror(float pdf, const LightChoice& choice) const {
     if constexpr (F.visibility)
-      return world_.direct_by_shadows && depth_ > 0 && !last_.delta && !like_mirror_;
+      return world_.direct_by_shadows && pdf > kLikeMirror &&
+             !world_.lights.reach(choice.light).has_blockers();
     return false;
   }
-  // True if light from a direction that a surface samples with this density is not looked for by shadow rays.
-  bool is_like_mirror(float pdf) const {
-    if constexpr (F.visibility) return world_.direct_by_shadows && pdf > kLikeMirror;
-    return false;
+  // True if the light that the current ray hits, of this reach or there, has full weight.
+  bool hits_count_fully(const LightReach& reach) const {
+    return last_.delta || (like_mirror_ && !reach.has_blockers());
   }
-  // True if lights that the current ray hits have full weight.
-  bool hits_count_fully() const {
-    if constexpr (F.visibility) return last_.delta || like_mirror_;
+  bool hits_count_fully(const SurfaceHit& hit) const {
+    if constexpr (F.visibility) return hits_count_fully(reach_of(hit));
     return last_.delta;
   }
-  // True if what scatters rays of this kind (surfaces or media) receives the chosen light.
-  bool receives(const LightChoice& choice, RayKind kind) const {
-    if constexpr (F.visibility) return !world_.ray_flags || !world_.lights.hidden(choice.light, kind);
-    return true;
+  // Returns whether a surface or a medium receives the chosen light. From this call on shadow rays are those
+  // of this light.
+  bool turn_to(const LightChoice& choice, const SurfaceHit& hit);
+  bool turn_to(const LightChoice& choice, const Medium& medium);
+  bool turn_to(const LightReach& reach, RayKind kind, scene::LinkMask links);
+  std::size_t index_of(const Medium& medium) const {
+    return static_cast<std::size_t>(&medium - world_.media.data());
   }
-  [[gnu::cold, gnu::noinline]] void add_environment_times(const C3& beta);
+  // True if rays of this kind pass straight through the surface because it is hidden from them.
+  bool is_hidden(std::uint32_t surface, RayKind kind) const;
+  [[gnu::cold, gnu::noinline]] void add_environment_times(const C3& beta, bool by_shadows);
   [[gnu::cold, gnu::noinline]] void add_direct();
+  void add_direct_past(scene::LinkIndex blockers);
   [[gnu::cold, gnu::noinline]] C3 shadow_at(const SurfaceHit& hit);
   bool meets_catcher(const V3& p, const LightSample& light) const;
   C3 unoccluded(const V3& start, const V3& p, const LightSample& light, const Within& medium,
@@ -428,7 +443,7 @@ class PathTracer {
   // Both with F.visibility. left_medium_: true if the last scattering was in a medium. direct_due_: true if
   // add_direct() has to look for light in the direction of the current ray.
   bool left_medium_ = false, direct_due_ = false;
-  // With F.visibility: true if the last direction was scattered as if by a mirror (is_like_mirror)
+  // With F.visibility: true if the last direction was scattered as if by a mirror (kLikeMirror)
   bool like_mirror_ = false;
   Vertex last_;
   SubpathDensities densities_;  // with F.connected: densities of the path up to the current vertex
@@ -442,6 +457,11 @@ class PathTracer {
   LampDirections near_lamps_;
   float aim_ = 1;
   struct Nothing {};
+  struct Links {
+    scene::LinkMask receiver = 0;                    // the lists that have what the last vertex is on or in
+    scene::LinkIndex blockers = scene::kEverything;  // the list of the light of shadow rays
+  };
+  std::conditional_t<F.visibility, Links, Nothing> links_;
   std::conditional_t<F.reuse, SharingPath, Nothing> sharing_;
   std::conditional_t<F.reuse && F.split, TailByGroup, Nothing> tail_by_group_;
 };
@@ -484,6 +504,7 @@ bool PathTracer<F, Light>::begin_at_meter(const CameraRay& ray) {
   if (!meter.has_plate()) {
     ray_.leave(plate, ray.d);
     depth_ = 1;
+    if constexpr (F.visibility) links_.receiver = world_.surface_links[world_.plate];
     return true;
   }
   last_.p = ray.o + plate.ng;  // the path comes from anywhere in front of the plate
@@ -636,11 +657,12 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   last_.pdf = s->pdf;
   last_.delta = s->delta;
   if constexpr (F.visibility) {
-    if (world_.direct_by_shadows) [[unlikely]] {
+    if (world_.ray_flags) [[unlikely]] {
+      links_.receiver = world_.surface_links[hit.surface];
       float pdf = s->pdf;
       if constexpr (F.aimed) pdf *= aim_;
-      like_mirror_ = !s->delta && is_like_mirror(pdf);
-      direct_due_ = direct_by_shadows();
+      like_mirror_ = world_.direct_by_shadows && !s->delta && pdf > kLikeMirror;
+      direct_due_ = !world_.shadow_lists.empty() && !s->delta;
     }
   }
   if constexpr (F.connected) {

@@ -235,7 +235,7 @@ class SegmentNee {
     const C3 scattering = at_point.rate > 0 ? s.scattering(at_point, p) : C3(0);
     if (is_black(scattering)) return;
     const auto light = path.world_.lights.sample(choice, p);
-    if (!light || !path.receives(choice, RayKind::medium)) return;
+    if (!light || !path.turn_to(choice, medium)) return;
 
     const Vertex v = vertex_at(path, medium, plan, at_point);
     const bool both = choice.has_place && v.by_angle && v.by_depth;

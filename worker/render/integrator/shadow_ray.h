@@ -37,9 +37,9 @@ C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSam
 }
 
 // Returns `value` times the transmittance of everything along the ray from p in the direction d, of length
-// `left`: of the media, and of the surfaces that light passes straight through (null transmission). No opaque
-// surface may block the ray. `medium` contains the media at the start of the ray. `start` is p before it was
-// moved off its surface; lengths in media are measured from there.
+// `left`: of the media, and of the surfaces that light passes straight through (null transmission). No
+// surface that is opaque to all lights may block the ray. `medium` contains the media at the start of the
+// ray. `start` is p before it was moved off its surface; lengths in media are measured from there.
 template <Features F, template <Features> class Light>
 C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left,
                                             Within medium, RandomStream stream) {
@@ -72,7 +72,14 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
     if (!met) return value;
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     bool hidden = false;
-    if constexpr (F.visibility) hidden = surface.hidden.has(RayKind::shadow);
+    if constexpr (F.visibility) {
+      if (surface.hidden.any()) [[unlikely]] {
+        hidden = is_hidden(hit.surface, RayKind::shadow);
+        // A surface that shades this light, but not all others
+        const bool opaque = !surface.null && !surface.null_transmission;
+        if (!hidden && opaque && surface.hidden.has(RayKind::some_shadow)) return {0, 0, 0};
+      }
+    }
     if (hidden) ++unmet;
     if (!may_go_on(depth_, passed_ + i + 1 - unmet)) return {0, 0, 0};
     if (surface.null_transmission && !hidden) {

@@ -24,13 +24,13 @@ template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::light_surface_by(const LightChoice& choice, const SurfaceHit& hit,
                                             const SurfaceInfo& surface, const V3& wo) {
   const auto light = world_.lights.sample(choice, hit.p);
-  if (!light || !receives(choice, RayKind::surface)) return;
+  if (!light || !turn_to(choice, hit)) return;
   const V3 wi = hit.shading.to_local(light->direction);
   // A shading normal must not let light through a surface that is opaque by its geometric normal. Sampled
   // directions are checked in the same way (scatter_on_surface).
   if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0)) return;
   const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, wi);
-  if (is_black(f.f_cos) || (!light->delta && is_like_mirror(f.pdf))) return;
+  if (is_black(f.f_cos) || (!light->delta && is_like_mirror(f.pdf, choice))) return;
   float sampled = f.pdf;
   if constexpr (F.aimed) sampled = near_lamps_.pdf(f.pdf, light->direction);
   const float weight = light->delta ? 1 : balance_weight(light->pdf, sampled);

@@ -114,7 +114,7 @@ class VertexNee {
     const Group g = path.stream_.group(path.depth_, Purpose::light);
     const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]}, path.last_.place);
     const auto light = lights.sample(choice, p);
-    if (!light || !path.receives(choice, RayKind::medium)) return;
+    if (!light || !path.turn_to(choice, medium)) return;
     const float phase = medium.phase.value(d, light->direction);
     const auto& v = path.last_.in_medium;
     const float with_equiangular = v.uses_equiangular(choice.is_point) && choice.has_place
@@ -165,7 +165,7 @@ class VertexNee {
     const C3 scattering = at_point.rate > 0 ? depths.scattering(at_point, p) : C3(0);
     if (is_black(scattering)) return;
     const auto light = lights.sample(choice, p);
-    if (!light || !(s.pdf > 0) || !path.receives(choice, RayKind::medium)) return;
+    if (!light || !(s.pdf > 0) || !path.turn_to(choice, medium)) return;
     const float phase = medium.phase.value(path.ray_.d, light->direction);
     const float ratio = ratio_to_flight(s.pdf, flight_pdf<F>(medium, path.density_, at_point));
     const bool delta = light->delta;

@@ -69,13 +69,9 @@ Result<void> Lights::add_map(const Scene& scene, const EnvmapEmitter& emitter, c
 Result<void> Lights::add_emitter(const Scene& scene, const Emitter& emitter, const ImageLoader& images) {
   return std::visit(overloaded{[&](const ConstantEmitter& e) -> Result<void> {
                                  environment_ += color(e.radiance);
-                                 sky_hidden_ = hidden_from(e);
                                  return {};
                                },
-                               [&](const EnvmapEmitter& e) {
-                                 sky_hidden_ = hidden_from(e);
-                                 return add_map(scene, e, images);
-                               },
+                               [&](const EnvmapEmitter& e) { return add_map(scene, e, images); },
                                [&](const GoniometricEmitter& e) -> Result<void> {
                                  if (textures_->aspect(e.texture) != 1)
                                    return fail(Errc::invalid_argument,
@@ -94,12 +90,16 @@ Result<void> Lights::add_emitter(const Scene& scene, const Emitter& emitter, con
 Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const TextureTable& textures,
                              const ImageLoader& images, std::span<const std::string> light_groups) {
   Lights l;
-  // Sets the group and the receivers of the lights from `first` on.
-  const auto mark = [&](std::size_t first, const std::string& name, RayKinds hidden) {
+  const scene::LinkLists lists(scene);
+  const auto reach_of = [&](RayKinds hidden, const LightLinks& links) {
+    return LightReach{hidden, lists.index(links.receivers), lists.index(links.blockers)};
+  };
+  // Sets the group and the reach of the lights from `first` on.
+  const auto mark = [&](std::size_t first, const std::string& name, const LightReach& reach) {
     const LightGroup group = light_group_of(light_groups, name);
     for (std::size_t light = first; light < l.lights_.size(); ++light) {
       l.lights_[light].group = group;
-      l.lights_[light].hidden = hidden;
+      l.lights_[light].reach = reach;
     }
     return group;
   };
@@ -111,15 +111,21 @@ Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const Textu
     if (!emitter) continue;
     const auto first = l.lights_.size();
     l.add_area(scene, i, primitives, geometry);
-    mark(first, emitter->light_group, hidden_from(scene.shapes[i]));
+    mark(first, emitter->light_group, reach_of(hidden_from(scene.shapes[i]), emitter->links));
   }
   for (const Emitter& e : scene.emitters) {
     const auto first = l.lights_.size();
     if (auto ok = l.add_emitter(scene, e, images); !ok) return tl::unexpected(ok.error());
-    const LightGroup index =
-        std::visit([&](const auto& any) { return mark(first, any.light_group, hidden_from(any)); }, e);
-    if (std::holds_alternative<ConstantEmitter>(e) || std::holds_alternative<EnvmapEmitter>(e))
-      l.sky_group_ = index;
+    std::visit(
+        [&]<class E>(const E& any) {
+          const LightReach reach = reach_of(hidden_from(any), any.links);
+          const LightGroup group = mark(first, any.light_group, reach);
+          if constexpr (std::is_same_v<E, ConstantEmitter> || std::is_same_v<E, EnvmapEmitter>) {
+            l.sky_group_ = group;
+            l.sky_reach_ = reach;
+          }
+        },
+        e);
   }
   l.sort_places_first();
   l.set_probabilities();
@@ -141,6 +147,16 @@ std::vector<V3> Lights::points() const {
   for (const Light* l : found)
     list.push_back(pivot({.light = static_cast<std::uint32_t>(l - lights_.data())}).p);
   return list;
+}
+
+std::vector<scene::LinkIndex> Lights::blockers_of_extended() const {
+  std::vector<scene::LinkIndex> lists{sky_reach_.blockers};
+  for (const Light& l : lights_)
+    if (!is_point(l) && !std::holds_alternative<DirectionalLight>(l.kind)) lists.push_back(l.reach.blockers);
+  std::ranges::sort(lists);
+  lists.erase(std::ranges::unique(lists).begin(), lists.end());
+  std::erase(lists, scene::kEverything);
+  return lists;
 }
 
 bool Lights::any_without_place() const { return !std::all_of(lights_.begin(), lights_.end(), has_place); }
@@ -209,7 +225,7 @@ void Lights::set_portals(std::unique_ptr<const Portals> portals) {
   } else if (at != lights_.end()) {
     at->kind = sky_;
   } else {
-    lights_.push_back({.kind = sky_, .group = sky_group_});
+    lights_.push_back({.kind = sky_, .group = sky_group_, .reach = sky_reach_});
   }
   local_ = nullptr;
   set_probabilities();
@@ -238,12 +254,12 @@ Lights::EnvironmentParts Lights::environment_parts(const V3& x, const V3& direct
 }
 
 bool Lights::hides_environment() const {
-  return sky_hidden_.has(RayKind::camera) ||
+  return sky_reach_.hidden.has(RayKind::camera) ||
          std::ranges::any_of(suns_, [&](std::uint32_t i) { return !sun(i).seen; });
 }
 
 C3 Lights::environment_seen(const V3& direction) const {
-  C3 sum = sky_hidden_.has(RayKind::camera) ? C3(0) : environment_ + sky_.radiance(direction);
+  C3 sum = sky_reach_.hidden.has(RayKind::camera) ? C3(0) : environment_ + sky_.radiance(direction);
   for (const std::uint32_t i : suns_)
     if (sun(i).seen) sum += sun(i).found(direction, kInfinity, 1);
   return sum;

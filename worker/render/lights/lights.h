@@ -16,6 +16,7 @@
 
 #include "core/base/error.h"
 #include "worker/render/base/light_group.h"
+#include "worker/render/base/light_reach.h"
 #include "worker/render/lights/area.h"
 #include "worker/render/lights/distant.h"
 #include "worker/render/lights/local_lights.h"
@@ -52,8 +53,11 @@ class Lights {
   LightGroup group(std::uint32_t light) const { return lights_[light].group; }
   LightGroup group(const SurfaceHit& hit) const { return group(geometry_->surfaces[hit.surface].light); }
   LightGroup sky_group() const { return sky_group_; }
-  // True if what scatters rays of this kind (surfaces or media) does not receive the light.
-  bool hidden(std::uint32_t light, RayKind from) const { return lights_[light].hidden.has(from); }
+  // What receives a light, or the environment map and the constant environment, and what shades it.
+  const LightReach& reach(std::uint32_t light) const { return lights_[light].reach; }
+  const LightReach& sky_reach() const { return sky_reach_; }
+  // The lists of blockers of the lights that rays can hit, each once, without kEverything.
+  std::vector<scene::LinkIndex> blockers_of_extended() const;
 
   // False if there is no light that next-event estimation can sample.
   bool can_sample() const { return !lights_.empty(); }
@@ -118,14 +122,15 @@ class Lights {
     f(sky_group_, sky_.sampled() ? environment_ + sky(x, direction, pdf, place) : environment_);
     for (const std::uint32_t i : suns_) f(group(i), sun(i).found(direction, pdf, probability_at(i, place)));
   }
-  // The same, for parts that rays of this kind see.
-  template <class F>
-  void environment_seen_from(RayKind kind, const V3& x, const V3& direction, float pdf,
-                             const LightPlace& place, F f) const {
-    if (!sky_hidden_.has(kind))
-      f(sky_group_, sky_.sampled() ? environment_ + sky(x, direction, pdf, place) : environment_);
+  // The same with a `pdf` of each part: pdf_of(reach), an optional; nullopt: the part does not count.
+  template <class PdfOf, class F>
+  void environment_by_reach(const V3& x, const V3& direction, const PdfOf& pdf_of, const LightPlace& place,
+                            F f) const {
+    if (const std::optional<float> pdf = pdf_of(sky_reach_))
+      f(sky_group_, sky_.sampled() ? environment_ + sky(x, direction, *pdf, place) : environment_);
     for (const std::uint32_t i : suns_)
-      if (!hidden(i, kind)) f(group(i), sun(i).found(direction, pdf, probability_at(i, place)));
+      if (const std::optional<float> pdf = pdf_of(reach(i)))
+        f(group(i), sun(i).found(direction, *pdf, probability_at(i, place)));
   }
   // The radiance that a camera ray sees if it leaves the scene in this direction without a scattering: that
   // of the lights whose visible_camera is true.
@@ -133,12 +138,10 @@ class Lights {
   // Calls f(group, radiance) for each of these lights.
   template <class F>
   void environment_seen_by_group(const V3& direction, F f) const {
-    if (!sky_hidden_.has(RayKind::camera)) f(sky_group_, environment_ + sky_.radiance(direction));
+    if (!sky_reach_.hidden.has(RayKind::camera)) f(sky_group_, environment_ + sky_.radiance(direction));
     for (const std::uint32_t i : suns_)
       if (sun(i).seen) f(group(i), sun(i).found(direction, kInfinity, 1));
   }
-  // True if rays of this kind do not see the environment map or the constant environment.
-  bool hides_sky(RayKind from) const { return sky_hidden_.has(from); }
   bool hides_environment() const;  // true if visible_camera of one of these lights is false
   // The radiance of the constant environment; black while portals are set, since the constant environment is
   // then a part of the sky, which is sampled as a light.
@@ -204,7 +207,7 @@ class Lights {
     VariantOf<AreaKinds, PunctualKinds, DistantKinds> kind;
     float probability = 0;
     LightGroup group = kNoLightGroup;
-    RayKinds hidden;  // what does not receive this light: surfaces, media
+    LightReach reach{};
   };
 
   static bool has_place(const Light& light) {
@@ -285,7 +288,7 @@ class Lights {
   bool tree_in_media_ = false;
   bool any_with_place_ = false;
   LightGroup sky_group_ = kNoLightGroup;
-  RayKinds sky_hidden_;  // what does not see the environment map or the constant environment
+  LightReach sky_reach_;  // of the environment map or the constant environment
   std::uint64_t left_out_ = 0, clamped_ = 0;
 };
 

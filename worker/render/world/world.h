@@ -111,12 +111,18 @@ class World {
   // Lights::hides_environment()
   bool hide_environment = false;
   // True if some surfaces are hidden from shadow rays or scattered rays, or some lights from what receives
-  // light
+  // light, or if some lights are linked (LightReach)
   bool ray_flags = false;
+  // The lists of link sets that have each surface and each medium (light_links.h)
+  std::vector<scene::LinkMask> surface_links, medium_links;
   // True if rays that are scattered in some direction may meet other surfaces than shadow rays in that
   // direction. Shadow rays then decide about all light that comes straight from a light to a vertex that does
   // not scatter as a mirror does.
   bool direct_by_shadows = false;
+  // Shadow rays decide likewise about light from lights that are linked to blockers, and there they also do
+  // so for what scatters almost as a mirror. These are the lists of blockers of the lights about which shadow
+  // rays decide and that scattered rays can hit.
+  std::vector<scene::LinkIndex> shadow_lists;
   int max_depth = -1;  // maximum path length in segments; -1: unlimited
   // True if passing straight through a surface (null, or with null transmission) counts as a segment for
   // max_depth, as in Mitsuba's `path`; false if it does not, as in Mitsuba's `volpath`.

@@ -28,7 +28,7 @@ Features features_of(const scene::Needs& n) {
           .chromatic = n.chromatic,
           .emission = n.emission,
           .passing = n.boundaries || n.null_transmission,
-          .visibility = n.flagged_shapes > 0 || n.ray_flags > 0};
+          .visibility = n.flagged_shapes > 0 || n.ray_flags > 0 || n.linked_lights > 0};
 }
 
 // Returns the features that the finished world requires. Except for `overlaps` and `chromatic`, features_of()
@@ -111,6 +111,19 @@ bool a_point_shines_in_a_grid(const World& w) {
       return true;
     });
   });
+}
+
+// Sets what the world knows of links between lights and what they light or what shades them.
+void link(const Scene& scene, World& w) {
+  const scene::LinkLists lists(scene);
+  for (const Shape& s : scene.shapes) w.surface_links.push_back(lists.having(s.link_sets));
+  w.surface_links.resize(w.geometry.surfaces.size(), lists.having(""));  // the plate of meters is in no set
+  for (const ls::Medium& m : scene.media)
+    w.medium_links.push_back(lists.having(std::visit([](const auto& x) { return x.link_sets; }, m)));
+  w.shadow_lists = w.lights.blockers_of_extended();
+  if (w.direct_by_shadows) w.shadow_lists.push_back(scene::kEverything);
+  w.shadows_walk = std::ranges::any_of(
+      w.geometry.surfaces, [](const SurfaceInfo& s) { return s.hidden.has(RayKind::some_shadow); });
 }
 
 // Finds the regions inside media that contain no surfaces. There a flight may be sampled first, and its ray
@@ -314,12 +327,13 @@ Result<std::shared_ptr<World>> make_world(const Scene& given, const RenderSettin
   if (w.aovs.any_of(aovs_of(AovKind::ids))) name_surfaces(scene, w);
   bool homogeneous_media = false;
   for (const Medium& m : w.media) homogeneous_media = homogeneous_media || (!m.grid && !is_black(m.sigma_t));
-  w.ray_flags = w.needs.ray_flags > 0;
+  w.ray_flags = w.needs.ray_flags > 0 || w.needs.linked_lights > 0;
   w.direct_by_shadows = std::ranges::any_of(w.geometry.surfaces, [&](const SurfaceInfo& s) {
     const bool shadow = s.hidden.has(RayKind::shadow);
     return s.hidden.has(RayKind::surface) != shadow || s.hidden.has(RayKind::medium) != shadow;
   });
-  w.shadows_walk = w.null_transmission || (w.need.media && w.accel.has_boundaries());
+  link(scene, w);
+  w.shadows_walk = w.shadows_walk || w.null_transmission || (w.need.media && w.accel.has_boundaries());
   const bool segments = w.distant_mis || scene.integrator.equiangular == 0;
   w.equiangular = segments && w.need.media && homogeneous_media && w.lights.any_with_place();
   w.equiangular_points =

@@ -93,7 +93,8 @@ WorldReport describe(const World& w) {
   feature(w.coincident, "a search for surfaces that lie on null or hidden ones");
   feature(w.need.split, "AOVs of light");
   feature(w.needs.flagged_shapes > 0, "surfaces hidden from the camera, held out or that catch shadows");
-  feature(w.ray_flags, "surfaces and lights hidden from shadow or scattered rays");
+  feature(w.needs.ray_flags > 0, "surfaces and lights hidden from shadow or scattered rays");
+  feature(w.needs.linked_lights > 0, "lights linked to receivers or blockers");
   const TechniqueSet techniques = techniques_of(w);
   feature(techniques.has(Technique::equiangular), "equi-angular sampling about lights");
   feature(techniques.has(Technique::exponential), "points along segments, as light fades");

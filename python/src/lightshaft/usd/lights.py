@@ -12,6 +12,7 @@ from .document import Document, colour
 from .gprims import cylinder_part, sphere_part
 from .ignored import tell_light
 from .images import Images, exr, scaled
+from .links import NONE, Links
 from .meshes import Part
 from .problems import Problems
 from .shading import plain
@@ -32,9 +33,10 @@ class Lights:
         problems: Problems,
         time: Usd.TimeCode,
         up_axis: str,
+        links: Links,
     ) -> None:
         self._document, self._images, self._problems, self._time = document, images, problems, time
-        self._up_axis = up_axis
+        self._up_axis, self._links = up_axis, links
         self._sky: list[tuple[Usd.Prim, list[float], Dict]] = []
         self._maps = 0
         self.count = 0
@@ -61,7 +63,7 @@ class Lights:
             total = np.sum([radiance for _, radiance, _ in self._sky], axis=0)
             first, _, flags = self._sky[0]
             if any(others != flags for _, _, others in self._sky):
-                self._problems.warn(first, "dome lights differ in which rays see them: all are seen by all")
+                self._problems.warn(first, "dome lights differ in which rays see them, or in what they are linked to: all light everything")
                 flags = {}
             sky = {"type": "constant", "radiance": colour(list(total)), **flags}
             self._document.define(str(first.GetPath()), sky)
@@ -100,19 +102,17 @@ class Lights:
         for name in ("diffuse", "specular"):
             if self.number(prim, name, 1.0) != 1:
                 self._problems.warn(prim, f"inputs:{name} has no effect: light is reflected as the surface's material says")
-        if self.value(prim, "shadow:enable", True) is False:
-            self._problems.warn(prim, "inputs:shadow:enable has no effect: all lights cast shadows")
         filters = prim.GetRelationship("light:filters")
         if filters and filters.GetTargets():
             self._problems.warn(prim, "light filters are left out")
-        for name in ("lightLink", "shadowLink"):
-            excludes = prim.GetRelationship(f"collection:{name}:excludes")
-            root = prim.GetAttribute(f"collection:{name}:includeRoot")
-            if (excludes and excludes.GetTargets()) or (root and root.Get() is False):
-                self._problems.warn(prim, "light linking has no effect: lights reach everything")
         ies = self.value(prim, "shaping:ies:file", None)
         if ies is not None and ies.path:
             self._problems.warn(prim, "an IES profile is left out")
+
+    def _linked(self, prim: Usd.Prim) -> Dict:
+        """Returns the parameters of what the light lights, and of what shades it."""
+        shades = self.value(prim, "shadow:enable", True) is not False
+        return {**self._links.of_light(prim), **({} if shades else {"blockers": NONE})}
 
     def distant(self, prim: Usd.Prim, matrix: Matrix) -> None:
         luminance = self.luminance(prim, 50000.0)
@@ -132,6 +132,7 @@ class Lights:
                 "irradiance": colour([x * (1 if whole else size) for x in luminance]),
                 "angular_radius": half,
                 **self._visible.of_sky(),
+                **self._linked(prim),
             },
         )
 
@@ -141,7 +142,8 @@ class Lights:
         if not any(luminance):
             return
         if file is None or not file.path:
-            self._sky.append((prim, luminance, self._visible.of_sky()))
+            flags = {**self._visible.of_sky(), **self._linked(prim)}
+            self._sky.append((prim, luminance, flags))
             return
         kind = str(self.value(prim, "texture:format", "automatic"))
         if kind not in ("automatic", "latlong"):
@@ -173,6 +175,7 @@ class Lights:
                 # USD's map lies as the scene format's: its middle is +z, a quarter from its left edge is +x.
                 "to_world": _turned(matrix) @ (turn if stands else np.eye(4)),
                 **self._visible.of_sky(),
+                **self._linked(prim),
             },
         )
 
@@ -243,7 +246,7 @@ class Lights:
             name = self._document.files.write(scaled(asset, luminance), ".exr")
             radiance = {"type": "bitmap", "filename": name, "raw": True, "to_uv": mirror}
             radiance["wrap_mode"] = "clamp"
-        emitter = {"type": "area", "radiance": radiance, **self._beam(prim, flat)}
+        emitter = {"type": "area", "radiance": radiance, **self._beam(prim, flat), **self._linked(prim)}
         placed = {**shape, "to_world": to_world, "bsdf": {"type": "null"}, "emitter": emitter}
         self._document.define(str(prim.GetPath()), {**placed, **self._visible.of_sky()})
 
@@ -277,6 +280,7 @@ class Lights:
     def _point(self, prim: Usd.Prim, matrix: Matrix, radius: float, cone: float) -> None:
         """Replaces a tiny sphere by a point that emits the light of its cross-section in each direction."""
         luminance = self.luminance(prim)
+        flags = {**self._visible.of_light(), **self._linked(prim)}
         if self.value(prim, "normalize", False):
             intensity = [x / 4 for x in luminance]  # pi r^2 of 4 pi r^2
         else:
@@ -286,7 +290,7 @@ class Lights:
             return
         if cone >= 180:
             place = {"type": "point", "position": matrix[:3, 3], "intensity": colour(intensity)}
-            self._document.define(str(prim.GetPath()), {**place, **self._visible.of_light()})
+            self._document.define(str(prim.GetPath()), {**place, **flags})
             return
         if radius > 0:
             self._problems.warn(prim, "a sphere light with a cone shines from its centre: shadows are hard")
@@ -307,7 +311,7 @@ class Lights:
             spot["beam_width"] = cone * (1 - soft)
         if self.number(prim, "shaping:focus", 0.0) > 0:
             self._problems.warn(prim, "inputs:shaping:focus beside a cone is left out")
-        self._document.define(str(prim.GetPath()), {**spot, **self._visible.of_light()})
+        self._document.define(str(prim.GetPath()), {**spot, **flags})
 
 
 def soft_profile(cone: float, soft: float) -> Any:

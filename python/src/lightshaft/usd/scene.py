@@ -19,6 +19,7 @@ from .files import Files
 from .geometry import Geometry
 from .images import Images
 from .lights import Lights
+from .links import Links
 from .materials import Materials
 from .problems import Problems
 from .volumes import Volumes
@@ -161,10 +162,12 @@ class _Reader:
         up_axis = str(UsdGeom.GetStageUpAxis(self._stage))
         materials = Materials(document, self._images, problems, time)
         geometry = Geometry(document, materials, problems, time)
-        lights = Lights(document, self._images, problems, time, up_axis)
-        volumes = Volumes(document, problems, time)
-        Walk(document, problems, time, geometry, lights, volumes).run(self._stage)
+        links = Links(self._stage, problems)
+        lights = Lights(document, self._images, problems, time, up_axis, links)
+        volumes = Volumes(document, problems, time, links)
+        Walk(document, problems, time, geometry, lights, volumes, links).run(self._stage)
         lights.finish()
+        links.finish(document.scene)
         shines = any("emitter" in value or "temperature" in value for value in document.scene.values())
         if not lights.count and not shines:
             problems.warn("the stage", "it has no light: a white sky is added")

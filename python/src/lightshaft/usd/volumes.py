@@ -8,6 +8,7 @@ import numpy as np
 from pxr import Usd, UsdGeom, UsdVol
 
 from .document import Document, colour, reference
+from .links import Links
 from .problems import Problems
 from .shading import plain
 from .transforms import Matrix, is_usable, scale, translation
@@ -25,8 +26,8 @@ SETTINGS = {
 
 
 class Volumes:
-    def __init__(self, document: Document, problems: Problems, time: Usd.TimeCode) -> None:
-        self._document, self._problems, self._time = document, problems, time
+    def __init__(self, document: Document, problems: Problems, time: Usd.TimeCode, links: Links) -> None:
+        self._document, self._problems, self._time, self._links = document, problems, time, links
         self._boxes: list[tuple[str, Matrix]] = []
         self._settings = {name: plain(value) for name, value in SETTINGS.items()}
 
@@ -60,6 +61,7 @@ class Volumes:
             "scale": max(values["densityScale"], 0.0),
             "albedo": colour(values["albedo"]),
             "phase": {"type": "isotropic"},
+            **self._links.of_object(prim),
         }
         if values["anisotropy"]:
             medium["phase"] = {"type": "hg", "g": values["anisotropy"]}

@@ -19,6 +19,7 @@ from .document import Document, reference
 from .geometry import Geometry, Leaf
 from .ignored import SILENT, tell_prim
 from .lights import Lights, is_light
+from .links import Links
 from .problems import Problems
 from .transforms import Matrix, column_matrix, is_usable
 from .visibility import Visibility
@@ -62,9 +63,10 @@ class Walk:
         geometry: Geometry,
         lights: Lights,
         volumes: Volumes,
+        links: Links,
     ) -> None:
         self._document, self._problems, self._time = document, problems, time
-        self._geometry, self._lights, self._volumes = geometry, lights, volumes
+        self._geometry, self._lights, self._volumes, self._links = geometry, lights, volumes, links
         self._prototypes: dict[Any, Content] = {}
         self._building: list[Any] = []
 
@@ -133,6 +135,8 @@ class Walk:
                 self._problems.warn(prim, "the light of a mesh is ignored: give it an emissiveColor")
             leaves = self._geometry.leaves(prim, matrix)
             flags = Visibility(prim, self._time, self._problems).of_shape() if leaves else {}
+            if leaves:
+                flags.update(self._links.of_object(prim))
             for leaf in leaves:
                 leaf.shape.update(flags)
             content.leaves += leaves
@@ -147,7 +151,7 @@ class Walk:
         inherited = tuple((str(p.GetPrimvarName()), str(p.Get(self._time))) for p in primvars)
         purpose = str(UsdGeom.Imageable(prim).ComputePurpose()) if prim.IsA(UsdGeom.Imageable) else ""
         path = material.GetPath() if material else ""
-        key = (str(prim.GetPrototype().GetPath()), str(path), purpose, inherited)
+        key = (str(prim.GetPrototype().GetPath()), str(path), purpose, inherited, self._links.key(prim))
 
         def fill(own: Content) -> None:
             self._add(prim, np.eye(4), own)

@@ -89,6 +89,28 @@ TEST(Meters, IrradianceOfAConstantEnvironmentIsPiTimesItsRadiance) {
   expect_value(values[2], 2);
 }
 
+// Meters are in no set of receivers.
+TEST(Meters, MeasureTheLightOfLightsThatAreLinkedToEverythingElse) {
+  SceneBuilder builder;
+  const MeterIndex floor = add(builder, MeterKind::irradiance, {});
+  Shape& s = builder.shape(RectangleShape{}, {}, builder.diffuse(0));
+  s.meter = floor;
+  s.link_sets = "floor";
+  for (const char* receivers : {"floor", "-floor"})
+    builder.scene.emitters.push_back(
+        DirectionalEmitter{{0, 0, -1}, {3, 3, 3}, 0, true, {}, true, true, {receivers, ""}});
+  builder.environment(2);
+  std::get<ConstantEmitter>(builder.scene.emitters.back()).links.receivers = "floor";
+  add(builder, MeterKind::irradiance, {{{{0, 0, 1}}, {{0, 0, 1}}}});
+  add(builder, MeterKind::radiance, {{{{1, 2, 3}}, {{0, -.6, .8}}}});
+
+  const auto values = measure(builder, 16);
+
+  expect_value(values[0], 3);
+  expect_value(values[1], 3);
+  EXPECT_EQ(values[2].value, 0);
+}
+
 TEST(Meters, IrradianceOfADistantLightFallsWithTheCosine) {
   SceneBuilder builder;
   const double c = std::cos(.6), s = std::sin(.6);
