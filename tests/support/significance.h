@@ -64,6 +64,7 @@ struct Share {
 };
 inline constexpr std::array kShares = {Share{Family::chi_square, "bsdf/sampling", 240},
                                        Share{Family::chi_square, "sampling/phases", 20},
+                                       Share{Family::chi_square, "sampling/other_phases", 36},
                                        Share{Family::chi_square, "sampling/lights", 18},
                                        Share{Family::chi_square, "sampling/choice", 13},
                                        Share{Family::chi_square, "sampling/distances", 58},
