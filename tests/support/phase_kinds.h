@@ -51,7 +51,8 @@ struct NamedPhase {
 inline std::vector<NamedPhase> phase_kinds() {
   using namespace render;
   std::vector<NamedPhase> kinds;
-  const auto add = [&](std::string name, PhaseFunctions::Kind kind, bool one_lobe = true, double steepness = 2) {
+  const auto add = [&](std::string name, PhaseFunctions::Kind kind, bool one_lobe = true,
+                       double steepness = 2) {
     NamedPhase& n = kinds.emplace_back();
     n.name = std::move(name);
     n.add(std::move(kind));
@@ -59,7 +60,7 @@ inline std::vector<NamedPhase> phase_kinds() {
     n.steepness = steepness;
   };
   add("rayleigh", RayleighLobe{});
-  add("draine .8 1", DraineLobe{.8, 1});
+  add("draine .6 1", DraineLobe{.6, 1});
   add("draine -.5 40", DraineLobe{-.5, 40});
   add("draine 0 1000", DraineLobe{0, 1000}, true, 1000);
   add("draine .999 1", DraineLobe{.999, 1});
@@ -86,8 +87,9 @@ inline std::vector<NamedPhase> phase_kinds() {
   return kinds;
 }
 
-// The error of integral() and integral_below(): their steps have a relative width of 6e-4, so the midpoint rule
-// is off by up to 3e-8 times the curvature of the function in ln x; at a kink or a jump by up to a step's share.
+// The error of integral() and integral_below(): their steps have a relative width of 6e-4, so the midpoint
+// rule is off by up to 3e-8 times the curvature of the function in ln x; at a kink or a jump by up to a
+// step's share.
 inline constexpr double kIntegralError = 2e-4;
 
 // The integral of f(angle) over all directions scattered by less than `end`.

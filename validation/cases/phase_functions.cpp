@@ -32,15 +32,15 @@ double draine(double g, double alpha, double c) {
 double droplets(double d, double c) {
   const double w = std::exp(-.599085 / (d - .641583) - .665888);
   return (1 - w) * hg(std::exp(-.0990567 / (d - 1.67154)), c) +
-         w * draine(std::exp(-2.20679 / (d + 3.91029) - .428934), std::exp(3.62489 - 8.29288 / (d + 5.52825)), c);
+         w * draine(std::exp(-2.20679 / (d + 3.91029) - .428934), std::exp(3.62489 - 8.29288 / (d + 5.52825)),
+                    c);
 }
 // Fournier and Jonasz 1999, with the slope nu that gives this backscatter
 double fournier_forand(double backscatter, double n, double c) {
   const double s2 = (1 - c) / 2, k = 4 / (3 * (n - 1) * (n - 1)), d = k * s2, d180 = k, d90 = k / 2;
   const double nu = -std::log(1 + 2 * backscatter * (d90 - 1)) / std::log(d90);
   const double dn = std::pow(d, nu), b = std::pow(d180, nu);
-  return (nu * (1 - d) - (1 - dn) + (d * (1 - dn) - nu * (1 - d)) / s2) /
-             (4 * kPi * (1 - d) * (1 - d) * dn) +
+  return (nu * (1 - d) - (1 - dn) + (d * (1 - dn) - nu * (1 - d)) / s2) / (4 * kPi * (1 - d) * (1 - d) * dn) +
          (1 - b) / (16 * kPi * (d180 - 1) * b) * (3 * c * c - 1);
 }
 // Values at cosines evenly from -1 to 1
@@ -48,13 +48,13 @@ double table(const std::vector<double>& v, double c) {
   const double h = 2. / static_cast<double>(v.size() - 1);
   double whole = 0;
   for (std::size_t i = 1; i < v.size(); ++i) whole += kPi * h * (v[i - 1] + v[i]);
-  const double at = std::min((c + 1) / h, static_cast<double>(v.size() - 1) - 1e-12), f = at - std::floor(at);
-  const auto i = static_cast<std::size_t>(at);
+  const auto i = std::min(static_cast<std::size_t>((c + 1) / h), v.size() - 2);
+  const double f = (c + 1) / h - static_cast<double>(i);
   return ((1 - f) * v[i] + f * v[i + 1]) / whole;
 }
 
 std::vector<Kind> kinds() {
-  const std::vector<double> grey_table{3, 1, 2, 0, 5}, red{1, 2, 3}, green{6, 2, 1}, blue{.5, 4, 0};
+  const std::vector<double> grey_table{3, 1, 2, 0, 5}, red{1, 2, 3}, green{6, 2, 1}, blue{.5, 4, .25};
   const auto blend = [](SceneBuilder& b, VolumeIndex weight) {
     const PhaseIndex first = put(b, RayleighPhase{}), second = put(b, HgPhase{.3});
     return put(b, BlendPhase{weight, first, second});
@@ -63,19 +63,34 @@ std::vector<Kind> kinds() {
   return {
       {"rayleigh", [](SceneBuilder& b) { return put(b, RayleighPhase{}); },
        [](double c) { return grey(3 / (16 * kPi) * (1 + c * c)); }},
-      {"draine", [](SceneBuilder& b) { return put(b, DrainePhase{.7, 2}); },
+      {"draine",
+       [](SceneBuilder& b) {
+         return put(b, DrainePhase{.7, 2});
+       },
        [](double c) { return grey(draine(.7, 2, c)); }},
       {"droplets", [](SceneBuilder& b) { return put(b, DropletsPhase{12}); },
        [](double c) { return grey(droplets(12, c)); }},
-      {"fournier-forand", [](SceneBuilder& b) { return put(b, FournierForandPhase{.1, 1.33}); },
+      {"fournier-forand",
+       [](SceneBuilder& b) {
+         return put(b, FournierForandPhase{.1, 1.33});
+       },
        [](double c) { return grey(fournier_forand(.1, 1.33, c)); }, true, false},
-      {"table", [=](SceneBuilder& b) { return put(b, TabulatedPhase{grey_table, {}, {}, {}, {}, {}}); },
+      {"table",
+       [=](SceneBuilder& b) {
+         return put(b, TabulatedPhase{grey_table, {}, {}, {}, {}, {}});
+       },
        [=](double c) { return grey(table(grey_table, c)); }},
-      {"table-of-colours", [=](SceneBuilder& b) { return put(b, TabulatedPhase{{}, red, green, blue, {}, {}}); },
-       [=](double c) { return Channels{table(red, c), table(green, c), table(blue, c)}; }, false},
+      {"table-of-colours",
+       [=](SceneBuilder& b) {
+         return put(b, TabulatedPhase{{}, red, green, blue, {}, {}});
+       },
+       [=](double c) {
+         return Channels{table(red, c), table(green, c), table(blue, c)};
+       },
+       false},
       {"blend", [=](SceneBuilder& b) { return blend(b, b.constant(rgb(.25))); }, quarter},
-      // The grid's weight is y / 2 + 1 / 4 between the middles of its two voxels, and 1/4 at y = 0, where rays
-      // are looked at.
+      // The grid's weight is y / 2 + 1 / 4 between the middles of its two voxels, and 1/4 at y = 0, where
+      // rays are looked at.
       {"blend-by-grid",
        [=](SceneBuilder& b) {
          return blend(b, b.grid({1, 2, 1}, {0, .5}, translate({-1, -1, -1}) * scale(2)));
@@ -101,15 +116,16 @@ void once(Table& t, const Kind& kind, const Configuration& configuration) {
            fmt::format("Light scattered once by {} degrees: the phase function there.", angle),
            with_phase(std::move(builder), kind), expected, {.slack = kFloats});
   };
-  add("90", lit_cube(configuration, rgb(1), rgb(1)),
-      times(kind.value(0), 4 * kPi * lit_cube_answer(1, 1)));
+  add("90", lit_cube(configuration, rgb(1), rgb(1)), times(kind.value(0), 4 * kPi * lit_cube_answer(1, 1)));
   // head_on() has its cube in [0, 1]^3, with rays at y = 1/2
   if (kind.name == "blend-by-grid") return;
   add("180", head_on(configuration, .5, .5, false), times(kind.value(-1), -std::expm1(-1) / 2));
-  if (kind.ends_forwards) add("0", head_on(configuration, .5, .5, true), times(kind.value(1), .5 * std::exp(-.5)));
+  if (kind.ends_forwards)
+    add("0", head_on(configuration, .5, .5, true), times(kind.value(1), .5 * std::exp(-.5)));
 }
 
-// A ray past a lamp, on which all scattering angles occur (passing()). Points are also sampled about the lamp.
+// A ray past a lamp, on which all scattering angles occur (passing()). Points are also sampled about the
+// lamp.
 void past_a_lamp(Table& t, const Kind& kind, const Configuration& configuration) {
   constexpr double kBeside = .5, kSigma = .2;
   Channels expected;

@@ -29,8 +29,8 @@ TableProblem problem_of_places(std::string_view name, const std::vector<double>&
     if (!(at[i] > at[i - 1]))
       return {name, fmt::format("must ascend: number {} is {} after {}", i + 1, at[i], at[i - 1])};
   if (at.front() != first || at.back() != last)
-    return {name, fmt::format("leaves a hole: it goes from {} to {}, not from {} to {}", at.front(), at.back(),
-                              first, last)};
+    return {name, fmt::format("leaves a hole: it goes from {} to {}, not from {} to {}", at.front(),
+                              at.back(), first, last)};
   return {};
 }
 

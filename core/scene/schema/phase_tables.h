@@ -10,8 +10,8 @@
 
 namespace ls::scene {
 
-// Returns what is wrong with the table, as a predicate ("has 3 values and 2 angles"), and the name of the list
-// that it is about. Both are empty if nothing is.
+// Returns what is wrong with the table, as a predicate ("has 3 values and 2 angles"), and the name of the
+// list that it is about. Both are empty if nothing is.
 struct TableProblem {
   std::string_view list;
   std::string what;

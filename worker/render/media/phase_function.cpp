@@ -59,8 +59,7 @@ double squared_cosines(double a, double s) {
     return c * c;
   };
   double sum = kWeight[0] * at(.5 * s);
-  for (int i = 1; i < 3; ++i)
-    sum += kWeight[i] * (at(.5 * s * (1 - kNode[i])) + at(.5 * s * (1 + kNode[i])));
+  for (int i = 1; i < 3; ++i) sum += kWeight[i] * (at(.5 * s * (1 - kNode[i])) + at(.5 * s * (1 + kNode[i])));
   return .5 * s * sum;
 }
 
@@ -94,8 +93,8 @@ double DraineLobe::density(const ScatteringAngle& angle) const {
 }
 
 // The paper of Jendersie and d'Eon inverts the distribution by the roots of a quartic, which divide by g and
-// by alpha. Here the unknown is the random number s with which Henyey-Greenstein's function has the angle: the
-// distribution is smooth and increasing in s for all parameters.
+// by alpha. Here the unknown is the random number s with which Henyey-Greenstein's function has the angle:
+// the distribution is smooth and increasing in s for all parameters.
 ScatteringAngle DraineLobe::sample(double u) const {
   const double a = std::abs(g), whole = 1 + alpha * (1 + 2 * g * g) / 3;
   const HenyeyGreensteinLobe hg{g};
@@ -142,11 +141,11 @@ double DropletLobe::density(const ScatteringAngle& angle) const {
 }
 
 ScatteringAngle DropletLobe::sample(double u) const {
-  return u < draine_share ? rest.sample(u / draine_share) : peak.sample((u - draine_share) / (1 - draine_share));
+  return u < draine_share ? rest.sample(u / draine_share)
+                          : peak.sample((u - draine_share) / (1 - draine_share));
 }
 
-FournierForandLobe::FournierForandLobe(double backscatter, double ior)
-    : delta_of_x_(2 / (3 * sqr(ior - 1))) {
+FournierForandLobe::FournierForandLobe(double backscatter, double ior) : delta_of_x_(2 / (3 * sqr(ior - 1))) {
   // backscatter = (delta^power - 1) / (delta - 1) / 2 at 90 degrees, where delta is delta_of_x_
   const double e = delta_of_x_ - 1;
   power_ = e == 0 ? 2 * backscatter : std::log1p(2 * backscatter * e) / std::log1p(e);
@@ -192,11 +191,10 @@ ScatteringAngle FournierForandLobe::sample(double u) const {
   return {std::min(x, 2.), std::max(0., 2 - x)};
 }
 
-TabulatedLobe::TabulatedLobe(std::span<const double> cosines,
-                                               std::span<const std::vector<double>> values) {
+TabulatedLobe::TabulatedLobe(std::span<const double> cosines, std::span<const std::vector<double>> values) {
   const std::size_t n = cosines.size();
-  CHECK(n >= 2 && (values.size() == 1 || values.size() == 3), "a phase function of {} values in {} colours", n,
-        values.size());
+  CHECK(n >= 2 && (values.size() == 1 || values.size() == 3), "a phase function of {} values in {} colours",
+        n, values.size());
   x_.resize(n);
   for (std::size_t i = 0; i < n; ++i) x_[i] = 1 - cosines[n - 1 - i];
   for (const std::vector<double>& given : values) {

@@ -91,9 +91,9 @@ class FournierForandLobe {
   };
   Share share(double x) const;
 
-  double delta_of_x_;          // delta in the papers is this times x
-  double power_;               // -nu in the papers, in (0, 1]
-  double at_back_ = 0;         // (delta^power - 1) / (delta - 1) straight back
+  double delta_of_x_;   // delta in the papers is this times x
+  double power_;        // -nu in the papers, in (0, 1]
+  double at_back_ = 0;  // (delta^power - 1) / (delta - 1) straight back
   double peak_ = 0;     // the share of light below kLeast
 };
 
@@ -130,9 +130,8 @@ struct BlendedLobes {
 // The phase functions of a scene; they refer to each other by their places in the list.
 class PhaseFunctions {
  public:
-  using Kind =
-      std::variant<HenyeyGreensteinLobe, RayleighLobe, DraineLobe, DropletLobe,
-                   FournierForandLobe, TabulatedLobe, BlendedLobes>;
+  using Kind = std::variant<HenyeyGreensteinLobe, RayleighLobe, DraineLobe, DropletLobe, FournierForandLobe,
+                            TabulatedLobe, BlendedLobes>;
   struct Value {
     C3 value{0, 0, 0};  // the phase function, by colour [1/sr]
     float pdf = 0;      // the density with which sample() finds the direction [1/sr]: the mean of the colours

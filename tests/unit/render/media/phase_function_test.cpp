@@ -1,5 +1,5 @@
-// Tests the phase functions other than Henyey-Greenstein's: their integrals, mean cosines and closed forms, and
-// extreme parameters.
+// Tests the phase functions other than Henyey-Greenstein's: their integrals, mean cosines and closed forms,
+// and extreme parameters.
 #include "worker/render/media/phase_function.h"
 
 #include <gtest/gtest.h>
@@ -73,14 +73,14 @@ TEST(FournierForand, MatchesThePublishedForm) {
   for (const double backscatter : {.001, .018, .1, .4})
     for (const double n : {1.05, 1.1, 1.33, 1.7}) {
       const FournierForandLobe lobe(backscatter, n);
-      const double k = 4 / (3 * (n - 1) * (n - 1)), nu =
-          -std::log(1 + 2 * backscatter * (k / 2 - 1)) / std::log(k / 2), b = std::pow(k, nu);
+      const double k = 4 / (3 * (n - 1) * (n - 1)),
+                   nu = -std::log(1 + 2 * backscatter * (k / 2 - 1)) / std::log(k / 2), b = std::pow(k, nu);
       for (const double degrees : {.1, 1., 10., 45., 90., 135., 170.}) {
         const double angle = degrees * kPiD / 180, s2 = sqr(std::sin(angle / 2)), d = k * s2,
                      dn = std::pow(d, nu), c = std::cos(angle);
-        const double published = (nu * (1 - d) - (1 - dn) + (d * (1 - dn) - nu * (1 - d)) / s2) /
-                                     (4 * kPiD * sqr(1 - d) * dn) +
-                                 (1 - b) / (16 * kPiD * (k - 1) * b) * (3 * c * c - 1);
+        const double published =
+            (nu * (1 - d) - (1 - dn) + (d * (1 - dn) - nu * (1 - d)) / s2) / (4 * kPiD * sqr(1 - d) * dn) +
+            (1 - b) / (16 * kPiD * (k - 1) * b) * (3 * c * c - 1);
         EXPECT_NEAR(lobe.density({2 * s2, 2 - 2 * s2}) / published, 1, 1e-8 + 1e-15 / sqr(1 - d))
             << backscatter << " " << n << " " << degrees;
       }
@@ -108,7 +108,8 @@ TEST(FournierForand, IsFiniteStraightOn) {
 // The share of light below the angle of a sample is the random number: an exact inversion.
 TEST(PhaseFunctions, InvertTheirDistributions) {
   const auto expect = [](const std::string& name, const auto& lobe) {
-    const bool backwards = lobe.sample(.25).x > lobe.sample(.75).x;  // g > 0: random numbers begin at the back
+    const bool backwards =
+        lobe.sample(.25).x > lobe.sample(.75).x;  // g > 0: random numbers begin at the back
     for (const double u : {1e-6, .01, .3, .5, .8, .99, 1 - 1e-6}) {
       const ScatteringAngle s = lobe.sample(u);
       const double below = test::integral_below(s, [&](const ScatteringAngle& a) { return lobe.density(a); });
@@ -117,8 +118,7 @@ TEST(PhaseFunctions, InvertTheirDistributions) {
   };
   expect("rayleigh", RayleighLobe{});
   for (const double g : {-.9, 0., 1e-7, .049, .051, .7, .999})
-    for (const double alpha : {0., 1e-9, 1., 40., 1000.})
-      expect("draine", DraineLobe{g, alpha});
+    for (const double alpha : {0., 1e-9, 1., 40., 1000.}) expect("draine", DraineLobe{g, alpha});
   for (const double b : {.001, .018, .1, .5})
     for (const double n : {1.02, 1.33, 2.}) expect("fournier_forand", FournierForandLobe(b, n));
 }
@@ -132,7 +132,8 @@ TEST(PhaseFunctions, AreTheSameForwardsAndBackwardsInTime) {
   for (const test::NamedPhase& kind : test::phase_kinds())
     for (int i = 0; i < 100; ++i) {
       const V3 w = direction(), w1 = direction();
-      const auto there = kind.all.value(kind.which, V3(0), w, w1), back = kind.all.value(kind.which, V3(0), w1, w),
+      const auto there = kind.all.value(kind.which, V3(0), w, w1),
+                 back = kind.all.value(kind.which, V3(0), w1, w),
                  turned = kind.all.value(kind.which, V3(0), -w1, -w);
       ASSERT_EQ(there.value, back.value) << kind.name;
       ASSERT_EQ(there.value, turned.value) << kind.name;

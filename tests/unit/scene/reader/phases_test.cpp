@@ -66,8 +66,8 @@ TEST(Phases, PutTablesByAngleIntoTheOrderOfCosines) {
 
 TEST(Phases, ReadBlendsInTheirOrderOrByTheirNames) {
   const auto parts = [](const std::string& inner) {
-    const Scene s = must_read(fog("<phase type=\"blendphase\"><float name=\"weight\" value=\".2\"/>" + inner +
-                                  "</phase>"));
+    const Scene s = must_read(
+        fog("<phase type=\"blendphase\"><float name=\"weight\" value=\".2\"/>" + inner + "</phase>"));
     EXPECT_EQ(must_read(write_xml(s)), s);
     const auto blend = std::get<BlendPhase>(phase_of(s));
     EXPECT_EQ(std::get<ConstVolume>(s.volumes.at(blend.weight.value)).value, (Rgb{.2, .2, .2}));
@@ -101,7 +101,8 @@ TEST(Phases, RefuseWrongTablesWithTheirPlace) {
   expect(list("red", "1 2") + list("green", "1 2 3") + list("blue", "1 2"), "1 2 3",
          "has 3 numbers, and 'red' 2");
   expect(list("values", "1 2 3") + list("angles", "0 180"), "1 2 3", "has 3 numbers, and 'angles' 2");
-  expect(list("values", "1 2 3") + list("angles", "0 60 60"), "0 60 60", "must ascend: number 3 is 60 after 60");
+  expect(list("values", "1 2 3") + list("angles", "0 60 60"), "0 60 60",
+         "must ascend: number 3 is 60 after 60");
   expect(list("values", "1 2 3") + list("angles", "0 60 170"), "0 60 170",
          "leaves a hole: it goes from 0 to 170, not from 0 to 180");
   expect(list("values", "1 2") + list("nodes", "-1 .5"), "-1 .5", "leaves a hole");
@@ -116,8 +117,10 @@ TEST(Phases, RefuseWrongNumbersAndBlends) {
   const std::string two = "<phase type=\"rayleigh\"/><phase type=\"hg\"/>";
   EXPECT_THAT(blend("<phase type=\"rayleigh\"/>"), HasSubstr("needs two nested phase functions, not 1"));
   EXPECT_THAT(blend(two + "<phase type=\"hg\"/>"), HasSubstr("needs two nested phase functions, not 3"));
-  EXPECT_THAT(blend("<float name=\"weight\" value=\"1.5\"/>" + two), HasSubstr("out of its range 0 <= weight"));
-  EXPECT_THAT(blend("<rgb name=\"weight\" value=\".1 .2 .3\"/>" + two), HasSubstr("is one number, not a colour"));
+  EXPECT_THAT(blend("<float name=\"weight\" value=\"1.5\"/>" + two),
+              HasSubstr("out of its range 0 <= weight"));
+  EXPECT_THAT(blend("<rgb name=\"weight\" value=\".1 .2 .3\"/>" + two),
+              HasSubstr("is one number, not a colour"));
   EXPECT_THAT(error(fog("<phase type=\"droplets\"><float name=\"diameter\" value=\"60\"/></phase>")),
               HasSubstr("'diameter' of phase \"droplets\" is 60, out of its range 0.001 <= diameter <= 50"));
   EXPECT_THAT(error(fog("<phase type=\"draine\"><float name=\"g\" value=\"1\"/></phase>")),
