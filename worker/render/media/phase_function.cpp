@@ -11,8 +11,6 @@
 namespace ls::render {
 namespace {
 
-constexpr double kOverTwoPi = 1 / (2 * kPiD), kOverFourPi = 1 / (4 * kPiD);
-
 // Returns the root of an increasing function in [low, high], from a first guess. f(t) returns the function
 // and its derivative. Newton's steps that leave the interval in which the root is known to lie are replaced
 // by bisection.
@@ -67,7 +65,7 @@ double squared_cosines(double a, double s) {
 
 double HenyeyGreensteinLobe::density(const ScatteringAngle& angle) const {
   const double a = std::abs(g), s = sqr(1 - a) + 2 * a * from_peak(g, angle).x;
-  return (1 - a) * (1 + a) * kOverFourPi / (s * std::sqrt(s));
+  return (1 - a) * (1 + a) / (4 * kPiD * s * std::sqrt(s));
 }
 
 ScatteringAngle HenyeyGreensteinLobe::sample(double u) const {
@@ -76,7 +74,7 @@ ScatteringAngle HenyeyGreensteinLobe::sample(double u) const {
 }
 
 double RayleighLobe::density(const ScatteringAngle& angle) const {
-  return .75 * kOverFourPi * (1 + sqr(angle.cosine()));
+  return 3 / (16 * kPiD) * (1 + sqr(angle.cosine()));
 }
 
 ScatteringAngle RayleighLobe::sample(double u) const {
@@ -173,7 +171,7 @@ FournierForandLobe::Share FournierForandLobe::share(double x) const {
 }
 
 double FournierForandLobe::density(const ScatteringAngle& angle) const {
-  return kOverTwoPi * (angle.x < kLeast ? peak_ / kLeast : share(angle.x).slope);
+  return (angle.x < kLeast ? peak_ / kLeast : share(angle.x).slope) / (2 * kPiD);
 }
 
 ScatteringAngle FournierForandLobe::sample(double u) const {
@@ -205,7 +203,7 @@ TabulatedLobe::TabulatedLobe(std::span<const double> cosines, std::span<const st
       c.below[i] = c.below[i - 1] + .5 * (x_[i] - x_[i - 1]) * (c.value[i - 1] + c.value[i]);
     const double whole = c.below[n - 1];
     for (double& b : c.below) b /= whole;
-    for (double& v : c.value) v *= kOverTwoPi / whole;
+    for (double& v : c.value) v /= 2 * kPiD * whole;
   }
 }
 
@@ -249,7 +247,7 @@ ScatteringAngle TabulatedLobe::sample(double u) const {
   --i;
   const double width = x_[i + 1] - x_[i], v0 = c.value[i], v1 = c.value[i + 1];
   // With t in [0, 1] across the cell, v0 t + (v1 - v0) t^2 / 2 = r; this form of the root has no cancellation
-  const double r = (wanted - c.below[i]) * kOverTwoPi / width;
+  const double r = (wanted - c.below[i]) / (2 * kPiD * width);
   const double t = r > 0 ? 2 * r / (v0 + safe_sqrt(v0 * v0 + 2 * (v1 - v0) * r)) : 0;
   const double x = std::clamp(x_[i] + std::min(t, 1.) * width, 0., 2.);
   return {x, 2 - x};
