@@ -312,7 +312,7 @@ SCATTERING = {
     "FOURNIER_FORAND": {"Backscatter": 0.1, "IOR": 1.33},
     "DRAINE": {"Anisotropy": 0.5, "Alpha": 1.0},
     "RAYLEIGH": {},
-    "MIE": {"Diameter": 8.0},
+    "MIE": {"Diameter": 2.5},
 }
 
 
