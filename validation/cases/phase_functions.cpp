@@ -18,7 +18,6 @@ struct Kind {
   std::string name;
   std::function<PhaseIndex(SceneBuilder&)> add;
   AtCosine value;
-  bool grey = true;
   bool ends_forwards = true;  // false: infinite straight on
 };
 
@@ -74,7 +73,7 @@ std::vector<Kind> kinds() {
        [](SceneBuilder& b) {
          return put(b, FournierForandPhase{.1, 1.33});
        },
-       [](double c) { return grey(fournier_forand(.1, 1.33, c)); }, true, false},
+       [](double c) { return grey(fournier_forand(.1, 1.33, c)); }, false},
       {"table",
        [=](SceneBuilder& b) {
          return put(b, TabulatedPhase{grey_table, {}, {}, {}, {}, {}});
@@ -86,8 +85,7 @@ std::vector<Kind> kinds() {
        },
        [=](double c) {
          return Channels{table(red, c), table(green, c), table(blue, c)};
-       },
-       false},
+       }},
       {"blend", [=](SceneBuilder& b) { return blend(b, b.constant(rgb(.25))); }, quarter},
       // The grid's weight is y / 2 + 1 / 4 between the middles of its two voxels, and 1/4 at y = 0, where
       // rays are looked at.
@@ -159,28 +157,6 @@ void shining_sphere(Table& t, const Kind& kind, bool distant) {
          with_phase(std::move(builder), kind), grey(1), {.channels = true});
 }
 
-// A cube of fog under a sun, whose light is also found by connections to light vertices or by shared tails.
-void other_means(Table& t, const Kind& kind) {
-  const auto lit = [&](bool connected, int shared) {
-    SceneBuilder builder = lit_cube({}, rgb(1), rgb(.9));
-    builder.scene.integrator.max_depth = 4;
-    builder.scene.integrator.light_vertices = connected ? 1 : -1;
-    builder.scene.integrator.path_reuse = shared;
-    builder.shape(RectangleShape{}, translate({0, -1.5, 0}) * rotate_x(-90) * scale(4), builder.diffuse(.7));
-    builder.look({0, 0, -4}, {0, -.2, 0}, 30, {0, 1, 0});
-    return with_phase(std::move(builder), kind);
-  };
-  // Light vertices and tails are common to many pixels, so whole frames tell the error
-  const MeanOptions wide{.band = .01,
-                         .why_band = "Both sides are noisy: light that is scattered three times counts.",
-                         .slow = true,
-                         .frames = 32};
-  t.same(fmt::format("phase-{}-light-vertices", kind.name), "N27",
-         "Connections to what the sun lights in fog: the same light.", lit(true, -1), lit(false, -1), wide);
-  t.same(fmt::format("phase-{}-shared-paths", kind.name), "N27",
-         "Paths that share what they find in fog: the same light.", lit(false, 16), lit(false, -1), wide);
-}
-
 }  // namespace
 
 void add_phase_functions(Table& t) {
@@ -190,7 +166,6 @@ void add_phase_functions(Table& t) {
       past_a_lamp(t, kind, configuration);
     }
     for (const bool distant : {false, true}) shining_sphere(t, kind, distant);
-    if (!kind.grey || kind.name == "fournier-forand") other_means(t, kind);
   }
 }
 
