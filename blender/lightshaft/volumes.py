@@ -7,16 +7,44 @@ from .document import element
 from .nodes import Place, constant, output_node
 
 
-class Coefficients:
-    """Scattering, absorption (1/m) and emission (radiance/m) in three channels, and the mean cosine of the phase
-    function. `grid`: the name of the grid that multiplies scattering and absorption, or None."""
+ISOTROPIC = ("isotropic", {})
 
-    def __init__(self, scattering=(0, 0, 0), absorption=(0, 0, 0), emission=(0, 0, 0), g=0.0, grid=None):
-        self.scattering, self.absorption, self.emission, self.g, self.grid = (
+
+def henyey_greenstein(g):
+    return ("hg", {"g": g}) if g else ISOTROPIC
+
+
+# By the name of Blender's phase function: the inputs that it has, and its plugin with the parameters. What is
+# outside the ranges of the plugins scatters as the nearest value within.
+PHASES = {
+    "HENYEY_GREENSTEIN": (("Anisotropy",), lambda v: henyey_greenstein(v["Anisotropy"])),
+    "FOURNIER_FORAND": (
+        ("Backscatter", "IOR"),
+        lambda v: (
+            "fournier_forand",
+            {"backscatter": min(max(v["Backscatter"], 1e-5), 0.5), "ior": max(v["IOR"], 1.0001)},
+        ),
+    ),
+    "DRAINE": (
+        ("Anisotropy", "Alpha"),
+        lambda v: ("draine", {"g": v["Anisotropy"], "alpha": max(v["Alpha"], 0.0)}),
+    ),
+    "RAYLEIGH": ((), lambda v: ("rayleigh", {})),
+    "MIE": (("Diameter",), lambda v: ("droplets", {"diameter": min(max(v["Diameter"], 1e-3), 50.0)})),
+}
+
+
+class Coefficients:
+    """Scattering, absorption (1/m) and emission (radiance/m) in three channels, and the phase function: the name
+    of its plugin and its parameters. `grid`: the name of the grid that multiplies scattering and absorption, or
+    None."""
+
+    def __init__(self, scattering=(0, 0, 0), absorption=(0, 0, 0), emission=(0, 0, 0), phase=ISOTROPIC, grid=None):
+        self.scattering, self.absorption, self.emission, self.phase, self.grid = (
             scattering,
             absorption,
             emission,
-            g,
+            phase,
             grid,
         )
 
@@ -51,6 +79,15 @@ class Volumes:
                 f"{where}: Lightshaft has no {place.node.bl_label} shader for volumes. Use a Principled Volume"
             )
             return None
+        phase_of = None
+        if kind in ("VOLUME_SCATTER", "VOLUME_COEFFICIENTS"):
+            if place.node.phase not in PHASES:
+                self.problems.error(
+                    f"{where}: phase function {place.node.phase.replace('_', ' ').title()}. Choose Henyey-Greenstein"
+                )
+                return None
+            more, phase_of = PHASES[place.node.phase]
+            names = (*names, *more)
         values = {}
         for name in names:
             values[name] = constant(place, place.input(name))
@@ -66,12 +103,9 @@ class Volumes:
                     "unlink it, or bake the volume to an OpenVDB file (Geometry Nodes: Mesh to Volume; Physics: Fluid)"
                 )
                 return None
-        if kind in ("VOLUME_SCATTER", "VOLUME_COEFFICIENTS") and place.node.phase != "HENYEY_GREENSTEIN":
-            self.problems.error(
-                f"{where}: phase function {place.node.phase.replace('_', ' ').title()}. Choose Henyey-Greenstein"
-            )
-            return None
         found = BUILD[kind](values)
+        if phase_of:
+            found.phase = phase_of(values)
         if kind == "PRINCIPLED_VOLUME":
             if values["Blackbody Intensity"] != 0.0:
                 self.problems.unsupported(
@@ -116,19 +150,19 @@ class Volumes:
         if len(parts) < 2:
             return parts[0] if parts else None
         one, two = parts
-        scattering = [part for part in parts if any(part.scattering)]
-        if len(scattering) == 2 and one.g != two.g or one.grid != two.grid:
+        add = lambda a, b: tuple(x + y for x, y in zip(a, b))  # noqa: E731
+        scattering = add(one.scattering, two.scattering)
+        phase = blended(one, two, scattering)
+        if phase is None or one.grid != two.grid:
             self.problems.error(
-                f"{owner}, node '{place.title}': the sum of two volumes of different Anisotropy or grid. Give both the same, or put them into two objects"
+                f"{owner}, node '{place.title}': the sum of two volumes of different grids, or of different phase functions and colours. Give both the same, or put them into two objects"
             )
             return None
-        add = lambda a, b: tuple(x + y for x, y in zip(a, b))  # noqa: E731
-        g = scattering[0].g if scattering else 0.0
         return Coefficients(
-            add(one.scattering, two.scattering),
+            scattering,
             add(one.absorption, two.absorption),
             add(one.emission, two.emission),
-            g,
+            phase,
             one.grid,
         )
 
@@ -182,14 +216,33 @@ def total(found):
     return [s + a for s, a in zip(found.scattering, found.absorption)]
 
 
+def blended(one, two, scattering):
+    """Returns the phase function of the sum of two volumes: a blend by the share of each of the scattering. Returns
+    None if that share differs between the channels."""
+    if one.phase == two.phase or not any(two.scattering):
+        return one.phase
+    if not any(one.scattering):
+        return two.phase
+    weight = sum(two.scattering) / sum(scattering)
+    if any(abs(s - weight * both) > 1e-6 * both for s, both in zip(two.scattering, scattering)):
+        return None
+    return ("blendphase", {"weight": weight, "parts": (one.phase, two.phase)})
+
+
+def phase_element(phase):
+    plugin, parameters = phase
+    inner = [phase_element(part) for part in parameters.get("parts", ())]
+    numbers = {name: value for name, value in parameters.items() if name != "parts"}
+    return element("phase", plugin, None, *inner, **numbers)
+
+
 def medium(plugin, found, sigma_t, glows, group, link_sets):
     albedo = [s / (s + a) if s + a > 0 else 0.0 for s, a in zip(found.scattering, found.absorption)]
-    phase = element("phase", "hg", None, g=found.g) if found.g else element("phase", "isotropic")
     return element(
         "medium",
         plugin,
         None,
-        phase,
+        phase_element(found.phase),
         sigma_t=sigma_t,
         albedo=albedo,
         emission=list(found.emission) if glows else None,
@@ -202,9 +255,9 @@ INPUTS = {
     "PRINCIPLED_VOLUME": (
         "Color", "Density", "Anisotropy", "Absorption Color", "Emission Strength", "Emission Color", "Blackbody Intensity",
     ),
-    "VOLUME_SCATTER": ("Color", "Density", "Anisotropy"),
+    "VOLUME_SCATTER": ("Color", "Density"),
     "VOLUME_ABSORPTION": ("Color", "Density"),
-    "VOLUME_COEFFICIENTS": ("Absorption Coefficients", "Scatter Coefficients", "Anisotropy", "Emission Coefficients"),
+    "VOLUME_COEFFICIENTS": ("Absorption Coefficients", "Scatter Coefficients", "Emission Coefficients"),
     "EMISSION": ("Color", "Strength"),
 }  # fmt: skip
 
@@ -218,7 +271,7 @@ def principled(v):
         for c, a in zip(v["Color"], v["Absorption Color"])
     ]
     emission = [v["Emission Strength"] * c for c in v["Emission Color"]]
-    return Coefficients(scattering, absorption, emission, v["Anisotropy"])
+    return Coefficients(scattering, absorption, emission, henyey_greenstein(v["Anisotropy"]))
 
 
 def density_of(v):
@@ -227,12 +280,12 @@ def density_of(v):
 
 BUILD = {
     "PRINCIPLED_VOLUME": principled,
-    "VOLUME_SCATTER": lambda v: Coefficients([density_of(v) * c for c in v["Color"]], g=v["Anisotropy"]),
+    "VOLUME_SCATTER": lambda v: Coefficients([density_of(v) * c for c in v["Color"]]),
     "VOLUME_ABSORPTION": lambda v: Coefficients(
         absorption=[density_of(v) * max(1 - c, 0) for c in v["Color"]]
     ),
     "VOLUME_COEFFICIENTS": lambda v: Coefficients(
-        v["Scatter Coefficients"], v["Absorption Coefficients"], v["Emission Coefficients"], v["Anisotropy"]
+        v["Scatter Coefficients"], v["Absorption Coefficients"], v["Emission Coefficients"]
     ),
     "EMISSION": lambda v: Coefficients(emission=[v["Strength"] * c for c in v["Color"]]),
 }

@@ -57,6 +57,11 @@ inline constexpr std::size_t kMaxGltfMeshBytes = std::size_t{1} << 30;
 inline constexpr int kMaxReferenceDepth = 64;
 // Nesting depth of bsdfs. A blend has two inner bsdfs, so 8 levels allow up to 2^7 innermost bsdfs.
 inline constexpr int kMaxBsdfNesting = 8;
+// Nesting depth of phase functions; a blend has two
+inline constexpr int kMaxPhaseNesting = 8;
+// Angles of a tabulated phase function. So many numbers fit into one attribute, however many digits they
+// have.
+inline constexpr std::size_t kMaxPhaseAngles = 2520;
 inline constexpr double kMaxTemperature = 1e6;  // temperature of a black body, in kelvin
 inline constexpr std::size_t kMaxDiagnostics = 20;
 inline constexpr std::size_t kMaxExcerptBytes = 160;  // bytes of a source line that a message shows

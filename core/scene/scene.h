@@ -285,7 +285,40 @@ struct HgPhase {
   double g = .8;  // mean cosine, in (-1, 1)
   bool operator==(const HgPhase&) const = default;
 };
-using Phase = std::variant<IsotropicPhase, HgPhase>;
+struct RayleighPhase {
+  bool operator==(const RayleighPhase&) const = default;
+};
+struct DrainePhase {
+  double g = .8, alpha = 1;
+  bool operator==(const DrainePhase&) const = default;
+};
+struct DropletsPhase {   // water droplets
+  double diameter = 20;  // micrometres
+  bool operator==(const DropletsPhase&) const = default;
+};
+struct FournierForandPhase {  // particles in water
+  double backscatter = .1;    // share of the light scattered by more than 90 degrees
+  double ior = 1.33;          // index of refraction of the particles relative to what is around them
+  bool operator==(const FournierForandPhase&) const = default;
+};
+// Values at scattering angles (schema/phase_tables.h says which lists go together). Each colour is scaled to
+// an integral of 1. The scattering angle is 0 where light goes straight on.
+struct TabulatedPhase {
+  std::vector<double> values;            // of all colours; or
+  std::vector<double> red, green, blue;  // of each
+  // At which the values are: cosines from -1 to 1, or angles in degrees from 0 to 180. Both empty: at cosines
+  // evenly from -1 to 1.
+  std::vector<double> nodes, angles;
+  bool operator==(const TabulatedPhase&) const = default;
+};
+// Phase functions that contain others may be nested at most scene::kMaxPhaseNesting deep.
+struct BlendPhase {  // the mixture (1 - weight) first + weight second
+  VolumeIndex weight;
+  PhaseIndex first, second;
+  bool operator==(const BlendPhase&) const = default;
+};
+using Phase = std::variant<IsotropicPhase, HgPhase, RayleighPhase, DrainePhase, DropletsPhase,
+                           FournierForandPhase, TabulatedPhase, BlendPhase>;
 
 // A medium with a constant extinction sigma_t (per scene unit) and albedo. When the medium is loaded, sigma_s
 // = albedo * sigma_t * scale. Emission per length is emission + sigma_a * source_radiance.

@@ -1,7 +1,11 @@
 // Reads volumes, phase functions and media.
 #include <fmt/format.h>
 
+#include <map>
+#include <utility>
+
 #include "core/base/file_form.h"
+#include "core/scene/schema/phase_tables.h"
 #include "formats/reader/reader.h"
 #include "formats/xml/transform_element.h"
 
@@ -79,6 +83,24 @@ void check_medium(const Params& p, const Factors& given, const HeterogeneousMedi
 }
 void check_medium(const Params&, const Factors&, const HomogeneousMedium&, Report&) {}
 
+// The places of the lists of a table, for messages. Must be constructed before parameters are taken.
+class TablePlaces {
+ public:
+  explicit TablePlaces(const Params& p) {
+    for (const Element& e : p.object().children) at_.emplace(e.get("name"), &e);
+  }
+  void check(const Params& p, const TabulatedPhase& table, Report& report) const {
+    const auto [list, what] = table_problem(table);
+    if (what.empty()) return;
+    const auto e = at_.find(list);
+    report.error(e == at_.end() ? p.object().at : value_place(*e->second, "value"),
+                 fmt::format("'{}' of {} {}", list, p.title(), what));
+  }
+
+ private:
+  std::map<std::string_view, const Element*> at_;
+};
+
 // True if the object has a parameter of this name that is a volume "gridvolume".
 bool has_grid(Reader& reader, const Element& e, std::string_view name) {
   return std::ranges::any_of(e.children, [&](const Element& c) {
@@ -130,12 +152,42 @@ std::optional<PhaseIndex> Reader::read_phase(const Element& e) {
   std::optional<PhaseIndex> read;
   const auto read_as = [&]<class Kind>() {
     Kind phase;
+    const TablePlaces places(p);
     bind(p, phase);
+    if constexpr (std::is_same_v<Kind, BlendPhase>)
+      if (!read_parts(p, phase)) return;
     p.finish();
-    read = added<PhaseIndex>(phase);
+    if constexpr (std::is_same_v<Kind, TabulatedPhase>)
+      if (!report_.has_errors()) places.check(p, phase, report_);
+    read = added<PhaseIndex>(std::move(phase));
+    if (!report_.has_errors() && nested_too_deep(scene_.phases))
+      read =
+          report_.refuse(e.at, fmt::format("phase functions are nested more than {} deep", kMaxPhaseNesting));
   };
   if (!with_kind_named<Phase>(e.get("type"), read_as)) unknown_plugin(e, report_);
   return read;
+}
+
+// Reads the two phase functions of a blend, in their order in the file or, if both have names, by these.
+bool Reader::read_parts(Params& p, BlendPhase& blend) {
+  auto parts = p.take_nested("phase");
+  if (parts.size() != 2) {
+    report_.error(p.object().at,
+                  fmt::format("{} needs two nested phase functions, not {}", p.title(), parts.size()));
+    return false;
+  }
+  const auto name = [](const Params::Nested& n) { return n.use->get("name"); };
+  if (!name(parts[0]).empty() && name(parts[1]) < name(parts[0])) std::swap(parts[0], parts[1]);
+  const auto first = phase(*parts[0].object, *parts[0].use), second = phase(*parts[1].object, *parts[1].use);
+  if (!first || !second) return false;
+  blend.first = *first;
+  blend.second = *second;
+  if (const Rgb* weight = report_.has_errors() ? nullptr : constant(blend.weight);
+      weight && !is_grey(*weight)) {
+    report_.error(p.object().at, fmt::format("'weight' of {} is one number, not a colour", p.title()));
+    return false;
+  }
+  return true;
 }
 
 std::optional<MediumIndex> Reader::read_medium(const Element& e) {

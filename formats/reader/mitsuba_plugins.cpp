@@ -24,7 +24,8 @@ constexpr std::string_view kSky =
     "sky models are not supported; save the sky's image in Mitsuba and use it as an \"envmap\", with a "
     "\"directional\" of an `angular_radius` for the sun";
 constexpr std::string_view kPhase =
-    "only \"isotropic\" and \"hg\" are supported; use an \"hg\" of the same mean cosine";
+    "phase functions that depend on a direction of the medium are not supported; use an \"hg\" or a "
+    "\"tabphase\" of the same mean cosine";
 constexpr std::string_view kMeasured =
     "measured materials are not supported; fit a \"roughconductor\" or a \"principled\" to it";
 constexpr std::string_view kBakeTexture = "bake it into a \"bitmap\"";
@@ -143,15 +144,15 @@ constexpr PluginRow kPlugins[] = {
     {"medium", "heterogeneous", kRead, ""},
     {"medium", "homogeneous", kRead, ""},
 
-    {"phase", "blendphase", kRefused, kPhase},
+    {"phase", "blendphase", kRead, ""},
     {"phase", "hg", kRead, ""},
     {"phase", "isotropic", kRead, ""},
-    {"phase", "rayleigh", kRefused, "use \"isotropic\", which has the same mean cosine, 0"},
+    {"phase", "rayleigh", kRead, ""},
     {"phase", "sggx", kRefused, kPhase},
-    {"phase", "tabphase", kRefused, kPhase},
+    {"phase", "tabphase", kRead, ""},
     {"phase", "kkay", kRefused, kPhase, kOlder},
     {"phase", "microflake", kRefused, kPhase, kOlder},
-    {"phase", "mixturephase", kRefused, kPhase, kOlder},
+    {"phase", "mixturephase", kRefused, "write it as a \"blendphase\", nested for more than two", kOlder},
 
     {"volume", "constvolume", kRead, ""},
     {"volume", "gridvolume", kInPart, "from files; for arrays in Python use the package `lightshaft`"},
@@ -309,6 +310,7 @@ bool is_our_parameter(std::string_view tag, std::string_view plugin, std::string
        "",
        {"tint", "emission", "source_radiance", "temperature", "emission_scale", "temperature_scale",
         "temperature_offset", "peak_one", "emission_weight", "priority", "light_group", "link_sets"}},
+      {"phase", "tabphase", {"red", "green", "blue", "nodes", "angles"}},
       {"volume", "gridvolume", {"grid_name", "node_centred", "border", "order"}},
       {"sensor", "", {"aperture_scale", "points", "filename"}},
       {"sensor", "perspective", {"aperture_radius", "focus_distance"}},

@@ -227,6 +227,41 @@ void Params::convert(const Field& f, const Element& e, Rgb& value) {
   if (in_range(f, e, *constant)) value = *constant;
 }
 
+void Params::convert(const Field& f, const Element& e, std::vector<double>& value) {
+  const auto text = string_value(f.name, e);
+  if (!text) return;
+  const auto wrong = [&](std::string what) {
+    reader_.report().error(value_place(e, "value"), fmt::format("'{}' of {} {}", f.name, title(), what));
+  };
+  constexpr std::string_view kBlank = " \t\r\n";
+  std::vector<double> numbers;
+  bool after_comma = true;  // a number has to follow
+  for (std::size_t i = text->find_first_not_of(kBlank); i < text->size();
+       i = text->find_first_not_of(kBlank, i)) {
+    if ((*text)[i] == ',') {
+      if (std::exchange(after_comma, true))
+        return wrong(fmt::format("has a hole: number {} is missing", numbers.size() + 1));
+      ++i;
+      continue;
+    }
+    const std::size_t end = std::min(text->find_first_of(", \t\r\n", i), text->size());
+    const std::string_view word = std::string_view(*text).substr(i, end - i);
+    const auto number = parse_number(word);
+    if (!number)
+      return wrong(fmt::format("wants finite numbers, but number {} is \"{}\"", numbers.size() + 1,
+                               word.substr(0, kMaxExcerptBytes)));
+    if (!f.range.contains(*number))
+      return wrong(fmt::format("has {} as number {}, out of its range {}", *number, numbers.size() + 1,
+                               range_text(f.name, f.range)));
+    numbers.push_back(*number);
+    after_comma = false;
+    i = end;
+  }
+  if (numbers.empty()) return wrong("has no numbers");
+  if (after_comma) return wrong(fmt::format("has a hole: number {} is missing", numbers.size() + 1));
+  value = std::move(numbers);
+}
+
 const Element* Params::object_at(const Element& e) {
   const TagKind kind = kind_of(e);
   return kind == TagKind::reference ? reader_.resolve(e) : kind == TagKind::object ? &e : nullptr;

@@ -62,6 +62,7 @@ class Params {
   void convert(const Field& f, const Element& e, std::string& value);
   void convert(const Field& f, const Element& e, Vec3& value);
   void convert(const Field& f, const Element& e, Rgb& value);
+  void convert(const Field& f, const Element& e, std::vector<double>& value);
   void convert(const Field& f, const Element& e, Transform& value);
   void convert(const Field& f, const Element& e, UvTransform& value);
   void convert(const Field& f, const Element& e, AssetIndex& value);

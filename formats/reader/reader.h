@@ -115,6 +115,7 @@ class Reader {
   void read_metal_preset(Params& p, Rgb& eta, Rgb& k);
   std::optional<VolumeIndex> read_volume(const Element& e);
   std::optional<PhaseIndex> read_phase(const Element& e);
+  bool read_parts(Params& p, BlendPhase& blend);
   std::optional<MediumIndex> read_medium(const Element& e);
   template <class Kind>
   std::optional<MediumIndex> read_medium_as(const Element& e);

@@ -357,6 +357,7 @@ class Writer {
     }
     if (!rows.empty()) value("string", f.name, rows);
   }
+  void property(const Field& f, const std::vector<double>& x) { value("string", f.name, numbers(x)); }
   void property(const Field& f, const Rgb& x) { colour(f, x, f.constvolume); }
   void colour(const Field& f, const Rgb& x, bool stands_for_volume) {
     const bool grey = is_grey(x);

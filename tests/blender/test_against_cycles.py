@@ -340,6 +340,55 @@ def test_a_cloud_of_an_openvdb_file(stage):
     differ(stage, EXACT, 16)
 
 
+SCATTERING = {
+    "HENYEY_GREENSTEIN": {"Anisotropy": 0.6},
+    "FOURNIER_FORAND": {"Backscatter": 0.1, "IOR": 1.33},
+    "DRAINE": {"Anisotropy": 0.5, "Alpha": 1.0},
+    "RAYLEIGH": {},
+    "MIE": {"Diameter": 2.5},
+}
+
+
+def scattering(phase, density=0.8, colour=(0.9, 0.8, 0.7)):
+    from stage import material
+
+    # Each phase function has inputs of its own, and which there are is known only once it is chosen
+    made = material("Scatter", "ShaderNodeVolumeScatter", "Volume", Density=density, Color=colour)
+    node = next(n for n in made.node_tree.nodes if n.type == "VOLUME_SCATTER")
+    node.phase = phase
+    for name, value in SCATTERING[phase].items():
+        node.inputs[name].default_value = value
+    return made
+
+
+@pytest.mark.parametrize("phase", SCATTERING)
+def test_phase_functions(stage, phase):
+    stage.sky(0.05)
+    # From the left and behind: the camera sees light scattered by many angles, and no peak
+    stage.light("SUN", 3, rotation=(1.2, 0.3, 0))
+    stage.ball(scattering(phase), (0, 0, 1))
+    # Fog; the forward peak of droplets makes rare bright paths
+    differ(stage, 2 * EXACT, 256 if phase == "MIE" else 64)
+
+
+def test_a_sum_of_phase_functions(stage):
+    made = scattering("RAYLEIGH", 0.3)
+    tree = made.node_tree
+    first = next(n for n in tree.nodes if n.type == "VOLUME_SCATTER")
+    second, both = tree.nodes.new("ShaderNodeVolumeScatter"), tree.nodes.new("ShaderNodeAddShader")
+    second.phase = "HENYEY_GREENSTEIN"
+    for name, value in {"Anisotropy": 0.6, "Density": 0.5, "Color": (0.9, 0.8, 0.7, 1)}.items():
+        second.inputs[name].default_value = value
+    output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
+    for slot, node in enumerate((first, second)):
+        tree.links.new(node.outputs[0], both.inputs[slot])
+    tree.links.new(both.outputs[0], output.inputs["Volume"])
+    stage.sky(0.05)
+    stage.light("SUN", 3, rotation=(1.2, 0.3, 0))
+    stage.ball(made, (0, 0, 1))
+    differ(stage, 2 * EXACT, 64)
+
+
 def test_baked_procedural_textures(stage):
     from stage import bpy, feed, material
 

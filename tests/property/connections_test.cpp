@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/coloured_phase.h"
 #include "tests/support/render_check.h"
 #include "tests/support/significance.h"
 #include "tests/support/sunny_room.h"
@@ -95,7 +96,7 @@ SceneBuilder by_path(bool sheet, int light_vertices) {
 TEST(Connections, GiveTheSameImageAsPathsAlone) {
   constexpr int kSeeds = 64;
   Tests tests("property/connections");
-  const double level = tests.level(8 * 3);
+  const double level = tests.level(9 * 3);
   const auto room = [](SunnyRoom r) {
     return [r](int light_vertices) mutable {
       r.light_vertices = light_vertices;
@@ -109,8 +110,12 @@ TEST(Connections, GiveTheSameImageAsPathsAlone) {
   };
   for (const Rival& rival :
        {Rival{"diffuse", room({})}, Rival{"glossy", room({.glossy = true})},
-        Rival{"fog", room({.fog = .6}), 16}, Rival{"fog and a lamp", with_lamp, 16},
-        Rival{"tilted normals", tilted, 64}, Rival{"grid", room({.glossy = true, .fog = .4, .grid = true})},
+        Rival{"fog", room({.fog = .6}), 16},
+        Rival{"fog that scatters colours apart",
+              [](int n) { return with_coloured_phase(SunnyRoom{.fog = .6, .light_vertices = n}.builder()); },
+              16},
+        Rival{"fog and a lamp", with_lamp, 16}, Rival{"tilted normals", tilted, 64},
+        Rival{"grid", room({.glossy = true, .fog = .4, .grid = true})},
         Rival{"path", [](int n) { return by_path(false, n); }},
         Rival{"path and a sheet", [](int n) { return by_path(true, n); }}}) {
     const SceneBuilder on = rival.scene(1), off = rival.scene(-1);

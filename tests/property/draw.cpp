@@ -139,6 +139,38 @@ VolumeIndex Draw::volume(GridKind kind) {
   return SceneBuilder::push<VolumeTag>(scene_.volumes, g);
 }
 
+PhaseIndex Draw::phase(int depth) {
+  const int outer = std::exchange(phase_depth_, depth);
+  Phase p;
+  do {
+    any(p);
+  } while (depth > 2 && std::holds_alternative<BlendPhase>(p));
+  if (auto* table = std::get_if<TabulatedPhase>(&p)) {
+    const std::size_t n = 2 + dice_.below(5);
+    const auto values = [&] {
+      std::vector<double> list(n, 0);
+      for (double& v : list)
+        if (dice_.chance(.7)) v = number(scene::kUnit);
+      list[dice_.below(n)] = 1;
+      return list;
+    };
+    *table = {};
+    if (dice_.chance(.5))
+      table->values = values();
+    else
+      table->red = values(), table->green = values(), table->blue = values();
+    if (dice_.chance(.5))
+      for (std::size_t i = 0; i < n; ++i)
+        table->angles.push_back(180 * static_cast<double>(i * i) / static_cast<double>((n - 1) * (n - 1)));
+  }
+  if (auto* blend = std::get_if<BlendPhase>(&p)) {
+    const double share = number(scene::kUnit);
+    blend->weight = SceneBuilder::push<VolumeTag>(scene_.volumes, ConstVolume{{share, share, share}, {}});
+  }
+  phase_depth_ = outer;
+  return SceneBuilder::push<PhaseTag>(scene_.phases, p);
+}
+
 MediumIndex Draw::medium() {
   Medium m;
   any(m);

@@ -32,6 +32,7 @@ class Draw {
   TextureIndex texture(const scene::Range& range, int depth = 0);
   BsdfIndex bsdf(int depth = 0);
   VolumeIndex volume(GridKind kind);
+  PhaseIndex phase(int depth = 0);
   MediumIndex medium();
   double number(const scene::Range& range) {
     return dice_.chance(choice_.wild) ? dice_.extreme(range) : dice_.tame(range);
@@ -83,11 +84,8 @@ class Draw {
   void draw(const scene::Field& f, TextureIndex& x) { x = texture(f.range); }
   void draw(const scene::Field&, BsdfIndex& x) { x = bsdf(depth_ + 1); }
   void draw(const scene::Field& f, VolumeIndex& x) { x = volume(kind_of(f)); }
-  void draw(const scene::Field&, PhaseIndex& x) {
-    Phase p;
-    any(p);
-    x = SceneBuilder::push<PhaseTag>(scene_.phases, p);
-  }
+  void draw(const scene::Field&, PhaseIndex& x) { x = phase(phase_depth_ + 1); }
+  void draw(const scene::Field&, std::vector<double>&) {}  // lists that must fit each other: phase()
   void draw(const scene::Field&, MediumIndex& x) { x = medium(); }
   void draw(const scene::Field&, AssetIndex&) {}  // by whoever knows what the file is for
   void draw(const scene::Field&, GroupIndex&) {}
@@ -111,6 +109,7 @@ class Draw {
   RandomAssets& assets_;
   SceneChoice choice_;
   int depth_ = 0;  // of the bsdf being filled
+  int phase_depth_ = 0;
 };
 
 }  // namespace ls::test

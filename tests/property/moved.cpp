@@ -134,7 +134,12 @@ bool can_be_permuted(const Scene& s) {
     const auto* h = std::get_if<HeterogeneousMedium>(&m);
     return h && h->temperature;
   };
-  return s.assets.empty() && std::none_of(s.bsdfs.begin(), s.bsdfs.end(), weighs) &&
+  const auto chooses_colours = [](const Phase& p) {
+    const auto* table = std::get_if<TabulatedPhase>(&p);
+    return table && table->values.empty();
+  };
+  return s.assets.empty() && std::none_of(s.phases.begin(), s.phases.end(), chooses_colours) &&
+         std::none_of(s.bsdfs.begin(), s.bsdfs.end(), weighs) &&
          std::none_of(s.media.begin(), s.media.end(), glows);
 }
 

@@ -9,6 +9,7 @@
 #include <functional>
 
 #include "tests/property/quarters.h"
+#include "tests/support/coloured_phase.h"
 #include "tests/support/lamp_room.h"
 #include "tests/support/significance.h"
 #include "tests/support/sky_yard.h"
@@ -133,6 +134,8 @@ TEST(PathReuse, GivesTheSameImageAsPathsAlone) {
       {"diffuse", room({})},
       {"glossy", room({.glossy = true})},
       {"fog", room({.fog = .8})},
+      {"fog that scatters colours apart",
+       [](int n) { return with_coloured_phase(LampRoom{.fog = .8, .path_reuse = n}.builder()); }},
       {"black squares", [](int n) { return black_squares(0, n); }},
       {"black squares in fog", [](int n) { return black_squares(.5, n); }},
       {"glossy in fog", room({.glossy = true, .fog = .4})},

@@ -86,7 +86,10 @@ void Analyst::add(const Medium& medium) {
   n_.density_files = n_.density_files || m.density_file;
   n_.emission = n_.emission || m.emits;
   const PhaseIndex phase = std::visit([](const auto& kind) { return kind.phase; }, medium);
-  n_.anisotropic = n_.anisotropic || !std::holds_alternative<IsotropicPhase>(s_.phases[phase.value]);
+  const Phase& kind = s_.phases[phase.value];
+  const bool isotropic = std::holds_alternative<IsotropicPhase>(kind);
+  n_.anisotropic = n_.anisotropic || !isotropic;
+  n_.phases = n_.phases || !(isotropic || std::holds_alternative<HgPhase>(kind));
 }
 
 void Analyst::media() {
@@ -245,6 +248,8 @@ class Words {
     say("light given off by media", n_.emission, "some medium glows", n_.media ? "no medium glows" : none);
     say("anisotropic phase functions", n_.anisotropic, "scattering has a direction",
         n_.media ? "all scattering is isotropic" : none);
+    say("other phase functions", n_.phases, "scattering that is not Henyey-Greenstein's",
+        n_.media ? "all scattering is isotropic or Henyey-Greenstein's" : none);
     if (n_.meters == 0)
       say("camera inside a medium", n_.camera_in_medium, "the sensor names a medium", "it stands in vacuum");
     say("index-matched boundaries", n_.boundaries, "surfaces that light passes unchanged", "no such surface");
@@ -313,6 +318,7 @@ std::string canonical_json(const Needs& n) {
          {"only_delta_lights", n.only_delta_lights}};
   // Left out of scenes without them, so that the needs of stored jobs stay the same.
   if (n.transparent_film) j["transparent_film"] = true;
+  if (n.phases) j["phases"] = true;
   if (n.meters > 0) j["meters"] = n.meters;
   if (n.flagged_shapes > 0) j["flagged_shapes"] = n.flagged_shapes;
   if (n.ray_flags > 0) j["ray_flags"] = n.ray_flags;

@@ -27,8 +27,9 @@ struct FileNeed {
 struct Needs {
   // Each is true if the scene has such media. media: media of any kind; grids: media with coefficients that
   // vary in space; chromatic: media whose extinction differs between channels; emission: media that emit
-  // light; anisotropic: media with a phase function that is not isotropic.
-  bool media = false, grids = false, chromatic = false, emission = false, anisotropic = false;
+  // light; anisotropic: media with a phase function that is not isotropic; phases: media with one that is
+  // neither isotropic nor Henyey-Greenstein's.
+  bool media = false, grids = false, chromatic = false, emission = false, anisotropic = false, phases = false;
   bool camera_in_medium = false;
   // boundaries: the scene has index-matched surfaces (bsdf "null"). null_transmission: it has other surfaces
   // through which a part of the light passes without a change of direction.

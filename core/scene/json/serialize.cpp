@@ -126,6 +126,12 @@ class ObjectReader {
     for (std::size_t i = 0; i < N; ++i)
       if (!number(f, j[i], x[i])) return;
   }
+  void read(const Field& f, const Json& j, std::vector<double>& x) {
+    if (!j.is_array() || j.size() > kMaxElements) return fail(f.name, "is not a list, or too long");
+    x.resize(j.size());
+    for (std::size_t i = 0; i < j.size(); ++i)
+      if (!number(f, j[i], x[i])) return;
+  }
   template <class T>
   void read(const Field& f, const Json& j, std::vector<T>& x) {
     if (!j.is_array() || j.size() > kMaxElements) return fail(f.name, "is not a list, or too long");

@@ -58,6 +58,80 @@ template <class V, Of<HgPhase> T>
 void describe(V& v, T& p) {
   v.field({.name = "g", .doc = "mean cosine; positive: forwards", .range = kMeanCosine}, p.g);
 }
+LS_TYPE(RayleighPhase, "phase", "rayleigh", "",
+        "particles much smaller than the wavelength: 3/(16 pi) (1 + cos^2 of the scattering angle)")
+template <class V, Of<RayleighPhase> T>
+void describe(V&, T&) {}
+
+LS_TYPE(DrainePhase, "phase", "draine", "",
+        "Henyey-Greenstein times 1 + alpha cos^2 (Draine 2003): `alpha` 0 is `hg`; `g` 0 with `alpha` 1 is "
+        "`rayleigh`")
+template <class V, Of<DrainePhase> T>
+void describe(V& v, T& p) {
+  v.field({.name = "g", .doc = "as of `hg`; the mean cosine is a little larger", .range = kMeanCosine}, p.g);
+  v.field({.name = "alpha", .doc = "weight of cos^2", .range = {.min = 0, .max = 1000}}, p.alpha);
+}
+
+LS_TYPE(DropletsPhase, "phase", "droplets", "",
+        "water droplets of fog and clouds: Jendersie and d'Eon's fit (2023) to Mie's solution. It has the "
+        "forward peak and a broad rise backwards, but no bow and no glory; for these see `tabphase`")
+template <class V, Of<DropletsPhase> T>
+void describe(V& v, T& p) {
+  v.field({.name = "diameter",
+           .doc = "of the droplets: mist and fog 2 to 20, clouds 10 to 40",
+           .unit = "micrometres",
+           .range = {.min = 1e-3, .max = 50}},
+          p.diameter);
+}
+
+LS_TYPE(FournierForandPhase, "phase", "fournier_forand", "",
+        "particles in sea water, of many sizes (Fournier and Forand 1994)")
+template <class V, Of<FournierForandPhase> T>
+void describe(V& v, T& p) {
+  v.field({.name = "backscatter",
+           .doc = "share of the light scattered by more than 90 degrees",
+           .range = {.min = 1e-5, .max = .5}},
+          p.backscatter);
+  v.field({.name = "ior",
+           .doc = "index of refraction of the particles, relative to the water",
+           .range = {.min = 1.0001, .max = 5}},
+          p.ior);
+}
+
+LS_TYPE(
+    TabulatedPhase, "phase", "tabphase", "",
+    "values at scattering angles (0 where light goes straight on), linear in the cosine between them: "
+    "grey `values`, or `red`, `green` and `blue`. The values may have any scale, as each colour is scaled "
+    "to an integral of 1 over all directions")
+template <class V, Of<TabulatedPhase> T>
+void describe(V& v, T& p) {
+  const auto list = [&](std::string_view name, std::string_view doc, const Range& range, auto& numbers) {
+    v.field({.name = name, .doc = doc, .range = range, .elided = true}, numbers);
+  };
+  list("values", "from straight back to straight on, unless `angles` says otherwise", kNonNegative, p.values);
+  list("red", "the values of a colour each. Not in Mitsuba", kNonNegative, p.red);
+  list("green", "with `red`", kNonNegative, p.green);
+  list("blue", "with `red`", kNonNegative, p.blue);
+  list("nodes",
+       "cosines at which the values are, ascending from -1 to 1; if neither these nor `angles` are given, "
+       "evenly spaced. Not in Mitsuba",
+       {.min = -1, .max = 1}, p.nodes);
+  list("angles", "angles at which the values are, in degrees, ascending from 0 to 180. Not in Mitsuba",
+       {.min = 0, .max = 180}, p.angles);
+}
+
+LS_TYPE(BlendPhase, "phase", "blendphase", "", "a mixture of two phase functions")
+template <class V, Of<BlendPhase> T>
+void describe(V& v, T& p) {
+  v.field({.name = "weight",
+           .doc = "share of the second: a number, or a grid that says it at each place",
+           .range = kUnit,
+           .fallback = {.5, .5, .5}},
+          p.weight);
+  v.field(nested_field("first", "where the weight is 0", "<phase>"), p.first);
+  v.field(nested_field("second", "where the weight is 1", "<phase>"), p.second);
+}
+
 template <class V>
 void describe_priority(V& v, auto& priority) {
   v.field({.name = "priority",

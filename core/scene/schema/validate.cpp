@@ -12,6 +12,7 @@
 #include "core/scene/limits.h"
 #include "core/scene/schema/describe_fields.h"
 #include "core/scene/schema/light_links.h"
+#include "core/scene/schema/phase_tables.h"
 #include "core/scene/schema/traits.h"
 
 namespace ls::scene {
@@ -25,6 +26,7 @@ class ValueChecker {
     check_list("textures", s_.textures);
     check_list("bsdfs", s_.bsdfs);
     check_list("volumes", s_.volumes);
+    check_list("phases", s_.phases);
     check_list("media", s_.media);
     check_list("shapes", s_.shapes);
     check_list("emitters", s_.emitters);
@@ -34,6 +36,7 @@ class ValueChecker {
     walker.walk(s_.sensor);
     if (wrong_.empty()) check_bsdf_nesting();
     if (wrong_.empty()) check_texture_nesting();
+    if (wrong_.empty()) check_phases();
     if (wrong_.empty()) check_groups();
     if (wrong_.empty()) check_crop();
     if (wrong_.empty()) check_labels();
@@ -75,6 +78,20 @@ class ValueChecker {
         if ((*traits)[side.value].transmits || (*traits)[side.value].two_sided)
           wrong_ = "scene.bsdfs: a twosided bsdf holds one that lets light through, or another twosided";
     }
+  }
+  void check_phases() {
+    if (nested_too_deep(s_.phases))
+      wrong_ =
+          fmt::format("scene.phases contain each other in a circle or more than {} deep", kMaxPhaseNesting);
+    for (std::size_t i = 0; i < s_.phases.size() && wrong_.empty(); ++i)
+      if (const auto* table = std::get_if<TabulatedPhase>(&s_.phases[i]))
+        if (const auto [list, what] = table_problem(*table); !what.empty())
+          wrong_ = fmt::format("scene.phases[{}]: '{}' {}", i, list, what);
+    for (const Phase& phase : s_.phases)
+      if (const auto* blend = std::get_if<BlendPhase>(&phase); blend && wrong_.empty())
+        if (const auto* weight = std::get_if<ConstVolume>(&s_.volumes[blend->weight.value]))
+          if (!is_grey(weight->value) || !kUnit.contains(weight->value[0]))
+            wrong_ = "scene.phases: the weight of a blend is not one number from 0 to 1";
   }
   // Checks that the shapes of each group are contiguous in the scene's list of shapes and do not emit, that
   // every group has a shape, and that in this list the groups follow each other in the order of their

@@ -111,6 +111,7 @@ WIDE_CLASSES = {
     ("formats/reader/reader.h", "Reader"): ONE_MEMO,
     ("coordinator/service/coordinator.h", "Coordinator"): "the facade: a function for each request of users, workers and operators",
     ("worker/render/integrator/path_tracer.h", "PathTracer"): "one path, in steps of a few lines that share its state",
+    ("formats/reader/params.h", "Params"): "one convert() for each type of parameter",
     ("worker/render/lights/lights.h", "Lights"): "choosing, sampling and hitting lights, whose densities must agree",
 }
 # Interfaces of which the product has one implementation.

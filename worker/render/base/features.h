@@ -34,13 +34,16 @@ struct Features {
   bool whitted = false;
   // Neighbouring pixels share the parts of their paths from the second vertex on (path_reuse.h).
   bool reuse = false;
+  // Some medium has a phase function other than Henyey-Greenstein's (phase_function.h).
+  bool phases = false;
   bool operator==(const Features&) const = default;
 
   constexpr bool covers(const Features& need) const {
     return (media || !need.media) && (grids || !need.grids) && (chromatic || !need.chromatic) &&
            (emission || !need.emission) && (overlaps || !need.overlaps) && (passing || !need.passing) &&
            (aimed || !need.aimed) && (connected || !need.connected) && (whitted || !need.whitted) &&
-           (reuse || !need.reuse) && (split || !need.split) && (visibility || !need.visibility);
+           (reuse || !need.reuse) && (split || !need.split) && (visibility || !need.visibility) &&
+           (phases || !need.phases);
   }
   constexpr Features with(bool Features::*feature) const {
     Features more = *this;
@@ -50,6 +53,7 @@ struct Features {
 };
 inline constexpr Features kEveryScene{
     .media = true, .grids = true, .chromatic = true, .emission = true, .overlaps = true, .passing = true};
-inline constexpr Features kEverything = kEveryScene.with(&Features::split).with(&Features::visibility);
+inline constexpr Features kEverything =
+    kEveryScene.with(&Features::phases).with(&Features::split).with(&Features::visibility);
 
 }  // namespace ls::render

@@ -11,6 +11,7 @@ std::span<const Variant> distant_variants() {
       variant<Features{.media = true, .passing = true}, SegmentNee>("homogeneous grey media"),
       variant<Features{.media = true, .grids = true, .passing = true}, SegmentNee>("grey grids"),
       variant<kEveryScene, SegmentNee>("everything"),
+      variant<kEveryScene.with(&Features::phases), SegmentNee>("everything, any phase function"),
       kDistantSplitVariant,
   };
   return kVariants;

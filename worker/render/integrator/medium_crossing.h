@@ -138,13 +138,18 @@ template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::scatter_by_phase(const Medium& medium) -> Step {
   const Group direction = stream_.group(depth_, Purpose::direction);
   const V2 u(direction.u(0), direction.u(1));
-  PhaseSample s = medium.phase.sample(ray_.d, u);
+  [[maybe_unused]] const C3 before = beta_;
+  PhaseSample s = medium.sample_phase<F>(last_.p, ray_.d, u, beta_);
   if constexpr (F.connected) last_.sum = densities_.sum(s.pdf);
   if constexpr (F.aimed) {
     aim_ = 1;
     if (near_lamps_.any()) {
       float choice = direction.u(2);
-      if (const auto w = near_lamps_.sample(choice, u)) s = {*w, medium.phase.value(ray_.d, *w)};
+      if (const auto w = near_lamps_.sample(choice, u)) {
+        const PhaseValue<F> own = medium.phase_value<F>(last_.p, ray_.d, *w);
+        s = {*w, own.pdf};
+        if constexpr (F.phases) beta_ = before * (own.pdf > 0 ? own.value / own.pdf : C3(0));
+      }
       const float own = s.pdf;
       s.pdf = near_lamps_.pdf(own, s.w);
       aim_ = own / s.pdf;
@@ -219,12 +224,12 @@ void PathTracer<F, Light>::light_vertex_by(const LightChoice& choice, const Medi
                                            const V3& d) {
   const auto light = world_.lights.sample(choice, p);
   if (!light || !turn_to(choice, medium)) return;
-  const float phase = medium.phase.value(d, light->direction);
-  const float sampled = direction_pdf(p, phase, light->direction);
+  const PhaseValue<F> phase = medium.phase_value<F>(p, d, light->direction);
+  const float sampled = direction_pdf(p, phase.pdf, light->direction);
   const float weight = light->delta ? 1 : light->pdf / (light->pdf + sampled);
   const C3 arriving =
       unoccluded(ray_.start, p, *light, medium_, stream_.stream(depth_, Purpose::track_shadow));
-  if (!is_black(arriving)) add(beta_ * arriving * (phase * weight / light->pdf), group_of(choice));
+  if (!is_black(arriving)) add(beta_ * arriving * (phase.value * weight / light->pdf), group_of(choice));
 }
 
 // For each medium, adds its emission up to the point where a flight through the other media ends. The

@@ -153,8 +153,9 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
   V3 origin = x.at.p;
   OneMedium around = x.around;
   if (x.at.medium) {
-    pdf = x.at.medium->phase.value(x.d, w);
-    value = C3(pdf);
+    const PhaseValue<F> phase = x.at.medium->template phase_value<F>(x.at.p, x.d, w);
+    pdf = phase.pdf;
+    value = C3(phase.value);
   } else {
     const SurfaceHit& hit = x.at.hit;
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
@@ -220,8 +221,8 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
 template <Features F, template <Features> class Light>
 BsdfEval PathTracer<F, Light>::scattered_at(const PathVertex& y, const V3& d, const V3& w) const {
   if (y.medium) {
-    const float phase = y.medium->phase.value(d, w);
-    return {C3(phase), phase};
+    const PhaseValue<F> phase = y.medium->template phase_value<F>(y.p, d, w);
+    return {C3(phase.value), phase.pdf};
   }
   return world_.bsdfs.eval(world_.geometry.surfaces[y.hit.surface].bsdf, y.hit.uv_point(),
                            y.hit.shading.to_local(-d), y.hit.shading.to_local(w));

@@ -31,6 +31,7 @@ std::span<const Variant> plain_variants() {
       variant<Features{.media = true, .grids = true, .passing = true}>("grey grids"),
       variant<Features{.media = true, .grids = true, .chromatic = true, .passing = true}>("chromatic grids"),
       variant<kEveryScene>("everything"),
+      variant<kEveryScene.with(&Features::phases)>("everything, any phase function"),
       kSplitVariant,
   };
   return kVariants;

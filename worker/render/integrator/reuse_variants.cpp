@@ -121,14 +121,14 @@ bool sharing_pays(World& w, const Variant& sharing, int threads) {
 }  // namespace
 
 std::span<const Variant> reuse_variants() {
+  static constexpr Features kAll{.media = true, .chromatic = true, .passing = true, .reuse = true};
   static constexpr Variant kVariants[] = {
       group_variant<Features{.passing = true, .reuse = true}>("surfaces, tails shared"),
       group_variant<Features{.media = true, .passing = true, .reuse = true}>(
           "homogeneous grey media, tails shared"),
-      group_variant<Features{.media = true, .chromatic = true, .passing = true, .reuse = true}>(
-          "homogeneous chromatic media, tails shared"),
-      group_variant<Features{
-          .media = true, .chromatic = true, .passing = true, .split = true, .reuse = true}>(
+      group_variant<kAll>("homogeneous chromatic media, tails shared"),
+      group_variant<kAll.with(&Features::phases)>("homogeneous media, tails shared, any phase function"),
+      group_variant<kAll.with(&Features::phases).with(&Features::split)>(
           "homogeneous media, tails shared, and light in parts"),
   };
   return kVariants;

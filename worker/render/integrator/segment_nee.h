@@ -247,17 +247,17 @@ class SegmentNee {
     const float own = by_angle ? e_angle : by_depth;
     if (!(own > 0)) return;
     float weight = both ? mis_weight(path.world_.heuristic, own, by_angle ? by_depth : e_angle) : 1.f;
-    const float phase = medium.phase.value(path.ray_.d, light->direction);
+    const PhaseValue<F> phase = medium.phase_value<F>(p, path.ray_.d, light->direction);
     if (!light->delta) {
       const float found = choice.has_place ? v.found_as_light(pivot) : v.found_as_light();
-      weight *= 1 / (1 + path.direction_pdf(p, phase, light->direction) / (light->pdf * found));
+      weight *= 1 / (1 + path.direction_pdf(p, phase.pdf, light->direction) / (light->pdf * found));
     }
     const C3 arriving = path.unoccluded(start, p, *light, path.medium_, RandomStream(stream.next()));
     if (is_black(arriving)) return;
     const C3 through =
         transmittance<F>(medium, path.ray_.start, path.ray_.d, 0, at_point.t, RandomStream(stream.next()));
     path.see(start);
-    path.add(path.beta_ * scattering * through * arriving * (phase * weight / (light->pdf * own)),
+    path.add(path.beta_ * scattering * through * arriving * (phase.value * weight / (light->pdf * own)),
              path.group_of(choice), true);
   }
 };

@@ -24,6 +24,8 @@ std::span<const Variant> aimed_variants() {
       variant<Features{.media = true, .grids = true, .passing = true, .aimed = true}, CameraSegmentNee>(
           "grey grids, aimed"),
       variant<kEveryScene.with(&Features::aimed), CameraSegmentNee>("everything, aimed"),
+      variant<kEveryScene.with(&Features::aimed).with(&Features::phases), CameraSegmentNee>(
+          "everything, aimed, any phase function"),
       kAimedSplitVariant,
   };
   return kVariants;
@@ -37,7 +39,9 @@ std::span<const Variant> connected_variants() {
       variant<Features{.media = true, .grids = true, .passing = true, .connected = true}>(
           "grey media, connected"),
       variant<kAll, CameraSegmentNee>("grey media, aimed and connected"),
-      variant<kAll.with(&Features::split), CameraSegmentNee>(
+      variant<kAll.with(&Features::phases), CameraSegmentNee>(
+          "grey media, aimed and connected, any phase function"),
+      variant<kAll.with(&Features::phases).with(&Features::split), CameraSegmentNee>(
           "grey media, aimed and connected, and light in parts"),
   };
   return kVariants;

@@ -58,11 +58,11 @@ void PathTracer<F, Light>::connect_in(const Medium& medium, const V3& p, const V
     const Medium& medium;
     V3 p, d;
     C3 value(const V3& w, float& pdf) const {
-      const float phase = medium.phase.value(d, w);
-      pdf = path.direction_pdf(p, phase, w);
-      return C3(phase);
+      const PhaseValue<F> phase = medium.phase_value<F>(p, d, w);
+      pdf = path.direction_pdf(p, phase.pdf, w);
+      return C3(phase.value);
     }
-    float back(const V3& w) const { return medium.phase.value(d, w); }
+    float back(const V3& w) const { return medium.phase_value<F>(p, d, w).pdf; }
     float cosine(const V3&) const { return 1; }
     V3 origin(const V3&) const { return p; }
     Within media(const V3&) const { return path.medium_; }
@@ -148,10 +148,10 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
     if (densities_.last > 0) light_pdf = world_.bsdfs.eval(bsdf, y.hit.uv_point(), to_light, to_x).pdf;
     light.target = offset_target(y.hit, start, -w);
   } else {
-    const float phase = world_.media[y.medium].phase.value(w, y.to_light);
-    value *= phase;
-    camera_pdf = direction_pdf(y.p, phase, y.to_light);
-    light_pdf = phase;
+    const PhaseValue<F> phase = world_.media[y.medium].template phase_value<F>(y.p, w, y.to_light);
+    value *= phase.value;
+    camera_pdf = direction_pdf(y.p, phase.pdf, y.to_light);
+    light_pdf = phase.pdf;
   }
   const float from_camera = pdf * cos_y * y.densities.sum(camera_pdf);
   float from_light = 0;
@@ -227,7 +227,7 @@ void PathTracer<F, Light>::follow_light(const SunMap::Ray& from, const Keep& kee
       y.medium = medium_.one();
       reach(ray_.origin, V3(0));
       const Group g = stream_.group(y.scatterings, Purpose::direction);
-      const PhaseSample s = medium->phase.sample(ray_.d, {g.u(0), g.u(1)});
+      const PhaseSample s = medium->sample_phase<F>(y.p, ray_.d, {g.u(0), g.u(1)}, beta_);
       leave(s.pdf, s.pdf);
       ray_.d = s.w;
     } else {

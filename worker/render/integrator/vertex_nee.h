@@ -115,19 +115,18 @@ class VertexNee {
     const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]}, path.last_.place);
     const auto light = lights.sample(choice, p);
     if (!light || !path.turn_to(choice, medium)) return;
-    const float phase = medium.phase.value(d, light->direction);
+    const PhaseValue<F> phase = medium.phase_value<F>(p, d, light->direction);
     const auto& v = path.last_.in_medium;
     const float with_equiangular = v.uses_equiangular(choice.is_point) && choice.has_place
                                        ? 1 + v.equiangular_ratio(lights.pivot(choice))
                                        : 1.f;
-    const float weight =
-        light->delta
-            ? 1 / with_equiangular
-            : light->pdf / (light->pdf * with_equiangular + path.direction_pdf(p, phase, light->direction));
+    const float weight = light->delta ? 1 / with_equiangular
+                                      : light->pdf / (light->pdf * with_equiangular +
+                                                      path.direction_pdf(p, phase.pdf, light->direction));
     float traced = 1;  // probability of tracing the shadow ray
     if constexpr (F.grids && !F.connected) {
       if (medium.grid && path.world_.faint_shadow > 0) {
-        C3 most = path.beta_ * light->radiance * (phase * weight / light->pdf);
+        C3 most = path.beta_ * light->radiance * (phase.value * weight / light->pdf);
         if constexpr (F.chromatic) most /= path.mean(path.density_);
         traced = shadow_ray_probability(path.mean(most), path.world_.faint_shadow);
         if (!(g.u(3) < traced)) return;
@@ -137,8 +136,8 @@ class VertexNee {
                                         path.stream_.stream(path.depth_, Purpose::track_shadow));
     if (!is_black(arriving))
       path.add_found(choice, p, V3(0), light->direction,
-                     path.beta_ * arriving * (phase * weight / (light->pdf * traced)),
-                     [phase] { return phase; });
+                     path.beta_ * arriving * (phase.value * weight / (light->pdf * traced)),
+                     [&phase] { return phase.pdf; });
   }
 
  private:
@@ -166,20 +165,20 @@ class VertexNee {
     if (is_black(scattering)) return;
     const auto light = lights.sample(choice, p);
     if (!light || !(s.pdf > 0) || !path.turn_to(choice, medium)) return;
-    const float phase = medium.phase.value(path.ray_.d, light->direction);
+    const PhaseValue<F> phase = medium.phase_value<F>(p, path.ray_.d, light->direction);
     const float ratio = ratio_to_flight(s.pdf, flight_pdf<F>(medium, path.density_, at_point));
     const bool delta = light->delta;
     const float weight =
         delta ? ratio / (1 + ratio)
               : light->pdf /
-                    (light->pdf + (light->pdf + path.direction_pdf(p, phase, light->direction)) / ratio);
+                    (light->pdf + (light->pdf + path.direction_pdf(p, phase.pdf, light->direction)) / ratio);
     const C3 arriving = path.unoccluded(s.p, p, *light, path.medium_,
                                         path.stream_.stream(path.segment_, Purpose::track_segment));
     if (is_black(arriving)) return;
     const C3 through = transmittance<F>(medium, path.ray_.start, path.ray_.d, 0, at_point.t,
                                         path.stream_.stream(path.segment_, Purpose::track_distance));
     path.see(s.p);
-    path.add(path.beta_ * (scattering * through) * arriving * (phase * weight / (light->pdf * s.pdf)),
+    path.add(path.beta_ * (scattering * through) * arriving * (phase.value * weight / (light->pdf * s.pdf)),
              path.group_of(choice), true);
   }
 };

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "worker/render/base/features.h"
@@ -24,6 +25,7 @@
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/grid.h"
 #include "worker/render/media/phase.h"
+#include "worker/render/media/phase_function.h"
 
 namespace ls::render {
 
@@ -34,6 +36,17 @@ enum class EmissionKind : std::uint8_t { none, per_length, per_absorption, black
 // The lights about which segments through a medium are also sampled equi-angularly (vertex_nee.h): none,
 // point lights, or all lights with a position.
 enum class EquiangularMode : std::uint8_t { none, points, places };
+
+// The phase function at a place for two directions [1/sr], and the density with which sampling finds the
+// second direction. Without Features::phases the two are the same.
+template <class T>
+struct PhaseValueOf {
+  using Colour = T;
+  Colour value;
+  float pdf;
+};
+template <Features F>
+using PhaseValue = PhaseValueOf<std::conditional_t<F.phases, C3, float>>;
 
 struct Medium {
   bool grid = false;
@@ -52,6 +65,10 @@ struct Medium {
   // stored separately because 1 - (1 - 1e-7) in float32 is off by a fifth.
   C3 absorbing{1, 1, 1};
   HenyeyGreenstein phase;
+  // Set if the phase function is none of Henyey-Greenstein's: then it is number `other_phase` of these, and
+  // `phase` is a rough idea of it, with the same mean cosine. Only code with Features::phases sees it.
+  const PhaseFunctions* other_phases = nullptr;
+  std::uint32_t other_phase = 0;
   // The emission (emission.h). A homogeneous medium emits `emission` [radiance per world unit]. A grid emits
   // `emission` times the value of the grid `emitter`; for black_body, `emission` times the radiance of a
   // black body at kelvin_offset + kelvin_scale times that value [K]. Unless the kind is per_length, the
@@ -69,6 +86,33 @@ struct Medium {
   LightGroup light_group = kNoLightGroup;  // of the emission
   int priority = 0;  // where media overlap, only those of the highest priority are in effect
   bool chromatic() const { return sigma_t.x != sigma_t.y || sigma_t.y != sigma_t.z || by_channel[0]; }
+
+  // Returns the phase function at the world point p, for the directions of travel w before and w1 after.
+  template <Features F>
+  PhaseValue<F> phase_value(const V3& p, const V3& w, const V3& w1) const {
+    if constexpr (F.phases) {
+      if (other_phases) {
+        const PhaseFunctions::Value v = other_phases->value(other_phase, p, w, w1);
+        return {v.value, v.pdf};
+      }
+    }
+    const float same = phase.value(w, w1);
+    return {typename PhaseValue<F>::Colour(same), same};
+  }
+  // Samples the direction after a scattering at p. With F.phases, multiplies `weight` by the phase function
+  // over the density: 1, unless its colours differ.
+  template <Features F>
+  PhaseSample sample_phase([[maybe_unused]] const V3& p, const V3& w, V2 u,
+                           [[maybe_unused]] C3& weight) const {
+    if constexpr (F.phases) {
+      if (other_phases) {
+        const PhaseFunctions::Sample s = other_phases->sample(other_phase, p, w, u);
+        weight *= s.of.pdf > 0 ? s.of.value / s.of.pdf : C3(0);
+        return {s.w, s.of.pdf};
+      }
+    }
+    return phase.sample(w, u);
+  }
 
   // Returns the scattering coefficients per unit of density at the world point p of a grid.
   C3 scattering_at(const V3& p) const {

@@ -9,6 +9,7 @@
 #include "worker/render/math/blackbody.h"
 #include "worker/render/math/transform.h"
 #include "worker/render/media/grid_load.h"
+#include "worker/render/world/phase_build.h"
 
 namespace ls::render {
 namespace {
@@ -23,21 +24,6 @@ constexpr double kMaxExtinction = 1e30;
 // absorption coefficient]. The integral of a larger value along a ray could exceed the largest radiance of a
 // sample.
 constexpr double kMaxEmission = 1e25;
-
-// Returns the phase function i of the scene. Rejects a g that rounds to 1 or -1 in float32, such as
-// 0.99999999, because the phase function does not exist for these.
-Result<HenyeyGreenstein> phase_of(const Scene& scene, PhaseIndex i) {
-  const auto* hg = std::get_if<HgPhase>(&scene.phases.at(i.value));
-  if (!hg) return HenyeyGreenstein{0};
-  const auto g = static_cast<float>(hg->g);
-  if (!(std::abs(g) < 1)) {
-    return fail(Errc::invalid_argument,
-                fmt::format("a phase function's g = {} is, to the precision of the renderer, not between -1 "
-                            "and 1; light scattered so far forward passes as if there were no medium",
-                            hg->g));
-  }
-  return HenyeyGreenstein{g};
-}
 
 // Checks that the extinction of a medium is at most kMaxExtinction: both `sigma`, the extinction per unit of
 // density [1/world unit], and its product with `largest`, the medium's largest density.
@@ -68,17 +54,15 @@ Result<void> shine(Medium& m, EmissionKind emission_kind, const Rgb& factor, dou
   return {};
 }
 
-// Makes a homogeneous medium. `scale` is the number of world units per scene unit: lengths are multiplied by
-// it, so coefficients are divided by it.
-Result<Medium> homogeneous(const Scene& scene, const HomogeneousMedium& m, double scale) {
+// Makes a homogeneous medium. Lengths are multiplied by the world's scale, so coefficients are divided by it.
+Result<Medium> homogeneous(const Scene& scene, const HomogeneousMedium& m, const World& w) {
+  const double scale = w.geometry.scale;
   Medium out;
   const Rgb sigma_t = times(m.sigma_t, m.scale / scale);
   if (auto ok = check_extinction(sigma_t, 1, scale); !ok) return tl::unexpected(ok.error());
-  auto phase = phase_of(scene, m.phase);
-  if (!phase) return tl::unexpected(phase.error());
+  set_phase(scene, m.phase, w.phases, out);
   out.sigma_t = color(sigma_t);
   out.sigma_s = color(times(sigma_t, m.albedo));
-  out.phase = *phase;
   Rgb emission{};
   for (std::size_t c = 0; c < 3; ++c)
     emission[c] = m.emission[c] / scale + sigma_t[c] * (1 - m.albedo[c]) * m.source_radiance[c];
@@ -252,11 +236,9 @@ Result<void> HeteroBuilder::black_bodies(const Volume& temperature) {
 
 Result<Medium> heterogeneous(const Scene& scene, const HeterogeneousMedium& m, const AssetLoader& files,
                              World& w) {
-  auto phase = phase_of(scene, m.phase);
-  if (!phase) return tl::unexpected(phase.error());
   HeteroBuilder b{scene, m, files, w, m.scale / w.geometry.scale, {}, {}};
   b.out.grid = true;
-  b.out.phase = *phase;
+  set_phase(scene, m.phase, w.phases, b.out);
   if (auto ok = b.density(); !ok) return tl::unexpected(ok.error());
   if (auto ok = b.albedo(); !ok) return tl::unexpected(ok.error());
   if (scene::traits_of(m, scene.volumes).emits)
@@ -281,6 +263,7 @@ std::vector<bool> named_media(const Scene& scene) {
 }  // namespace
 
 Result<void> build_media(const Scene& scene, const AssetLoader& files, World& w) {
+  if (auto ok = build_phases(scene, files, w); !ok) return ok;
   const std::vector<bool> named = named_media(scene);
   for (std::size_t i = 0; i < scene.media.size(); ++i) {
     if (!named[i]) {
@@ -288,7 +271,7 @@ Result<void> build_media(const Scene& scene, const AssetLoader& files, World& w)
       continue;
     }
     Result<Medium> m = std::visit(
-        overloaded{[&](const HomogeneousMedium& h) { return homogeneous(scene, h, w.geometry.scale); },
+        overloaded{[&](const HomogeneousMedium& h) { return homogeneous(scene, h, w); },
                    [&](const HeterogeneousMedium& h) { return heterogeneous(scene, h, files, w); }},
         scene.media[i]);
     if (!m) return tl::unexpected(m.error());

@@ -35,6 +35,7 @@ class World {
   TextureTable textures;
   BsdfTable bsdfs;
   std::deque<Grid> grids;  // a deque, since media point at its elements
+  PhaseFunctions phases;   // those of media that are not Henyey-Greenstein's, by their index in the scene
   std::vector<Medium> media;
   std::deque<ClearRegion> clear_regions;  // a deque, since media point at its elements
   Lights lights;

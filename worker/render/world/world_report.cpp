@@ -88,6 +88,7 @@ WorldReport describe(const World& w) {
   feature(w.need.media, "participating media");
   feature(w.need.grids, "density grids, majorants and their trackers");
   feature(w.need.chromatic, "spectral weights for extinction that differs between channels");
+  feature(w.need.phases, "phase functions other than Henyey-Greenstein's");
   feature(w.need.emission, "light given off by media");
   feature(w.overlaps, "media within or across each other");
   feature(w.coincident, "a search for surfaces that lie on null or hidden ones");

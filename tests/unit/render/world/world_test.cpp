@@ -141,6 +141,16 @@ std::vector<Named> scenes() {
                    return m;
                  }),
                  1});
+  all.push_back({"phase functions of colours", with_medium([](SceneBuilder& k) {
+                   const MediumIndex m = k.homogeneous({0, .8, 3}, {.9, .5, .9});
+                   const auto put = [&](const Phase& p) { return k.push<PhaseTag>(k.scene.phases, p); };
+                   const PhaseIndex table = put(TabulatedPhase{{}, {1, 2}, {3, 1}, {1, 0}, {}, {}});
+                   const PhaseIndex droplets = put(DropletsPhase{8});
+                   const PhaseIndex blend = put(BlendPhase{k.constant({.4, .4, .4}), droplets, table});
+                   std::get<HomogeneousMedium>(k.scene.media[m.value]).phase = blend;
+                   return m;
+                 }),
+                 0});
   return all;
 }
 
@@ -154,8 +164,8 @@ TEST(World, EveryVariantThatCoversASceneGivesTheSameBits) {
     const auto world = test::world_of(n.builder);
     const auto names = covering_variants(*world);
     const TileResult first = render(*world);
-    // One more variant is the one for AOVs of light.
-    EXPECT_EQ(names.size(), n.variants + 1) << n.name;
+    // Two more variants are the one for all phase functions and the one for AOVs of light.
+    EXPECT_EQ(names.size(), n.variants + 2) << n.name;
     EXPECT_EQ(names.front(), describe(*world).variant);
     EXPECT_EQ(first.health.nonfinite + first.health.negative + first.health.majorant_violations, 0u)
         << n.name;

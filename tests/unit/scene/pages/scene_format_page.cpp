@@ -30,6 +30,7 @@ Column column(const Field&, const std::string& x) {
   return {"string", x.empty() ? "" : fmt::format("\"{}\"", x)};
 }
 Column column(const Field& f, const Rgb& x) { return {f.constvolume ? "rgb, volume" : "rgb", text_of(x)}; }
+Column column(const Field&, const std::vector<double>&) { return {"string of numbers", ""}; }
 Column column(const Field&, const Vec3& x) { return {"point, vector", text_of(x)}; }
 Column column(const Field&, const Transform&) { return {"transform", "identity"}; }
 Column column(const Field&, const UvTransform&) { return {"transform", "identity"}; }

@@ -136,6 +136,8 @@ bool mitsuba_has(std::string_view plugin, std::string_view parameter) {
       {"homogeneous", {medium}},
       {"heterogeneous", {medium}},
       {"hg", {{"g"}}},
+      {"tabphase", {{"values"}}},
+      {"blendphase", {{"weight"}}},
       {"constvolume", {{"value", "to_world"}}},
       {"gridvolume", {{"filename", "filter_type", "wrap_mode", "raw", "to_world", "use_grid_bbox"}}},
       {"perspective", {view, {"principal_point_offset_x", "principal_point_offset_y"}}},

@@ -1,0 +1,32 @@
+// Checks of phase functions that concern several of their values.
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/scene/scene.h"
+
+namespace ls::scene {
+
+// Returns what is wrong with the table, as a predicate ("has 3 values and 2 angles"), and the name of the
+// list that it is about. Both are empty if nothing is.
+struct TableProblem {
+  std::string_view list;
+  std::string what;
+};
+TableProblem table_problem(const TabulatedPhase& table);
+
+// The contents of a table without problems. `values` has one list, or one for each colour.
+struct PhaseValues {
+  std::vector<double> cosines;  // ascending from -1 to 1
+  std::vector<std::vector<double>> values;
+};
+PhaseValues values_of(const TabulatedPhase& table);
+
+// Returns whether phase functions contain each other in a circle, or more than kMaxPhaseNesting deep. All
+// indices must be valid.
+bool nested_too_deep(std::span<const Phase> phases);
+
+}  // namespace ls::scene
