@@ -2,11 +2,13 @@
 
 import os
 
+from attack_kit import BYSTANDER
+
 PAGE = """# Attacks
 
 `/usr/bin/python3 tests/attacks/run.py --write docs/measurements/attacks.md` wrote this page at commit {commit}, in {minutes:.0f} minutes on {cores} cores, while other work ran on the machine (load average {before:.1f} at the start, {after:.1f} at the end): times are upper bounds.
 
-Every attack is against a farm of its own on this machine: real coordinators and workers, real sockets. A try holds if the answer is what it should be (refused with a status below 500, or read as the one thing it says), if it comes within the limits of [SECURITY.md](../../SECURITY.md), and if others are served meanwhile and afterwards. {tries} tries, {held} held.
+Every attack is against a farm of its own on this machine: real coordinators and workers, real sockets. A try holds if the answer is what it should be (refused with a status below 500, or read as the one thing it says), if it comes within the limits of [SECURITY.md](../../SECURITY.md), and if others are served meanwhile and afterwards. "Another user waits no longer than a second" is judged as {bystander:.1f} s in this run, for that load. {tries} tries, {held} held.
 
 | group | what was tried | tries | held |
 |---|---|---|---|
@@ -43,7 +45,7 @@ def page(done, commit, seconds, load):
         faults += [f"| {number} | {cell(what)} | {cell(before)} | {cell(today)}{'' if held else ' **did not hold**'} |" for number, what, before, today, held in record.faults]
         left_out += [f"- {name}: {what}" for what in record.left_out]
     tries = [t for _, record, _ in done for t in record.tries]
-    return PAGE.format(commit=commit, minutes=seconds / 60, cores=os.cpu_count(), before=load[0], after=os.getloadavg()[0], tries=f"{len(tries):,}",
+    return PAGE.format(commit=commit, minutes=seconds / 60, cores=os.cpu_count(), before=load[0], after=os.getloadavg()[0], bystander=BYSTANDER, tries=f"{len(tries):,}",
                        held=f"{sum(t.held for t in tries):,}", table="\n".join(table), faults="\n".join(faults),
                        wrong="\nDid not hold:\n\n" + "\n".join(wrong) + "\n" if wrong else "",
                        left_out="Left out on that machine:\n\n" + "\n".join(left_out) + "\n" if left_out else "")

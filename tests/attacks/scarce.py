@@ -43,8 +43,8 @@ def descriptors(record, folder):
 
 
 def memory(record, folder):
-    record.row = "little memory: 600 MB of data for the coordinator, beside large scenes, images and bundles"
-    with LocalFarm(folder / "memory", flags=UNLIMITED, within=["prlimit", "--data=600000000"]) as farm:
+    record.row = "little memory: 1.5 GB of data for the coordinator, beside large scenes, images and bundles"
+    with LocalFarm(folder / "memory", flags=UNLIMITED, within=["prlimit", "--data=1500000000"]) as farm:
         farm.add_worker()
         token = farm.token_of("mallory")
         ball = '<shape type="sphere"><transform name="to_world"><translate x="1"/></transform></shape>\n'
@@ -63,6 +63,13 @@ def memory(record, folder):
                     ask(farm, "DELETE", f"/api/v1/jobs/{job}", token)
         still_serves(record, farm, farm.token_of("bob"))
         record.attempt("a job is rendered", farm.pixels(submit(farm, farm.token, TINY, spp=2)), "")
+
+
+def answers(farm):
+    try:
+        return ask(farm, "GET", "/healthz").status == 200
+    except OSError:
+        return False
 
 
 def disk(record, folder):
@@ -89,12 +96,14 @@ def disk(record, folder):
             record.attempt(f"{path.replace(job, 'ID')} is answered", answer.status == 200, shown(answer))
         farm.coordinator.kill()
         with record.expecting("it starts again on the full disk, and jobs can be removed"):
-            farm.start_coordinator()
+            farm.coordinator.args[farm.coordinator.args.index("--http") + 1] = f"127.0.0.1:{farm.http}"
+            farm.coordinator.start()  # it cannot write ports.json
+            wait_until(lambda: answers(farm) or not farm.coordinator.alive(), "it serves", 60)
             removed = ask(farm, "DELETE", f"/api/v1/jobs/{job}", farm.token)
             record.attempt("it starts again on the full disk, and jobs can be removed", removed.status == 204, shown(removed))
         small.free()
-        if not farm.coordinator.alive():
-            farm.start_coordinator()
+        farm.coordinator.kill()
+        farm.start_coordinator()
         record.attempt("with room again, a job is rendered", farm.pixels(submit(farm, token, TINY, spp=2)) and worker.alive(), "")
         still_serves(record, farm, bob)
 

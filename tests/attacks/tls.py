@@ -106,7 +106,7 @@ def tls(record, folder):
         with record.expecting(label):
             os.chmod(key, mode)
             (refused := folder / label.replace(" ", "-")).mkdir()
-            record.attempt(label, "key" in refused_coordinator(refused, *flags), "")
+            record.attempt(label, "tls-" in (said := refused_coordinator(refused, *flags)) or "key" in said, "")
     os.chmod(key, 0o644)
     worker = Process("worker", [bin_dir() / "lightshaft-worker", "--coordinator", "127.0.0.1:1", "--cache", folder / "cache", "--tls-ca", stranger.folder / "ca.pem", "--tls-cert", cert, "--tls-key", key],
                      folder / "worker.log", dict(os.environ, LIGHTSHAFT_JOIN_TOKEN="x"))
