@@ -8,11 +8,13 @@ import lzma
 import os
 import struct
 import tarfile
+import warnings
 import zipfile
 import zlib
 
 from attack_kit import Bystander, LocalFarm, TINY, UNLIMITED, ask, group, shown, still_serves
 
+warnings.filterwarnings("ignore", message="Duplicate name")  # twins are meant
 SOON = 20  # seconds; the largest bomb unpacks to 200 times its size before it is refused
 ZIP, TAR, GZIP = "application/zip", "application/x-tar", "application/gzip"
 SCENE = TINY.encode()

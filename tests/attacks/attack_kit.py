@@ -23,6 +23,9 @@ NO_ANSWER = 60
 # Seconds that a bystander may wait: one on a quiet machine (issue 41). Where other programs wanted more than there is of the machine before
 # the first attack, everything takes as much longer.
 BYSTANDER = 1.0 * max(1, os.getloadavg()[0] / os.cpu_count())
+# The bound of the system test, which is of no time of this machine: who waits for what another one holds waits until that one is cut, 15 s at
+# least after it began.
+UNHELD = 14.0
 UNLIMITED = ("--http-requests-per-second", "0", "--http-wrong-tokens-per-minute", "0")
 TINY = SCENE.replace('"96"', '"16"').replace('"64"', '"16"')
 
@@ -181,6 +184,8 @@ def still_serves(record, farm, token, label="others are served afterwards"):
 class Bystander:
     """How long another user waits: the longest of its requests."""
 
+    limit = BYSTANDER
+
     def __init__(self, farm, user="bob"):
         self.farm, self.token = farm, farm.token_of(user)
         self.waits, self.refused = [], []
@@ -220,7 +225,7 @@ class Bystander:
         return f"{max(self.waits):.2f} s at most in {len(self.waits)} requests" + (f", {len(self.refused)} refused" if self.refused else "")
 
     def served(self):
-        return not self.refused and max(self.waits) < BYSTANDER
+        return not self.refused and max(self.waits) < self.limit
 
 
 # ---- groups ----
@@ -228,10 +233,10 @@ class Bystander:
 GROUPS = {}
 
 
-def group(name, quick=False):
-    """A function of (record, folder). `quick`: part of the system test too."""
+def group(name, quick=False, whole=True):
+    """A function of (record, folder). `quick`: part of the system test; `whole`: of a run of all."""
     def remember(function):
-        GROUPS[name] = function, quick
+        GROUPS[name] = function, quick, whole
         return function
     return remember
 
@@ -247,5 +252,5 @@ def cpu_seconds(process):
     return (int(fields[11]) + int(fields[12])) / 100
 
 
-__all__ = ["Answer", "BYSTANDER", "Bystander", "GROUPS", "HttpError", "LocalFarm", "NO_ANSWER", "ROOT", "Record", "SCENE", "TINY", "UNLIMITED", "ask",
+__all__ = ["Answer", "BYSTANDER", "Bystander", "GROUPS", "HttpError", "LocalFarm", "NO_ANSWER", "ROOT", "Record", "SCENE", "TINY", "UNHELD", "UNLIMITED", "ask",
            "cpu_seconds", "exchange", "group", "resident_bytes", "sane", "shown", "still_serves", "submit"]

@@ -70,7 +70,7 @@ def waits_of(record, bob, label):
     record.attempt(label, bob.served(), f"{bob.told()}; {bob.refused[:2]}")
 
 
-@group("Slow and idle clients, with short limits", quick=True)
+@group("Slow and idle clients, with short limits", quick=True, whole=False)
 def short_limits(record, folder):
     flags = ("--http-header-seconds", "1", "--http-body-grace-seconds", "1")
     with LocalFarm(folder, flags=(*UNLIMITED, *flags)) as farm:

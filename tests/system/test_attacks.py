@@ -15,7 +15,7 @@ from attack_kit import GROUPS, Record, ask, exchange, sane  # noqa: E402
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name, (_, quick) in GROUPS.items() if quick])
+@pytest.mark.parametrize("name", [name for name, (_, quick, _) in GROUPS.items() if quick])
 def test_holds(name):
     ((_, record, seconds),) = run.run([name], quick=True)
 
@@ -74,7 +74,7 @@ def test_what_does_not_hold_is_told_and_makes_the_program_fail(monkeypatch, caps
         record.attempt("not held", False, "why")
         raise OSError("the farm is gone")
 
-    monkeypatch.setitem(GROUPS, "broken", (breaks, False))
+    monkeypatch.setitem(GROUPS, "broken", (breaks, False, False))
     monkeypatch.setattr(sys, "argv", ["run.py", "--group", "broken"])
 
     assert run.main() == 1
