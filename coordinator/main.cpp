@@ -13,11 +13,16 @@
 #include <atomic>
 #include <cerrno>
 #include <chrono>
+#include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <new>
 #include <optional>
+#include <string>
 #include <utility>
 #include <variant>
 
@@ -186,6 +191,27 @@ ls::coordinator::JoinGuard guard_of(const ls::http::Limits& limits) {
           }};
 }
 
+// Ends the process with a sentence, where an exception reaches no handler: nearly always because memory or
+// threads have run out where nothing can be refused. What was acknowledged is on disk.
+[[noreturn]] void end_with_a_sentence() {
+  std::string what = "an unknown exception";
+  try {
+    if (const auto e = std::current_exception()) std::rethrow_exception(e);
+  } catch (const std::bad_alloc&) {
+    what = "there is not enough memory";
+  } catch (const std::exception& e) {
+    what = e.what();
+  } catch (...) {
+  }
+  std::fprintf(
+      stderr,
+      "lightshaft-coordinator: error: %s; if memory or threads are limited here (RLIMIT_DATA, "
+      "RLIMIT_NPROC, the control group), raise the limit. Start it again: what it has acknowledged is "
+      "stored\n",
+      what.c_str());
+  std::_Exit(kFailed);
+}
+
 sigset_t block_signals() {
   sigset_t set;
   sigemptyset(&set);
@@ -324,6 +350,7 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::set_terminate(end_with_a_sentence);
   const auto parsed = ls::coordinator::parse_flags(argc, argv);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   auto flags = std::get<Flags>(parsed);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <new>
 
 #include "coordinator/admission/layer_names.h"
 #include "coordinator/base/limits.h"
@@ -21,6 +22,16 @@ namespace {
 // Tiles of a snapshot are copied under the lock in groups of this many; between two groups the lock is
 // released for other threads.
 constexpr TileIndex kTilesAtOnce = 64;
+
+// Calls write() and returns what it returns, or an error if memory runs out meanwhile.
+template <class Write>
+Result<void> within_memory(const Write& write) {
+  try {
+    return write();
+  } catch (const std::bad_alloc&) {
+    return fail(Errc::resource_exhausted, "the coordinator has not enough memory for it now");
+  }
+}
 
 std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
 
@@ -107,8 +118,14 @@ void ImageWriter::take_snapshot(const EntryPtr& entry) {
     const auto core = core_.lock();
     entry->snapshots.running = false;
   };
-  auto file = copy_folded(entry);
-  if (!file) return done(tl::unexpected(file.error()));
+  std::optional<SnapshotFile> file;
+  const auto copied = within_memory([&]() -> Result<void> {
+    auto made = copy_folded(entry);
+    if (!made) return tl::unexpected(made.error());
+    file.emplace(std::move(*made));
+    return {};
+  });
+  if (!copied) return done(copied);
   writes_.push([this, entry, done, before = entry->snapshots.committed,
                 file = std::make_shared<SnapshotFile>(std::move(*file))] {
     auto core = core_.lock();
@@ -228,8 +245,9 @@ void ImageWriter::write_final(const EntryPtr& entry, std::uint64_t number) {
   core.unlock();
 
   const TimePoint begin = clock_.now();
-  const auto written =
-      files_.on_disk() ? write_files(entry, folded, facts, std::move(denoised)) : Result<void>();
+  const auto written = within_memory([&] {
+    return files_.on_disk() ? write_files(entry, folded, facts, std::move(denoised)) : Result<void>();
+  });
 
   core.lock();
   if (entry->trace) entry->trace->step("write image", begin, clock_.now(), {}, !written);
@@ -302,7 +320,7 @@ void ImageWriter::write_retired(const EntryPtr& entry) {
   if (!entry->assembly || entry->removed) return;
   const Folded folded{entry->assembly->film(), entry->assembly->errors(), entry->assembly->health()};
   core.unlock();
-  const auto written = write_snapshot(entry, folded);
+  const auto written = within_memory([&] { return write_snapshot(entry, folded); });
   core.lock();
   if (!entry->assembly || entry->removed) return;
   if (!written) {  // the image stays in memory until it is written

@@ -6,7 +6,7 @@ import shutil
 import subprocess
 
 import pytest
-from local_farm import ROOT, SCENE, HttpError, LocalFarm, refused_coordinator, wait_until
+from local_farm import ROOT, SCENE, HttpError, LocalFarm, bin_dir, refused_coordinator, wait_until
 from redis_server import RedisServer
 from webhook_receiver import Receiver, signature_is_right
 
@@ -301,6 +301,16 @@ def test_a_restore_does_not_touch_a_folder_that_has_a_farm_in_it(tmp_path, folde
 
 
 # ---- upgrade ----
+
+@pytest.mark.parametrize("megabytes", [60, 200, 400, 600])
+def test_a_coordinator_with_too_little_memory_ends_with_a_sentence(tmp_path, megabytes):
+    """Its threads alone need more: 8 MiB of stack each."""
+    limited = ["prlimit", f"--data={megabytes * 1_000_000}", bin_dir() / "lightshaft-coordinator",
+               "--data", tmp_path, "--http", "127.0.0.1:0", "--grpc", "127.0.0.1:0"]
+    done = subprocess.run([str(word) for word in limited], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1, (done.returncode, done.stderr)
+    assert "lightshaft-coordinator: error: " in done.stderr and "RLIMIT_DATA" in done.stderr
+
 
 def test_a_worker_of_another_protocol_is_refused_with_both_versions(farm, tmp_path):
     grpc = pytest.importorskip("grpc")

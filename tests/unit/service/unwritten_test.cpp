@@ -2,7 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <new>
+
 #include "coordinator/base/limits.h"
+#include "coordinator/store/blobs/memory_blobs.h"
 #include "tests/support/eventually.h"
 #include "tests/support/fake_clock.h"
 #include "tests/unit/service/fake_farm.h"
@@ -105,6 +109,42 @@ TEST_F(Unwritten, RemovedJobIsNotWritten) {
   wait_and_look();
 
   EXPECT_TRUE(test::eventually([&] { return !std::filesystem::exists(file("")); }));
+}
+
+// A store that has no memory to read blobs while `empty`. The names in cryptomattes are read from the scene.
+class StoreWithoutMemory final : public MemoryBlobs {
+ public:
+  std::atomic<bool> empty{false};
+  Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
+                                      std::uint64_t length) const override {
+    if (empty) throw std::bad_alloc();
+    return MemoryBlobs::read(digest, offset, length);
+  }
+};
+
+TEST_F(Unwritten, FinalImageForWhichMemoryRanOutIsWrittenLater) {
+  TempFolder folder;
+  const auto blobs = std::make_shared<StoreWithoutMemory>();
+  Coordinator::Options options;
+  options.data = folder.path();
+  options.clock = clock;
+  options.blobs = blobs;
+  options.audit_rate = 0;
+  const auto small = Coordinator::open(std::move(options)).value();
+  JobSpec spec;
+  spec.aov = {"crypto_object"};
+  const JobId with_names = submit(*small, spec);
+  FakeFarm farm(*small, 1);
+  ASSERT_TRUE(farm.run([&] { return small->job(with_names)->units_done > 0; }));
+  blobs->empty = true;
+  ASSERT_TRUE(farm.run([&] { return !small->job(with_names)->error.empty(); }));
+  EXPECT_THAT(small->job(with_names)->error, HasSubstr("not enough memory"));
+
+  blobs->empty = false;
+  clock->advance(limits::kWriteAgain);
+  small->tick();
+
+  EXPECT_TRUE(test::eventually([&] { return small->job(with_names)->state == JobState::done; }));
 }
 
 TEST_F(Unwritten, ImageOfACancelledJobIsWrittenOnceThereIsAPlaceForIt) {
