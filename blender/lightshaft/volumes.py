@@ -10,27 +10,42 @@ from .nodes import Place, constant, output_node
 ISOTROPIC = ("isotropic", {})
 
 
+def within(value, least, most):
+    return min(max(value, least), most)
+
+
+def anisotropy(g):
+    """Blender's slider goes to 1 and -1, where a phase function is none; Cycles stops a thousandth before."""
+    return within(g, -0.999, 0.999)
+
+
 def henyey_greenstein(g):
-    return ("hg", {"g": g}) if g else ISOTROPIC
+    return ("hg", {"g": anisotropy(g)}) if g else ISOTROPIC
+
+
+def nesting(phase):
+    """How deep a phase function is nested: 1 if it is no blend."""
+    return 1 + max((nesting(part) for part in phase[1].get("parts", ())), default=0)
 
 
 # By the name of Blender's phase function: the inputs that it has, and its plugin with the parameters. What is
 # outside the ranges of the plugins scatters as the nearest value within.
+MOST_NESTED = 8  # phase functions within each other that the scene language takes
 PHASES = {
     "HENYEY_GREENSTEIN": (("Anisotropy",), lambda v: henyey_greenstein(v["Anisotropy"])),
     "FOURNIER_FORAND": (
         ("Backscatter", "IOR"),
         lambda v: (
             "fournier_forand",
-            {"backscatter": min(max(v["Backscatter"], 1e-5), 0.5), "ior": max(v["IOR"], 1.0001)},
+            {"backscatter": within(v["Backscatter"], 1e-5, 0.5), "ior": within(v["IOR"], 1.0001, 5.0)},
         ),
     ),
     "DRAINE": (
         ("Anisotropy", "Alpha"),
-        lambda v: ("draine", {"g": v["Anisotropy"], "alpha": max(v["Alpha"], 0.0)}),
+        lambda v: ("draine", {"g": anisotropy(v["Anisotropy"]), "alpha": within(v["Alpha"], 0.0, 1000.0)}),
     ),
     "RAYLEIGH": ((), lambda v: ("rayleigh", {})),
-    "MIE": (("Diameter",), lambda v: ("droplets", {"diameter": min(max(v["Diameter"], 1e-3), 50.0)})),
+    "MIE": (("Diameter",), lambda v: ("droplets", {"diameter": within(v["Diameter"], 1e-3, 50.0)})),
 }
 
 
@@ -156,6 +171,12 @@ class Volumes:
         if phase is None or one.grid != two.grid:
             self.problems.error(
                 f"{owner}, node '{place.title}': the sum of two volumes of different grids, or of different phase functions and colours. Give both the same, or put them into two objects"
+            )
+            return None
+        if nesting(phase) > MOST_NESTED:
+            self.problems.error(
+                f"{owner}, node '{place.title}': volumes of more than {MOST_NESTED} phase functions, one added to the other. "
+                "Add them in pairs, or give some the same phase function"
             )
             return None
         return Coefficients(

@@ -160,9 +160,10 @@ std::optional<PhaseIndex> Reader::read_phase(const Element& e) {
     if constexpr (std::is_same_v<Kind, TabulatedPhase>)
       if (!report_.has_errors()) places.check(p, phase, report_);
     read = added<PhaseIndex>(std::move(phase));
-    if (!report_.has_errors() && nested_too_deep(scene_.phases))
-      read =
-          report_.refuse(e.at, fmt::format("phase functions are nested more than {} deep", kMaxPhaseNesting));
+    if constexpr (std::is_same_v<Kind, BlendPhase>)
+      if (!report_.has_errors() && nesting_of(scene_.phases, *read) > kMaxPhaseNesting)
+        read = report_.refuse(
+            e.at, fmt::format("phase functions are nested more than {} deep", kMaxPhaseNesting));
   };
   if (!with_kind_named<Phase>(e.get("type"), read_as)) unknown_plugin(e, report_);
   return read;
@@ -177,7 +178,8 @@ bool Reader::read_parts(Params& p, BlendPhase& blend) {
     return false;
   }
   const auto name = [](const Params::Nested& n) { return n.use->get("name"); };
-  if (!name(parts[0]).empty() && name(parts[1]) < name(parts[0])) std::swap(parts[0], parts[1]);
+  const bool named = !name(parts[0]).empty() && !name(parts[1]).empty();
+  if (named && name(parts[1]) < name(parts[0])) std::swap(parts[0], parts[1]);
   const auto first = phase(*parts[0].object, *parts[0].use), second = phase(*parts[1].object, *parts[1].use);
   if (!first || !second) return false;
   blend.first = *first;

@@ -6,7 +6,7 @@ from attack_kit import BYSTANDER
 
 PAGE = """# Attacks
 
-`/usr/bin/python3 tests/attacks/run.py --write docs/measurements/attacks.md` wrote this page at commit {commit}, in {minutes:.0f} minutes on {cores} cores, while other work ran on the machine (load average {before:.1f} at the start, {after:.1f} at the end): times are upper bounds.
+`/usr/bin/python3 tests/attacks/attacks.py --write docs/measurements/attacks.md` wrote this page at commit {commit}, in {minutes:.0f} minutes on {cores} cores, while other work ran on the machine (load average {before:.1f} at the start, {after:.1f} at the end): times are upper bounds.
 
 Every attack is against a farm of its own on this machine: real coordinators and workers, real sockets. A try holds if the answer is what it should be (refused with a status below 500, or read as the one thing it says), if it comes within the limits of [SECURITY.md](../../SECURITY.md), and if others are served meanwhile and afterwards. "Another user waits no longer than a second" is judged as {bystander:.1f} s in this run, for that load. {tries} tries, {held} held.
 

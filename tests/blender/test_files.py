@@ -6,7 +6,7 @@ import zlib
 
 import numpy as np
 import pytest
-from lightshaft import document, exr, lights, meshes, textures, world
+from lightshaft import document, exr, lights, meshes, textures, volumes, world
 
 
 def test_an_image_is_read_as_it_was_written():
@@ -87,3 +87,20 @@ def test_the_middle_of_the_worlds_image_is_plus_x():
 
 def test_turning_upside_down_twice_is_nothing():
     assert np.array_equal(textures.UPSIDE_DOWN @ textures.UPSIDE_DOWN, np.eye(4))
+
+
+def test_phase_functions_at_the_ends_of_blenders_sliders_are_ones_that_the_scene_takes():
+    values = {"Anisotropy": 1.0, "Alpha": 1e4, "Backscatter": 0.0, "IOR": 9.0, "Diameter": 0.0}
+    made = {kind: make(values) for kind, (_, make) in volumes.PHASES.items()}
+
+    assert made["HENYEY_GREENSTEIN"] == ("hg", {"g": 0.999})
+    assert made["DRAINE"] == ("draine", {"g": 0.999, "alpha": 1000.0})
+    assert made["FOURNIER_FORAND"] == ("fournier_forand", {"backscatter": 1e-5, "ior": 5.0})
+    assert made["MIE"] == ("droplets", {"diameter": 1e-3})
+
+
+def test_the_nesting_of_blends_is_counted():
+    phase = volumes.ISOTROPIC
+    for depth in range(1, 10):
+        assert volumes.nesting(phase) == depth
+        phase = ("blendphase", {"weight": 0.5, "parts": (phase, volumes.ISOTROPIC)})

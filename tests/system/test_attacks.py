@@ -10,14 +10,14 @@ from local_farm import ROOT
 sys.path.insert(0, str(ROOT / "tests" / "attacks"))
 pytest.importorskip("grpc", reason="python3-grpcio is not installed")
 import attack_page  # noqa: E402
-import run  # noqa: E402
+import attacks  # noqa: E402
 from attack_kit import GROUPS, Record, ask, exchange, sane  # noqa: E402
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, (_, quick, _) in GROUPS.items() if quick])
 def test_holds(name):
-    ((_, record, seconds),) = run.run([name], quick=True)
+    ((_, record, seconds),) = attacks.run([name], quick=True)
 
     assert record.tries or record.faults
     assert not record.failures(), attack_page.told(name, record, seconds)

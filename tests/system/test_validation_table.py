@@ -71,10 +71,10 @@ def inspected(tmp_path, code, sensor="", phase="isotropic", values=""):
     return lightshaft("inspect", scene, code=code)
 
 
-def test_tabulated_phase_functions_are_refused_by_name(tmp_path):
-    values = '<string name="values" value="1, 2, 1e6"/>'
-    said = inspected(tmp_path, 2, phase="tabphase", values=values).stderr
-    assert "scene.xml:3:" in said and 'the phase "tabphase" is not supported: only "isotropic" and "hg" are supported' in said
+def test_a_steep_table_of_a_phase_function_is_read_and_one_with_a_negative_value_refused(tmp_path):
+    inspected(tmp_path, 0, phase="tabphase", values='<string name="values" value="1, 2, 1e6"/>')
+    said = inspected(tmp_path, 2, phase="tabphase", values='<string name="values" value="1, -2, 1e6"/>').stderr
+    assert "scene.xml:3:" in said and "'values'" in said
 
 
 def test_shutters_that_mean_nothing_are_warned_of(tmp_path):

@@ -23,11 +23,17 @@ std::vector<NamedList> lists_of(const TabulatedPhase& t) {
   return {{"red", &t.red}, {"green", &t.green}, {"blue", &t.blue}};
 }
 
+double cosine_of_degrees(double angle) { return std::cos(angle * std::numbers::pi / 180); }
+
 TableProblem problem_of_places(std::string_view name, const std::vector<double>& at, double first,
-                               double last) {
-  for (std::size_t i = 1; i < at.size(); ++i)
+                               double last, double (*cosine_of)(double)) {
+  for (std::size_t i = 1; i < at.size(); ++i) {
     if (!(at[i] > at[i - 1]))
       return {name, fmt::format("must ascend: number {} is {} after {}", i + 1, at[i], at[i - 1])};
+    if (1 - cosine_of(at[i]) == 1 - cosine_of(at[i - 1]))
+      return {name, fmt::format("has numbers too close to be told apart: {} and {} are {} and {}", i, i + 1,
+                                at[i - 1], at[i])};
+  }
   if (at.front() != first || at.back() != last)
     return {name, fmt::format("leaves a hole: it goes from {} to {}, not from {} to {}", at.front(),
                               at.back(), first, last)};
@@ -61,10 +67,10 @@ TableProblem table_problem(const TabulatedPhase& t) {
       most = std::max(most, x);
     }
     if (!(most > 0)) return {name, "is zero everywhere: it scatters no light; for that, give an albedo of 0"};
-    if (!(most < 1e30)) return {name, fmt::format("reaches {}; at most 1e30 is allowed", most)};
+    if (!(most <= 1e30)) return {name, fmt::format("reaches {}; at most 1e30 is allowed", most)};
   }
-  if (!t.nodes.empty()) return problem_of_places("nodes", t.nodes, -1, 1);
-  if (!t.angles.empty()) return problem_of_places("angles", t.angles, 0, 180);
+  if (!t.nodes.empty()) return problem_of_places("nodes", t.nodes, -1, 1, [](double c) { return c; });
+  if (!t.angles.empty()) return problem_of_places("angles", t.angles, 0, 180, cosine_of_degrees);
   return {};
 }
 
@@ -77,7 +83,7 @@ PhaseValues values_of(const TabulatedPhase& t) {
   } else if (!t.angles.empty()) {
     // Angles ascend from straight on, cosines from straight back
     for (auto& list : out.values) std::ranges::reverse(list);
-    for (std::size_t i = n; i-- > 0;) out.cosines.push_back(std::cos(t.angles[i] * std::numbers::pi / 180));
+    for (std::size_t i = n; i-- > 0;) out.cosines.push_back(cosine_of_degrees(t.angles[i]));
   } else {
     for (std::size_t i = 0; i < n; ++i)
       out.cosines.push_back(-1 + 2 * static_cast<double>(i) / static_cast<double>(n - 1));
@@ -85,6 +91,11 @@ PhaseValues values_of(const TabulatedPhase& t) {
   out.cosines.front() = -1;
   out.cosines.back() = 1;
   return out;
+}
+
+int nesting_of(std::span<const Phase> phases, PhaseIndex i) {
+  const auto* b = std::get_if<BlendPhase>(&phases[i.value]);
+  return b ? 1 + std::max(nesting_of(phases, b->first), nesting_of(phases, b->second)) : 1;
 }
 
 bool nested_too_deep(std::span<const Phase> phases) {

@@ -198,6 +198,9 @@ TabulatedLobe::TabulatedLobe(std::span<const double> cosines, std::span<const st
   for (const std::vector<double>& given : values) {
     Colour& c = colours_.emplace_back();
     c.value.assign(given.rbegin(), given.rend());
+    // So that no sum of small values is zero
+    const double most = std::ranges::max(c.value);
+    for (double& v : c.value) v /= most;
     c.below.resize(n);
     for (std::size_t i = 1; i < n; ++i)
       c.below[i] = c.below[i - 1] + .5 * (x_[i] - x_[i - 1]) * (c.value[i - 1] + c.value[i]);
@@ -308,8 +311,9 @@ PhaseFunctions::Sample PhaseFunctions::sample(std::uint32_t which, const V3& p, 
   return s;
 }
 
-double PhaseFunctions::mean_cosine(std::uint32_t which) const {
-  return std::visit(overloaded{[&](const BlendedLobes& b) {
+double PhaseFunctions::mean_cosine(std::uint32_t which) {
+  if (mean_cosines_[which]) return *mean_cosines_[which];
+  mean_cosines_[which] = std::visit(overloaded{[&](const BlendedLobes& b) {
                                  const double second = b.grid ? .5 : double{b.weight};
                                  return (1 - second) * mean_cosine(b.first) + second * mean_cosine(b.second);
                                },
@@ -321,6 +325,7 @@ double PhaseFunctions::mean_cosine(std::uint32_t which) const {
                                  return sum / kQuantiles;
                                }},
                     kinds_[which]);
+  return *mean_cosines_[which];
 }
 
 }  // namespace ls::render

@@ -10,6 +10,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <variant>
 #include <vector>
@@ -141,12 +142,16 @@ class PhaseFunctions {
     Value of;
   };
 
-  void add(Kind kind) { kinds_.push_back(std::move(kind)); }
+  void add(Kind kind) {
+    kinds_.push_back(std::move(kind));
+    mean_cosines_.emplace_back();
+  }
   // p: the place of scattering. w, w1: the directions of travel before and after.
   Value value(std::uint32_t which, const V3& p, const V3& w, const V3& w1) const;
   Sample sample(std::uint32_t which, const V3& p, const V3& w, V2 u) const;
-  // The mean cosine of the scattering angle, to about 1e-3; where a grid blends, that of equal parts.
-  double mean_cosine(std::uint32_t which) const;
+  // The mean cosine of the scattering angle, to about 1e-3; where a grid blends, that of equal parts. It is
+  // computed once.
+  double mean_cosine(std::uint32_t which);
 
  private:
   void add_value(std::uint32_t which, const V3& p, const ScatteringAngle& angle, float share,
@@ -154,6 +159,7 @@ class PhaseFunctions {
   ScatteringAngle sample_angle(std::uint32_t which, const V3& p, double u) const;
 
   std::vector<Kind> kinds_;
+  std::vector<std::optional<double>> mean_cosines_;
 };
 
 }  // namespace ls::render

@@ -284,9 +284,9 @@ Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, boo
   drop_channels(t.f32, image.channels, first, keep);
   if (image.to_srgb && t.channels == 3 && content == Content::colours)
     if (auto ok = convert(name, t, *image.to_srgb); !ok) return tl::unexpected(ok.error());
-  if (auto ok = check_texels(name, t, content == Content::heights); !ok) return tl::unexpected(ok.error());
-  if (decode)
+  if (decode)  // before the check: the curve makes large numbers infinite
     for (float& v : t.f32) v = static_cast<float>(srgb_to_linear(v));
+  if (auto ok = check_texels(name, t, content == Content::heights); !ok) return tl::unexpected(ok.error());
   t.mean = mean_of(t);
   return t;
 }

@@ -11,6 +11,7 @@
 namespace ls {
 namespace {
 
+using testing::AnyOf;
 using testing::HasSubstr;
 
 std::string fog(const std::string& phase) {
@@ -76,6 +77,26 @@ TEST(Phases, ReadBlendsInTheirOrderOrByTheirNames) {
   const std::pair<Phase, Phase> wanted(RayleighPhase{}, HgPhase{.8});
   EXPECT_EQ(parts("<phase type=\"rayleigh\"/><phase type=\"hg\"/>"), wanted);
   EXPECT_EQ(parts("<phase name=\"b\" type=\"hg\"/><phase name=\"a\" type=\"rayleigh\"/>"), wanted);
+}
+
+// Their distance in 1 - cos is 0 in double, so that no line goes through the values.
+TEST(Phases, RefuseAnglesThatCannotBeToldApart) {
+  for (const std::string& places :
+       {list("angles", "0 179.9999999999 180"), list("angles", "0 1e-9 180"),
+        list("nodes", "-1 -0.9999999999999999 1"), list("nodes", "-1 0.99999999999999999 1")})
+    EXPECT_THAT(error(table(list("values", "1 1 1") + places)), AnyOf(HasSubstr("too close"), HasSubstr("ascend")))
+        << places;
+  EXPECT_EQ(error(table(list("values", "1 1 1") + list("angles", "0 1e-5 180"))), "");
+  EXPECT_EQ(error(table(list("values", "1e30 1e-320"))), "") << "any scale";
+}
+
+TEST(Phases, KeepTheOrderOfBlendsOfWhichOnePartHasAName) {
+  for (const char* first : {"name=\"zz\"", ""}) {
+    const std::string second = *first ? "" : "name=\"aa\"";
+    const Scene s = must_read(fog(fmt::format(
+        "<phase type=\"blendphase\"><phase type=\"rayleigh\" {}/><phase type=\"hg\" {}/></phase>", first, second)));
+    EXPECT_EQ(s.phases.at(std::get<BlendPhase>(phase_of(s)).first.value), Phase(RayleighPhase{}));
+  }
 }
 
 TEST(Phases, RefuseWrongTablesWithTheirPlace) {

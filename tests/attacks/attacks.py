@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Attacks a farm of this machine in every way that a stranger, a user, a worker or a scene could, and says what held.
 
-  tests/attacks/run.py                     all groups; exit code 1 if something did not hold
-  tests/attacks/run.py --group TLS         one, or several; --list names them
-  tests/attacks/run.py --write docs/measurements/attacks.md
+  tests/attacks/attacks.py                     all groups; exit code 1 if something did not hold
+  tests/attacks/attacks.py --group TLS         one, or several; --list names them
+  tests/attacks/attacks.py --write docs/measurements/attacks.md
 """
 
 import argparse
