@@ -22,7 +22,6 @@
 #include <memory>
 #include <new>
 #include <optional>
-#include <string>
 #include <utility>
 #include <variant>
 
@@ -191,25 +190,30 @@ ls::coordinator::JoinGuard guard_of(const ls::http::Limits& limits) {
           }};
 }
 
-// Ends the process with a sentence, where an exception reaches no handler: nearly always because memory or
-// threads have run out where nothing can be refused. What was acknowledged is on disk.
+// Ends the process with a sentence, where an exception reaches no handler: memory or threads have run out
+// where nothing can be refused, or it is a bug. It allocates nothing.
 [[noreturn]] void end_with_a_sentence() {
-  std::string what = "an unknown exception";
+  const auto end_for_want = [](const char* what) {
+    std::fprintf(
+        stderr,
+        "lightshaft-coordinator: error: %s; if memory or threads are limited here (RLIMIT_DATA, "
+        "RLIMIT_NPROC, the control group), raise the limit. Start it again: what it has acknowledged is "
+        "stored\n",
+        what);
+    std::_Exit(kFailed);
+  };
   try {
     if (const auto e = std::current_exception()) std::rethrow_exception(e);
   } catch (const std::bad_alloc&) {
-    what = "there is not enough memory";
+    end_for_want("there is not enough memory");
   } catch (const std::exception& e) {
-    what = e.what();
+    // The text of EAGAIN and ENOMEM, by which the C++ library and Boost say that a thread cannot be started
+    if (std::strstr(e.what(), "temporarily unavailable") || std::strstr(e.what(), "Cannot allocate"))
+      end_for_want(e.what());
+    std::fprintf(stderr, "lightshaft-coordinator: error: a bug: %s\n", e.what());
   } catch (...) {
   }
-  std::fprintf(
-      stderr,
-      "lightshaft-coordinator: error: %s; if memory or threads are limited here (RLIMIT_DATA, "
-      "RLIMIT_NPROC, the control group), raise the limit. Start it again: what it has acknowledged is "
-      "stored\n",
-      what.c_str());
-  std::_Exit(kFailed);
+  std::abort();
 }
 
 sigset_t block_signals() {

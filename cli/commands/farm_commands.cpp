@@ -146,12 +146,20 @@ int after(FarmApi& api, const FarmFlags& flags) { return change(api, flags, {{"a
 
 int log(FarmApi& api, const FarmFlags& flags) { return print_lines(api.text(job_path(flags.id) + "/log")); }
 
+// True for a job of which all is rendered, but whose final image could not be written: it waits for room on
+// the disk, and can be removed to make some.
+bool is_unwritten(const json& job) {
+  const auto done = number_field(job, "units_done"), total = number_field(job, "units_total");
+  return text_field(job, "state") == "running" && !text_field(job, "error").empty() && done && total &&
+         *total > 0 && *done >= *total;
+}
+
 // Removes a job that has ended. HTTP's DELETE of a job that has not ended cancels it: who asks to remove a
 // job may not know that it still renders.
 int remove(FarmApi& api, const FarmFlags& flags) {
   const auto job = api.get(job_path(flags.id));
   if (!job) return print_rejected(job.error());
-  if (!is_over(*job)) {
+  if (!is_over(*job) && !is_unwritten(*job)) {
     complain(fmt::format("job {} is {}: end it first, with lightshaft cancel {}", flags.id,
                          plain_text(text_field(*job, "state")), shell_word(flags.id)));
     return kFailed;

@@ -207,6 +207,7 @@ void ImageWriter::note_check(const EntryPtr& entry, std::uint64_t curve, double 
 
 void ImageWriter::finish(Core&, const EntryPtr& entry) {
   const std::uint64_t number = entry->finishing = ++last_final_;
+  entry->denoised = nullptr;
   const auto write = [this, entry, number] { write_final(entry, number); };
   const bool denoised = entry->stored.spec.denoise && files_.on_disk();
   if (!entry->reference_tiles && !denoised) return writes_.push(write);
@@ -245,14 +246,14 @@ void ImageWriter::write_final(const EntryPtr& entry, std::uint64_t number) {
   core.unlock();
 
   const TimePoint begin = clock_.now();
-  const auto written = within_memory([&] {
-    return files_.on_disk() ? write_files(entry, folded, facts, std::move(denoised)) : Result<void>();
-  });
+  const auto written = within_memory(
+      [&] { return files_.on_disk() ? write_files(entry, folded, facts, denoised) : Result<void>(); });
 
   core.lock();
   if (entry->trace) entry->trace->step("write image", begin, clock_.now(), {}, !written);
   if (entry->finishing != number) return;  // the job was extended or removed meanwhile
   if (!written) {
+    entry->denoised = std::move(denoised);  // denoising takes longer than writing
     entry->trouble = fmt::format(
         "the final image cannot be written: {}; this is tried again every {:.0f} s, and at once when the job "
         "is resumed",
@@ -292,7 +293,7 @@ void ImageWriter::write_final(const EntryPtr& entry, std::uint64_t number) {
 }
 
 Result<void> ImageWriter::write_files(const EntryPtr& entry, const Folded& folded, ReportFacts& facts,
-                                      std::shared_ptr<const Denoised> denoised) {
+                                      std::shared_ptr<const Denoised>& denoised) {
   const auto where = files_.folder(facts.job.id);
   denoised = denoising_.of_job(folded.film, facts, std::move(denoised));
   if (facts.denoised && facts.denoised->by.empty())

@@ -61,8 +61,9 @@ class ImageWriter {
   void denoise(const EntryPtr& entry, std::uint64_t number);
   void note_check(const EntryPtr& entry, std::uint64_t curve, double spp, const Denoised& made);
   void write_final(const EntryPtr& entry, std::uint64_t number);
+  // `denoised` becomes the denoised image, if it is null and the job wants one.
   Result<void> write_files(const EntryPtr& entry, const Folded& folded, ReportFacts& facts,
-                           std::shared_ptr<const Denoised> denoised);
+                           std::shared_ptr<const Denoised>& denoised);
   void write_retired(const EntryPtr& entry);
 
   Guarded<Core>& core_;

@@ -162,8 +162,8 @@ std::optional<PhaseIndex> Reader::read_phase(const Element& e) {
     read = added<PhaseIndex>(std::move(phase));
     if constexpr (std::is_same_v<Kind, BlendPhase>)
       if (!report_.has_errors() && nesting_of(scene_.phases, *read) > kMaxPhaseNesting)
-        read = report_.refuse(
-            e.at, fmt::format("phase functions are nested more than {} deep", kMaxPhaseNesting));
+        read = report_.refuse(e.at,
+                              fmt::format("phase functions are nested more than {} deep", kMaxPhaseNesting));
   };
   if (!with_kind_named<Phase>(e.get("type"), read_as)) unknown_plugin(e, report_);
   return read;

@@ -199,9 +199,8 @@ void Params::convert(const Field& f, const Element& e, std::string& value) {
   auto text = string_value(f.name, e);
   if (!text) return;
   if (const std::string wrong = f.wrong ? f.wrong(*text) : ""; !wrong.empty())
-    return reader_.report().error(e.at, wrong);
-  if (f.wrong == wrong_link_list || f.wrong == wrong_link_sets)
-    reader_.note_links(e, *text, f.wrong == wrong_link_list);
+    return reader_.report().error(value_place(e, "value"), wrong);
+  if (f.wrong == wrong_link_list || f.wrong == wrong_link_sets) reader_.note_links(e, f.name, *text);
   value = std::move(*text);
 }
 

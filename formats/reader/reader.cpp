@@ -51,9 +51,9 @@ Scene Reader::read() {
   return std::move(scene_);
 }
 
-void Reader::note_links(const Element& e, const std::string& names, bool of_light) {
-  if (of_light)
-    links_.push_back({&e, link_list(names)});
+void Reader::note_links(const Element& e, std::string_view parameter, const std::string& names) {
+  if (parameter != "link_sets")
+    links_.push_back({&e, link_list(names), parameter == "blockers"});
   else
     for (std::string& name : link_sets(names)) link_sets_.insert(std::move(name));
 }
@@ -61,9 +61,10 @@ void Reader::note_links(const Element& e, const std::string& names, bool of_ligh
 // Checks that something is in each set to which a light is linked, since the name may be misspelt, and that
 // there are not too many lists.
 void Reader::check_links() {
+  if (report_.has_errors()) return;  // the sets of what could not be read are missing
   const std::vector<std::string> known(link_sets_.begin(), link_sets_.end());
   std::vector<LinkList> lists;
-  for (const auto& [element, list] : links_) {
+  for (const auto& [element, list, blockers] : links_) {
     for (const auto* names : {&list.with, &list.without})
       for (const std::string& name : *names)
         if (name != kNoLinkSet && !link_sets_.contains(name))
@@ -80,6 +81,35 @@ void Reader::check_links() {
                                        "they share",
                                        kMostLinkLists));
   }
+  warn_of_idle_links();
+}
+
+// Warns of sets that cannot do what a light's list says: media are no blockers, and boundaries of media (bsdf
+// "null") neither receive light nor stop it.
+void Reader::warn_of_idle_links() {
+  std::set<std::string> surfaces, receivers;
+  const auto add = [](const std::string& names, std::set<std::string>& to) {
+    if (!names.empty())
+      for (std::string& name : link_sets(names)) to.insert(std::move(name));
+  };
+  for (const Shape& s : scene_.shapes)
+    if (!std::holds_alternative<NullBsdf>(scene_.bsdfs[s.bsdf.value])) add(s.link_sets, surfaces);
+  receivers = surfaces;
+  for (const Medium& m : scene_.media) std::visit([&](const auto& one) { add(one.link_sets, receivers); }, m);
+  for (const auto& [element, list, blockers] : links_)
+    for (const auto* names : {&list.with, &list.without})
+      for (const std::string& name : *names) {
+        if (name == kNoLinkSet || (blockers ? surfaces : receivers).contains(name)) continue;
+        report_.warning(value_place(*element, "value"),
+                        blockers
+                            ? fmt::format("no surface is in the link set \"{}\", so that it has no effect "
+                                          "here: media attenuate all light, whatever its blockers are",
+                                          name)
+                            : fmt::format("no surface and no medium is in the link set \"{}\", so that it "
+                                          "has no effect here: give the medium within the boundary the "
+                                          "parameter 'link_sets'",
+                                          name));
+      }
 }
 
 // Warns if the camera is inside a shape with an interior medium but has no `medium` itself: as in Mitsuba,

@@ -31,7 +31,7 @@ class Reader {
 
   Report& report() { return report_; }
   // Notes the link sets that an object is in or, if `of_light`, to which a light is linked.
-  void note_links(const Element& e, const std::string& names, bool of_light);
+  void note_links(const Element& e, std::string_view parameter, const std::string& names);
   // Returns the object that `child` is or refers to. nullptr: there is none, which has been reported.
   const Element* resolve(const Element& child);
 
@@ -86,6 +86,7 @@ class Reader {
   void read_child(const Element& child);
   void read_idle_parts();
   void check_links();
+  void warn_of_idle_links();
 
   std::optional<TextureIndex> read_texture(const Element& e);
   template <class T>
@@ -208,6 +209,7 @@ class Reader {
   struct LinkedTo {
     const Element* element;
     LinkList list;
+    bool blockers;  // false: receivers
   };
   std::vector<LinkedTo> links_;  // what the lights read so far are linked to
   std::map<std::string, AssetIndex> assets_by_name_;

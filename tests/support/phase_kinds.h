@@ -84,6 +84,7 @@ inline std::vector<NamedPhase> phase_kinds() {
   blend.which = 4;
   blend.one_lobe = false;
   blend.steepness = 100;
+  for (NamedPhase& kind : kinds) kind.all.find_mean_cosines();
   return kinds;
 }
 

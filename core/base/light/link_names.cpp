@@ -10,14 +10,16 @@
 namespace ls {
 namespace {
 
+constexpr std::string_view kBlanks = " \t\r\n";
+
 std::vector<std::string_view> split(std::string_view text) {
   std::vector<std::string_view> names;
-  if (text.find_first_not_of(' ') == std::string_view::npos) return names;
+  if (text.find_first_not_of(kBlanks) == std::string_view::npos) return names;
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
     std::string_view name = text.substr(begin, end - begin);
-    name.remove_prefix(std::min(name.find_first_not_of(' '), name.size()));
-    name = name.substr(0, name.find_last_not_of(' ') + 1);
+    name.remove_prefix(std::min(name.find_first_not_of(kBlanks), name.size()));
+    name = name.substr(0, name.find_last_not_of(kBlanks) + 1);
     names.push_back(name);
     begin = end + 1;
   }

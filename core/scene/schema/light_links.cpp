@@ -51,10 +51,12 @@ LinkIndex LinkLists::index(const std::string& text) const {
 
 LinkMask LinkLists::having(const std::string& link_sets) const {
   if (lists_.empty()) return 0;
+  if (const auto known = known_.find(link_sets); known != known_.end()) return known->second;
   const std::vector<std::string> sets = sets_of(link_sets);
   LinkMask mask = 0;
   for (std::size_t i = 0; i < lists_.size(); ++i)
     if (lists_[i].has(sets)) mask |= LinkMask{1} << i;
+  known_.emplace(link_sets, mask);
   return mask;
 }
 

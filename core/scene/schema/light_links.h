@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "core/base/light/link_names.h"
@@ -45,6 +46,7 @@ class LinkLists {
   std::vector<LinkList> lists_;
   LinkMask blockers_ = 0;
   bool too_many_ = false;
+  mutable std::unordered_map<std::string, LinkMask> known_;  // what having() has returned: texts repeat
 };
 
 // Returns the number of lights that are linked to receivers or blockers.

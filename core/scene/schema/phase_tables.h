@@ -25,8 +25,8 @@ struct PhaseValues {
 };
 PhaseValues values_of(const TabulatedPhase& table);
 
-// Returns how deep a phase function is nested; 1: it contains no others. None of those that it contains may be
-// nested more than kMaxPhaseNesting deep, or contain itself.
+// Returns how deep a phase function is nested; 1: it contains no others. None of those that it contains may
+// be nested more than kMaxPhaseNesting deep, or contain itself.
 int nesting_of(std::span<const Phase> phases, PhaseIndex i);
 // Returns whether phase functions contain each other in a circle, or more than kMaxPhaseNesting deep. All
 // indices must be valid.

@@ -216,6 +216,11 @@ TEST(WorkerEntry, KeepsItsLatestEventsEachNoLongerThanOneLine) {
   ASSERT_EQ(worker.log.size(), limits::kWorkerLogLines);
   EXPECT_THAT(worker.log.front().text, HasSubstr(fmt::format("event {} forged", limits::kWorkerLogLines)));
   for (const LogLine& line : worker.log) EXPECT_LE(line.text.size(), limits::kWorkerLogBytes);
+  for (std::size_t letters = limits::kWorkerLogBytes - 4; letters <= limits::kWorkerLogBytes; ++letters) {
+    worker.note(std::string(letters, 'x') + "\u00e9\u00e9\u20ac");
+    const std::string& kept = worker.log.back().text;
+    EXPECT_TRUE(kept.ends_with('x') || kept.ends_with("\u00e9") || kept.ends_with("\u20ac")) << kept;
+  }
   const std::string text = log_text(worker.log);
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), limits::kWorkerLogLines);
 }

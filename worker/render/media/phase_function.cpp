@@ -311,21 +311,30 @@ PhaseFunctions::Sample PhaseFunctions::sample(std::uint32_t which, const V3& p, 
   return s;
 }
 
-double PhaseFunctions::mean_cosine(std::uint32_t which) {
+void PhaseFunctions::find_mean_cosines() {
+  mean_cosines_.assign(kinds_.size(), std::nullopt);
+  for (std::uint32_t i = 0; i < kinds_.size(); ++i) find_mean_cosine(i);
+}
+
+// Each is computed once, however many blends contain it.
+double PhaseFunctions::find_mean_cosine(std::uint32_t which) {
   if (mean_cosines_[which]) return *mean_cosines_[which];
-  mean_cosines_[which] = std::visit(overloaded{[&](const BlendedLobes& b) {
-                                 const double second = b.grid ? .5 : double{b.weight};
-                                 return (1 - second) * mean_cosine(b.first) + second * mean_cosine(b.second);
-                               },
-                               [](const auto& one) {
-                                 constexpr int kQuantiles = 1024;
-                                 double sum = 0;
-                                 for (int i = 0; i < kQuantiles; ++i)
-                                   sum += one.sample((i + .5) / kQuantiles).cosine();
-                                 return sum / kQuantiles;
-                               }},
-                    kinds_[which]);
-  return *mean_cosines_[which];
+  const double found = std::visit(overloaded{[&](const BlendedLobes& b) {
+                                               const double second = b.grid ? .5 : double{b.weight};
+                                               return (1 - second) * find_mean_cosine(b.first) +
+                                                      second * find_mean_cosine(b.second);
+                                             },
+                                             [](const HenyeyGreensteinLobe& one) { return one.g; },
+                                             [](const auto& one) {
+                                               constexpr int kQuantiles = 1024;
+                                               double sum = 0;
+                                               for (int i = 0; i < kQuantiles; ++i)
+                                                 sum += one.sample((i + .5) / kQuantiles).cosine();
+                                               return sum / kQuantiles;
+                                             }},
+                                  kinds_[which]);
+  mean_cosines_[which] = found;
+  return found;
 }
 
 }  // namespace ls::render

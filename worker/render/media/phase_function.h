@@ -142,18 +142,17 @@ class PhaseFunctions {
     Value of;
   };
 
-  void add(Kind kind) {
-    kinds_.push_back(std::move(kind));
-    mean_cosines_.emplace_back();
-  }
+  void add(Kind kind) { kinds_.push_back(std::move(kind)); }
+  // To be called once all are added.
+  void find_mean_cosines();
   // p: the place of scattering. w, w1: the directions of travel before and after.
   Value value(std::uint32_t which, const V3& p, const V3& w, const V3& w1) const;
   Sample sample(std::uint32_t which, const V3& p, const V3& w, V2 u) const;
-  // The mean cosine of the scattering angle, to about 1e-3; where a grid blends, that of equal parts. It is
-  // computed once.
-  double mean_cosine(std::uint32_t which);
+  // The mean cosine of the scattering angle, to about 1e-3; where a grid blends, that of equal parts.
+  double mean_cosine(std::uint32_t which) const { return *mean_cosines_[which]; }
 
  private:
+  double find_mean_cosine(std::uint32_t which);
   void add_value(std::uint32_t which, const V3& p, const ScatteringAngle& angle, float share,
                  Value& sum) const;
   ScatteringAngle sample_angle(std::uint32_t which, const V3& p, double u) const;

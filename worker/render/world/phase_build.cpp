@@ -76,10 +76,11 @@ Result<void> build_phases(const Scene& scene, const AssetLoader& files, World& w
     if (!made) return tl::unexpected(made.error());
     w.phases.add(std::move(*made));
   }
+  w.phases.find_mean_cosines();
   return {};
 }
 
-void set_phase(const Scene& scene, PhaseIndex i, PhaseFunctions& all, Medium& m) {
+void set_phase(const Scene& scene, PhaseIndex i, const PhaseFunctions& all, Medium& m) {
   const Phase& phase = scene.phases.at(i.value);
   if (std::holds_alternative<IsotropicPhase>(phase)) return;
   if (const auto* hg = std::get_if<HgPhase>(&phase)) {

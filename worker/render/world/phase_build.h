@@ -14,6 +14,6 @@ class World;
 Result<void> build_phases(const Scene& scene, const AssetLoader& files, World& w);
 
 // Gives the medium phase function number i of the scene. `all` are the world's.
-void set_phase(const Scene& scene, PhaseIndex i, PhaseFunctions& all, Medium& m);
+void set_phase(const Scene& scene, PhaseIndex i, const PhaseFunctions& all, Medium& m);
 
 }  // namespace ls::render

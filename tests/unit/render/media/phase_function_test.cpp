@@ -50,7 +50,7 @@ TEST(PhaseFunctions, HaveTheirMeanCosines) {
   // Figures of an independent integration of the paper's formulas, to three digits
   for (const auto& [diameter, g] : {std::pair(5., .843), {10., .864}, {20., .879}, {50., .891}})
     EXPECT_NEAR(mean_cosine(DropletLobe::of_diameter(diameter)), g, 6e-4) << diameter;
-  for (test::NamedPhase kind : test::phase_kinds()) {
+  for (const test::NamedPhase& kind : test::phase_kinds()) {
     const double exact = integral([&](const ScatteringAngle& a) { return kind.pdf(a) * a.cosine(); });
     EXPECT_NEAR(kind.all.mean_cosine(kind.which), exact, 1e-3) << kind.name;
   }
@@ -208,11 +208,11 @@ TEST(TabulatedPhase, IsLinearInTheCosineAndNeverSampledWhereItIsZero) {
 // A peak 1e6 times as high as the rest, over a million angles
 TEST(TabulatedPhase, HasTheSameShapeAtAnyScale) {
   const std::vector<double> cosines{-1, .2, 1}, values{1, 4, 2};
-  const TabulatedLobe plain(cosines, std::vector{values});
+  const TabulatedLobe plain(cosines, std::vector<std::vector<double>>{values});
   for (const double scale : {5e-324, 1e-300, 1e29}) {
     std::vector<double> scaled = values;
     for (double& v : scaled) v *= scale;
-    const TabulatedLobe lobe(cosines, std::vector{scaled});
+    const TabulatedLobe lobe(cosines, std::vector<std::vector<double>>{scaled});
     for (const double x : {0., .7, 2.})
       EXPECT_DOUBLE_EQ(lobe.density({x, 2 - x}), plain.density({x, 2 - x})) << scale;
   }

@@ -16,6 +16,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 std::string listed(std::string_view name, std::string_view value) {
   return fmt::format(R"(<string name="{}" value="{}"/>)", name, value);
@@ -187,6 +188,28 @@ TEST(Links, MediumInWhatLightPassesStays) {
   EXPECT_TRUE(linked_and_pruned(body + kLinkedFloor + point_light(listed("blockers", "body"))).media.empty());
   EXPECT_EQ(linked_and_pruned(body + kLinkedFloor + point_light(listed("blockers", "-body"))).media.size(),
             1u);
+}
+
+TEST(Links, WarnOfSetsThatHaveNoEffect) {
+  const auto said = [](const std::string& objects) {
+    const ReadResult r = read(with_sensor(objects));
+    EXPECT_TRUE(r.scene) << messages(r);
+    return messages(r);
+  };
+  const std::string fog =
+      R"(<shape type="cube"><bsdf type="null"/><string name="link_sets" value="edge"/>
+<medium name="interior" type="homogeneous"><string name="link_sets" value="haze"/></medium></shape>)";
+  const auto lamp = [](const std::string& parameter, const std::string& list) {
+    return fmt::format(R"(<emitter type="point"><string name="{}" value="{}"/></emitter>)", parameter, list);
+  };
+  EXPECT_THAT(said(fog + lamp("blockers", "-haze")), HasSubstr("media attenuate all light"));
+  EXPECT_THAT(said(fog + lamp("receivers", "edge")),
+              HasSubstr("no surface and no medium is in the link set \"edge\""));
+  EXPECT_THAT(said(fog + lamp("receivers", "-haze")), Not(HasSubstr("no effect")));
+}
+
+TEST(Links, NamesAreSeparatedByAnyBlanks) {
+  EXPECT_EQ(link_sets(" a,\t b\n,c "), (std::vector<std::string>{"a", "b", "c"}));
 }
 
 }  // namespace

@@ -84,7 +84,8 @@ TEST(Phases, RefuseAnglesThatCannotBeToldApart) {
   for (const std::string& places :
        {list("angles", "0 179.9999999999 180"), list("angles", "0 1e-9 180"),
         list("nodes", "-1 -0.9999999999999999 1"), list("nodes", "-1 0.99999999999999999 1")})
-    EXPECT_THAT(error(table(list("values", "1 1 1") + places)), AnyOf(HasSubstr("too close"), HasSubstr("ascend")))
+    EXPECT_THAT(error(table(list("values", "1 1 1") + places)),
+                AnyOf(HasSubstr("too close"), HasSubstr("ascend")))
         << places;
   EXPECT_EQ(error(table(list("values", "1 1 1") + list("angles", "0 1e-5 180"))), "");
   EXPECT_EQ(error(table(list("values", "1e30 1e-320"))), "") << "any scale";
@@ -93,8 +94,9 @@ TEST(Phases, RefuseAnglesThatCannotBeToldApart) {
 TEST(Phases, KeepTheOrderOfBlendsOfWhichOnePartHasAName) {
   for (const char* first : {"name=\"zz\"", ""}) {
     const std::string second = *first ? "" : "name=\"aa\"";
-    const Scene s = must_read(fog(fmt::format(
-        "<phase type=\"blendphase\"><phase type=\"rayleigh\" {}/><phase type=\"hg\" {}/></phase>", first, second)));
+    const Scene s = must_read(fog(
+        fmt::format("<phase type=\"blendphase\"><phase type=\"rayleigh\" {}/><phase type=\"hg\" {}/></phase>",
+                    first, second)));
     EXPECT_EQ(s.phases.at(std::get<BlendPhase>(phase_of(s)).first.value), Phase(RayleighPhase{}));
   }
 }
