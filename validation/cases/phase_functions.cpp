@@ -109,17 +109,20 @@ Channels times(const Channels& c, double k) { return {c[0] * k, c[1] * k, c[2] *
 constexpr double kFloats = 1e-6;
 
 void once(Table& t, const Kind& kind, const Configuration& configuration) {
-  const auto add = [&](const char* angle, SceneBuilder builder, const Channels& expected) {
+  const auto add = [&](const char* angle, SceneBuilder builder, const Channels& expected, bool slow) {
     t.mean(fmt::format("phase-{}-{}{}", kind.name, angle, configuration.name()), "N18 N21",
            fmt::format("Light scattered once by {} degrees: the phase function there.", angle),
-           with_phase(std::move(builder), kind), expected, {.slack = kFloats});
+           with_phase(std::move(builder), kind), expected, {.slack = kFloats, .slow = slow});
   };
-  add("90", lit_cube(configuration, rgb(1), rgb(1)), times(kind.value(0), 4 * kPi * lit_cube_answer(1, 1)));
+  add("90", lit_cube(configuration, rgb(1), rgb(1)), times(kind.value(0), 4 * kPi * lit_cube_answer(1, 1)),
+      false);
   // head_on() has its cube in [0, 1]^3, with rays at y = 1/2
   if (kind.name == "blend-by-grid") return;
-  add("180", head_on(configuration, .5, .5, false), times(kind.value(-1), -std::expm1(-1) / 2));
+  add("180", head_on(configuration, .5, .5, false), times(kind.value(-1), -std::expm1(-1) / 2),
+      configuration.grid);
   if (kind.ends_forwards)
-    add("0", head_on(configuration, .5, .5, true), times(kind.value(1), .5 * std::exp(-.5)));
+    add("0", head_on(configuration, .5, .5, true), times(kind.value(1), .5 * std::exp(-.5)),
+        configuration.grid);
 }
 
 // A ray past a lamp, on which all scattering angles occur (passing()). Points are also sampled about the
@@ -154,7 +157,7 @@ void shining_sphere(Table& t, const Kind& kind, bool distant) {
   builder.look({.2, -.3, .1}, {.5, .9, 0}, 60);
   t.mean(fmt::format("phase-{}-shining-sphere/{}", kind.name, configuration.integrator_name()), "7.6c N27",
          "Shining walls around a medium that absorbs nothing: as bright as they are.",
-         with_phase(std::move(builder), kind), grey(1), {.channels = true});
+         with_phase(std::move(builder), kind), grey(1), {.channels = true, .slow = distant});
 }
 
 }  // namespace
