@@ -75,9 +75,9 @@ def test_what_does_not_hold_is_told_and_makes_the_program_fail(monkeypatch, caps
         raise OSError("the farm is gone")
 
     monkeypatch.setitem(GROUPS, "broken", (breaks, False, False))
-    monkeypatch.setattr(sys, "argv", ["run.py", "--group", "broken"])
+    monkeypatch.setattr(sys, "argv", ["attacks.py", "--group", "broken"])
 
-    assert run.main() == 1
+    assert attacks.main() == 1
     said = capsys.readouterr().out
     assert "1 of 3 tries held" in said and "not held: why" in said and "the farm is gone" in said
 
