@@ -31,7 +31,7 @@ TableProblem problem_of_places(std::string_view name, const std::vector<double>&
     if (!(at[i] > at[i - 1]))
       return {name, fmt::format("must ascend: number {} is {} after {}", i + 1, at[i], at[i - 1])};
     if (1 - cosine_of(at[i]) == 1 - cosine_of(at[i - 1]))
-      return {name, fmt::format("has numbers too close to be told apart: {} and {} are {} and {}", i, i + 1,
+      return {name, fmt::format("has numbers too close to each other: {} and {} are {} and {}", i, i + 1,
                                 at[i - 1], at[i])};
   }
   if (at.front() != first || at.back() != last)
