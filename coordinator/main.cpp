@@ -190,8 +190,8 @@ ls::coordinator::JoinGuard guard_of(const ls::http::Limits& limits) {
           }};
 }
 
-// Ends the process with a sentence, where an exception reaches no handler: memory or threads have run out
-// where nothing can be refused, or it is a bug. It allocates nothing.
+// The terminate handler: an exception has reached no handler, because memory or threads have run out where no
+// request can be refused, or because of a bug. Prints an error message, and allocates no memory.
 [[noreturn]] void end_with_a_sentence() {
   const auto end_for_want = [](const char* what) {
     std::fprintf(
@@ -207,11 +207,12 @@ ls::coordinator::JoinGuard guard_of(const ls::http::Limits& limits) {
   } catch (const std::bad_alloc&) {
     end_for_want("there is not enough memory");
   } catch (const std::exception& e) {
-    // The text of EAGAIN and ENOMEM, by which the C++ library and Boost say that a thread cannot be started
+    // The texts of EAGAIN and ENOMEM: the C++ library and Boost throw these if a thread cannot be started
     if (std::strstr(e.what(), "temporarily unavailable") || std::strstr(e.what(), "Cannot allocate"))
       end_for_want(e.what());
     std::fprintf(stderr, "lightshaft-coordinator: error: a bug: %s\n", e.what());
   } catch (...) {
+    std::fprintf(stderr, "lightshaft-coordinator: error: a bug: an exception of an unknown type\n");
   }
   std::abort();
 }

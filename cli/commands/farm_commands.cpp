@@ -146,12 +146,10 @@ int after(FarmApi& api, const FarmFlags& flags) { return change(api, flags, {{"a
 
 int log(FarmApi& api, const FarmFlags& flags) { return print_lines(api.text(job_path(flags.id) + "/log")); }
 
-// True for a job of which all is rendered, but whose final image could not be written: it waits for room on
-// the disk, and can be removed to make some.
+// True if the job is rendered, but its final image cannot be written (ImageWriter of the coordinator). Such a
+// job can be removed, to make room on a full disk.
 bool is_unwritten(const json& job) {
-  const auto done = number_field(job, "units_done"), total = number_field(job, "units_total");
-  return text_field(job, "state") == "running" && !text_field(job, "error").empty() && done && total &&
-         *total > 0 && *done >= *total;
+  return text_field(job, "error").starts_with("the final image cannot be written");
 }
 
 // Removes a job that has ended. HTTP's DELETE of a job that has not ended cancels it: who asks to remove a

@@ -22,13 +22,13 @@ inline constexpr std::size_t kMaxUnfinishedUploads = 1024;
 // A job is paused while a blob that it needs is missing. This is the time between two checks whether missing
 // blobs have arrived
 inline constexpr Duration kMissingBlobLook = std::chrono::seconds(1);
-// Time after which the files of a job's end are written again, if they could not be written (the disk was
-// full)
+// If the files of a job cannot be written at its end (the disk is full), this is the time until the next
+// attempt
 inline constexpr Duration kWriteAgain = std::chrono::seconds(10);
 
 // Workers
-inline constexpr std::size_t kWorkerLogLines = 40;   // latest events kept for each worker, in memory
-inline constexpr std::size_t kWorkerLogBytes = 256;  // length of one of them
+inline constexpr std::size_t kWorkerLogLines = 40;   // events that are kept in memory for each worker
+inline constexpr std::size_t kWorkerLogBytes = 256;  // largest size of the text of an event
 
 // Submission
 inline constexpr std::size_t kMaxAssets = 100'000;  // files that one submission may name

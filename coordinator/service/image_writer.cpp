@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <new>
+#include <type_traits>
 
 #include "coordinator/admission/layer_names.h"
 #include "coordinator/base/limits.h"
@@ -23,9 +24,9 @@ namespace {
 // released for other threads.
 constexpr TileIndex kTilesAtOnce = 64;
 
-// Calls write() and returns what it returns, or an error if memory runs out meanwhile.
+// Returns the Result of write(), or an error if memory runs out meanwhile.
 template <class Write>
-Result<void> within_memory(const Write& write) {
+std::invoke_result_t<Write> within_memory(const Write& write) {
   try {
     return write();
   } catch (const std::bad_alloc&) {
@@ -118,14 +119,8 @@ void ImageWriter::take_snapshot(const EntryPtr& entry) {
     const auto core = core_.lock();
     entry->snapshots.running = false;
   };
-  std::optional<SnapshotFile> file;
-  const auto copied = within_memory([&]() -> Result<void> {
-    auto made = copy_folded(entry);
-    if (!made) return tl::unexpected(made.error());
-    file.emplace(std::move(*made));
-    return {};
-  });
-  if (!copied) return done(copied);
+  auto file = within_memory([&] { return copy_folded(entry); });
+  if (!file) return done(tl::unexpected(file.error()));
   writes_.push([this, entry, done, before = entry->snapshots.committed,
                 file = std::make_shared<SnapshotFile>(std::move(*file))] {
     auto core = core_.lock();

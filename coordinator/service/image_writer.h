@@ -39,7 +39,8 @@ class ImageWriter {
   void finish_again(Core&, const EntryPtr& entry);  // repeats finish() after it failed
   // Starts writing the current image of a failed or cancelled job, and frees the job's memory afterwards.
   void retire(Core&, const EntryPtr& entry);
-  // Repeats finish() and retire() where the files could not be written limits::kWriteAgain ago
+  // Repeats finish() and retire() for jobs whose files could not be written, limits::kWriteAgain after the
+  // last attempt
   void write_again_if_due(Core&);
 
  private:
@@ -48,10 +49,11 @@ class ImageWriter {
     RoundErrors errors;
     HealthTable health;
   };
-  struct Unwritten {  // files of a job's end that could not be written
+  // A job whose files at its end could not be written
+  struct Unwritten {
     EntryPtr entry;
-    std::uint64_t final_number;  // of the request for a final image; 0: the image of a job that was retired
-    TimePoint again;
+    std::uint64_t final_number;  // number of the request for the final image; 0: the job was retired
+    TimePoint again;             // when they are written again
   };
   // The following functions run on the writer thread, except denoise() and note_check(), which run on the
   // thread of the ReferenceComparer.

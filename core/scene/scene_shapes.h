@@ -46,9 +46,9 @@ struct MeshShape {
 };
 using Geometry = std::variant<RectangleShape, CubeShape, SphereShape, DiskShape, MeshShape, CylinderShape>;
 
-// What a light is linked to: lists of link sets (core/base/light/link_names.h). Only the shapes and media in
-// `receivers` receive its light, and of the shapes only those in `blockers` stop or attenuate it on its way.
-// An empty text is a list of everything.
+// The lists of link sets (core/base/light/link_names.h) to which a light is linked. Only the shapes and media
+// in `receivers` receive its light. Only the shapes in `blockers` stop or attenuate its light on the way. An
+// empty text is the list of everything.
 struct LightLinks {
   std::string receivers, blockers;
   bool operator==(const LightLinks&) const = default;

@@ -30,7 +30,7 @@ class Reader {
   Scene read();  // valid only if the report has no errors afterwards
 
   Report& report() { return report_; }
-  // Notes the link sets that an object is in or, if `of_light`, to which a light is linked.
+  // Notes the names in the parameter `link_sets` of an object, or in `receivers` or `blockers` of a light.
   void note_links(const Element& e, std::string_view parameter, const std::string& names);
   // Returns the object that `child` is or refers to. nullptr: there is none, which has been reported.
   const Element* resolve(const Element& child);

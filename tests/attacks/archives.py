@@ -1,4 +1,4 @@
-"""Archives that name what is not theirs, lie about themselves, or unpack to more than they are."""
+"""Archives with names outside their folder, with wrong sizes and checksums, and archives that unpack to very many bytes."""
 
 import bz2
 import gzip
@@ -20,7 +20,7 @@ ZIP, TAR, GZIP = "application/zip", "application/x-tar", "application/gzip"
 SCENE = TINY.encode()
 OUTSIDE = ["../evil", "a/../../evil", "/evil", "//evil", "\\evil", "..\\evil", "C:\\evil", "c:/evil", "C:evil", "a/./../..//evil", "./../evil", "a\nb", "", ".", "..", "/", "a" * 5000, "/".join(["d"] * 2000)]
 ODD = ["evil\0.xml", "~/evil", "CON", "a:stream", "%2e%2e/evil", "\u202eevil", "．．/evil", "..\u2215evil", "a.xml/b", "scene.xml/", "-rf", "$(id)", "`id`", "a;b", "file:///evil"]
-# What SECURITY.md promises to refuse; the others may also be read as files that only their digest names.
+# The archives that SECURITY.md promises to refuse. Others may be accepted: their files are stored under their SHA-256, not under their names.
 REFUSED = ("outside", "symbolic link", "hard link", "device", "block device", "FIFO", "the scene is a link", "a link in a zip", "512 MB", "a bomb", "GNU sparse of", "it says 4 GB", "a wrong checksum", "encrypted")
 
 

@@ -1,5 +1,5 @@
-"""Meshes, textures and grids that lie about themselves, on a worker that renders: each job fails with a sentence or is rendered, and the
-worker goes on."""
+"""Meshes, textures and grids with wrong sizes and contents, on a worker that renders: each job fails with an error message or is rendered, and
+the worker goes on."""
 
 import gzip
 import json

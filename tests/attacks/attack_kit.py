@@ -1,4 +1,4 @@
-"""What the attacks share: a record of tries with what is right for each, raw connections, and a bystander who must be served meanwhile."""
+"""Shared by the attacks: a record of tries and their expected answers, raw connections, and a bystander, a user who must be served during an attack."""
 
 import contextlib
 import dataclasses
@@ -20,11 +20,11 @@ from local_farm import SCENE, HttpError, LocalFarm  # noqa: E402
 # Seconds after which an answer counts as one that never came. The longest limit of the coordinator for a stranger is the grace of a
 # body, 15 s (SECURITY.md, "How much at once"); the rest is for a busy machine.
 NO_ANSWER = 60
-# Seconds that a bystander may wait: one on a quiet machine (issue 41). Where other programs wanted more than there is of the machine before
-# the first attack, everything takes as much longer.
+# Seconds that a bystander may wait: one second on a quiet machine. If other programs keep the processors busy before the first attack, the
+# limit grows with the load average.
 BYSTANDER = 1.0 * max(1, os.getloadavg()[0] / os.cpu_count())
-# The bound of the system test, which is of no time of this machine: who waits for what another one holds waits until that one is cut, 15 s at
-# least after it began.
+# The limit of the system test. It follows from a limit of the coordinator, not from the speed of this machine: if an attack holds something
+# that a bystander needs, the bystander waits until the coordinator ends the attack, which is 15 s after its beginning or later.
 UNHELD = 14.0
 UNLIMITED = ("--http-requests-per-second", "0", "--http-wrong-tokens-per-minute", "0")
 TINY = SCENE.replace('"96"', '"16"').replace('"64"', '"16"')
@@ -57,7 +57,7 @@ class Record:
 
     @contextlib.contextmanager
     def expecting(self, label):
-        """An exception within is a try that did not hold, and ends no group."""
+        """Counts an exception as a try that did not hold, and goes on with the group."""
         try:
             yield
         except Exception as error:
@@ -158,7 +158,7 @@ def ask(farm, method, path, token=None, body=None, kind="application/json", head
 
 
 def sane(answer, allowed=(501,)):
-    """It came, and blames the client if anybody; 501 is the answer to what HTTP has and the coordinator has not."""
+    """Returns whether an answer came that is no server error. 501 is right for parts of HTTP that the coordinator does not have."""
     return 200 <= answer.status < 500 or answer.status in allowed
 
 
@@ -182,7 +182,7 @@ def still_serves(record, farm, token, label="others are served afterwards"):
 
 
 class Bystander:
-    """How long another user waits: the longest of its requests."""
+    """Another user, whose longest wait for an answer is measured."""
 
     limit = BYSTANDER
 
@@ -203,7 +203,7 @@ class Bystander:
 
     @contextlib.contextmanager
     def watching(self):
-        """Asks in a thread of its own, as a dashboard that is open does, all through what is done meanwhile."""
+        """Sends requests from another thread for as long as the context is open, as an open dashboard does."""
         over = threading.Event()
 
         def look():

@@ -1,4 +1,4 @@
-"""The nineteen faults of a review of commit 54967dbd, made again: the figure of then, and today's."""
+"""The nineteen faults that a review of commit 54967dbd found: the same attacks, with the figures of that review and those of today."""
 
 import contextlib
 import errno
@@ -33,7 +33,7 @@ def seconds_of(function):
 
 
 def join_seconds(farm):
-    """Until a new worker has joined and a job is done."""
+    """Returns the seconds until a new worker has joined and a job is done."""
     def joins():
         farm.add_worker()
         farm.wait_for_job(submit(farm, farm.token, TINY, spp=2))
@@ -57,7 +57,7 @@ def f1(record, folder):
 
 
 def renderer(record, folder):
-    """F2, F10, F11, F12: what a renderer that was taken over asks of the kernel."""
+    """F2, F10, F11, F12: system calls of a renderer that an attacker controls."""
     with LocalFarm(folder / "renderer") as farm:
         worker = farm.add_worker(fake=False, within=ON_A_TERMINAL)
         farm.wait_for_workers(1)

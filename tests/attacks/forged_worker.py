@@ -1,4 +1,4 @@
-"""A worker that says what its program never would: messages of proto/farm.proto made by hand."""
+"""A worker that sends arbitrary messages of proto/farm.proto."""
 
 import contextlib
 import pathlib

@@ -1,4 +1,4 @@
-"""Requests whose framing two readers might understand differently: each is refused, or read as one request."""
+"""Requests whose framing is ambiguous: each is refused, or read as one request."""
 
 from attack_kit import LocalFarm, UNLIMITED, exchange, group, still_serves
 

@@ -1,4 +1,4 @@
-"""Settings beyond what a user may have, by every way in."""
+"""Settings above the limits of a user, by every route that takes settings."""
 
 import hashlib
 import io

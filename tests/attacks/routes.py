@@ -1,4 +1,4 @@
-"""Every route of the OpenAPI document, without a right token, with odd bodies and with odd queries; and what browsers of other sites could send."""
+"""Every route of the OpenAPI document without a right token, with odd bodies and with odd queries; and requests that pages of other sites can make a browser send."""
 
 import json
 
@@ -135,7 +135,7 @@ def other_sites(record, farm):
 
 
 def new_routes(record, farm):
-    """Values of what came after the first review: deep images, views, mixes, meters, videos, regions that go first, jobs that wait."""
+    """Odd values for deep images, views, mixes, meters, videos, focused regions and jobs that wait for others."""
     record.row = "views, mixes, deep images, meters, videos, focus and after: values made for them"
     lamp = TINY.replace("</scene>", '<emitter type="point"><string name="light_group" value="key"/><rgb name="intensity" value="1"/></emitter></scene>')
     lit = submit(farm, farm.token, lamp, spp=4, aov="light_groups", deep=2)

@@ -1,4 +1,4 @@
-"""Too few descriptors, too little memory, full disks, clocks that jump, kills: what is refused says why, and all goes on when there is more."""
+"""Too few file descriptors, too little memory, full disks, clocks that jump, kills: refusals say why, and work goes on once there is more."""
 
 import hashlib
 import json

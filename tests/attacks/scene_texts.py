@@ -1,5 +1,5 @@
-"""Scenes in Mitsuba's XML, pbrt's text and glTF that want a file, a name, a size or a depth that is not theirs. They are read by the
-coordinator's `lightshaft-scene`: each is refused with a sentence, or read within what its size allows."""
+"""Hostile scenes in Mitsuba's XML, pbrt's text and glTF: names of other files, wrong sizes, great depth. The coordinator's `lightshaft-scene`
+reads them: each is refused with an error message, or read in a time that its size allows."""
 
 import io
 import json

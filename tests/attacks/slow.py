@@ -1,4 +1,4 @@
-"""Clients that are slow, idle, or read nothing: they are cut, and hold up nobody."""
+"""Clients that are slow, idle, or read nothing: they are disconnected, and delay nobody else."""
 
 import select
 import socket

@@ -1,4 +1,4 @@
-"""A user who knows the ids of another user's jobs: every route says that there is no such job, and no list or stream has a byte of it."""
+"""A user who knows the ids of another user's jobs: every route answers that there is no such job, and no list or stream shows anything of it."""
 
 import hashlib
 import json

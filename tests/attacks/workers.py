@@ -1,4 +1,4 @@
-"""Whoever has the join token, and says what no worker would: refused, or without effect on jobs, users and other workers."""
+"""Workers with a right join token that send forged messages: these are refused, or have no effect on jobs, users and other workers."""
 
 import hashlib
 import json
@@ -132,7 +132,7 @@ def forged_results(record, farm, good, user):
                 ack = liar.hears("ack", 5)
                 told = ack.refused.message if ack else liar.ended(0.1) or "no answer"
             view = farm.job(job)
-            # What is wrong only in its figures may be taken with others in their place, what is wrong in its pixels may not.
+            # A result with wrong figures (seconds, health) may be accepted, with corrected figures. A result with wrong pixels may not.
             figures = label.startswith(("seconds", "times", "2^64", "a lease", "health"))
             record.attempt(label, lease is not None and view["state"] in ("queued", "running") and (figures or not (ack and not ack.HasField("refused") and view["units_done"])), f"{told}; {view['state']}, {view['units_done']} units")
             worker = honest(farm, f"after-{len(farm.workers)}")
@@ -175,7 +175,7 @@ def forged(record, folder):
         listed = len(farm.get("/api/v1/workers")["workers"])
         for label, raw in first_messages():
             with record.expecting(label), ForgedWorker(farm, first=raw) as liar:
-                # What is no message at all is the end of a stream to gRPC, which is then OK.
+                # gRPC ends the stream with OK if the bytes are no message.
                 record.attempt(label, liar.ended() not in ("", "UNKNOWN", "INTERNAL") and len(farm.get("/api/v1/workers")["workers"]) == listed, f"ended with {liar.ended(0.1)!r}")
         with ForgedWorker(farm) as liar:
             liar.welcome()
@@ -254,7 +254,7 @@ def forged(record, folder):
         for i in range(3):
             view = json.loads(ask(farm, "GET", f"/api/v1/jobs/{(j := submit(farm, alice, TINY, **JOB))}", alice).body)
             ends = wait_until(lambda: (v := farm.job(j))["state"] in ("done", "failed") and v, "the job ends", 120)
-            # Ten votes of one machine's processes count as so many (SECURITY.md): on this machine the liars are three principals.
+            # Votes are counted by principal (SECURITY.md). The liars on this machine are three principals.
             record.attempt(f"job {i} ends", ends["state"] == "done" or "the scene is broken" in (ends["error"] or ""), ends)
         for liar in liars:
             liar.__exit__()

@@ -1,4 +1,4 @@
-"""The fast attacks of tests/attacks against a farm of today; and that a service which does not hold is told."""
+"""The fast attacks of tests/attacks; and that the attacks report a server that does not hold."""
 
 import http.server
 import sys
@@ -24,7 +24,7 @@ def test_holds(name):
 
 
 class Wrong(http.server.BaseHTTPRequestHandler):
-    """A server as none should be: each request is answered by an error of its own, and reads on after a body that it has not understood."""
+    """A server with two faults: it answers every request with a server error, and reads the body of a request as the next request."""
 
     protocol_version = "HTTP/1.1"
 

@@ -7,7 +7,7 @@ import urllib.request
 
 import pytest
 from cli_kit import FOG, digest, lightshaft, load, png_size, write_fog
-from local_farm import LocalFarm, bin_dir, wait_until
+from local_farm import SCENE, LocalFarm, bin_dir, wait_until
 
 
 @pytest.fixture(scope="module")
@@ -170,3 +170,24 @@ def test_watch_outlives_a_restart_of_the_coordinator(farm, tmp_path):
         watching.kill()
 
     assert json.loads(log.read_text().splitlines()[-1])["state"] == "done"
+
+
+def test_a_job_whose_image_cannot_be_written_is_removed(tmp_path):
+    """A full disk is made so: a folder is in the place of the image."""
+    with LocalFarm(tmp_path) as farm:
+        job = farm.submit(SCENE, spp=8)
+        (farm.data / "jobs" / job / "image.exr" / "in the way").mkdir(parents=True)
+        farm.add_worker()
+        wait_until(lambda: "the final image cannot be written" in (farm.job(job)["error"] or ""), "the image was tried")
+        assert farm.job(job)["state"] == "running"
+
+        call(farm, "remove", job)
+
+        call(farm, "show", job, code=1)
+
+
+def test_a_job_that_renders_is_not_removed(tmp_path):
+    with LocalFarm(tmp_path) as farm:
+        job = farm.submit(SCENE, spp=8)
+        assert f"lightshaft cancel {job}" in call(farm, "remove", job, code=1).stderr
+        assert farm.job(job)["state"] == "queued"

@@ -1,5 +1,5 @@
-// The names of link sets: sets of shapes and media by which lights are linked to what they light, and to what
-// shades it. Lists of names are texts, the names separated by commas.
+// The names of link sets. A link set is a set of shapes and media; a light is linked to the sets that receive
+// its light and to the sets that shade it. A list of names is a text, in which commas separate the names.
 #pragma once
 
 #include <cstddef>
@@ -32,7 +32,7 @@ struct LinkList {
 std::string wrong_link_sets(std::string_view text);
 std::string wrong_link_list(std::string_view text);
 
-// Both expect texts that are right.
+// Both expect a text for which wrong_link_sets() or wrong_link_list() returns an empty text.
 std::vector<std::string> link_sets(std::string_view text);
 LinkList link_list(std::string_view text);
 

@@ -121,7 +121,7 @@ inline constexpr Field kLightGroup{
 inline Field link_sets_field(std::string_view doc) {
   return {.name = "link_sets", .doc = doc, .wrong = wrong_link_sets, .elided = true};
 }
-// Describes what a light is linked to.
+// Describes the receivers and blockers of a light.
 template <class V, class T>
 void describe_links(V& v, T& e) {
   v.field({.name = "receivers",
@@ -155,8 +155,8 @@ inline Field image_colours_field() {
           "of the image: `auto` is as the file says (sRGB in 8- and 16-bit files; otherwise linear, with the "
           "primaries in its header), `srgb` is encoded by the curve of sRGB, `rec709` to `lin_adobergb` are "
           "linear, the others are encoded; a white of theirs becomes white. Also the names of these spaces "
-          "in "
-          "the configurations of ACES for OpenColorIO and in MaterialX, such as `ACES - ACEScg`, `lin_ap1`, "
+          "in the configurations of ACES for OpenColorIO and in MaterialX, such as `ACES - ACEScg`, "
+          "`lin_ap1`, "
           "`sRGB - Texture`. No effect on `raw` values. Not in Mitsuba",
       .elided = true};
 }
@@ -239,8 +239,8 @@ LS_NAMES(SkyMapping, {"latlong", latlong}, {"equal_area", equal_area})
 LS_NAMES(DistanceSampling, {"exponential", exponential}, {"equiangular", equiangular}, {"mis", mis})
 LS_NAMES(MisHeuristic, {"power", power}, {"balance", balance})
 
-// Returns the enumerator that has this name elsewhere: only files of users have such names, and canonical
-// JSON never.
+// Returns the enumerator that other programs call so. The reader of XML accepts such names; canonical JSON
+// has the names of NamesOf alone.
 template <class E>
 std::optional<E> also_named(std::string_view) {
   return std::nullopt;

@@ -132,15 +132,20 @@ void describe(V& v, T& p) {
   v.field(nested_field("second", "where the weight is 1", "<phase>"), p.second);
 }
 
-template <class V>
-void describe_priority(V& v, auto& priority) {
+// Describes the fields that all media have.
+template <class V, class T>
+void describe_common(V& v, T& m) {
   v.field({.name = "priority",
            .doc = "where media overlap, those of the highest priority are there and the others are not; "
                   "equal ones add up. Not in Mitsuba",
            .range = {-1000000, 1000000},
            .unwritten = 0,
            .elided = true},
-          priority);
+          m.priority);
+  v.field(kLightGroup, m.light_group);
+  v.field(link_sets_field("link sets that the medium is in, for `receivers` of lights: names, separated by "
+                          "commas; letters, digits, `_` and `-`. Not in Mitsuba"),
+          m.link_sets);
 }
 
 LS_TYPE(HomogeneousMedium, "medium", "homogeneous", "", "the same everywhere")
@@ -174,11 +179,7 @@ void describe(V& v, T& m) {
            .constvolume = true,
            .unwritten = 0},
           m.source_radiance);
-  describe_priority(v, m.priority);
-  v.field(kLightGroup, m.light_group);
-  v.field(link_sets_field("link sets that the medium is in, for `receivers` of lights: names, separated by "
-                          "commas; letters, digits, `_` and `-`. Not in Mitsuba"),
-          m.link_sets);
+  describe_common(v, m);
 }
 
 LS_TYPE(HeterogeneousMedium, "medium", "heterogeneous", "", "varies in space by volumes")
@@ -239,11 +240,7 @@ void describe(V& v, T& m) {
            .range = kNonNegative,
            .elided = true},
           m.emission_weight);
-  describe_priority(v, m.priority);
-  v.field(kLightGroup, m.light_group);
-  v.field(link_sets_field("link sets that the medium is in, for `receivers` of lights: names, separated by "
-                          "commas; letters, digits, `_` and `-`. Not in Mitsuba"),
-          m.link_sets);
+  describe_common(v, m);
 }
 
 }  // namespace ls::scene

@@ -1,7 +1,6 @@
 // Checks of phase functions that concern several of their values.
 #pragma once
 
-#include <array>
 #include <span>
 #include <string>
 #include <vector>

@@ -1,4 +1,5 @@
-// Jobs whose files cannot be written at their end: they are written once that is possible, without a user.
+// Jobs whose files cannot be written at their end: they are written as soon as that is possible, without an
+// action of a user.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

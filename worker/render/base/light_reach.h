@@ -1,4 +1,5 @@
-// What receives the light of a light, and what shades it.
+// The receivers and the blockers of a light: the surfaces and media that receive its light, and the surfaces
+// that shade it.
 #pragma once
 
 #include "core/scene/schema/light_links.h"
@@ -7,11 +8,11 @@
 namespace ls::render {
 
 struct LightReach {
-  RayKinds hidden;  // what receives no light: surfaces, media
-  // The lists of link sets (light_links.h) of what receives the light, and of the surfaces that shade it.
+  RayKinds hidden;  // whether surfaces, or media, do not receive the light
+  // The lists of link sets (light_links.h) of the receivers and of the blockers
   scene::LinkIndex receivers = scene::kEverything, blockers = scene::kEverything;
 
-  // True if its shadow rays do not meet all surfaces.
+  // True if its shadow rays may pass surfaces that are no blockers.
   constexpr bool has_blockers() const { return blockers != scene::kEverything; }
   // True if a surface or a medium, which scatters rays of this kind and which these lists have, receives the
   // light.

@@ -216,7 +216,7 @@ class PathTracer {
     if (depth_ == 0) return RayKind::camera;
     return left_medium_ ? RayKind::medium : RayKind::surface;
   }
-  // The same: what receives the light of the surface that was hit, and what shades it.
+  // The receivers and blockers of the light that was hit
   const LightReach& reach_of(const SurfaceHit& hit) const {
     return world_.lights.reach(world_.geometry.surfaces[hit.surface].light);
   }

@@ -53,7 +53,7 @@ class Lights {
   LightGroup group(std::uint32_t light) const { return lights_[light].group; }
   LightGroup group(const SurfaceHit& hit) const { return group(geometry_->surfaces[hit.surface].light); }
   LightGroup sky_group() const { return sky_group_; }
-  // What receives a light, or the environment map and the constant environment, and what shades it.
+  // Returns the receivers and blockers of a light, and of the environment map and the constant environment.
   const LightReach& reach(std::uint32_t light) const { return lights_[light].reach; }
   const LightReach& sky_reach() const { return sky_reach_; }
   // The lists of blockers of the lights that rays can hit, each once, without kEverything.

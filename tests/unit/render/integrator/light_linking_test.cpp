@@ -37,7 +37,7 @@ void link(SceneBuilder& b, const LightLinks& links) {
   for (Emitter& e : b.scene.emitters) std::visit([&](auto& l) { l.links = links; }, e);
 }
 
-// What a floor of albedo 1/2 reflects of point lights of this intensity 2 above it.
+// Returns the radiance of a floor of albedo 1/2 if point lights of this total intensity are 2 above it.
 double reflected(double intensity) { return .5 / std::numbers::pi * intensity / 4; }
 
 // ---- receivers
@@ -88,7 +88,7 @@ TEST(LightLinking, LightGivesNothingToWhatItIsNotLinkedTo) {
     }
 }
 
-// As visible_volume and visible_reflection say it.
+// Links to the fog alone, or to all but the fog, have the effect of visible_reflection and visible_volume.
 TEST(LightLinking, MediaAreReceiversOfTheirOwn) {
   for (const char* integrator : {"volpath", "volpath_distant_mis"})
     for (const NamedLight& light : kLights)

@@ -79,7 +79,7 @@ TEST(Phases, ReadBlendsInTheirOrderOrByTheirNames) {
   EXPECT_EQ(parts("<phase name=\"b\" type=\"hg\"/><phase name=\"a\" type=\"rayleigh\"/>"), wanted);
 }
 
-// Their distance in 1 - cos is 0 in double, so that no line goes through the values.
+// The numbers 1 - cos of such angles are equal in double, so there is no line through their values.
 TEST(Phases, RefuseAnglesThatCannotBeToldApart) {
   for (const std::string& places :
        {list("angles", "0 179.9999999999 180"), list("angles", "0 1e-9 180"),
