@@ -49,6 +49,7 @@ class Grid {
   // Returns the index coordinates of the world point p. They are computed in double: if the grid is small in
   // its world, the terms are large and nearly cancel.
   V3 to_index(const V3& p) const { return V3(exact_.point(V3d(p))); }
+  const Affine& world_to_index() const { return exact_; }
   VolumeFilter filter() const { return filter_; }
   // Returns the value at index coordinates inside the domain. kFilter must equal filter(). It is a template
   // parameter so that a caller that needs many values tests filter() only once.

@@ -1,0 +1,174 @@
+// Glowing grids as lights: the directions that are sampled towards them, against the density that is claimed
+// for a ray in such a direction.
+#include "worker/render/lights/glowing_grids.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <deque>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "tests/support/chi_square.h"
+#include "tests/support/sphere_cells.h"
+#include "tests/unit/render/grids.h"
+#include "worker/render/math/random.h"
+
+namespace ls::render {
+namespace {
+
+constexpr int kGlowSamples = 100000, kGlowRows = 8, kGlowColumns = 8;
+
+struct GlowCase {
+  std::string name;
+  std::vector<Medium> media;
+  V3 from{0, 0, 0}, towards{0, 0, 1};  // `towards`: the axis of the cells of directions
+  double reach = 2;                    // of these cells: 1 - cos
+};
+
+class GlowCases {
+ public:
+  GlowCases() {
+    const Grid& fire = add(grid_of({12, 12, 12}, 3));
+    const Grid& smoke = add(grid_of({9, 14, 10}, 4));
+    const Grid& one = add(voxel_grid({1, 1, 1}, {1}, kNearest, Wrap::clamp));
+    const V3 middle(5.5f, 5.5f, 5.5f), beside(40, -3, 7);
+    all.push_back({"from the inside", {per_length(fire)}, {3.2f, 4.1f, 8.7f}});
+    all.push_back({"from the inside of one voxel", {per_length(one)}, {.1f, -.2f, .3f}});
+    all.push_back({"from beside it", {per_length(fire)}, beside, middle - beside, .05});
+    const V3 far(4e4f, -3e3f, 7e3f);
+    all.push_back({"from far away", {per_length(fire)}, far, middle - far, 3e-8});
+    all.push_back({"by absorption", {by_absorption(smoke)}, {4, 6, 5}});
+    Medium hot = by_absorption(smoke);
+    emit(hot, fire);
+    hot.emission_kind = EmissionKind::black_body;
+    hot.kelvin_scale = 3000;
+    hot.weight = &smoke;
+    all.push_back({"black bodies", {hot}, {4, 6, 5}});
+    all.push_back({"two media", {per_length(fire), by_absorption(smoke)}, {6, 2, 3}});
+    Affine flat;  // of voxels of 1 x 1/2 x 1/30, mirrored
+    flat.a = {1, 0, 0, 0, -2, 0, 0, 0, 30};
+    const Grid& wide =
+        add({{12, 12, 12}, random_values({12, 12, 12}, 8, true), flat, V3d(0), V3d(11, 11, 11), 1});
+    all.push_back({"voxels of unlike sides", {per_length(wide)}, {5, -2, .2f}});
+  }
+  std::vector<GlowCase> all;
+
+ private:
+  static Grid grid_of(Size n, unsigned seed) { return unit_grid(n, random_values(n, seed, true)); }
+  const Grid& add(Grid g) { return grids_.emplace_back(std::move(g)); }
+  static void emit(Medium& m, const Grid& g) { m.emitter = {&g, &g, &g}; }
+  static Medium per_length(const Grid& g) {
+    Medium m;
+    m.grid = true;
+    m.density = &g;
+    m.sigma_t = C3(1);
+    m.emission_kind = EmissionKind::per_length;
+    m.emission = C3(1, 2, 3);
+    emit(m, g);
+    return m;
+  }
+  static Medium by_absorption(const Grid& density) {
+    Medium m = per_length(density);
+    m.emission_kind = EmissionKind::per_absorption;
+    m.emitter = {};
+    return m;
+  }
+  std::deque<Grid> grids_;  // a deque, since media point at its elements
+};
+
+TEST(GlowingGrids, AreSampledWithTheirStatedDensity) {
+  test::ChiSquareTally tally("sampling/glowing_grids");
+  for (const GlowCases cases; const GlowCase& c : cases.all) {
+    SCOPED_TRACE(c.name);
+    const GlowingGrids glow(c.media);
+    ASSERT_TRUE(glow.any());
+    const test::SphereCells cells(c.towards, c.reach, kGlowRows, kGlowColumns);
+    // The density has edges where a ray passes from one cell of a grid to the next, so the sum over 48 x 48
+    // points of a cell of directions is right to about 1 / 48^2. The test asks for 1 / sqrt(samples in it).
+    const auto masses = cells.masses([&](const V3& w) { return double{glow.pdf(c.from, w)}; }, 48);
+    EXPECT_NEAR(cells.total(), 1, 2e-3) << "the density's integral over all directions";
+    std::vector<double> observed(cells.size(), 0);
+    RandomStream r(17);
+    for (int i = 0; i < kGlowSamples; ++i) {
+      const auto s = glow.sample(c.from, {{r.bits(), r.bits(), r.bits(), r.bits()}}, r);
+      ASSERT_TRUE(s);
+      // sample() takes the density from the direction that it returns
+      ASSERT_EQ(s->pdf, glow.pdf(c.from, s->w));
+      ++observed[cells.of(s->w)];
+    }
+    tally.expect(c.name, test::counts(masses, kGlowSamples), observed);
+  }
+  tally.close();
+}
+
+TEST(GlowingGrids, AreEmptyWithoutLightThatVaries) {
+  const Grid none = unit_grid({4, 4, 4}, std::vector<float>(64, 0));
+  Medium dark;
+  dark.grid = true;
+  dark.density = &none;
+  dark.sigma_t = C3(1);
+  dark.emission_kind = EmissionKind::per_length;
+  dark.emission = C3(1);
+  // The extent of an emission without a grid is that of the medium's boundary
+  EXPECT_FALSE(GlowingGrids(std::vector{dark}).any());
+  dark.emitter = {&none, &none, &none};
+  EXPECT_FALSE(GlowingGrids(std::vector{dark}).any());
+  EXPECT_FALSE(GlowingGrids(std::vector<Medium>{}).any());
+  EXPECT_EQ(GlowingGrids().pdf({0, 0, 0}, {0, 0, 1}), 0);
+}
+
+// Along a ray, the mean of emission over density is the integral of the emission.
+TEST(GlowingGrids, PointsOnARayGiveTheIntegralOfTheEmission) {
+  const Grid fire = unit_grid({12, 12, 12}, random_values({12, 12, 12}, 3, true));
+  Medium m;
+  m.grid = true;
+  m.density = &fire;
+  m.sigma_t = C3(1);
+  m.emission_kind = EmissionKind::per_length;
+  m.emission = C3(1);
+  m.emitter = {&fire, &fire, &fire};
+  const GlowingGrids glow(std::vector{m});
+  // From so far away that all sampled directions are one ray, up to the spread of the grid's width over the
+  // distance. The first number decides the cell, the others the point in it: always the same.
+  RandomStream r(5);
+  const V3 from(-30, 5.2f, 6.1f);
+  const Group numbers{{1u << 30, 1u << 31, 1u << 31, 1u << 31}};
+  constexpr int kPoints = 40000;
+  double sum = 0, square = 0;
+  V3 w(0);
+  for (int i = 0; i < kPoints; ++i) {
+    const auto s = glow.sample(from, numbers, r);
+    ASSERT_TRUE(s);
+    const double value = double{s->emission.x} / double{s->pdf_of_distance};
+    sum += value / kPoints;
+    square += value * value / kPoints;
+    w = s->w;
+  }
+  const double error = std::sqrt((square - sum * sum) / kPoints);
+  EXPECT_LT(error, .02 * sum) << "the test has no power";
+  EXPECT_NEAR(sum, exact_integral(fire, V3d(from), V3d(w), 0, 100), test::kStandardErrors * error);
+}
+
+TEST(GlowingGrids, AnswerUnusualPoints) {
+  const Grid fire = unit_grid({5, 5, 5}, random_values({5, 5, 5}, 2));
+  Medium m;
+  m.grid = true;
+  m.density = &fire;
+  m.sigma_t = C3(1);
+  m.emission_kind = EmissionKind::per_length;
+  m.emission = C3(1);
+  m.emitter = {&fire, &fire, &fire};
+  const GlowingGrids glow(std::vector{m});
+  constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
+  for (const V3& x : {V3(kNotANumber), V3(kInfinity), V3(3e38f), V3(1e30f, 0, 0)})
+    for (std::uint32_t word : {0u, 1u, ~0u}) {
+      RandomStream r(word);
+      EXPECT_FALSE(glow.sample(x, {{word, word, word, word}}, r)) << x;
+    }
+  EXPECT_EQ(glow.pdf({0, 0, 0}, V3(kNotANumber)), 0);
+}
+
+}  // namespace
+}  // namespace ls::render
