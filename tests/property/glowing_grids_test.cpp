@@ -27,7 +27,8 @@ TEST(GlowingGrids, GiveTheSameImageAsPathsThatMeetTheirLight) {
   };
   const auto thin_glass = [](SceneBuilder& b) {
     const TextureIndex white = b.texture({1, 1, 1});
-    b.shape(RectangleShape{}, translate({.6, .8, 0}) * rotate_y(90), b.bsdf(ThinDielectricBsdf{1.5, 1, white, white}));
+    b.shape(RectangleShape{}, translate({.6, .8, 0}) * rotate_y(90),
+            b.bsdf(ThinDielectricBsdf{1.5, 1, white, white}));
   };
   const auto overlap = [](SceneBuilder& b) {
     const MediumIndex haze = b.homogeneous({.5, .6, .7}, {.8, .8, .8}, 0);

@@ -46,12 +46,12 @@ struct Fire {
     b.scene.integrator.max_depth = 8;
     const MediumIndex outside =
         fog ? b.homogeneous(coloured ? Rgb{.1, .2, .3} : Rgb{.2, .2, .2}, {.9, .9, .9}, .5) : MediumIndex{};
-    const BsdfIndex floor =
-        glossy ? b.bsdf(RoughConductorBsdf{.distribution = {},
-                                           .alpha_u = b.texture({.15, .15, .15}),
-                                           .alpha_v = b.texture({.15, .15, .15}),
-                                           .specular_reflectance = b.texture({.8, .8, .8})})
-               : b.diffuse(.6);
+    const BsdfIndex floor = glossy
+                                ? b.bsdf(RoughConductorBsdf{.distribution = {},
+                                                            .alpha_u = b.texture({.15, .15, .15}),
+                                                            .alpha_v = b.texture({.15, .15, .15}),
+                                                            .specular_reflectance = b.texture({.8, .8, .8})})
+                                : b.diffuse(.6);
     b.shape(RectangleShape{}, rotate_x(-90) * scale(5), floor);
     b.shape(SphereShape{}, translate({1.1, .5, .3}) * scale(.5), b.diffuse(.7));
     Shape& box = b.container(CubeShape{}, translate({0, .9, 0}) * scale(.3, .5, .3), b.null(), flame);

@@ -1,7 +1,7 @@
 // Part of path_tracer.h, which includes it: next-event estimation towards glowing grids (glowing_grids.h). At
-// each vertex a direction towards them is sampled, and a point on its ray whose emission is an estimate of the
-// light from there. A scattered ray in that direction meets the same light (add_medium_emission()); the two
-// are combined by the balance heuristic over directions.
+// each vertex a direction towards them is sampled, and a point on its ray whose emission is an estimate of
+// the light from there. A scattered ray in that direction meets the same light (add_medium_emission()); the
+// two are combined by the balance heuristic over directions.
 #pragma once
 
 #include "worker/render/integrator/mis.h"

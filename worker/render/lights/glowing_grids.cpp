@@ -35,7 +35,8 @@ CellBox box_of(const Grid& grid, std::size_t number) {
   CellBox box;
   for (int k = 0; k < 3; ++k) {
     box.lo[k] = double{grid.domain_lo()[k]} + static_cast<double>(at[k]) * grid.cell_size();
-    box.size[k] = std::clamp(double{grid.domain_hi()[k]} - box.lo[k], 0., static_cast<double>(grid.cell_size()));
+    box.size[k] =
+        std::clamp(double{grid.domain_hi()[k]} - box.lo[k], 0., static_cast<double>(grid.cell_size()));
   }
   return box;
 }
@@ -99,7 +100,8 @@ GlowingGrids::GlowingGrids(std::span<const Medium> media) {
     for (std::size_t i = 0; i < s.densities.size(); ++i) {
       if (!(powers[k][i] > 0)) continue;
       before += powers[k][i];
-      const auto next = static_cast<std::uint64_t>(std::min(kAllWords, std::round(before / total * kAllWords)));
+      const auto next =
+          static_cast<std::uint64_t>(std::min(kAllWords, std::round(before / total * kAllWords)));
       // No word is left for the cell only if there are about as many cells as words; then paths alone find
       // the medium's light.
       if (next <= word) found_[s.index] = false;

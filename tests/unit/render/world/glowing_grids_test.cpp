@@ -1,5 +1,5 @@
-// Next-event estimation towards glowing grids: which scenes use it, how much noise it removes, and that it does
-// not depend on the seed, the crop or the threads. That the image stays the same is tested in
+// Next-event estimation towards glowing grids: which scenes use it, how much noise it removes, and that it
+// does not depend on the seed, the crop or the threads. That the image stays the same is tested in
 // tests/property/glowing_grids_test.cpp.
 #include "worker/render/lights/glowing_grids.h"
 
@@ -40,7 +40,8 @@ TEST(GlowingGrids, AreNotLookedForWhereThatDoesNotPay) {
     SceneBuilder b({24, 16});
     b.look({0, 0, .1}, {0, 0, 0}, 60, {0, 1, 0});
     const Transform place = test::translate({-1, -1, -1}) * test::scale(2);
-    const MediumIndex m = b.heterogeneous(b.grid({2, 2, 2}, std::vector<float>(8, 1), place), {.5, .5, .5}, 4);
+    const MediumIndex m =
+        b.heterogeneous(b.grid({2, 2, 2}, std::vector<float>(8, 1), place), {.5, .5, .5}, 4);
     std::get<HeterogeneousMedium>(b.scene.media[m.value]).emission =
         b.grid({2, 2, 2}, {1, 2, 1, 2, 2, 1, 2, 1}, place);
     b.container(CubeShape{}, test::scale(.99), b.null(), m);
@@ -72,9 +73,9 @@ TEST(GlowingGrids, AreTheSameForAnyNumberOfThreadsAndForEveryCrop) {
   EXPECT_EQ(sums(crop, 1, {0, 0, 8, 8}), one);
 }
 
-// A cube without extinction, of side 1 and emission 1 per length, lights a white plate 100 away, which faces it:
-// its irradiance is the integral of emission times cosine over squared distance, which is the cube's volume
-// over 100^2 up to terms of (1 / 100)^2.
+// A cube without extinction, of side 1 and emission 1 per length, lights a white plate 100 away, which faces
+// it: its irradiance is the integral of emission times cosine over squared distance, which is the cube's
+// volume over 100^2 up to terms of (1 / 100)^2.
 TEST(GlowingGrids, DistantCubeLightsAPlate) {
   constexpr double kDistance = 100;
   SceneBuilder b({16, 16});
