@@ -49,7 +49,7 @@ class Numbers {
 };
 
 struct Profile {
-  int type = 1;  // of the angles: 1 is C, 2 is B, 3 is A
+  int type = 1;                              // of the angles: 1 is C, 2 is B, 3 is A
   std::vector<double> vertical, horizontal;  // degrees, ascending
   std::vector<double> candelas;              // index: horizontal * vertical.size() + vertical
 };
@@ -140,18 +140,23 @@ bool ascend(const std::vector<double>& angles) {
 
 // What is wrong with the range of the angles; empty: nothing
 std::string_view wrong_range(const Profile& p) {
-  const double v0 = p.vertical.front(), v1 = p.vertical.back(), h0 = p.horizontal.front(), h1 = p.horizontal.back();
+  const double v0 = p.vertical.front(), v1 = p.vertical.back(), h0 = p.horizontal.front(),
+               h1 = p.horizontal.back();
   if (p.type != 1)
     return v0 < -90 || v1 > 90 || h0 < -90 || h1 > 90 ? "an angle is not within -90 to 90 degrees" : "";
   if (v0 < 0 || v1 > 180) return "a vertical angle is not within 0 to 180 degrees";
   if (h0 < 0 || h1 > 360) return "a horizontal angle is not within 0 to 360 degrees";
-  const bool known = h1 - h0 < 1 || (h0 == 0 && (h1 == 90 || h1 == 180 || h1 == 360)) || (h0 == 90 && h1 == 270);
-  return known ? "" : "the horizontal angles are neither one alone nor from 0 to 90, 180 or 360, nor from 90 to 270 degrees";
+  const bool known =
+      h1 - h0 < 1 || (h0 == 0 && (h1 == 90 || h1 == 180 || h1 == 360)) || (h0 == 90 && h1 == 270);
+  return known ? ""
+               : "the horizontal angles are neither one alone nor from 0 to 90, 180 or 360, nor from 90 to "
+                 "270 degrees";
 }
 
 }  // namespace
 
-Result<ImageData> decode_ies(std::string_view name, std::span<const std::byte> file, std::uint64_t max_pixels) {
+Result<ImageData> decode_ies(std::string_view name, std::span<const std::byte> file,
+                             std::uint64_t max_pixels) {
   std::size_t line = 1;
   const auto broken = [&](std::string_view problem, std::size_t where) {
     return BrokenImage{name, "IES file"}(fmt::format("line {}: {}", where, problem));
@@ -225,7 +230,8 @@ Result<ImageData> decode_ies(std::string_view name, std::span<const std::byte> f
     const auto n = numbers.next();
     if (!n) return stopped(fmt::format("{} of {} intensities", i, values));
     const double candela = *n * *factor;
-    if (!(candela >= 0 && candela <= 1e30)) return broken(fmt::format("an intensity is {} candela", candela), numbers.line());
+    if (!(candela >= 0 && candela <= 1e30))
+      return broken(fmt::format("an intensity is {} candela", candela), numbers.line());
     p.candelas.push_back(candela);
   }
   close_circle(p);

@@ -515,7 +515,7 @@ struct IntegratorSettings {
   int local_lights = 0;
   // For "volpath" only: whether next-event estimation also samples directions towards the cells of grids that
   // give off light, such as fire. 0: chosen for the scene; -1: never; 1: where possible.
-  int glowing_grids = 0;
+  int emissive_grids = 0;
   // For "volpath" only, in scenes with grids: whether a path may split at its first scattering, and whether
   // Russian roulette may end a path whose throughput has fallen below its value just after that scattering
   // (worker/render/world/roulette.h). 0: chosen for the scene; -1: neither.

@@ -12,7 +12,7 @@ namespace ls::test {
 
 struct Fire {
   bool glossy = false, absorbed = false, black_body = false, fog = false, coloured = false;
-  int glowing_grids = 0;
+  int emissive_grids = 0;
 
   // A flame of 12 x 20 x 12 voxels between a floor and a ball, seen from above. The middle of it glows.
   SceneBuilder builder(FrameSize size) const {
@@ -42,7 +42,7 @@ struct Fire {
       medium.emission_scale = 20;
     }
     if (coloured) medium.tint = {1, .6, .3};
-    b.scene.integrator.glowing_grids = glowing_grids;
+    b.scene.integrator.emissive_grids = emissive_grids;
     b.scene.integrator.max_depth = 8;
     const MediumIndex outside =
         fog ? b.homogeneous(coloured ? Rgb{.1, .2, .3} : Rgb{.2, .2, .2}, {.9, .9, .9}, .5) : MediumIndex{};

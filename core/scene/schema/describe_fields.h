@@ -91,10 +91,10 @@ void describe(V& v, T& i) {
             "learned it; 0: if that pays; -1: never; 1: where it is possible",
             i.local_lights);
   technique(
-      "glowing_grids", {-1, 1}, {"volpath"},
+      "emissive_grids", {-1, 1}, {"volpath"},
       "whether light is also looked for in the directions of the cells of grids that give off light, such "
       "as fire; 0: if that pays; -1: never; 1: where it is possible",
-      i.glowing_grids);
+      i.emissive_grids);
   technique("path_splitting", {-1, 0}, {"volpath"},
             "in scenes with grids, whether paths split at their first scattering if it is in a grid, and "
             "Russian roulette compares their weight with that behind the first scattering; 0: where it is "

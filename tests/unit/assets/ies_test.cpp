@@ -78,27 +78,37 @@ std::vector<double> steps(double from, double to, double step) {
 constexpr double kTexel = 6;
 
 TEST(Ies, IntensitiesAreWhereTheirAnglesPoint) {
-  const auto candela = [](double v, double h) { return 1000 + 3 * v + (h <= 90 ? 4 * h : (360 - h) * 4 / 3); };
+  const auto candela = [](double v, double h) {
+    return 1000 + 3 * v + (h <= 90 ? 4 * h : (360 - h) * 4 / 3);
+  };
   const ImageData image = decode_lamp(
       Photometry{.vertical = steps(0, 180, 10), .horizontal = steps(0, 360, 15), .candela = candela}.text());
   EXPECT_EQ(image.width, image.height);
   EXPECT_EQ(image.channels, 1u);
   for (const double v : {1., 20., 77., 91., 130., 178.})
     for (const double h : {1., 29., 90., 170., 190., 271., 359.})
-      EXPECT_NEAR(at_angles(image, v, h), candela(v, h), v < 5 || v > 175 ? 400 : kTexel * 1.5) << v << " " << h;
+      EXPECT_NEAR(at_angles(image, v, h), candela(v, h), v < 5 || v > 175 ? 400 : kTexel * 1.5)
+          << v << " " << h;
 }
 
 TEST(Ies, SymmetricLampsAreCompleted) {
   const auto of = [](std::vector<double> horizontal) {
-    return decode_lamp(Photometry{.vertical = {0, 90, 180}, .horizontal = std::move(horizontal), .candela = [](double, double h) {
-                    return 100 + h;
-                  }}.text());
+    return decode_lamp(Photometry{
+        .vertical = {0, 90, 180}, .horizontal = std::move(horizontal), .candela = [](double, double h) {
+          return 100 + h;
+        }}.text());
   };
-  const ImageData around = of({30}), quarter = of({0, 45, 90}), half = of({0, 90, 180}), other = of({90, 180, 270}),
-                  open = of({0, 90, 180, 270});
+  const ImageData around = of({30}), quarter = of({0, 45, 90}), half = of({0, 90, 180}),
+                  other = of({90, 180, 270}), open = of({0, 90, 180, 270});
   for (const double h : {10., 100., 200., 300.}) {
     EXPECT_NEAR(at_angles(around, 60, h), 130, kTexel) << h;
-    EXPECT_NEAR(at_angles(quarter, 60, h), 100 + (h <= 90 ? h : h <= 180 ? 180 - h : h <= 270 ? h - 180 : 360 - h), kTexel) << h;
+    EXPECT_NEAR(at_angles(quarter, 60, h),
+                100 + (h <= 90    ? h
+                       : h <= 180 ? 180 - h
+                       : h <= 270 ? h - 180
+                                  : 360 - h),
+                kTexel)
+        << h;
     EXPECT_NEAR(at_angles(half, 60, h), 100 + (h <= 180 ? h : 360 - h), kTexel) << h;
     EXPECT_NEAR(at_angles(other, 60, h), 100 + (h < 90 ? 180 - h : h <= 270 ? h : 540 - h), kTexel) << h;
   }
@@ -109,26 +119,34 @@ TEST(Ies, SymmetricLampsAreCompleted) {
 TEST(Ies, TypesAAndBTurnAboutTheirAxes) {
   const double k = std::numbers::pi / 180, h = 30 * k, v = 50 * k;
   for (const int type : {2, 3}) {
-    const auto candela = [](double vertical, double horizontal) { return 200 + vertical + 2 * horizontal / 3; };
-    const ImageData image = decode_lamp(
-        Photometry{.type = type, .vertical = steps(-90, 90, 10), .horizontal = steps(-90, 90, 10), .candela = candela}
-            .text());
-    const double there = type == 2 ? at(image, std::sin(h), std::cos(h) * std::sin(v), std::cos(h) * std::cos(v))
-                                   : at(image, std::cos(v) * std::sin(h), std::sin(v), std::cos(v) * std::cos(h));
+    const auto candela = [](double vertical, double horizontal) {
+      return 200 + vertical + 2 * horizontal / 3;
+    };
+    const ImageData image = decode_lamp(Photometry{
+        .type = type, .vertical = steps(-90, 90, 10), .horizontal = steps(-90, 90, 10), .candela = candela}
+                                            .text());
+    const double there = type == 2
+                             ? at(image, std::sin(h), std::cos(h) * std::sin(v), std::cos(h) * std::cos(v))
+                             : at(image, std::cos(v) * std::sin(h), std::sin(v), std::cos(v) * std::cos(h));
     EXPECT_NEAR(there, candela(50, 30), kTexel) << type;
     EXPECT_EQ(at(image, .1, .1, -1), type == 3 ? 0 : at(image, .1, .1, -1)) << "behind the lamp";
     // From 0 degrees on, a lamp is symmetric
-    const ImageData one = decode_lamp(
-        Photometry{.type = type, .vertical = steps(0, 90, 10), .horizontal = steps(0, 90, 10), .candela = candela}
-            .text());
+    const ImageData one = decode_lamp(Photometry{
+        .type = type, .vertical = steps(0, 90, 10), .horizontal = steps(0, 90, 10), .candela = candela}
+                                          .text());
     for (const double sx : {-1, 1})
-      for (const double sy : {-1, 1}) EXPECT_NEAR(at(one, .4 * sx, .3 * sy, 1), at(image, .4, .3, 1), kTexel) << type;
+      for (const double sy : {-1, 1})
+        EXPECT_NEAR(at(one, .4 * sx, .3 * sy, 1), at(image, .4, .3, 1), kTexel) << type;
   }
 }
 
 TEST(Ies, FactorsMultiply) {
-  const ImageData image = decode_lamp(
-      Photometry{.multiplier = 2.5, .ballast = .5, .vertical = {0, 180}, .horizontal = {0}, .candela = [](double, double) {
+  const ImageData image = decode_lamp(Photometry{
+      .multiplier = 2.5,
+      .ballast = .5,
+      .vertical = {0, 180},
+      .horizontal = {0},
+      .candela = [](double, double) {
         return 8;
       }}.text());
   for (const float x : image.f32) ASSERT_EQ(x, 10);
@@ -168,14 +186,20 @@ TEST(Ies, BrokenFilesAreRefusedWithTheirLine) {
   };
   EXPECT_THAT(ies_refusal("IESNA:LM-63-2002\n[TEST]\n"), HasSubstr("no line begins with TILT="));
   EXPECT_THAT(with([](auto& q) { q.before = "TILT=other.tlt\n"; }), HasSubstr("line 1: TILT=other.tlt"));
-  EXPECT_THAT(with([](auto& q) { q.vertical = {0, 90, 45}; }), HasSubstr("the vertical angles do not ascend"));
+  EXPECT_THAT(with([](auto& q) {
+                q.vertical = {0, 90, 45};
+              }),
+              HasSubstr("the vertical angles do not ascend"));
   EXPECT_THAT(with([](auto& q) { q.vertical = {-90, 0, 90}; }), HasSubstr("0 to 180 degrees"));
   EXPECT_THAT(with([](auto& q) { q.horizontal = {0, 100}; }), HasSubstr("90, 180 or 360"));
-  EXPECT_THAT(with([](auto& q) { q.candela = [](double, double) { return -1; }; }), HasSubstr("line 8: an intensity is -1"));
-  EXPECT_THAT(with([](auto& q) { q.candela = [](double, double) { return NAN; }; }), HasSubstr("'nan' is no number"));
+  EXPECT_THAT(with([](auto& q) { q.candela = [](double, double) { return -1; }; }),
+              HasSubstr("line 8: an intensity is -1"));
+  EXPECT_THAT(with([](auto& q) { q.candela = [](double, double) { return NAN; }; }),
+              HasSubstr("'nan' is no number"));
   EXPECT_THAT(with([](auto& q) { q.multiplier = 1e300; }), HasSubstr("an intensity is 1e+300"));
   EXPECT_THAT(with([](auto& q) { q.type = 4; }), HasSubstr("line 4: the photometric type"));
-  EXPECT_THAT(ies_refusal(fine.substr(0, fine.size() - 5)), HasSubstr("line 9: 4 of 6 intensities: the file ends"));
+  EXPECT_THAT(ies_refusal(fine.substr(0, fine.size() - 5)),
+              HasSubstr("line 9: 4 of 6 intensities: the file ends"));
   EXPECT_THAT(ies_refusal("IESNA91\nTILT=NONE\n1 1 1 4000000000 4000000000 1 2 0 0 0\n"),
               HasSubstr("the number of vertical angles"));
   EXPECT_THAT(ies_refusal(""), HasSubstr("lamp.ies"));
@@ -183,7 +207,9 @@ TEST(Ies, BrokenFilesAreRefusedWithTheirLine) {
 
 TEST(Ies, HostileFilesAreRefusedOrRead) {
   const std::string file = Photometry{.vertical = {0, 90}, .horizontal = {0, 90}}.text();
-  const auto decoder = [](std::string_view name, std::span<const std::byte> bytes) { return decode_ies(name, bytes); };
+  const auto decoder = [](std::string_view name, std::span<const std::byte> bytes) {
+    return decode_ies(name, bytes);
+  };
   // Of the cuts, only those behind the first digit of the last number are accepted.
   EXPECT_EQ(test::accepted_truncations(file, decoder), 2);
   test::survive_mutations(

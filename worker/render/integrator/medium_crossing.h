@@ -88,7 +88,7 @@ auto PathTracer<F, Light>::collide(const Medium& medium, Segment segment, const 
     Light<F>::at_vertex(*this, medium, last_.p, ray_.d);
   }
   if constexpr (F.connected) connect_in(medium, last_.p, ray_.d);
-  if constexpr (F.emission) look_for_glow_in(medium, ray_.d);
+  if constexpr (F.emission) look_for_emission_in(medium, ray_.d);
   return scatter_in(medium);
 }
 
@@ -160,7 +160,7 @@ auto PathTracer<F, Light>::scatter_by_phase(const Medium& medium) -> Step {
   }
   last_.pdf = s.pdf;
   ray_.d = s.w;
-  if constexpr (F.emission) glow_.pdf = -1;
+  if constexpr (F.emission) emissive_.pdf = -1;
   if constexpr (F.visibility) {
     if (world_.ray_flags) [[unlikely]] {
       links_.receiver = world_.medium_links[index_of(medium)];
@@ -207,7 +207,7 @@ auto PathTracer<F, Light>::fly_through_several(const SurfaceHit* end, float reac
   begin_vertex(segment, flight);
   if constexpr (F.aimed) near_lamps_ = LampDirections(world_.lamps, last_.p);
   light_vertex(*met, last_.p, ray_.d);
-  if constexpr (F.emission) look_for_glow_in(*met, ray_.d);
+  if constexpr (F.emission) look_for_emission_in(*met, ray_.d);
   return scatter_in(*met);
 }
 
@@ -332,7 +332,7 @@ void PathTracer<F, Light>::add_along(const C3& total, const Medium& medium, [[ma
       return;
     }
   }
-  add(beta_ * total * glow_weight(medium), group);
+  add(beta_ * total * emissive_weight(medium), group);
 }
 
 template <Features F, template <Features> class Light>

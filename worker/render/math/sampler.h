@@ -144,8 +144,8 @@ enum class Purpose : std::uint32_t {
   track_direct,
   shadow_catcher,
   track_shadow_catcher,
-  glow,
-  track_glow,
+  emissive,
+  track_emissive,
   end  // not a purpose, but the number of purposes
 };
 

@@ -124,7 +124,7 @@ class EmissionWalk {
     // `emitter_` walks the grid of the first channel. If the channels have different grids, the bounds of the
     // others are unknown, so the cell is assumed to emit.
     if (m_.emitter[1] != m_.emitter[0]) return true;
-    return may_glow(m_, emitter_->cell().hi);
+    return may_emit(m_, emitter_->cell().hi);
   }
 
   // Returns the end of the interval that begins at `at` and that run() integrates as one. `sampled` is the
@@ -261,7 +261,7 @@ C3 emission_at(const Medium& m, const V3& p) {
   return C3(source_at(m, q, p) * V3d(m.sigma_t) * V3d(absorbing_at(m, p)) * V3d(density));
 }
 
-bool may_glow(const Medium& m, float value) {
+bool may_emit(const Medium& m, float value) {
   return m.emission_kind == EmissionKind::black_body ? m.kelvin_offset + m.kelvin_scale * value >= kColdest
                                                      : value > 0;
 }

@@ -83,7 +83,7 @@ std::vector<Case> cases() {
           {Technique::path_splitting, test::lit_cloud({24, 16})},
           {Technique::sky_portals, test::SkyRoom{}.builder({24, 16})},
           {Technique::local_lights, test::LampRooms{}.builder({24, 16})},
-          {Technique::glowing_grids, test::Fire{}.builder({24, 16})}};
+          {Technique::emissive_grids, test::Fire{}.builder({24, 16})}};
 }
 
 // The scene with the parameter set to the value that off_switch() returns.
@@ -104,7 +104,7 @@ SceneBuilder switched_off(const Case& c) {
       {"path_splitting", [&] { i.path_splitting = -1; }},
       {"sky_portals", [&] { i.sky_portals = -1; }},
       {"local_lights", [&] { i.local_lights = -1; }},
-      {"glowing_grids", [&] { i.glowing_grids = -1; }},
+      {"emissive_grids", [&] { i.emissive_grids = -1; }},
       {"distance", [&] {
          i.distance =
              off.value == "exponential" ? DistanceSampling::exponential : DistanceSampling::equiangular;

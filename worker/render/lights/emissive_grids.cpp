@@ -1,4 +1,4 @@
-#include "worker/render/lights/glowing_grids.h"
+#include "worker/render/lights/emissive_grids.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@ namespace {
 
 // The emission of a cell is the mean of that at points this many voxels apart along each axis.
 constexpr int kVoxelsPerPoint = 2;
-// A cell that may glow is chosen at least as often as if it gave off this share of the mean of such cells, as
+// A cell that may emit is chosen at least as often as if it gave off this share of the mean of such cells, as
 // its points may miss what glows in it.
 constexpr double kLeastShare = 1. / 64;
 // The number of 32-bit words, which a choice divides among the cells.
@@ -56,7 +56,7 @@ double mean_emission(const Medium& m, const Grid& grid, const Affine& to_world, 
 
 }  // namespace
 
-GlowingGrids::GlowingGrids(std::span<const Medium> media) {
+EmissiveGrids::EmissiveGrids(std::span<const Medium> media) {
   std::vector<std::vector<double>> powers;
   double total = 0, volume_of_all = 0;
   for (std::size_t index = 0; index < media.size(); ++index) {
@@ -72,7 +72,7 @@ GlowingGrids::GlowingGrids(std::span<const Medium> media) {
     const double per_index = std::abs(s.to_world.determinant());
     for (std::size_t i = 0; i < count; ++i) {
       // Only the first channel's values are bounded by the cell.
-      if (m.emitter[1] == m.emitter[0] && !may_glow(m, grid->cell(i).hi)) continue;
+      if (m.emitter[1] == m.emitter[0] && !may_emit(m, grid->cell(i).hi)) continue;
       const CellBox box = box_of(*grid, i);
       s.densities[i] = box.volume() * per_index;
       volume_of_all += s.densities[i];
@@ -114,8 +114,8 @@ GlowingGrids::GlowingGrids(std::span<const Medium> media) {
   }
 }
 
-std::optional<GlowingGrids::Point> GlowingGrids::sample(const V3& x, const Group& numbers,
-                                                        RandomStream& stream) const {
+std::optional<EmissiveGrids::Point> EmissiveGrids::sample(const V3& x, const Group& numbers,
+                                                          RandomStream& stream) const {
   const auto chosen = static_cast<std::size_t>(
       std::upper_bound(first_words_.begin(), first_words_.end(), numbers.bits[0]) - first_words_.begin() - 1);
   std::size_t k = sources_.size() - 1;
@@ -151,7 +151,7 @@ std::optional<GlowingGrids::Point> GlowingGrids::sample(const V3& x, const Group
   return std::nullopt;  // by rounding of the sum
 }
 
-GlowingGrids::Sums GlowingGrids::sums(const V3& x, const V3& w) const {
+EmissiveGrids::Sums EmissiveGrids::sums(const V3& x, const V3& w) const {
   Sums sums;
   for (const Source& s : sources_)
     for (CellWalk walk(*s.grid, x, w, 0, kInfinity); walk.next();) {
@@ -165,7 +165,7 @@ GlowingGrids::Sums GlowingGrids::sums(const V3& x, const V3& w) const {
   return sums;
 }
 
-std::uint64_t GlowingGrids::bytes() const {
+std::uint64_t EmissiveGrids::bytes() const {
   std::uint64_t bytes = first_words_.size() * sizeof(first_words_[0]);
   for (const Source& s : sources_)
     bytes += s.densities.size() * sizeof(s.densities[0]) + s.cells.size() * sizeof(s.cells[0]);

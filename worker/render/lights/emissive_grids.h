@@ -1,4 +1,4 @@
-// Glowing grids as lights: the directions from a point towards media whose emission varies in space, such as
+// Emissive grids as lights: the directions from a point towards media whose emission varies in space, such as
 // fire (Villemin and Hery 2013, "Practical Illumination from Flames", Journal of Computer Graphics Techniques
 // 2(2)). A macro cell of an emission grid is chosen in proportion to the light that it gives off, and a point
 // in it uniformly. Only the direction of this point is kept. Its density at x, per steradian, is the density
@@ -24,7 +24,7 @@
 
 namespace ls::render {
 
-class GlowingGrids {
+class EmissiveGrids {
  public:
   struct Point {
     V3 w;                   // direction, of length 1
@@ -35,10 +35,10 @@ class GlowingGrids {
     std::uint32_t medium;   // index into the media
   };
 
-  GlowingGrids() = default;
+  EmissiveGrids() = default;
   // The media must outlive this object. Media whose emission does not vary, or whose extent is that of their
   // boundary alone, are left out.
-  explicit GlowingGrids(std::span<const Medium> media);
+  explicit EmissiveGrids(std::span<const Medium> media);
 
   bool any() const { return !first_words_.empty(); }
   // True if sample() finds all light that this medium gives off.

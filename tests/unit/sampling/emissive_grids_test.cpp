@@ -1,6 +1,6 @@
-// Glowing grids as lights: the directions that are sampled towards them, against the density that is claimed
+// Emissive grids as lights: the directions that are sampled towards them, against the density that is claimed
 // for a ray in such a direction.
-#include "worker/render/lights/glowing_grids.h"
+#include "worker/render/lights/emissive_grids.h"
 
 #include <gtest/gtest.h>
 
@@ -18,18 +18,18 @@
 namespace ls::render {
 namespace {
 
-constexpr int kGlowSamples = 100000, kGlowRows = 8, kGlowColumns = 8;
+constexpr int kEmissiveSamples = 100000, kEmissiveRows = 8, kEmissiveColumns = 8;
 
-struct GlowCase {
+struct EmissiveCase {
   std::string name;
   std::vector<Medium> media;
   V3 from{0, 0, 0}, towards{0, 0, 1};  // `towards`: the axis of the cells of directions
   double reach = 2;                    // of these cells: 1 - cos
 };
 
-class GlowCases {
+class EmissiveCases {
  public:
-  GlowCases() {
+  EmissiveCases() {
     const Grid& fire = add(grid_of({12, 12, 12}, 3));
     const Grid& smoke = add(grid_of({9, 14, 10}, 4));
     const Grid& one = add(voxel_grid({1, 1, 1}, {1}, kNearest, Wrap::clamp));
@@ -53,7 +53,7 @@ class GlowCases {
         add({{12, 12, 12}, random_values({12, 12, 12}, 8, true), flat, V3d(0), V3d(11, 11, 11), 1});
     all.push_back({"voxels of unlike sides", {per_length(wide)}, {5, -2, .2f}});
   }
-  std::vector<GlowCase> all;
+  std::vector<EmissiveCase> all;
 
  private:
   static Grid grid_of(Size n, unsigned seed) { return unit_grid(n, random_values(n, seed, true)); }
@@ -78,32 +78,32 @@ class GlowCases {
   std::deque<Grid> grids_;  // a deque, since media point at its elements
 };
 
-TEST(GlowingGrids, AreSampledWithTheirStatedDensity) {
-  test::ChiSquareTally tally("sampling/glowing_grids");
-  for (const GlowCases cases; const GlowCase& c : cases.all) {
+TEST(EmissiveGrids, AreSampledWithTheirStatedDensity) {
+  test::ChiSquareTally tally("sampling/emissive_grids");
+  for (const EmissiveCases cases; const EmissiveCase& c : cases.all) {
     SCOPED_TRACE(c.name);
-    const GlowingGrids glow(c.media);
-    ASSERT_TRUE(glow.any());
-    const test::SphereCells cells(c.towards, c.reach, kGlowRows, kGlowColumns);
+    const EmissiveGrids lights(c.media);
+    ASSERT_TRUE(lights.any());
+    const test::SphereCells cells(c.towards, c.reach, kEmissiveRows, kEmissiveColumns);
     // The density has edges where a ray passes from one cell of a grid to the next, so the sum over 48 x 48
     // points of a cell of directions is right to about 1 / 48^2. The test asks for 1 / sqrt(samples in it).
-    const auto masses = cells.masses([&](const V3& w) { return double{glow.pdf(c.from, w)}; }, 48);
+    const auto masses = cells.masses([&](const V3& w) { return double{lights.pdf(c.from, w)}; }, 48);
     EXPECT_NEAR(cells.total(), 1, 2e-3) << "the density's integral over all directions";
     std::vector<double> observed(cells.size(), 0);
     RandomStream r(17);
-    for (int i = 0; i < kGlowSamples; ++i) {
-      const auto s = glow.sample(c.from, {{r.bits(), r.bits(), r.bits(), r.bits()}}, r);
+    for (int i = 0; i < kEmissiveSamples; ++i) {
+      const auto s = lights.sample(c.from, {{r.bits(), r.bits(), r.bits(), r.bits()}}, r);
       ASSERT_TRUE(s);
       // sample() takes the density from the direction that it returns
-      ASSERT_EQ(s->pdf, glow.pdf(c.from, s->w));
+      ASSERT_EQ(s->pdf, lights.pdf(c.from, s->w));
       ++observed[cells.of(s->w)];
     }
-    tally.expect(c.name, test::counts(masses, kGlowSamples), observed);
+    tally.expect(c.name, test::counts(masses, kEmissiveSamples), observed);
   }
   tally.close();
 }
 
-TEST(GlowingGrids, AreEmptyWithoutLightThatVaries) {
+TEST(EmissiveGrids, AreEmptyWithoutLightThatVaries) {
   const Grid none = unit_grid({4, 4, 4}, std::vector<float>(64, 0));
   Medium dark;
   dark.grid = true;
@@ -112,15 +112,15 @@ TEST(GlowingGrids, AreEmptyWithoutLightThatVaries) {
   dark.emission_kind = EmissionKind::per_length;
   dark.emission = C3(1);
   // The extent of an emission without a grid is that of the medium's boundary
-  EXPECT_FALSE(GlowingGrids(std::vector{dark}).any());
+  EXPECT_FALSE(EmissiveGrids(std::vector{dark}).any());
   dark.emitter = {&none, &none, &none};
-  EXPECT_FALSE(GlowingGrids(std::vector{dark}).any());
-  EXPECT_FALSE(GlowingGrids(std::vector<Medium>{}).any());
-  EXPECT_EQ(GlowingGrids().pdf({0, 0, 0}, {0, 0, 1}), 0);
+  EXPECT_FALSE(EmissiveGrids(std::vector{dark}).any());
+  EXPECT_FALSE(EmissiveGrids(std::vector<Medium>{}).any());
+  EXPECT_EQ(EmissiveGrids().pdf({0, 0, 0}, {0, 0, 1}), 0);
 }
 
 // Along a ray, the mean of emission over density is the integral of the emission.
-TEST(GlowingGrids, PointsOnARayGiveTheIntegralOfTheEmission) {
+TEST(EmissiveGrids, PointsOnARayGiveTheIntegralOfTheEmission) {
   const Grid fire = unit_grid({12, 12, 12}, random_values({12, 12, 12}, 3, true));
   Medium m;
   m.grid = true;
@@ -129,7 +129,7 @@ TEST(GlowingGrids, PointsOnARayGiveTheIntegralOfTheEmission) {
   m.emission_kind = EmissionKind::per_length;
   m.emission = C3(1);
   m.emitter = {&fire, &fire, &fire};
-  const GlowingGrids glow(std::vector{m});
+  const EmissiveGrids lights(std::vector{m});
   // From so far away that all sampled directions are one ray, up to the spread of the grid's width over the
   // distance. The first number decides the cell, the others the point in it: always the same.
   RandomStream r(5);
@@ -139,7 +139,7 @@ TEST(GlowingGrids, PointsOnARayGiveTheIntegralOfTheEmission) {
   double sum = 0, square = 0;
   V3 w(0);
   for (int i = 0; i < kPoints; ++i) {
-    const auto s = glow.sample(from, numbers, r);
+    const auto s = lights.sample(from, numbers, r);
     ASSERT_TRUE(s);
     const double value = double{s->emission.x} / double{s->pdf_of_distance};
     sum += value / kPoints;
@@ -151,7 +151,7 @@ TEST(GlowingGrids, PointsOnARayGiveTheIntegralOfTheEmission) {
   EXPECT_NEAR(sum, exact_integral(fire, V3d(from), V3d(w), 0, 100), test::kStandardErrors * error);
 }
 
-TEST(GlowingGrids, AnswerUnusualPoints) {
+TEST(EmissiveGrids, AnswerUnusualPoints) {
   const Grid fire = unit_grid({5, 5, 5}, random_values({5, 5, 5}, 2));
   Medium m;
   m.grid = true;
@@ -160,14 +160,14 @@ TEST(GlowingGrids, AnswerUnusualPoints) {
   m.emission_kind = EmissionKind::per_length;
   m.emission = C3(1);
   m.emitter = {&fire, &fire, &fire};
-  const GlowingGrids glow(std::vector{m});
+  const EmissiveGrids lights(std::vector{m});
   constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
   for (const V3& x : {V3(kNotANumber), V3(kInfinity), V3(3e38f), V3(1e30f, 0, 0)})
     for (std::uint32_t word : {0u, 1u, ~0u}) {
       RandomStream r(word);
-      EXPECT_FALSE(glow.sample(x, {{word, word, word, word}}, r)) << x;
+      EXPECT_FALSE(lights.sample(x, {{word, word, word, word}}, r)) << x;
     }
-  EXPECT_EQ(glow.pdf({0, 0, 0}, V3(kNotANumber)), 0);
+  EXPECT_EQ(lights.pdf({0, 0, 0}, V3(kNotANumber)), 0);
 }
 
 }  // namespace

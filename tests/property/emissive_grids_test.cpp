@@ -1,4 +1,4 @@
-// Looking for glowing grids by next-event estimation brings the same image as meeting their light by chance.
+// Looking for emissive grids by next-event estimation brings the same image as meeting their light by chance.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,9 +12,9 @@
 namespace ls::test {
 namespace {
 
-TEST(GlowingGrids, GiveTheSameImageAsPathsThatMeetTheirLight) {
+TEST(EmissiveGrids, GiveTheSameImageAsPathsThatMeetTheirLight) {
   constexpr int kSeeds = 24;
-  Tests tests("property/glowing_grids");
+  Tests tests("property/emissive_grids");
   struct Rival {
     const char* name;
     Fire fire;
@@ -49,16 +49,16 @@ TEST(GlowingGrids, GiveTheSameImageAsPathsThatMeetTheirLight) {
                           {"fire and a ball that reflections do not show", {}, unseen}};
   const double level = tests.level(std::size(rivals) * kQuarters);
   for (const Rival& rival : rivals) {
-    const auto scene = [&](int glowing_grids) {
+    const auto scene = [&](int emissive_grids) {
       Fire fire = rival.fire;
-      fire.glowing_grids = glowing_grids;
+      fire.emissive_grids = emissive_grids;
       SceneBuilder b = fire.builder({kSide, kSide});
       if (rival.change) rival.change(b);
       return b;
     };
     const SceneBuilder on = scene(1), off = scene(-1);
-    ASSERT_TRUE(world_of(on)->glow.any()) << rival.name;
-    ASSERT_FALSE(world_of(off)->glow.any()) << rival.name;
+    ASSERT_TRUE(world_of(on)->emissive.any()) << rival.name;
+    ASSERT_FALSE(world_of(off)->emissive.any()) << rival.name;
     ASSERT_THAT(estimate(on, 2).variant, testing::HasSubstr(rival.variant)) << rival.name;
     expect_same_quarters(rival.name, level, quarters_of(on, rival.spp, kSeeds, 100),
                          quarters_of(off, 4 * rival.spp, kSeeds, 900), kSeeds);

@@ -1,5 +1,5 @@
-// Part of path_tracer.h, which includes it: next-event estimation towards glowing grids (glowing_grids.h). At
-// each vertex a direction towards them is sampled, and a point on its ray whose emission is an estimate of
+// Part of path_tracer.h, which includes it: next-event estimation towards emissive grids (emissive_grids.h).
+// At each vertex a direction towards them is sampled, and a point on its ray whose emission is an estimate of
 // the light from there. A scattered ray in that direction meets the same light (add_medium_emission()); the
 // two are combined by the balance heuristic over directions.
 #pragma once
@@ -12,51 +12,51 @@ namespace ls::render {
 
 // Returns the weight of the light that the medium gives off along the path's current ray.
 template <Features F, template <Features> class Light>
-float PathTracer<F, Light>::glow_weight(const Medium& medium) {
-  if (last_.delta || !world_.glow.has(static_cast<std::uint32_t>(index_of(medium)))) return 1;
-  if (glow_.pdf < 0) glow_.pdf = world_.glow.pdf(last_.p, ray_.d);
-  return balance_weight(last_.pdf, glow_.pdf);
+float PathTracer<F, Light>::emissive_weight(const Medium& medium) {
+  if (last_.delta || !world_.emissive.has(static_cast<std::uint32_t>(index_of(medium)))) return 1;
+  if (emissive_.pdf < 0) emissive_.pdf = world_.emissive.pdf(last_.p, ray_.d);
+  return balance_weight(last_.pdf, emissive_.pdf);
 }
 
 template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::look_for_glow_on(const SurfaceHit& hit, const V3& wo) {
+void PathTracer<F, Light>::look_for_emission_on(const SurfaceHit& hit, const V3& wo) {
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-  if (!world_.glow.any() || !surface.smooth) return;
-  RandomStream stream = stream_.stream(depth_, Purpose::track_glow);
-  const auto glow = world_.glow.sample(hit.p, stream_.group(depth_, Purpose::glow), stream);
-  if (!glow) return;
-  const V3 wi = hit.shading.to_local(glow->w);
-  if ((wi.z > 0) != (dot(glow->w, hit.ng) > 0)) return;  // as for light_surface_by()
+  if (!world_.emissive.any() || !surface.smooth) return;
+  RandomStream stream = stream_.stream(depth_, Purpose::track_emissive);
+  const auto found = world_.emissive.sample(hit.p, stream_.group(depth_, Purpose::emissive), stream);
+  if (!found) return;
+  const V3 wi = hit.shading.to_local(found->w);
+  if ((wi.z > 0) != (dot(found->w, hit.ng) > 0)) return;  // as for light_surface_by()
   const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, wi);
   if (is_black(f.f_cos)) return;
   float sampled = f.pdf;
-  if constexpr (F.aimed) sampled = near_lamps_.pdf(f.pdf, glow->w);
+  if constexpr (F.aimed) sampled = near_lamps_.pdf(f.pdf, found->w);
   OffsetRay ray;
-  ray.leave(hit, glow->w);
-  add_glow(*glow, beta_ * f.f_cos * (1 / (glow->pdf + sampled)), ray,
-           beyond(hit, surface, glow->w, ray_.d, medium_), stream);
+  ray.leave(hit, found->w);
+  add_emission_at(*found, beta_ * f.f_cos * (1 / (found->pdf + sampled)), ray,
+                  beyond(hit, surface, found->w, ray_.d, medium_), stream);
 }
 
 // d is the direction of travel before the scattering.
 template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::look_for_glow_in(const Medium& medium, const V3& d) {
-  if (!world_.glow.any()) return;
-  RandomStream stream = stream_.stream(depth_, Purpose::track_glow);
-  const auto glow = world_.glow.sample(last_.p, stream_.group(depth_, Purpose::glow), stream);
-  if (!glow) return;
-  const PhaseValue<F> phase = medium.phase_value<F>(last_.p, d, glow->w);
-  const float sampled = direction_pdf(last_.p, phase.pdf, glow->w);
+void PathTracer<F, Light>::look_for_emission_in(const Medium& medium, const V3& d) {
+  if (!world_.emissive.any()) return;
+  RandomStream stream = stream_.stream(depth_, Purpose::track_emissive);
+  const auto found = world_.emissive.sample(last_.p, stream_.group(depth_, Purpose::emissive), stream);
+  if (!found) return;
+  const PhaseValue<F> phase = medium.phase_value<F>(last_.p, d, found->w);
+  const float sampled = direction_pdf(last_.p, phase.pdf, found->w);
   OffsetRay ray = ray_;
-  ray.d = glow->w;
-  add_glow(*glow, beta_ * phase.value * (1 / (glow->pdf + sampled)), ray, medium_, stream);
+  ray.d = found->w;
+  add_emission_at(*found, beta_ * phase.value * (1 / (found->pdf + sampled)), ray, medium_, stream);
 }
 
 // Adds the light of the point, times `weight`, if it reaches the start of the ray, which leads to the point.
 // `medium` contains the media at its start.
 template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::add_glow(const GlowingGrids::Point& glow, const C3& weight, OffsetRay ray,
-                                    Within medium, RandomStream& stream) {
-  C3 light = weight * glow.emission * (1 / glow.pdf_of_distance);
+void PathTracer<F, Light>::add_emission_at(const EmissiveGrids::Point& point, const C3& weight, OffsetRay ray,
+                                           Within medium, RandomStream& stream) {
+  C3 light = weight * point.emission * (1 / point.pdf_of_distance);
   if (is_black(light)) return;
   if (world_.faint_shadow > 0) {
     float most = mean(light);
@@ -66,7 +66,7 @@ void PathTracer<F, Light>::add_glow(const GlowingGrids::Point& glow, const C3& w
     light /= traced;
   }
   const RayKind kind = left_medium_ ? RayKind::medium : RayKind::surface;
-  float left = glow.distance;
+  float left = point.distance;
   int passed = passed_;
   for (int i = 0; i < kMaxShadowSegments; ++i) {
     SurfaceHit hit;
@@ -83,8 +83,8 @@ void PathTracer<F, Light>::add_glow(const GlowingGrids::Point& glow, const C3& w
       if (is_black(light)) return;
     }
     if (there) {
-      const int times = medium.count(glow.medium);
-      if (times > 0) add(light * static_cast<float>(times), world_.media[glow.medium].light_group);
+      const int times = medium.count(point.medium);
+      if (times > 0) add(light * static_cast<float>(times), world_.media[point.medium].light_group);
       return;
     }
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];

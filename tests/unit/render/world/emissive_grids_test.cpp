@@ -1,7 +1,7 @@
-// Next-event estimation towards glowing grids: which scenes use it, how much noise it removes, and that it
+// Next-event estimation towards emissive grids: which scenes use it, how much noise it removes, and that it
 // does not depend on the seed, the crop or the threads. That the image stays the same is tested in
-// tests/property/glowing_grids_test.cpp.
-#include "worker/render/lights/glowing_grids.h"
+// tests/property/emissive_grids_test.cpp.
+#include "worker/render/lights/emissive_grids.h"
 
 #include <gtest/gtest.h>
 
@@ -15,17 +15,17 @@ namespace {
 using test::Fire;
 using test::SceneBuilder;
 
-SceneBuilder fire(int glowing_grids = 0, FrameSize size = {24, 16}) {
-  return Fire{.glowing_grids = glowing_grids}.builder(size);
+SceneBuilder fire(int emissive_grids = 0, FrameSize size = {24, 16}) {
+  return Fire{.emissive_grids = emissive_grids}.builder(size);
 }
-bool is_used(const SceneBuilder& b) { return test::world_of(b)->glow.any(); }
+bool is_used(const SceneBuilder& b) { return test::world_of(b)->emissive.any(); }
 
-TEST(GlowingGrids, AreLookedForWhereTheFireIsSmall) {
+TEST(EmissiveGrids, AreLookedForWhereTheFireIsSmall) {
   EXPECT_TRUE(is_used(fire()));
   EXPECT_FALSE(is_used(fire(-1)));
 }
 
-TEST(GlowingGrids, AreNotLookedForByOtherIntegrators) {
+TEST(EmissiveGrids, AreNotLookedForByOtherIntegrators) {
   for (const char* name : {"path", "volpath_distant_mis"}) {
     SceneBuilder b = fire(1);
     b.scene.integrator.name = name;
@@ -35,8 +35,8 @@ TEST(GlowingGrids, AreNotLookedForByOtherIntegrators) {
 
 // The camera is in a glowing cloud that fills the scene and hides all else: paths meet its light anyway. What
 // was learned leaves the image unchanged.
-TEST(GlowingGrids, AreNotLookedForWhereThatDoesNotPay) {
-  const auto cloud = [](int glowing_grids) {
+TEST(EmissiveGrids, AreNotLookedForWhereThatDoesNotPay) {
+  const auto cloud = [](int emissive_grids) {
     SceneBuilder b({24, 16});
     b.look({0, 0, .1}, {0, 0, 0}, 60, {0, 1, 0});
     const Transform place = test::translate({-1, -1, -1}) * test::scale(2);
@@ -46,7 +46,7 @@ TEST(GlowingGrids, AreNotLookedForWhereThatDoesNotPay) {
         b.grid({2, 2, 2}, {1, 2, 1, 2, 2, 1, 2, 1}, place);
     b.container(CubeShape{}, test::scale(.99), b.null(), m);
     b.scene.sensor.medium = m;
-    b.scene.integrator.glowing_grids = glowing_grids;
+    b.scene.integrator.emissive_grids = emissive_grids;
     return b;
   };
   EXPECT_TRUE(is_used(cloud(1)));
@@ -58,10 +58,10 @@ TEST(GlowingGrids, AreNotLookedForWhereThatDoesNotPay) {
   EXPECT_NE(sums(cloud(1)), sums(cloud(-1)));
 }
 
-TEST(GlowingGrids, AreTheSameForAnyNumberOfThreadsAndForEveryCrop) {
+TEST(EmissiveGrids, AreTheSameForAnyNumberOfThreadsAndForEveryCrop) {
   const auto sums = [](SceneBuilder b, int threads, PixelRect tile) {
     const auto world = test::world_of(b, 3, threads);
-    EXPECT_TRUE(world->glow.any());
+    EXPECT_TRUE(world->emissive.any());
     return render_tile(*world, tile, {0, 4}, nullptr, nullptr).sums;
   };
   const SceneBuilder whole = fire(0, {64, 64});
@@ -76,7 +76,7 @@ TEST(GlowingGrids, AreTheSameForAnyNumberOfThreadsAndForEveryCrop) {
 // A cube without extinction, of side 1 and emission 1 per length, lights a white plate 100 away, which faces
 // it: its irradiance is the integral of emission times cosine over squared distance, which is the cube's
 // volume over 100^2 up to terms of (1 / 100)^2.
-TEST(GlowingGrids, DistantCubeLightsAPlate) {
+TEST(EmissiveGrids, DistantCubeLightsAPlate) {
   constexpr double kDistance = 100;
   SceneBuilder b({16, 16});
   b.look({0, 0, 3}, {0, 0, 0}, 20, {0, 1, 0});
@@ -86,7 +86,7 @@ TEST(GlowingGrids, DistantCubeLightsAPlate) {
   std::get<HeterogeneousMedium>(b.scene.media[m.value]).emission =
       b.grid({2, 2, 2}, std::vector<float>(8, 1), place);
   b.container(CubeShape{}, test::translate({0, 0, kDistance}) * test::scale(.5), b.null(), m);
-  b.scene.integrator.glowing_grids = 1;
+  b.scene.integrator.emissive_grids = 1;
   b.scene.integrator.max_depth = 2;
 
   const auto plate = test::estimate(b, 64);
@@ -99,9 +99,9 @@ TEST(GlowingGrids, DistantCubeLightsAPlate) {
   }
 }
 
-TEST(GlowingGrids, ReduceNoise) {
-  const auto noise = [](int glowing_grids) {
-    return test::estimate(fire(glowing_grids, {24, 24}), 32).standard_error[1];
+TEST(EmissiveGrids, ReduceNoise) {
+  const auto noise = [](int emissive_grids) {
+    return test::estimate(fire(emissive_grids, {24, 24}), 32).standard_error[1];
   };
   // The two images are the same in each run. Each standard error is that of a sum over 576 pixels, so it is
   // accurate to about 1 / sqrt(2 * 576) = 3 %, and less if few bright pixels dominate.
