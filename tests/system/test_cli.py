@@ -171,3 +171,15 @@ def test_inspect_tells_what_the_scene_needs(fog):
     assert any(s["bytes"] > 0 for s in told["structures"])
     text = lightshaft("inspect", fog).stdout
     assert "fog.vol" in text and "72 x 40" in text and not (fog.parent / "fog.exr").exists()
+
+
+def test_a_scene_without_light_is_told_to_be_black(tmp_path):
+    sphere = '<scene version="3.0.0">{}<shape type="sphere"/><sensor type="perspective"/></scene>'
+    dark, lit = tmp_path / "dark.xml", tmp_path / "lit.xml"
+    dark.write_text(sphere.format(""))
+    lit.write_text(sphere.format('<emitter type="constant"/>'))
+
+    said = lightshaft("render", dark, "-o", tmp_path / "out.exr", "--size", "4x4", "--spp", 2, "--quiet").stderr
+
+    assert said == f"{dark}: warning: nothing in the scene gives light, so that the picture is black\n"
+    assert not lightshaft("inspect", lit).stderr
