@@ -76,13 +76,17 @@ class Command:
         assert self.process.wait(timeout=PATIENCE) == code, self.text()
 
 
+OF_LIGHTSHAFT = object()  # the scene that a start without --first-scene renders
+
+
 class Up(Command):
     def __init__(self, folder, *words, program=None, scene=None, browser=None, environment=None):
         self.data = folder / "state"
         if scene is None:
             scene = folder / "scene.xml"
             scene.write_text(SCENE)
-        super().__init__(program or bin_dir() / "lightshaft", "up", "--data", self.data, "--threads", 1, "--first-scene", scene, *words,
+        super().__init__(program or bin_dir() / "lightshaft", "up", "--data", self.data, "--threads", 1,
+                         *([] if scene is OF_LIGHTSHAFT else ["--first-scene", scene]), *words,
                          *([] if browser else ["--no-browser"]), output=folder / "up.txt", folder=folder,
                          environment={**({"BROWSER": f"{browser} %s", "DISPLAY": ":0"} if browser else {}), **(environment or {})})  # fmt: skip
         self.url, self.token = self.said(r"dashboard: *(\S+)/#token=(\w+)").groups()
@@ -182,6 +186,17 @@ def test_a_first_scene_that_is_refused_is_shown_with_the_reason(tmp_path, leaves
     up = Up(tmp_path, scene=scene)
 
     up.said(r"(?m)^the first picture failed: .*\n.*broken\.xml")
+    up.interrupt()
+    up.ends()
+
+
+def test_a_python_without_numpy_is_told_as_the_reason_why_there_is_no_first_picture(tmp_path, leaves_nothing):
+    subprocess.run(["/usr/bin/python3", "-m", "venv", "--without-pip", tmp_path / "bare"], check=True)
+    python = tmp_path / "bare" / "bin" / "python3"
+
+    up = Up(tmp_path, scene=OF_LIGHTSHAFT, environment={"LIGHTSHAFT_PYTHON": str(python)})
+
+    up.said(rf"(?m)^the first picture failed: .*\n.*NumPy, which {python} does not have: install python3-numpy")
     up.interrupt()
     up.ends()
 

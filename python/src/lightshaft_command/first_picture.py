@@ -60,7 +60,8 @@ class FirstPicture:
                     say("this installation has no scene for a first picture: submit your own")
                     return
                 say("making the scene of the first picture")
-                yield start([sys.executable, "-B", str(maker), str(self.home / "bath")], subprocess.DEVNULL)
+                with self.errors.open("wb") as errors:
+                    yield start([sys.executable, "-B", str(maker), str(self.home / "bath")], subprocess.DEVNULL, None, errors)
                 scene = self.home / "bath" / "bath.xml"
             found = self.home / "doctor.json"
             with found.open("wb") as output:
