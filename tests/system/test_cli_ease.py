@@ -11,6 +11,8 @@ import pytest
 from cli_kit import lightshaft, write_fog
 from local_farm import LocalFarm, bin_dir, wait_until
 
+HELPERS = ["lightshaft-vdb", "lightshaft-denoise", "lightshaft-exr", "lightshaft-scene"]
+
 
 @pytest.fixture(scope="module")
 def idle(tmp_path_factory):
@@ -37,11 +39,22 @@ def test_a_misspelt_command_and_a_misspelt_option_are_suggested_right():
 
 
 @pytest.mark.parametrize("program", ["lightshaft-coordinator", "lightshaft-worker"])
-def test_the_other_programs_suggest_too_and_know_their_version(program):
+def test_the_other_programs_suggest_too(program):
     wrong = subprocess.run([bin_dir() / program, "--log-forma", "json"], capture_output=True, text=True)
     assert wrong.returncode == 2 and "did you mean '--log-format'?" in wrong.stderr
-    version = subprocess.run([bin_dir() / program, "--version"], capture_output=True, text=True)
-    assert version.returncode == 0 and version.stdout.startswith(program + " ")
+
+
+@pytest.mark.parametrize("program", ["lightshaft-coordinator", "lightshaft-worker", *HELPERS, "lightshaft-validate"])
+def test_each_program_knows_its_version(program):
+    version = lightshaft("--version").stdout.split()[1].rstrip(",")
+    told = subprocess.run([bin_dir() / program, "--version"], capture_output=True, text=True)
+    assert (told.returncode, told.stdout, told.stderr) == (0, f"{program} {version}\n", "")
+
+
+@pytest.mark.parametrize("program", HELPERS)
+def test_a_helper_that_a_person_starts_says_what_it_is(program):
+    told = subprocess.run([bin_dir() / program], capture_output=True, text=True)
+    assert told.returncode == 2 and "other programs of Lightshaft start" in told.stderr
 
 
 def test_the_bare_command_shows_its_help():
