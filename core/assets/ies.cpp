@@ -34,18 +34,21 @@ class Numbers {
     std::string_view digits = word_;
     if (digits.starts_with('+')) digits.remove_prefix(1);
     const auto n = parse_number<double>(digits);
-    if (!n || !std::isfinite(*n)) return std::nullopt;
+    accepted_ = n && std::isfinite(*n);
+    if (!accepted_) return std::nullopt;
     rest_.remove_prefix(word_.size());
     return n;
   }
-  // What next() did not accept
+  // Why what was wanted is not there
   std::string refused() const {
-    return word_.empty() ? "the file ends" : fmt::format("'{}' is no number", word_.substr(0, 40));
+    if (word_.empty()) return "the file ends";
+    return fmt::format(accepted_ ? "this is {}" : "'{}' is no number", word_.substr(0, 40));
   }
 
  private:
   std::string_view rest_, word_;
   std::size_t line_;
+  bool accepted_ = false;
 };
 
 struct Profile {
@@ -88,7 +91,7 @@ double intensity(const Profile& p, double x, double y, double z) {
     double h = std::atan2(-y, x) * kDegrees;
     if (h < 0) h += 360;
     // Lamps are symmetric about the planes at which the angles begin and end.
-    if (last - first < 1)
+    if (first == last)
       h = first;
     else if (last <= 90)
       h = h > 270 ? 360 - h : h > 180 ? h - 180 : h > 90 ? 180 - h : h;
@@ -122,6 +125,26 @@ double intensity_at(const Profile& p, double u, double v) {
                    below ? r * r - 1 : 1 - r * r);
 }
 
+// What stands behind TILT=, in capitals and without blanks around it; nullopt if the line is another.
+std::optional<std::string> tilt_of(std::string_view line) {
+  constexpr std::string_view kBlanks = " \t\r";
+  const auto trimmed = [&](std::string_view text) {
+    const auto first = std::min(text.find_first_not_of(kBlanks), text.size());
+    text.remove_prefix(first);
+    return text.substr(0, text.find_last_not_of(kBlanks) + 1);
+  };
+  const std::size_t equals = line.find('=');
+  if (equals == line.npos) return std::nullopt;
+  const auto capitals = [](std::string_view text) {
+    std::string out(text);
+    for (char& c : out)
+      if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
+    return out;
+  };
+  if (capitals(trimmed(line.substr(0, equals))) != "TILT") return std::nullopt;
+  return capitals(trimmed(line.substr(equals + 1)));
+}
+
 // Closes the circle of angles of type C that lack 360 degrees, as some files do: it is the first again.
 void close_circle(Profile& p) {
   std::vector<double>& h = p.horizontal;
@@ -142,6 +165,8 @@ bool ascend(const std::vector<double>& angles) {
 std::string_view wrong_range(const Profile& p) {
   const double v0 = p.vertical.front(), v1 = p.vertical.back(), h0 = p.horizontal.front(),
                h1 = p.horizontal.back();
+  if (p.vertical.size() < 2) return "there is only one vertical angle";
+  if (p.type != 1 && p.horizontal.size() < 2) return "there is only one horizontal angle, in a file of type A or B";
   if (p.type != 1)
     return v0 < -90 || v1 > 90 || h0 < -90 || h1 > 90 ? "an angle is not within -90 to 90 degrees" : "";
   if (v0 < 0 || v1 > 180) return "a vertical angle is not within 0 to 180 degrees";
@@ -162,15 +187,13 @@ Result<ImageData> decode_ies(std::string_view name, std::span<const std::byte> f
     return BrokenImage{name, "IES file"}(fmt::format("line {}: {}", where, problem));
   };
   if (std::uint64_t{kSide} * kSide > max_pixels) return too_many_pixels(name, kSide, kSide, max_pixels);
-  std::string_view rest = as_text(file), tilt;
-  for (bool found = false; !found; ++line) {
+  std::string_view rest = as_text(file);
+  const char line_end = rest.find('\n') == rest.npos ? '\r' : '\n';
+  std::optional<std::string> tilt;
+  for (; !tilt; ++line) {
     if (rest.empty() || line > kMostLines) return broken("no line begins with TILT=", line);
-    tilt = next_line(rest);
-    found = tilt.starts_with("TILT");
+    tilt = tilt_of(next_line(rest, line_end));
   }
-  tilt.remove_prefix(std::min(tilt.size(), tilt.find('=') + 1));
-  while (!tilt.empty() && (tilt.back() == '\r' || tilt.back() == ' ')) tilt.remove_suffix(1);
-  while (tilt.starts_with(' ')) tilt.remove_prefix(1);
   Numbers numbers(rest, line);
   const auto stopped = [&](std::string_view what) {
     return broken(fmt::format("{}: {}", what, numbers.refused()), numbers.line());
@@ -180,17 +203,17 @@ Result<ImageData> decode_ies(std::string_view name, std::span<const std::byte> f
     if (!n || !(*n >= 1 && *n <= static_cast<double>(most)) || *n != std::floor(*n)) return std::nullopt;
     return static_cast<std::size_t>(*n);
   };
-  if (tilt == "INCLUDE") {
+  if (*tilt == "INCLUDE") {
     // How the output depends on the lamp's tilt: it is not tilted.
     if (!numbers.next()) return stopped("the lamp's geometry");
     const auto pairs = count(kMostAngles);
     if (!pairs) return stopped("the number of tilt angles");
     for (std::size_t i = 0; i < 2 * *pairs; ++i)
       if (!numbers.next()) return stopped("tilt angles");
-  } else if (tilt != "NONE") {
+  } else if (*tilt != "NONE") {
     return broken(fmt::format("TILT={}: the file of another tilt table is not read; write TILT=NONE for a "
                               "lamp that is not tilted",
-                              tilt.substr(0, 40)),
+                              tilt->substr(0, 40)),
                   line - 1);
   }
   Profile p;
@@ -234,6 +257,10 @@ Result<ImageData> decode_ies(std::string_view name, std::span<const std::byte> f
       return broken(fmt::format("an intensity is {} candela", candela), numbers.line());
     p.candelas.push_back(candela);
   }
+  if (numbers.next())
+    return broken(fmt::format("more than {} intensities: {} vertical times {} horizontal angles", values, *verticals,
+                              *horizontals),
+                  numbers.line());
   close_circle(p);
   if (const auto wrong = wrong_range(p); !wrong.empty()) return broken(wrong, after_angles);
   ImageData out;
@@ -243,6 +270,10 @@ Result<ImageData> decode_ies(std::string_view name, std::span<const std::byte> f
   for (std::uint32_t y = 0; y < kSide; ++y)
     for (std::uint32_t x = 0; x < kSide; ++x)
       out.f32.push_back(static_cast<float>(intensity_at(p, (x + .5) / kSide, (y + .5) / kSide)));
+  const double brightest = *std::ranges::max_element(p.candelas);
+  if (double{*std::ranges::max_element(out.f32)} < brightest / 2)
+    return broken(fmt::format("its beam is too narrow for the image of {} x {} directions that is made of it", kSide, kSide),
+                  after_angles);
   return out;
 }
 

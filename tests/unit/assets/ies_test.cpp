@@ -166,13 +166,18 @@ TEST(Ies, OlderAndOddFilesAreRead) {
     EXPECT_EQ(decode_lamp(p.text()).f32, usual.f32) << before;
   };
   same("IESNA91\nTILT=NONE\n");
-  same("A lamp of 1986\nTILT = NONE\r\n");
+  same("A TILTED LAMP = of 1986\nTILT = NONE\t\r\n");
+  same("IESNA91\nTilt=None\n");
   same("IES:LM-63-2019\n[MANUFAC] \xe9\nTILT=INCLUDE\n1\n3\n0 45 90\n1 .9 .8\n");
   p.before = "IESNA:LM-63-2002\nTILT=NONE\n";
   std::string text = p.text();
   for (char& c : text)
     if (c == ' ') c = ',';
   EXPECT_EQ(decode_lamp(text).f32, usual.f32) << "numbers between commas";
+  text = p.text();
+  for (char& c : text)
+    if (c == '\n') c = '\r';
+  EXPECT_EQ(decode_lamp(text).f32, usual.f32) << "lines that end as in old Macs";
   EXPECT_EQ(decode_lamp(p.text() + "\nEND\n").f32, usual.f32) << "text behind the numbers";
 }
 
@@ -203,6 +208,15 @@ TEST(Ies, BrokenFilesAreRefusedWithTheirLine) {
   EXPECT_THAT(ies_refusal("IESNA91\nTILT=NONE\n1 1 1 4000000000 4000000000 1 2 0 0 0\n"),
               HasSubstr("the number of vertical angles"));
   EXPECT_THAT(ies_refusal(""), HasSubstr("lamp.ies"));
+  EXPECT_THAT(ies_refusal(fine + "7\n"), HasSubstr("more than 6 intensities: 3 vertical times 2 horizontal"));
+  EXPECT_THAT(with([](auto& q) { q.type = 0; }), HasSubstr("the photometric type, 1 to 3: this is 0"));
+  EXPECT_THAT(with([](auto& q) { q.vertical = {0}; }), HasSubstr("only one vertical angle"));
+  EXPECT_THAT(with([](auto& q) { q.horizontal = {0, .5}; }), HasSubstr("90, 180 or 360"));
+  EXPECT_THAT(with([](auto& q) { q.type = 2, q.horizontal = {0}; }), HasSubstr("only one horizontal angle"));
+  EXPECT_THAT(with([](auto& q) {
+                q.vertical = {0, .05, .1, 180}, q.candela = [](double v, double) { return v == 0 ? 1e6 : 0; };
+              }),
+              HasSubstr("its beam is too narrow"));
 }
 
 TEST(Ies, HostileFilesAreRefusedOrRead) {

@@ -151,6 +151,33 @@ TEST(EmissiveGrids, PointsOnARayGiveTheIntegralOfTheEmission) {
   EXPECT_NEAR(sum, exact_integral(fire, V3d(from), V3d(w), 0, 100), test::kStandardErrors * error);
 }
 
+// A grid that is dim, but so large that beside it a cell of the other would get no word in proportion
+TEST(EmissiveGrids, EveryCellThatMayEmitIsFound) {
+  std::vector<float> flame(32 * 32 * 32, 1e-6f);
+  flame[0] = 1;
+  const Grid small = unit_grid({32, 32, 32}, flame);
+  Affine thousand;  // to index coordinates
+  thousand.a = {1e-6, 0, 0, 0, 1e-6, 0, 0, 0, 1e-6};
+  const Grid large{{2, 2, 2}, std::vector<float>(8, 1e-3f), thousand, V3d(0), V3d(1, 1, 1), 1};
+  std::vector<Medium> media(2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    media[i].grid = true;
+    media[i].density = i == 0 ? &small : &large;
+    media[i].sigma_t = C3(1);
+    media[i].emission_kind = EmissionKind::per_length;
+    media[i].emission = C3(1);
+    media[i].emitter = {media[i].density, media[i].density, media[i].density};
+  }
+  const EmissiveGrids lights(media);
+  EXPECT_TRUE(lights.has(0) && lights.has(1));
+  std::size_t cells = 0;
+  for (const Grid* grid : {&small, &large}) {
+    const auto n = grid->cells();
+    cells += static_cast<std::size_t>(n[0]) * static_cast<std::size_t>(n[1]) * static_cast<std::size_t>(n[2]);
+  }
+  EXPECT_EQ(lights.cell_count(), cells);
+}
+
 TEST(EmissiveGrids, AnswerUnusualPoints) {
   const Grid fire = unit_grid({5, 5, 5}, random_values({5, 5, 5}, 2));
   Medium m;

@@ -90,9 +90,18 @@ EmissiveGrids::EmissiveGrids(std::span<const Medium> media) {
   for (std::size_t k = 0; k < sources_.size(); ++k)
     for (std::size_t i = 0; i < powers[k].size(); ++i)
       total += powers[k][i] = std::max(powers[k][i], least * sources_[k].densities[i]);
+  std::uint64_t count = 0;
+  for (const auto& power : powers)
+    count += static_cast<std::uint64_t>(std::ranges::count_if(power, [](double p) { return p > 0; }));
+  // One word for each cell, as all that may emit must be found, and the others in proportion
+  const double to_share = kAllWords - static_cast<double>(count);
+  if (!(to_share > 0)) {
+    sources_.clear();
+    return;
+  }
   found_.assign(media.size(), false);
   double before = 0;
-  std::uint64_t word = 0;
+  std::uint64_t word = 0, cells = 0;
   for (std::size_t k = 0; k < sources_.size(); ++k) {
     Source& s = sources_[k];
     found_[s.index] = true;
@@ -100,13 +109,8 @@ EmissiveGrids::EmissiveGrids(std::span<const Medium> media) {
     for (std::size_t i = 0; i < s.densities.size(); ++i) {
       if (!(powers[k][i] > 0)) continue;
       before += powers[k][i];
-      const auto next =
-          static_cast<std::uint64_t>(std::min(kAllWords, std::round(before / total * kAllWords)));
-      // No word is left for the cell only if there are about as many cells as words; then paths alone find
-      // the medium's light.
-      if (next <= word) found_[s.index] = false;
+      const auto next = ++cells + static_cast<std::uint64_t>(std::round(before / total * to_share));
       s.densities[i] = static_cast<double>(next - word) / kAllWords / s.densities[i];
-      if (next <= word) continue;
       s.cells.push_back(static_cast<std::uint32_t>(i));
       first_words_.push_back(static_cast<std::uint32_t>(word));
       word = next;
