@@ -118,7 +118,18 @@ def judged(record, root):
 
 
 def judged_blender(record):
-    return "loads", [], []
+    """By the words of the add-on alone: nothing else here reads .blend files. What loads once it is done as they advise is told."""
+    verdict = record["verdict"]
+    if verdict == "read":
+        return "loads", [], []
+    words = record["words"].replace("Error: ", "").strip()
+    kind = re.sub(r"\s+", " ", re.sub(r"\"[^\"]*\"|'[^']*'", "...", words.splitlines()[0] if words else "no words"))[:110]
+    if verdict in ("left out", "baked"):
+        return refusals.OUTSIDE, [("", f"{kind} ({verdict}: loads)", "docs/guide/blender.md")], []
+    if verdict == "failed":
+        return refusals.INSIDE, [("", kind, "-")], []
+    absent = verdict == "not opened" or re.search(r"does not exist|not found|no image\. Open|Git LFS|is packed but empty", record["words"] + record.get("still", ""), re.I)
+    return (refusals.INCOMPLETE if absent else refusals.OUTSIDE), [("", kind, "-" if absent else "docs/guide/blender.md")], []
 
 
 def shares(counts):
@@ -144,18 +155,21 @@ def kinds_table(kinds):
 
 
 def pictures_table(records):
-    yield "| format | rendered | healthy | black | failed | not finite, or with a count of what was clamped |"
-    yield "|---|---:|---:|---:|---:|---|"
+    yield "| format | rendered | healthy | black, as a warning says | black | failed | not finite, or majorants violated |"
+    yield "|---|---:|---:|---:|---:|---:|---:|"
     for form in ENDINGS:
         tried = [r for r in records if r["format"] == form and "picture" in r]
-        if not tried:
-            continue
-        failed = sum(r["picture"] is None for r in tried)
-        ill = [r["picture"][1] for r in tried if r["picture"] and r["picture"][1]]
-        black = sum("black" in i for i in ill)
-        others = collections.Counter(" ".join(i.split()[-1:]) for told in ill for i in told if i != "black")
-        yield f"| {form} | {len(tried)} | {len(tried) - failed - len(ill)} | {black} | {failed} | " + (
-            ", ".join(f"{kind} ({count})" for kind, count in others.items()) or "-") + " |"
+        ill = [(r["picture"] or (0, ["failed"]))[1] for r in tried]
+        cells = [len(tried), ill.count([]), *(sum(kind in i for i in ill) for kind in (every_scene.BLACK_AS_TOLD, "black", "failed"))]
+        yield f"| {form} | " + " | ".join(map(str, [*cells, 2 * len(tried) - sum(cells)])) + " |"
+
+
+def repositories_table(files):
+    yield "| repository (github.com) | commit | scenes |"
+    yield "|---|---|---|"
+    for row in table():
+        told = ", ".join(f"{form} {files[row['repository'], form]}" for form in FORMATS if files[row["repository"], form])
+        yield f"| {row['repository']} | {row['commit'][:12]} | {told or '-'} |"
 
 
 def tell(options):
@@ -170,12 +184,14 @@ def tell(options):
         kinds[record["format"], outcome].update({kind for _, kind, _ in errors})
         place, kind, reason = errors[0] if errors else ("", "", "")
         more = len({k for _, k, _ in errors} - {kind})
-        rows.append((record["format"], record["repository"], record["file"], outcome, place, kind + (f"; {more} more" if more else ""), reason))
+        rows.append((record["format"], f"{record['repository']}/{record['file']}", outcome, place, kind + (f"; {more} more" if more else ""), reason))
+    files = collections.Counter((r["repository"], r["format"]) for r in records)
+    write_between("repositories", repositories_table(files))
     counts = {form: counts[form] for form in FORMATS if form in counts}
     write_between("counts", [*table_of(counts), "", *kinds_table(kinds), "", *pictures_table(records)])
     with LIST.open("w", newline="") as out:
         writer = csv.writer(out, lineterminator="\n")
-        writer.writerow(("format", "repository", "file", "verdict", "place", "kind", "reason"))
+        writer.writerow(("format", "file", "verdict", "place", "kind", "reason"))
         writer.writerows(sorted(rows))
     for problem in problems:
         print(problem)

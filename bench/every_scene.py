@@ -34,6 +34,7 @@ GLTF, STAGES = (".gltf", ".glb"), (".usd", ".usda", ".usdc", ".usdz")
 SUFFIXES = (".xml", ".pbrt", *GLTF, *STAGES)
 ABSENT = re.compile("there is no file|Git LFS|no object has the id|is not defined: give it")
 SKY_ADVISED, DARK = "add -D environment=1", "nothing in the scene gives light"
+BLACK_AS_TOLD = "black, as its warning says"
 INCLUDES = re.compile(r'(?:<include[^>]*filename=|^\s*(?:Include|Import)\s+)"([^"]+)"', re.M)
 REMARKS = re.compile(r"^[\ufeff\s]+|<\?.*?\?>\s*|<!DOCTYPE[^>]*>\s*|<!--.*?-->\s*", re.S)
 ERROR = re.compile(r"^(?:(?P<place>\S.*?): )?error: (?P<text>.*)$")
@@ -123,7 +124,7 @@ def rendered(scene, size, spp, threads, folder, sky=()):
     if not image.any() and not is_told and spp < MOST_SAMPLES:  # a tiny light that few paths find
         again, picture = rendered(scene, size, 16 * spp, threads, folder, sky)
         return (again, picture) if picture else (answer, (0.0, ["black"], spp))
-    black = [] if image.any() else ["black, as its warning says"] if is_told else ["black"]
+    black = [] if image.any() else [BLACK_AS_TOLD] if is_told else ["black"]
     return answer, (float(image.mean()), ill + black, spp)
 
 

@@ -42,6 +42,11 @@ class Case:
         at = sum(len(line) + 1 for line in lines[: int(place["line"]) - 1]) + int(place["column"]) - 1
         self.before, self.rest = self.text[:at], self.text[at:]
 
+    def meant(self, value):
+        """The value of an attribute of XML: that of the parameter, by <default>, if it names one."""
+        default = re.search(rf'<default\s+name="{re.escape(value[1:])}"\s+value="([^"]*)"', self.text) if value.startswith("$") else None
+        return default[1] if default else value
+
     def begins(self, word):
         return self.rest.startswith(word)
 
@@ -143,7 +148,8 @@ def file_is_pointer(case, match):
 
 def names_type(case, match):
     tag, attributes = case.element
-    return case.begins(f'{match[2]}"') and tag in (match[1], "shape") and attributes.get("type") == match[2]
+    given = case.meant(attributes.get("type", ""))
+    return given == match[2] and tag in (match[1], "shape") and case.begins(attributes["type"])
 
 
 def row_of_refused(case, match):
@@ -341,6 +347,23 @@ def does_not_open(case, match):
         return True
 
 
+def has_other_type(case, match):
+    """An attribute of the prim, which the place names, is of another type than its schema says."""
+    prim = stage_of(case).GetPrimAtPath(case.where)
+    schema = prim.GetPrimDefinition()
+    for attribute in prim.GetAuthoredAttributes():
+        told = schema.GetSchemaAttributeSpec(attribute.GetName())
+        if told and any(spec.typeName != told.typeName for spec in attribute.GetPropertyStack()):
+            return True
+    return False
+
+
+def local_transform(case):
+    from pxr import UsdGeom
+
+    return UsdGeom.Xformable(stage_of(case).GetPrimAtPath(case.where)).GetLocalTransformation()
+
+
 def is_composed_wrongly(case, match):
     return any(match[1] in str(error) for error in stage_of(case).GetCompositionErrors())
 
@@ -417,15 +440,8 @@ def is_not_finite(case, match):
     return any(not math.isfinite(x) for x in values_of(case, int(match["index"])))
 
 
-def page_of_parameters(case, match):
-    """Where the parameters of the object are listed, in the language of the file."""
-    tag, kind = ("mesh" if case.around[-1][0] == "shape" else match[1]), match[2]
-    if re.search(r"<(camera|mesh)\b", case.text) and any(f"| {tag} `{kind}` |" in row for row in lines_of("scene-format.md")):
-        return NORI_PARAMETERS
-    if match[1] == "sampler":
-        return told_in("scene-format.md", "A sampler, whatever its type")
-    line = next((row for row in lines_of("scene-format.md") if row.startswith(f"### {match[1]} ") and f"`{kind}`" in row), None)
-    return f"scene-format.md: {line}" if line else NORI_PARAMETERS
+def is_nori(case):
+    return re.search(r"<(camera|mesh)\b", case.text) is not None
 
 
 NORI_TABLE = "scene-format.md: | object of Nori | means here |"
@@ -441,7 +457,8 @@ RULES = [
     Rule('{} "{}" of no Nori', r'Nori has no (\w+) "([^"]+)"', OUTSIDE, lacks_nori_row, NORI_TABLE),
     Rule("<{}> of no Nori", r"Nori has no element <(\w+)>", OUTSIDE,
          lambda case, match: case.begins(match[1]) and not is_told("scene-format.md", f"| {match[1]} `"), NORI_TABLE),
-    Rule("parameter '{2}' of {0} \"{1}\"", r"(\w+) \"([^\"]+)\" has no parameter '([^']+)'", OUTSIDE, lacks_parameter, page_of_parameters),
+    Rule("parameter '{2}' of {0} \"{1}\"", r"(\w+) \"([^\"]+)\" has no parameter '([^']+)'", lambda case, match: OUTSIDE if is_nori(case) else WRONG,
+         lacks_parameter, lambda case, match: NORI_PARAMETERS if is_nori(case) else "Mitsuba 3: unreferenced property"),
     Rule("<{}> in no object", r"<(\w+)> stands in no object: <scene> itself", OUTSIDE,
          lambda case, match: case.begins(match[1]) and [tag for tag, _ in case.around] == ["scene"], NORI_PARAMETERS),
     Rule("'{0}' of {1} \"{2}\" not here", r"'(\w+)' of (\w+) \"([^\"]+)\" has no meaning here", OUTSIDE, given_at_object, NORI_PARAMETERS),
@@ -452,7 +469,7 @@ RULES = [
     Rule("<{2}> in {0} \"{1}\"", r"(\w+) \"([^\"]+)\" has no use for a <(\w+)>(?: called '(\w+)')?", OUTSIDE, names_idle_object, NORI_PARAMETERS),
     Rule("<{4}> as '{0}' of {1} \"{2}\"", r"'(\w+)' of (\w+) \"([^\"]+)\" wants (.*), not <(\w+)>", OUTSIDE, wants_other_tag, NORI_PARAMETERS),
     Rule("{0} \"{1}\" without '{2}'", r"(\w+) \"([^\"]+)\" needs '(\w+)'", OUTSIDE, lacks_needed, NORI_PARAMETERS),
-    Rule('{} "{}" of no Mitsuba', r'there is no (shape|bsdf|emitter|texture|integrator|medium) "(\w+)"', WRONG, names_type, "Mitsuba 3: Plugin not found"),
+    Rule('{} "{}" of no Mitsuba', r'there is no (shape|bsdf|emitter|texture|integrator|medium|film) "(\w+)"', WRONG, names_type, "Mitsuba 3: Plugin not found"),
     Rule('{} "{}"', r'(\w+) "([^"]*)" is not read: ', OUTSIDE, names_pbrt_type, pbrt_row),
     Rule("'{0}' of {1} \"{2}\"", r"'(\w+)' of (\w+) \"([^\"]*)\" is not read: ", OUTSIDE, lambda case, match: gives(match[1])(case, match), pbrt_word),
     Rule("unclosed block", r"this is begun and not ended", WRONG, is_unclosed, "pbrt: Missing end to AttributeBegin"),
@@ -475,6 +492,10 @@ RULES = [
     Rule("NanoVDB of an old version", r"(\S+): a NanoVDB file of version ", OUTSIDE, version_of_nvdb, "odd-files.md: | NanoVDB files of another version than 32 |"),
     Rule("layer without shapes that are read", r"the stage shows nothing", has_other_shapes, shows_nothing, "../guide/usd.md: Curves, points, patches"),
     Rule("reference to nothing", r"Unresolved reference prim path @(?:.*?/)?([^/@]+)@", WRONG, is_composed_wrongly, "USD: a composition error"),
+    Rule("attribute of another type", r"its points are not three finite numbers each|one of its values has another type than its schema requires", WRONG,
+         has_other_type, "USD: the type of the attribute in its schema"),
+    Rule("transform that is a perspective", r"its transform is a perspective", WRONG,
+         lambda case, match: any(row[3] != last for row, last in zip(local_transform(case), (0, 0, 0, 1))), "USD: matrices of UsdGeomXformOp place, and have (0, 0, 0, 1) last"),
     Rule("no stage", r".* is no stage: ", WRONG, does_not_open, "USD: the stage does not open"),
     Rule("asset that is not there", r"Could not load sublayer @(.+?)@", INCOMPLETE, asset_is_absent, "-"),
     Rule("asset that is not there", r"Could not open asset @(.+?)@", INCOMPLETE, asset_is_absent, "-"),
@@ -489,7 +510,7 @@ RULES = [
     Rule("wrong type", PATH + r"a text is wanted here", WRONG, is_no(str), "glTF validator: TYPE_MISMATCH"),
     Rule("wrong type", PATH + r"this needs the index of a texture", WRONG,
          lambda case, match: not isinstance((json_value(case, match) or {}).get("index") if isinstance(json_value(case, match), dict) else None, int), "glTF validator: UNDEFINED_PROPERTY"),
-    Rule("wrong type", PATH + r"a whole number from (?P<least>\d+) to (?P<most>\d+) is wanted here", WRONG, is_no_whole_number, "glTF validator: TYPE_MISMATCH"),
+    Rule("wrong type", PATH + r"a whole number from (?P<least>\d+) to (?P<most>\d+) is wanted here", WRONG, is_no_whole_number, "glTF validator: TYPE_MISMATCH or INVALID_INDEX"),
     Rule("loop of nodes", PATH + r"this node stands in the scene already", WRONG, has_two_parents, "glTF validator: NODE_LOOP"),
     Rule("index out of range", PATH + r"there is no corner (?P<corner>\d+): POSITION has (?P<count>\d+)", WRONG, has_no_such_corner, "glTF validator: ACCESSOR_INDEX_OOB"),
     Rule("number that is not finite", r"accessors\[(?P<index>\d+)\]: element \d+ is not a finite number", WRONG, is_not_finite, "glTF validator: ACCESSOR_INVALID_FLOAT"),

@@ -32,8 +32,8 @@ Rgb linear_srgb(const std::array<double, 3>& xyz);
 // from 360 to 830.
 SpectralCurve black_body_curve(double kelvin);
 
-// Returns X, Y, Z of the light of that black body. X, Y, Z are normalised as in linear_srgb(): a spectral radiance of 1 at all
-// wavelengths would give X = Y = Z = 1.
+// Returns X, Y, Z of the light of that black body. X, Y, Z are normalised as in linear_srgb(): a spectral
+// radiance of 1 at all wavelengths would give X = Y = Z = 1.
 std::array<double, 3> black_body_xyz(double kelvin);
 
 // Returns the largest value, over all wavelengths, of a black body's spectral radiance [W/(m^2 sr nm)].

@@ -112,8 +112,7 @@ void check_version(const Item& root) {
   // Files of glTF 1 may have a number.
   const auto* given = version.given() ? std::get_if<std::string>(&version.identity()->is) : nullptr;
   if (!given)
-    version.error(
-        "the asset has no version that is a text, as \"2.0\" is, and only 2.0 is read: convert it");
+    version.error("the asset has no version that is a text, as \"2.0\" is, and only 2.0 is read: convert it");
   else if (!given->starts_with("2."))
     version.error(fmt::format("the asset's version is \"{}\", and only 2.0 is read: convert it", *given));
   if (const std::string least = root["asset"]["minVersion"].text("2.0"); least != "2.0")

@@ -343,9 +343,9 @@ void Object::left_over(const Child& c) {
                              fmt::format("'{}' of {} has no effect here: {}", name, title(), p.idle));
     // The parameter is known but was not taken: it has no meaning together with the other parameters.
     if (p.name == name)
-      return report_.error(
-          value_place(*c.e, "name"),
-          fmt::format("'{}' of {} has no meaning here beside its other parameters: {}", name, title(), p.meaning));
+      return report_.error(value_place(*c.e, "name"),
+                           fmt::format("'{}' of {} has no meaning here beside its other parameters: {}", name,
+                                       title(), p.meaning));
     names.emplace_back(p.name);
   }
   if (name.empty() || object_kind(*c.e) == TagKind::object) return idle_object(*c.e);

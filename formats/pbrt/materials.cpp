@@ -204,13 +204,14 @@ class MaterialTranslator {
       const bool named = p->type == "texture";
       const Texture* texture =
           named ? find_texture(t_, TextureOf::numbers, p->texts.empty() ? "" : p->texts[0]) : nullptr;
-      if (texture && !texture->value) return takes_image(*p, images, remap) ? Alpha{0, texture->id} : fallback;
+      if (texture && !texture->value)
+        return takes_image(*p, images, remap) ? Alpha{0, texture->id} : fallback;
       const bool given = named ? texture != nullptr : p->numbers.size() == 1;
       const double x = !given ? -1 : texture ? (*texture->value)[0] : p->numbers[0];
       if (x >= 0) return Alpha{remap ? std::sqrt(x) : x};
-      p_.error(p->at, named && !given
-                          ? fmt::format("'{}' names no Texture that stands before this", p->name)
-                          : fmt::format("'{}' of {} wants one number that is not negative", p->name, p_.title()));
+      p_.error(p->at, named && !given ? fmt::format("'{}' names no Texture that stands before this", p->name)
+                                      : fmt::format("'{}' of {} wants one number that is not negative",
+                                                    p->name, p_.title()));
       return fallback;
     };
     const Alpha both = one("roughness", {});
@@ -240,9 +241,8 @@ class MaterialTranslator {
   }
 
   // Returns the alpha of a coat, which has one.
-  double coat_alpha(const Roughness& a, std::string_view told = {}) {
-    if (a.u != a.v)
-      p_.error(p_.at(), fmt::format("{} has two roughnesses{}", p_.title(), told));
+  double coat_alpha(const Roughness& a, std::string_view which = {}) {
+    if (a.u != a.v) p_.error(p_.at(), fmt::format("{} has two roughnesses{}", p_.title(), which));
     return a.u.number;
   }
 

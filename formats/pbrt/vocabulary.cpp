@@ -282,12 +282,11 @@ void add_materials(std::vector<Row>& r) {
                Words{{"reflectance", kTextured, "0.5", "colour of the base"},
                      {"eta", "float|spectrum", "1.5", "index of refraction of the coat"}} +
                    remapped("roughness in both directions; no image") + layer_words() + material_words()});
-  r.push_back(
-      {"Material", "conductor", true, "`conductor` or `roughconductor` (ggx), on both sides",
-       Words{{"eta", kColour, "metal-Cu-eta", "real part of the index of refraction"},
-             {"k", kColour, "metal-Cu-k", "imaginary part"},
-             {"reflectance", kColour, "", "reflectance at normal incidence, instead of eta and k"}} +
-           remapped(kImageOfAlpha) + material_words()});
+  r.push_back({"Material", "conductor", true, "`conductor` or `roughconductor` (ggx), on both sides",
+               Words{{"eta", kColour, "metal-Cu-eta", "real part of the index of refraction"},
+                     {"k", kColour, "metal-Cu-k", "imaginary part"},
+                     {"reflectance", kColour, "", "reflectance at normal incidence, instead of eta and k"}} +
+                   remapped(kImageOfAlpha) + material_words()});
   r.push_back(
       {"Material", "coatedconductor", true,
        "`coatedconductor`, on both sides; with a warning that it is approximated, unless coat and metal are "

@@ -175,11 +175,16 @@ def test_inspect_tells_what_the_scene_needs(fog):
 
 def test_a_scene_without_light_is_told_to_be_black(tmp_path):
     sphere = '<scene version="3.0.0">{}<shape type="sphere"/><sensor type="perspective"/></scene>'
-    dark, lit = tmp_path / "dark.xml", tmp_path / "lit.xml"
+    dark = tmp_path / "dark.xml"
     dark.write_text(sphere.format(""))
-    lit.write_text(sphere.format('<emitter type="constant"/>'))
+    medium = '<medium name="interior" type="homogeneous"><rgb name="emission" value="1 1 1"/></medium>'
+    lights = ['<emitter type="constant"/>', '<shape type="disk"><emitter type="area"/></shape>',
+              f'<shape type="cube"><bsdf type="null"/>{medium}</shape>']
 
     said = lightshaft("render", dark, "-o", tmp_path / "out.exr", "--size", "4x4", "--spp", 2, "--quiet").stderr
 
     assert said == f"{dark}: warning: nothing in the scene gives light, so that the picture is black\n"
-    assert not lightshaft("inspect", lit).stderr
+    for k, light in enumerate(lights):
+        lit = tmp_path / f"lit{k}.xml"
+        lit.write_text(sphere.format(light))
+        assert "nothing in the scene gives light" not in lightshaft("inspect", lit).stderr

@@ -46,7 +46,8 @@ TEST(NoriDiagnostics, NameWhatIsWrongWithAnObjectWithoutUse) {
   const auto diffuse = [](const std::string& inside) {
     return first(R"(<mesh type="sphere"><bsdf type="diffuse">)" + inside + "</bsdf></mesh>");
   };
-  EXPECT_THAT(diffuse(R"(<texture type="solid"/>)"), HasSubstr("2:57 Nori has no texture \"solid\"; known here"));
+  EXPECT_THAT(diffuse(R"(<texture type="solid"/>)"),
+              HasSubstr("2:57 Nori has no texture \"solid\"; known here"));
   EXPECT_THAT(diffuse(R"(<texture type="constant_color"/>)"),
               HasSubstr("bsdf \"diffuse\" has no use for a <texture> without a name: call it 'albedo'"));
   EXPECT_THAT(diffuse(R"(<texture type="constant_color" name="kd"/>)"),

@@ -303,8 +303,8 @@ TEST(PbrtColours, BlackBodiesAsReflectancesHaveAPeakOfOne) {
 }
 
 TEST(PbrtColours, ReflectancesOfMoreThanOneRedAreCutOff) {
-  const ReadResult r = read_pbrt(pbrt_scene(
-      R"(Material "diffuse" "spectrum reflectance" [ 580 0 590 1 720 1 ] Shape "sphere")"));
+  const ReadResult r = read_pbrt(
+      pbrt_scene(R"(Material "diffuse" "spectrum reflectance" [ 580 0 590 1 720 1 ] Shape "sphere")"));
 
   ASSERT_TRUE(r.scene) << messages(r);
   EXPECT_EQ(reflectance_of(*r.scene)[0], 1);
@@ -367,11 +367,13 @@ TEST(PbrtTextures, MayBeTheAlphaOfMetalAndGlass) {
 }
 
 TEST(PbrtTextures, AreRefusedAsRoughnessWithTheReason) {
-  EXPECT_THAT(refusal(fmt::format(kRough, "conductor", "roughness", "true")),
-              HasSubstr("4:23: error: 'roughness' of Material \"conductor\" is an image: pbrt takes the square root "
-                        "of it, so make it an image of that, and give \"bool remaproughness\" false"));
-  EXPECT_THAT(refusal(fmt::format(kRough, "coateddiffuse", "vroughness", "false")),
-              HasSubstr("'vroughness' of Material \"coateddiffuse\" is an image: a layer has one roughness here"));
+  EXPECT_THAT(
+      refusal(fmt::format(kRough, "conductor", "roughness", "true")),
+      HasSubstr("4:23: error: 'roughness' of Material \"conductor\" is an image: pbrt takes the square root "
+                "of it, so make it an image of that, and give \"bool remaproughness\" false"));
+  EXPECT_THAT(
+      refusal(fmt::format(kRough, "coateddiffuse", "vroughness", "false")),
+      HasSubstr("'vroughness' of Material \"coateddiffuse\" is an image: a layer has one roughness here"));
   EXPECT_THAT(refusal(R"(Material "conductor" "texture roughness" "none" Shape "sphere")"),
               HasSubstr("'roughness' names no Texture that stands before this"));
   EXPECT_THAT(refusal(R"(Material "conductor" "float roughness" -1 Shape "sphere")"),
