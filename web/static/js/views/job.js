@@ -4,7 +4,7 @@ import { displayOf, healthComplaints, isOver, layerOf, mayChange, ownerOf, seesO
 import { duration, jobName, moment, percent, plural } from "../format.js";
 import { downloads } from "../api.js";
 import { againButton, againForm } from "./again.js";
-import { jobActions, notice, progressBar, statePill, stateWord } from "./pieces.js";
+import { jobActions, notice, progressBar, statePill, stateWord, wholeNotice } from "./pieces.js";
 import { imagePanel } from "./job_image.js";
 import { meterPanel } from "./meters.js";
 import { timeSplit } from "./time_split.js";
@@ -22,7 +22,7 @@ const whyStopped = (job) => (job.stopped === "error" && doubtful(job.verdict) ? 
 
 export function jobView(state, actions) {
   const job = state.jobs?.get(state.route.id);
-  if (state.open?.problem && !job) return notice("bad", "This job can't be shown", h("p", null, state.open.problem), h("p", null, h("a", { href: "#/jobs" }, "All jobs")));
+  if (state.open?.problem && !job) return wholeNotice("bad", "This job can't be shown", h("p", null, state.open.problem), h("p", null, h("a", { href: "#/jobs" }, "All jobs")));
   if (!job || !state.open) return h("p", { class: "waiting", key: "waiting" }, "Fetching the job …");
   return h("article", { key: job.id, class: "job" },
     heading(state, job, actions),

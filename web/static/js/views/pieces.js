@@ -21,8 +21,10 @@ export function progressBar(fraction, label, className = "") {
 
 export const workerMark = (colour, name) => h("span", { class: "worker-name" }, h("i", { class: `dot worker-${colour}`, "aria-hidden": "true" }), name);
 
-export const notice = (kind, title, ...body) =>
-  h("section", { class: `notice ${kind}`, role: kind === "bad" ? "alert" : null }, h("h2", null, title), ...body);
+const noticeUnder = (heading) => (kind, title, ...body) =>
+  h("section", { class: `notice ${kind}`, role: kind === "bad" ? "alert" : null }, h(heading, null, title), ...body);
+export const notice = noticeUnder("h2");
+export const wholeNotice = noticeUnder("h1"); // in place of a view
 
 /** One of a few: [[value, label], ...], as radio buttons, which the arrow keys walk along. */
 export const choice = (name, label, options, chosen, onChoose) =>
