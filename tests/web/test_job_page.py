@@ -181,6 +181,29 @@ def test_the_log_is_read_on_the_page(farm, dashboard):
     page.wait("document.querySelector('.job-log pre').textContent.includes('12:00:09 done')")
 
 
+def test_an_open_log_follows_its_job_and_shows_its_end(farm, dashboard):
+    farm.jobs["j-1"] = job()
+    farm.log = "".join(f"12:00:01 tile {n} is done\n" for n in range(100))
+    page = dashboard("#/jobs/j-1")
+    page.click(".job-log summary")
+    lines = "document.querySelector('.job-log pre')"
+    at_end = f"{lines}.scrollTop > 0 && {lines}.scrollHeight - {lines}.scrollTop - {lines}.clientHeight < 2"
+    page.wait(at_end)
+
+    farm.log += 50 * "12:00:09 lab-01 was lost\n"
+    farm.change("j-1", progress=0.5)
+    page.wait(f"{lines}.textContent.includes('lab-01 was lost') && {at_end}")
+    # Who reads further up is left there.
+    page.evaluate(f"{lines}.scrollTop = 40")
+    farm.log += "12:00:20 done\n"
+    farm.change("j-1", state="done", progress=1)
+    page.wait(f"{lines}.textContent.endsWith('12:00:20 done\\n')")
+    assert page.evaluate(f"{lines}.scrollTop") == 40
+
+    page.click(".job-log summary")
+    page.wait("!document.querySelector('.job-log').open && document.querySelector('.job-log .help')")
+
+
 def test_what_has_no_sample_is_not_offered_as_a_picture(farm, dashboard):
     farm.jobs["j-1"] = job(state="failed", units_done=0, error="no")
     page = dashboard("#/jobs/j-1")

@@ -102,8 +102,8 @@ function failure(job) {
   return [h("pre", { key: "cause" }, cause), where ? h("p", { key: "where", class: "failure-where" }, where) : null];
 }
 
-/** What happened to the job, the latest last; it is fetched when it is opened. */
-const logOf = (job, { log }, actions) => h("details", { key: `log ${job.id}`, class: "panel job-log", ontoggle: (event) => (event.currentTarget.open ? actions.readLog(job.id) : null) },
+/** What happened to the job, the latest last. While it is open it is fetched again when the job changes. */
+const logOf = (job, { log }, actions) => h("details", { key: `log ${job.id}`, class: "panel job-log", ontoggle: (event) => (event.currentTarget.open ? actions.readLog(job.id) : actions.closeLog()) },
   h("summary", null, "Log"),
   log === null ? h("p", { key: "waiting", class: "help" }, "Fetching the log …") : h("pre", { key: "lines", tabindex: 0, "aria-label": "Log" }, log || "Nothing has happened yet."),
   log === null ? null : h("button", { key: "again", type: "button", class: "small", onclick: () => actions.readLog(job.id) }, "Read it again"));
