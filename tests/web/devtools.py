@@ -240,9 +240,9 @@ class Page:
                 out.append(f"blocked: {params['blockedReason']}")
         return out
 
-    def screenshot(self, path, whole=True):
+    def screenshot(self, path, whole=True, quality=50):
         """Of the whole page, or of what fits the window: a PNG, or a .jpg."""
-        form = {"format": "jpeg", "quality": 50} if str(path).endswith(".jpg") else {"format": "png"}
+        form = {"format": "jpeg", "quality": quality} if str(path).endswith(".jpg") else {"format": "png"}
         data = self.call("Page.captureScreenshot", {**form, "captureBeyondViewport": whole})["data"]
         with open(path, "wb") as file:
             file.write(base64.b64decode(data))
