@@ -69,7 +69,7 @@ def test_a_job_that_waits_for_others_says_for_which(farm, dashboard):
     why = "It waits for j-7, which is rendering."
     farm.jobs["j-1"] = job(state="queued", units_done=0, waits_for=why, after=[{"id": "j-7", "state": "running"}, {"id": "j-8", "state": None}])
     page = dashboard()
-    assert page.text("[data-job=j-1] .reason") == why
+    assert page.text("[data-job=j-1] .reason") == why and page.text("[data-job=j-1] .pill") == "held"
     page.evaluate("void (location.hash = '#/jobs/j-1')")
     assert page.text(".job-head .sub") == why
     assert "After j-7 (rendering), j-8 (removed)" in " ".join(page.text(".job-facts").split())

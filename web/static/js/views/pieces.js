@@ -4,7 +4,8 @@ import { isOver, mayChange } from "../state.js";
 import { percent } from "../format.js";
 
 const kStateWords = { queued: "waiting", running: "rendering", paused: "paused", done: "done", failed: "failed", cancelled: "cancelled" };
-export const stateWord = (job) => kStateWords[job.state] ?? job.state;
+/** A job that waits for other jobs is held; one that only waits for a worker is not. */
+export const stateWord = (job) => (job.state === "queued" && job.after?.length > 0 ? "held" : kStateWords[job.state] ?? job.state);
 
 export const statePill = (job) => h("span", { class: `pill state-${safeClass(job.state)}` }, stateWord(job));
 
