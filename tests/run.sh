@@ -186,7 +186,7 @@ waiting_lane() {
   # Most of their time is waiting, so several files run side by side. A file runs in one process: its tests share what is slow
   # to make.
   part system "system tests" run_pytest system -n 3 --dist loadfile tests/system
-  part web "browser tests" run_pytest web -n 2 --dist loadfile tests/web
+  part web "browser tests" run_in_venv web -n 2 --dist loadfile tests/web
   part python "Python package" run_in_venv python tests/python tests/packages
   part python "Open Job Description" run_in_venv openjd tests/openjd
   part blender "Blender" run_blender

@@ -251,7 +251,7 @@ def test_the_same_scene_is_rendered_again_with_more_samples(farm, dashboard):
     assert farm.submitted == [("j-1", {"spp": 128, "seed": 5})]
 
 
-@pytest.mark.parametrize("width", [1280, 1000, 375])
+@pytest.mark.parametrize("width", [1280, 1000, 768, 375])
 def test_the_list_fits_its_place(many, dashboard, width):
     many.change("j-3210", relmse=5.55e-5, spp=4096, spp_done=2012)  # long figures
     page = dashboard(width=width, height=800, phone=width < 500)

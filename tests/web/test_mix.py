@@ -213,7 +213,7 @@ def test_a_picture_without_media_apart_has_no_gains_for_them(farm, lit):
     assert page.count(".mix-head input") == 0
 
 
-@pytest.mark.parametrize("width", [1280, 375])
+@pytest.mark.parametrize("width", [1280, 768, 375])
 def test_the_panel_is_used_by_keyboard_alone_and_fits(lit, width):
     page = lit("mix=lamp*v*g1", width=width, height=800, phone=width < 500)
     page.wait("document.querySelectorAll('.mix-part').length === 3 && [...document.styleSheets].some((sheet) => sheet.href?.endsWith('mix.css'))")

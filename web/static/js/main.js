@@ -183,6 +183,7 @@ async function refreshReport() {
   if (!id || state.jobs?.get(id)?.frames) return; // a sequence whose frames are not known yet
   const report = await api.report(id).catch(() => null); // there is no report before the first checkpoint
   if (report && state.open?.shown === id) set(withOpen(state, { report }));
+  if (state.open?.shown === id && state.open.log !== null) actions.readLog(id);
 }
 
 async function refreshOpen() {
