@@ -42,7 +42,8 @@ class Numbers {
   // Why what was wanted is not there
   std::string refused() const {
     if (word_.empty()) return "the file ends";
-    return fmt::format(accepted_ ? "this is {}" : "'{}' is no number", word_.substr(0, 40));
+    const std::string_view word = word_.substr(0, 40);
+    return accepted_ ? fmt::format("this is {}", word) : fmt::format("'{}' is no number", word);
   }
 
  private:
