@@ -13,7 +13,8 @@ inline int answer_person(const char* name, const char* version, int argc, const 
     std::printf("%s %s\n", name, version);
     return 0;
   }
-  std::fprintf(stderr, "%s: a helper that other programs of Lightshaft start; `lightshaft --help` lists commands\n",
+  std::fprintf(stderr,
+               "%s: a helper that other programs of Lightshaft start; `lightshaft --help` lists commands\n",
                name);
   return 2;
 }
