@@ -133,7 +133,8 @@ FarmApi::Answer<void> Tev::show(FarmApi& api, const json& job, bool all_layers) 
       fmt::format("{} {}{}", text_field(job, "name"), id, frames ? fmt::format(" {}", frame) : ""));
   auto packet = create_image(image, pixels, channels);
   // The same image again is only updated: tev then keeps how a person looks at it.
-  if (const std::string created(reinterpret_cast<const char*>(packet.data()), packet.size()); created != created_) {
+  if (const std::string created(reinterpret_cast<const char*>(packet.data()), packet.size());
+      created != created_) {
     if (auto sent = send(packet); !sent) return sent;
     created_ = created;
   }

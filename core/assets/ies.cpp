@@ -167,7 +167,8 @@ std::string_view wrong_range(const Profile& p) {
   const double v0 = p.vertical.front(), v1 = p.vertical.back(), h0 = p.horizontal.front(),
                h1 = p.horizontal.back();
   if (p.vertical.size() < 2) return "there is only one vertical angle";
-  if (p.type != 1 && p.horizontal.size() < 2) return "there is only one horizontal angle, in a file of type A or B";
+  if (p.type != 1 && p.horizontal.size() < 2)
+    return "there is only one horizontal angle, in a file of type A or B";
   if (p.type != 1)
     return v0 < -90 || v1 > 90 || h0 < -90 || h1 > 90 ? "an angle is not within -90 to 90 degrees" : "";
   if (v0 < 0 || v1 > 180) return "a vertical angle is not within 0 to 180 degrees";
@@ -259,8 +260,8 @@ Result<ImageData> decode_ies(std::string_view name, std::span<const std::byte> f
     p.candelas.push_back(candela);
   }
   if (numbers.next())
-    return broken(fmt::format("more than {} intensities: {} vertical times {} horizontal angles", values, *verticals,
-                              *horizontals),
+    return broken(fmt::format("more than {} intensities: {} vertical times {} horizontal angles", values,
+                              *verticals, *horizontals),
                   numbers.line());
   close_circle(p);
   if (const auto wrong = wrong_range(p); !wrong.empty()) return broken(wrong, after_angles);
@@ -273,7 +274,8 @@ Result<ImageData> decode_ies(std::string_view name, std::span<const std::byte> f
       out.f32.push_back(static_cast<float>(intensity_at(p, (x + .5) / kSide, (y + .5) / kSide)));
   const double brightest = *std::ranges::max_element(p.candelas);
   if (double{*std::ranges::max_element(out.f32)} < brightest / 2)
-    return broken(fmt::format("its beam is too narrow for the image of {} x {} directions that is made of it", kSide, kSide),
+    return broken(fmt::format("its beam is too narrow for the image of {} x {} directions that is made of it",
+                              kSide, kSide),
                   after_angles);
   return out;
 }
