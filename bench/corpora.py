@@ -125,7 +125,7 @@ def judged_blender(record):
         return "loads", [], []
     words = record["words"].replace("Error: ", "").strip()
     kind = re.sub(r"\"[^\"]*\"|'[^']*'|(?<=the file )\S.*(?= does not exist)", "...", words.splitlines()[0] if words else "no words")
-    kind = re.sub(r"\s+", " ", kind).partition(". ")[0][:90]
+    kind = re.split(r"(?<!\.)\. ", re.sub(r"\s+", " ", kind))[0][:90]
     if verdict in ("left out", "baked"):
         return refusals.OUTSIDE, [("", f"{kind} ({verdict}: loads)", "the add-on's words")], []
     if verdict == "failed":
