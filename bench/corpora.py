@@ -27,6 +27,7 @@ LIST = PAGE.with_name("corpora-refused.csv")
 ENDINGS = {"pbrt-v4": (".pbrt",), "glTF": every_scene.GLTF, "Mitsuba XML": (".xml",), "Nori": (".xml",), "USD": every_scene.STAGES}
 FORMATS = (*ENDINGS, "Blender")
 SIZE, SAMPLES = "32x24", 4
+MOST_KINDS = 9  # in the page; the list has all
 
 
 def table():
@@ -123,13 +124,14 @@ def judged_blender(record):
     if verdict == "read":
         return "loads", [], []
     words = record["words"].replace("Error: ", "").strip()
-    kind = re.sub(r"\s+", " ", re.sub(r"\"[^\"]*\"|'[^']*'", "...", words.splitlines()[0] if words else "no words"))[:110]
+    kind = re.sub(r"\"[^\"]*\"|'[^']*'|(?<=the file )\S.*(?= does not exist)", "...", words.splitlines()[0] if words else "no words")
+    kind = re.split(r"(?<!\.)\. ", re.sub(r"\s+", " ", kind))[0][:90]
     if verdict in ("left out", "baked"):
-        return refusals.OUTSIDE, [("", f"{kind} ({verdict}: loads)", "docs/guide/blender.md")], []
+        return refusals.OUTSIDE, [("", f"{kind} ({verdict}: loads)", "the add-on's words")], []
     if verdict == "failed":
         return refusals.INSIDE, [("", kind, "-")], []
     absent = verdict == "not opened" or re.search(r"does not exist|not found|no image\. Open|Git LFS|is packed but empty", record["words"] + record.get("still", ""), re.I)
-    return (refusals.INCOMPLETE if absent else refusals.OUTSIDE), [("", kind, "-" if absent else "docs/guide/blender.md")], []
+    return (refusals.INCOMPLETE if absent else refusals.OUTSIDE), [("", kind, "-" if absent else "the add-on's words")], []
 
 
 def shares(counts):
@@ -150,8 +152,8 @@ def kinds_table(kinds):
     yield "| format | verdict | reasons, with the number of files that have them |"
     yield "|---|---|---|"
     for (form, verdict), counts in sorted(kinds.items()):
-        yield f"| {form} | {verdict} | " + ", ".join(f"{kind.replace('|', '/')} ({count})" for kind, count in counts.most_common(12)) + (
-            f", and {len(counts) - 12} more" if len(counts) > 12 else "") + " |"
+        yield f"| {form} | {verdict} | " + ", ".join(f"{kind.replace('|', '/')} ({count})" for kind, count in counts.most_common(MOST_KINDS)) + (
+            f", and {len(counts) - MOST_KINDS} more" if len(counts) > MOST_KINDS else "") + " |"
 
 
 def pictures_table(records):
