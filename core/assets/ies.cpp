@@ -1,5 +1,6 @@
 // Decodes photometric files of lamps (IES LM-63-1986 to LM-63-2019) into images of all directions.
 #include <fmt/format.h>
+#include <strings.h>
 
 #include <algorithm>
 #include <cmath>
@@ -126,7 +127,12 @@ double intensity_at(const Profile& p, double u, double v) {
                    below ? r * r - 1 : 1 - r * r);
 }
 
-// What stands behind TILT=, in capitals and without blanks around it; nullopt if the line is another.
+// True if the text is this word, in capitals or not.
+bool is_word(std::string_view text, std::string_view word) {
+  return text.size() == word.size() && ::strncasecmp(text.data(), word.data(), word.size()) == 0;
+}
+
+// What stands behind TILT=, without blanks around it; nullopt if the line is another.
 std::optional<std::string> tilt_of(std::string_view line) {
   constexpr std::string_view kBlanks = " \t\r";
   const auto trimmed = [&](std::string_view text) {
@@ -136,14 +142,8 @@ std::optional<std::string> tilt_of(std::string_view line) {
   };
   const std::size_t equals = line.find('=');
   if (equals == line.npos) return std::nullopt;
-  const auto capitals = [](std::string_view text) {
-    std::string out(text);
-    for (char& c : out)
-      if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
-    return out;
-  };
-  if (capitals(trimmed(line.substr(0, equals))) != "TILT") return std::nullopt;
-  return capitals(trimmed(line.substr(equals + 1)));
+  if (!is_word(trimmed(line.substr(0, equals)), "TILT")) return std::nullopt;
+  return std::string(trimmed(line.substr(equals + 1)));
 }
 
 // Closes the circle of angles of type C that lack 360 degrees, as some files do: it is the first again.
@@ -173,8 +173,7 @@ std::string_view wrong_range(const Profile& p) {
     return v0 < -90 || v1 > 90 || h0 < -90 || h1 > 90 ? "an angle is not within -90 to 90 degrees" : "";
   if (v0 < 0 || v1 > 180) return "a vertical angle is not within 0 to 180 degrees";
   if (h0 < 0 || h1 > 360) return "a horizontal angle is not within 0 to 360 degrees";
-  const bool known =
-      h1 - h0 < 1 || (h0 == 0 && (h1 == 90 || h1 == 180 || h1 == 360)) || (h0 == 90 && h1 == 270);
+  const bool known = h0 == h1 || (h0 == 0 && (h1 == 90 || h1 == 180 || h1 == 360)) || (h0 == 90 && h1 == 270);
   return known ? ""
                : "the horizontal angles are neither one alone nor from 0 to 90, 180 or 360, nor from 90 to "
                  "270 degrees";
@@ -205,14 +204,14 @@ Result<ImageData> decode_ies(std::string_view name, std::span<const std::byte> f
     if (!n || !(*n >= 1 && *n <= static_cast<double>(most)) || *n != std::floor(*n)) return std::nullopt;
     return static_cast<std::size_t>(*n);
   };
-  if (*tilt == "INCLUDE") {
+  if (is_word(*tilt, "INCLUDE")) {
     // How the output depends on the lamp's tilt: it is not tilted.
     if (!numbers.next()) return stopped("the lamp's geometry");
     const auto pairs = count(kMostAngles);
     if (!pairs) return stopped("the number of tilt angles");
     for (std::size_t i = 0; i < 2 * *pairs; ++i)
       if (!numbers.next()) return stopped("tilt angles");
-  } else if (*tilt != "NONE") {
+  } else if (!is_word(*tilt, "NONE")) {
     return broken(fmt::format("TILT={}: the file of another tilt table is not read; write TILT=NONE for a "
                               "lamp that is not tilted",
                               tilt->substr(0, 40)),

@@ -64,7 +64,7 @@ def test_watch_shows_the_image_while_it_renders_and_all_of_it_at_the_end(farm):
 
 
 def test_a_tev_that_is_not_there_is_an_error_that_says_what_to_do(farm):
-    job = farm.submit(SCENE, spp=4, size="64x64")
+    job = farm.submit(SCENE, spp=65536, size="64x64")  # not done before it is paused
     lightshaft("pause", job, env=environment(farm))
 
     with StubTev() as tev:
