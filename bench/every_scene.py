@@ -33,7 +33,7 @@ MOST_SAMPLES = 1024
 GLTF, STAGES = (".gltf", ".glb"), (".usd", ".usda", ".usdc", ".usdz")
 SUFFIXES = (".xml", ".pbrt", *GLTF, *STAGES)
 ABSENT = re.compile("there is no file|Git LFS|no object has the id|is not defined: give it")
-SKY_ADVISED, DARK = "add -D environment=1", "nothing in the scene gives light"
+SKY_ADVISED, DARK = "add -D environment=1", "the scene has no light"
 BLACK_AS_TOLD = "black, as its warning says"
 INCLUDES = re.compile(r'(?:<include[^>]*filename=|^\s*(?:Include|Import)\s+)"([^"]+)"', re.M)
 REMARKS = re.compile(r"^[\ufeff\s]+|<\?.*?\?>\s*|<!DOCTYPE[^>]*>\s*|<!--.*?-->\s*", re.S)

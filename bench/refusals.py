@@ -133,7 +133,7 @@ def judge(case, text):
     raise ValueError(f"no rule: {case.where}: {text}")
 
 
-# What is not there.
+# Proofs that something is missing.
 
 def file_is_absent(case, match):
     name = match[1].replace("\\", "/")

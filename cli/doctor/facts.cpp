@@ -65,7 +65,7 @@ fs::path in_path(const std::string& program) {
   return {};
 }
 
-// Whether the interpreter finds NumPy, started as python_commands.cpp starts it.
+// Returns true if the interpreter finds NumPy when it is started as python_commands.cpp starts it.
 bool finds_numpy(const fs::path& interpreter) {
   const char* of_wheel = std::getenv("LIGHTSHAFT_PYTHON");
   std::vector<std::string> words{interpreter.string()};

@@ -21,14 +21,15 @@ constexpr std::size_t kMostLines = 1000;   // of descriptions before TILT
 // The numbers of the file, with the lines on which they stand.
 class Numbers {
  public:
-  Numbers(std::string_view text, std::size_t line) : rest_(text), line_(line) {}
+  Numbers(std::string_view text, std::size_t line, char line_end)
+      : rest_(text), line_(line), line_end_(line_end) {}
 
   std::size_t line() const { return line_; }
   // Returns the next number; nullopt if there is none or if it is no number.
   std::optional<double> next() {
-    constexpr std::string_view kBetween = " \t\r\n,\f\v\0";
+    constexpr std::string_view kBetween = " \t\r\n,\f\v";
     while (!rest_.empty() && kBetween.find(rest_[0]) != kBetween.npos) {
-      line_ += rest_[0] == '\n';
+      line_ += rest_[0] == line_end_;
       rest_.remove_prefix(1);
     }
     word_ = rest_.substr(0, rest_.find_first_of(kBetween));
@@ -50,6 +51,7 @@ class Numbers {
  private:
   std::string_view rest_, word_;
   std::size_t line_;
+  char line_end_;
   bool accepted_ = false;
 };
 
@@ -132,8 +134,8 @@ bool is_word(std::string_view text, std::string_view word) {
   return text.size() == word.size() && ::strncasecmp(text.data(), word.data(), word.size()) == 0;
 }
 
-// What stands behind TILT=, without blanks around it; nullopt if the line is another.
-std::optional<std::string> tilt_of(std::string_view line) {
+// Returns VALUE of a line TILT=VALUE, without blanks around it; nullopt if the line is another.
+std::optional<std::string_view> tilt_of(std::string_view line) {
   constexpr std::string_view kBlanks = " \t\r";
   const auto trimmed = [&](std::string_view text) {
     const auto first = std::min(text.find_first_not_of(kBlanks), text.size());
@@ -143,10 +145,10 @@ std::optional<std::string> tilt_of(std::string_view line) {
   const std::size_t equals = line.find('=');
   if (equals == line.npos) return std::nullopt;
   if (!is_word(trimmed(line.substr(0, equals)), "TILT")) return std::nullopt;
-  return std::string(trimmed(line.substr(equals + 1)));
+  return trimmed(line.substr(equals + 1));
 }
 
-// Closes the circle of angles of type C that lack 360 degrees, as some files do: it is the first again.
+// Some files of type C leave out 360 degrees. Adds this angle, with the intensities of 0 degrees.
 void close_circle(Profile& p) {
   std::vector<double>& h = p.horizontal;
   if (p.type != 1 || h.front() != 0 || h.back() <= 180 || h.back() >= 360) return;
@@ -162,7 +164,7 @@ bool ascend(const std::vector<double>& angles) {
   return std::ranges::adjacent_find(angles, std::greater_equal<>()) == angles.end();
 }
 
-// What is wrong with the range of the angles; empty: nothing
+// Returns what is wrong with the range of the angles; an empty text if nothing is.
 std::string_view wrong_range(const Profile& p) {
   const double v0 = p.vertical.front(), v1 = p.vertical.back(), h0 = p.horizontal.front(),
                h1 = p.horizontal.back();
@@ -190,12 +192,12 @@ Result<ImageData> decode_ies(std::string_view name, std::span<const std::byte> f
   if (std::uint64_t{kSide} * kSide > max_pixels) return too_many_pixels(name, kSide, kSide, max_pixels);
   std::string_view rest = as_text(file);
   const char line_end = rest.find('\n') == rest.npos ? '\r' : '\n';
-  std::optional<std::string> tilt;
+  std::optional<std::string_view> tilt;
   for (; !tilt; ++line) {
     if (rest.empty() || line > kMostLines) return broken("no line begins with TILT=", line);
     tilt = tilt_of(next_line(rest, line_end));
   }
-  Numbers numbers(rest, line);
+  Numbers numbers(rest, line, line_end);
   const auto stopped = [&](std::string_view what) {
     return broken(fmt::format("{}: {}", what, numbers.refused()), numbers.line());
   };

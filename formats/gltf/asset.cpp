@@ -9,6 +9,7 @@
 #include "core/base/parse_number.h"
 #include "core/base/safe_text.h"
 #include "core/base/text/suggest.h"
+#include "core/scene/analysis/needs.h"
 #include "core/scene/limits.h"
 #include "formats/file_names.h"
 #include "formats/gltf/support_table.h"
@@ -212,9 +213,7 @@ std::optional<Document> load_document(std::string_view file_name, std::string_vi
   if (report.has_errors()) return std::nullopt;
   add_camera(t, stage.cameras, chosen.camera, meshes.box());
   if (!t.has_light)
-    root.warning(
-        "the scene has no light, so that the picture is black: add -D environment=1 for a white sky of "
-        "radiance 1");
+    root.warning(fmt::format("{}: add -D environment=1 for a white sky of radiance 1", kNoLight));
   if (report.has_errors()) return std::nullopt;
   return Document{std::move(t.scene), {}, options.frame, options.labels};
 }

@@ -183,8 +183,8 @@ def test_a_scene_without_light_is_told_to_be_black(tmp_path):
 
     said = lightshaft("render", dark, "-o", tmp_path / "out.exr", "--size", "4x4", "--spp", 2, "--quiet").stderr
 
-    assert said == f"{dark}: warning: nothing in the scene gives light, so that the picture is black\n"
+    assert said == f"{dark}: warning: the scene has no light, so that the picture is black\n"
     for k, light in enumerate(lights):
         lit = tmp_path / f"lit{k}.xml"
         lit.write_text(sphere.format(light))
-        assert "nothing in the scene gives light" not in lightshaft("inspect", lit).stderr
+        assert "the scene has no light" not in lightshaft("inspect", lit).stderr

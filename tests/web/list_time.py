@@ -41,7 +41,7 @@ def main(jobs=10000):
         answer = json.dumps(farm.get("/api/v1/jobs?sort=active&limit=50&offset=0"))
         print(f"one page of the list in JSON: {len(answer)} bytes before compression")
         last = f"shot-{jobs - 1:05}"
-        # What is done on the page, and the rows that it leads to; the page is the same for all, one after the other.
+        # Each step is an action on the page and the rows that it leads to. All steps use one page, one after the other.
         steps = {
             "first rows": ("", f"{ROWS}.length === 50 && {FIRST}"),
             "search": (SEARCH % json.dumps(last), f"{ROWS}.length === 1 && {FIRST} === {json.dumps(last)}"),

@@ -193,7 +193,7 @@ def test_an_open_log_follows_its_job_and_shows_its_end(farm, dashboard):
     farm.log += 50 * "12:00:09 lab-01 was lost\n"
     farm.change("j-1", progress=0.5)
     page.wait(f"{lines}.textContent.includes('lab-01 was lost') && {at_end}")
-    # Who reads further up is left there.
+    # The log does not scroll to its end while somebody reads further up.
     page.evaluate(f"{lines}.scrollTop = 40")
     farm.log += "12:00:20 done\n"
     farm.change("j-1", state="done", progress=1)

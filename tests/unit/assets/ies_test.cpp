@@ -224,7 +224,7 @@ TEST(Ies, HostileFilesAreRefusedOrRead) {
   const auto decoder = [](std::string_view name, std::span<const std::byte> bytes) {
     return decode_ies(name, bytes);
   };
-  // Of the cuts, only those behind the first digit of the last number are accepted.
+  // The decoder accepts only cuts after the first digit of the last number.
   EXPECT_EQ(test::accepted_truncations(file, decoder), 2);
   test::survive_mutations(
       file, decoder,

@@ -20,6 +20,18 @@ namespace {
 
 constexpr int kEmissiveSamples = 100000, kEmissiveRows = 8, kEmissiveColumns = 8;
 
+// A medium that is as dense as it emits per length
+Medium emitting(const Grid& g) {
+  Medium m;
+  m.grid = true;
+  m.density = &g;
+  m.sigma_t = C3(1);
+  m.emission_kind = EmissionKind::per_length;
+  m.emission = C3(1, 2, 3);
+  m.emitter = {&g, &g, &g};
+  return m;
+}
+
 struct EmissiveCase {
   std::string name;
   std::vector<Medium> media;
@@ -34,43 +46,32 @@ class EmissiveCases {
     const Grid& smoke = add(grid_of({9, 14, 10}, 4));
     const Grid& one = add(voxel_grid({1, 1, 1}, {1}, kNearest, Wrap::clamp));
     const V3 middle(5.5f, 5.5f, 5.5f), beside(40, -3, 7);
-    all.push_back({"from the inside", {per_length(fire)}, {3.2f, 4.1f, 8.7f}});
-    all.push_back({"from the inside of one voxel", {per_length(one)}, {.1f, -.2f, .3f}});
-    all.push_back({"from beside it", {per_length(fire)}, beside, middle - beside, .05});
+    all.push_back({"from the inside", {emitting(fire)}, {3.2f, 4.1f, 8.7f}});
+    all.push_back({"from the inside of one voxel", {emitting(one)}, {.1f, -.2f, .3f}});
+    all.push_back({"from beside it", {emitting(fire)}, beside, middle - beside, .05});
     const V3 far(4e4f, -3e3f, 7e3f);
-    all.push_back({"from far away", {per_length(fire)}, far, middle - far, 3e-8});
+    all.push_back({"from far away", {emitting(fire)}, far, middle - far, 3e-8});
     all.push_back({"by absorption", {by_absorption(smoke)}, {4, 6, 5}});
     Medium hot = by_absorption(smoke);
-    emit(hot, fire);
+    hot.emitter = {&fire, &fire, &fire};
     hot.emission_kind = EmissionKind::black_body;
     hot.kelvin_scale = 3000;
     hot.weight = &smoke;
     all.push_back({"black bodies", {hot}, {4, 6, 5}});
-    all.push_back({"two media", {per_length(fire), by_absorption(smoke)}, {6, 2, 3}});
+    all.push_back({"two media", {emitting(fire), by_absorption(smoke)}, {6, 2, 3}});
     Affine flat;  // of voxels of 1 x 1/2 x 1/30, mirrored
     flat.a = {1, 0, 0, 0, -2, 0, 0, 0, 30};
     const Grid& wide =
         add({{12, 12, 12}, random_values({12, 12, 12}, 8, true), flat, V3d(0), V3d(11, 11, 11), 1});
-    all.push_back({"voxels of unlike sides", {per_length(wide)}, {5, -2, .2f}});
+    all.push_back({"voxels of unlike sides", {emitting(wide)}, {5, -2, .2f}});
   }
   std::vector<EmissiveCase> all;
 
  private:
   static Grid grid_of(Size n, unsigned seed) { return unit_grid(n, random_values(n, seed, true)); }
   const Grid& add(Grid g) { return grids_.emplace_back(std::move(g)); }
-  static void emit(Medium& m, const Grid& g) { m.emitter = {&g, &g, &g}; }
-  static Medium per_length(const Grid& g) {
-    Medium m;
-    m.grid = true;
-    m.density = &g;
-    m.sigma_t = C3(1);
-    m.emission_kind = EmissionKind::per_length;
-    m.emission = C3(1, 2, 3);
-    emit(m, g);
-    return m;
-  }
   static Medium by_absorption(const Grid& density) {
-    Medium m = per_length(density);
+    Medium m = emitting(density);
     m.emission_kind = EmissionKind::per_absorption;
     m.emitter = {};
     return m;
@@ -104,17 +105,14 @@ TEST(EmissiveGrids, AreSampledWithTheirStatedDensity) {
 }
 
 TEST(EmissiveGrids, AreEmptyWithoutLightThatVaries) {
-  const Grid none = unit_grid({4, 4, 4}, std::vector<float>(64, 0));
-  Medium dark;
-  dark.grid = true;
-  dark.density = &none;
-  dark.sigma_t = C3(1);
-  dark.emission_kind = EmissionKind::per_length;
-  dark.emission = C3(1);
+  const Grid none = unit_grid({4, 4, 4}, std::vector<float>(64, 0)),
+             full = unit_grid({4, 4, 4}, std::vector<float>(64, 1));
+  EXPECT_TRUE(EmissiveGrids(std::vector{emitting(full)}).any());
+  EXPECT_FALSE(EmissiveGrids(std::vector{emitting(none)}).any());
   // The extent of an emission without a grid is that of the medium's boundary
-  EXPECT_FALSE(EmissiveGrids(std::vector{dark}).any());
-  dark.emitter = {&none, &none, &none};
-  EXPECT_FALSE(EmissiveGrids(std::vector{dark}).any());
+  Medium even = emitting(full);
+  even.emitter = {};
+  EXPECT_FALSE(EmissiveGrids(std::vector{even}).any());
   EXPECT_FALSE(EmissiveGrids(std::vector<Medium>{}).any());
   EXPECT_EQ(EmissiveGrids().pdf({0, 0, 0}, {0, 0, 1}), 0);
 }
@@ -122,13 +120,7 @@ TEST(EmissiveGrids, AreEmptyWithoutLightThatVaries) {
 // Along a ray, the mean of emission over density is the integral of the emission.
 TEST(EmissiveGrids, PointsOnARayGiveTheIntegralOfTheEmission) {
   const Grid fire = unit_grid({12, 12, 12}, random_values({12, 12, 12}, 3, true));
-  Medium m;
-  m.grid = true;
-  m.density = &fire;
-  m.sigma_t = C3(1);
-  m.emission_kind = EmissionKind::per_length;
-  m.emission = C3(1);
-  m.emitter = {&fire, &fire, &fire};
+  const Medium m = emitting(fire);
   const EmissiveGrids lights(std::vector{m});
   // From so far away that all sampled directions are one ray, up to the spread of the grid's width over the
   // distance. The first number decides the cell, the others the point in it: always the same.
@@ -156,18 +148,10 @@ TEST(EmissiveGrids, EveryCellThatMayEmitIsFound) {
   std::vector<float> flame(32 * 32 * 32, 1e-6f);
   flame[0] = 1;
   const Grid small = unit_grid({32, 32, 32}, flame);
-  Affine thousand;  // to index coordinates
-  thousand.a = {1e-6, 0, 0, 0, 1e-6, 0, 0, 0, 1e-6};
-  const Grid large{{2, 2, 2}, std::vector<float>(8, 1e-3f), thousand, V3d(0), V3d(1, 1, 1), 1};
-  std::vector<Medium> media(2);
-  for (std::size_t i = 0; i < 2; ++i) {
-    media[i].grid = true;
-    media[i].density = i == 0 ? &small : &large;
-    media[i].sigma_t = C3(1);
-    media[i].emission_kind = EmissionKind::per_length;
-    media[i].emission = C3(1);
-    media[i].emitter = {media[i].density, media[i].density, media[i].density};
-  }
+  Affine shrunk;  // from the world to index coordinates: the grid is a million units wide
+  shrunk.a = {1e-6, 0, 0, 0, 1e-6, 0, 0, 0, 1e-6};
+  const Grid large{{2, 2, 2}, std::vector<float>(8, 1e-3f), shrunk, V3d(0), V3d(1, 1, 1), 1};
+  const std::vector<Medium> media{emitting(small), emitting(large)};
   const EmissiveGrids lights(media);
   EXPECT_TRUE(lights.has(0) && lights.has(1));
   std::size_t cells = 0;
@@ -180,13 +164,7 @@ TEST(EmissiveGrids, EveryCellThatMayEmitIsFound) {
 
 TEST(EmissiveGrids, AnswerUnusualPoints) {
   const Grid fire = unit_grid({5, 5, 5}, random_values({5, 5, 5}, 2));
-  Medium m;
-  m.grid = true;
-  m.density = &fire;
-  m.sigma_t = C3(1);
-  m.emission_kind = EmissionKind::per_length;
-  m.emission = C3(1);
-  m.emitter = {&fire, &fire, &fire};
+  const Medium m = emitting(fire);
   const EmissiveGrids lights(std::vector{m});
   constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
   for (const V3& x : {V3(kNotANumber), V3(kInfinity), V3(3e38f), V3(1e30f, 0, 0)})

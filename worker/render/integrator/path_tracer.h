@@ -468,7 +468,7 @@ class PathTracer {
   };
   std::conditional_t<F.visibility, Links, Nothing> links_;
   struct Emissive {
-    // The density with which the last vertex found the direction of the current ray by looking for glowing
+    // The density with which the last vertex found the direction of the current ray by looking for emissive
     // grids; negative if it is not known yet
     float pdf = -1;
   };

@@ -11,12 +11,12 @@ namespace {
 // The emission of a cell is the mean of that at points this many voxels apart along each axis.
 constexpr int kVoxelsPerPoint = 2;
 // A cell that may emit is chosen at least as often as if it gave off this share of the mean of such cells, as
-// its points may miss what glows in it.
+// its points may miss what emits in it.
 constexpr double kLeastShare = 1. / 64;
 // The number of 32-bit words, which a choice divides among the cells.
 constexpr double kAllWords = 0x1p32;
 
-// Returns the grid whose cells tell where the medium glows, or null if there is none.
+// Returns the grid whose cells tell where the medium emits, or null if there is none.
 const Grid* guide_of(const Medium& m) {
   if (m.emission_kind == EmissionKind::none) return nullptr;
   if (m.emitter[0]) return m.emitter[0];
@@ -107,7 +107,10 @@ EmissiveGrids::EmissiveGrids(std::span<const Medium> media) {
     found_[s.index] = true;
     s.first = first_words_.size();
     for (std::size_t i = 0; i < s.densities.size(); ++i) {
-      if (!(powers[k][i] > 0)) continue;
+      if (!(powers[k][i] > 0)) {
+        s.densities[i] = 0;
+        continue;
+      }
       before += powers[k][i];
       const auto next = ++cells + static_cast<std::uint64_t>(std::round(before / total * to_share));
       s.densities[i] = static_cast<double>(next - word) / kAllWords / s.densities[i];
