@@ -5,8 +5,8 @@ usage: corpora.py read FOLDER RECORDS [--only TEXT] [--render] [--blender ANSWER
        corpora.py tell FOLDER RECORDS
 FOLDER holds the repositories as OWNER+NAME, each checked out at its commit. `read` reads every scene (every_scene.py) of the table's
 formats, with --render renders at 32 x 24 pixels by 4 samples what loads, and appends a line of JSON for each file to RECORDS; files that
-have one are not read again. --blender takes the output of `blender_scenes.py FOLDER --every`, whose lines become records. `tell` judges each refusal (refusals.py) and writes the tables of docs/measurements/corpora.md and
-docs/measurements/corpora-refused.csv. It ends with 1 if a refusal is judged false or by no rule. A bench, not a test.
+have one are not read again. --blender takes the output of `blender_scenes.py FOLDER --every`, whose lines become records. `tell` judges
+each refusal (refusals.py) and writes the tables of docs/measurements/corpora.md and docs/measurements/corpora-refused.csv. It ends with 1 if a refusal is judged false or by no rule. A bench, not a test.
 """
 import argparse
 import collections
@@ -134,8 +134,10 @@ def judged_blender(record):
     return (refusals.INCOMPLETE if absent else refusals.OUTSIDE), [("", kind, "-" if absent else "the add-on's words")], []
 
 
-def shares(counts):
-    """Of the files that lie inside the features: those that load, of all."""
+def shares(name, counts):
+    """Of the files that lie inside the features: those that load, of all. Of Blender's the add-on alone says what lies inside."""
+    if name == "Blender":
+        return "-"
     inside = counts["loads"] + counts[refusals.INSIDE] + counts["not judged"]
     return f"{100 * counts['loads'] / inside:.1f} %" if inside else "-"
 
@@ -145,7 +147,7 @@ def table_of(rows):
     yield "|---|---:|---:|---:|---:|---:|---:|---:|"
     for name, counts in rows.items():
         cells = [counts.total(), counts["loads"], *(counts[v] for v in refusals.VERDICTS[:3]), counts[refusals.INSIDE] + counts["not judged"]]
-        yield f"| {name} | " + " | ".join(map(str, cells)) + f" | {shares(counts)} |"
+        yield f"| {name} | " + " | ".join(map(str, cells)) + f" | {shares(name, counts)} |"
 
 
 def kinds_table(kinds):

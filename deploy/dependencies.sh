@@ -42,16 +42,16 @@ Debian 12's gRPC is 1.51.1, without fixes of its own for these; Debian 13 and Ub
 
 ## Known faults of other libraries
 
-Debian mends faults of these packages within Debian 12 ([security tracker](https://security-tracker.debian.org/tracker/)), so `apt upgrade` comes first; the versions above have what was mended when this page was made. What would remain reaches this far:
+Debian mends faults of these packages within Debian 12 ([security tracker](https://security-tracker.debian.org/tracker/)), so `apt upgrade` comes first. What would remain reaches this far. The faults are examples; advisories were not searched library by library.
 
-| library | kinds of faults that it had | where strangers' bytes reach it, and what stops them |
+| library | where faults are to be expected | where strangers' bytes reach it, and what stops them |
 |---|---|---|
-| OpenEXR, Imath | overflows in deep scanlines (CVE-2023-5841, up to 3.1.11) and in rare compressions | images of scenes: a worker's render child, in its sandbox. References of users: `lightshaft-exr`, likewise. Results of workers are read by code of the coordinator's own, for one uncompressed form. Deep images are written, never read |
-| libpng, libjpeg | overflows at odd sizes and palettes | images of scenes: a worker's render child, in its sandbox |
-| OpenVDB, Blosc | reads and writes beyond buffers of damaged files | `lightshaft-vdb`, a process of its own below the render child, in the same sandbox |
-| libarchive | overflows and endless loops, nearly all of them in RAR, RAR5, 7zip and cpio (CVE-2024-20696, CVE-2024-48957, CVE-2025-5914) | bundles of users, in the coordinator: only ZIP and tar with gzip are switched on, with limits on entries and bytes; fuzzed |
-| hiredis | overflow of the number of elements in a reply (CVE-2021-32765) | replies of the farm's own Redis alone |
-| OpenColorIO | damaged look-up tables | configurations of the operator alone |
-| Embree, oneTBB | none known that data of a scene reach | meshes are checked before they are handed over |
-| libxml2 | many, in documents and schemas | not called: it comes along with libarchive, whose XAR reader is off |
+| OpenEXR, Imath | damaged files; overflow in deep scanlines (CVE-2023-5841, up to 3.1.11) | images of scenes: a worker's render child, in its sandbox. References of users: `lightshaft-exr`, likewise. Results of workers are read by code of the coordinator's own, for one uncompressed form. Deep images are written, never read |
+| libpng, libjpeg | damaged files | images of scenes: a worker's render child, in its sandbox |
+| OpenVDB, Blosc | damaged files | `lightshaft-vdb`, a process of its own below the render child, in the same sandbox |
+| libarchive | readers of rare formats, such as RAR (CVE-2025-5914) | bundles of users, in the coordinator: only ZIP and tar with gzip are switched on, with limits on entries and bytes; fuzzed |
+| hiredis | replies with too many elements (CVE-2021-32765) | replies of the farm's own Redis alone |
+| OpenColorIO | look-up tables | configurations of the operator alone |
+| Embree, oneTBB | meshes with wrong indices or numbers | meshes are checked before they are handed over |
+| libxml2 | documents and schemas | not called: it comes along with libarchive, whose XAR reader is off |
 TAIL
