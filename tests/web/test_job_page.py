@@ -204,6 +204,24 @@ def test_an_open_log_follows_its_job_and_shows_its_end(farm, dashboard):
     page.wait("!document.querySelector('.job-log').open && document.querySelector('.job-log .help')")
 
 
+def test_who_scrolls_up_while_new_lines_of_a_log_come_stays_there(farm, dashboard):
+    farm.jobs["j-1"] = job()
+    farm.log = "".join(f"12:00:01 tile {n} is done\n" for n in range(100))
+    page = dashboard("#/jobs/j-1")
+    page.click(".job-log summary")
+    lines = "document.querySelector('.job-log pre')"
+    page.wait(f"{lines}.scrollTop > 0")
+    # The reader scrolls between the drawing of the new lines and what the page does next in that frame.
+    page.evaluate(f"new MutationObserver(() => {{ {lines}.scrollTop = 40; }}).observe({lines}, {{ childList: true, characterData: true, subtree: true }})")
+
+    farm.log += "12:00:20 done\n"
+    page.click(".job-log button")
+
+    page.wait(f"{lines}.textContent.endsWith('12:00:20 done\\n')")
+    page.evaluate("new Promise(requestAnimationFrame).then(() => new Promise(requestAnimationFrame))")
+    assert page.evaluate(f"{lines}.scrollTop") == 40
+
+
 def test_what_has_no_sample_is_not_offered_as_a_picture(farm, dashboard):
     farm.jobs["j-1"] = job(state="failed", units_done=0, error="no")
     page = dashboard("#/jobs/j-1")

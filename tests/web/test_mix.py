@@ -234,6 +234,21 @@ def test_the_panel_is_used_by_keyboard_alone_and_fits(lit, width):
     page.wait("location.hash.includes('mix=sun*m*g0.1')")
 
 
+def test_changes_faster_than_the_page_is_drawn_are_all_kept(lit):
+    page = lit("")
+    page.wait("document.querySelector('[aria-label=\"Mute sun\"]')")
+
+    page.evaluate("""(() => {
+      const [gain, mute] = ["sun: gain slider", "Mute sun"].map((name) => document.querySelector(`[aria-label="${name}"]`));
+      gain.value = "1";
+      gain.dispatchEvent(new Event("input", { bubbles: true }));
+      mute.click();
+      document.querySelector('[aria-label="Solo lamp"]').click();
+    })()""")
+
+    assert query(page).endswith("mix=sun*m*g1&mix=lamp*s")
+
+
 @pytest.mark.parametrize("kelvin, x, y", [(2856, 0.44757, 0.40745), (4000, 0.38045, 0.37675), (6500, 0.31352, 0.32363), (10000, 0.28063, 0.28829)])
 def test_a_temperature_has_the_chromaticity_of_a_black_body_and_luminance_one(modules_page, kelvin, x, y):
     """x and y of Planck's law (CIE 1931). du and dv of 9e-5 are less than 4e-4 of x and y here, and the sRGB matrix has four digits."""

@@ -106,9 +106,14 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
       if (log === undefined || get().open?.shown !== id) return;
       const lines = () => document.querySelector(".job-log pre");
       const seen = lines();
-      const follows = !seen || seen.scrollHeight - seen.scrollTop - seen.clientHeight < kNearEnd;
+      const before = seen?.scrollTop ?? 0;
+      const follows = !seen || seen.scrollHeight - before - seen.clientHeight < kNearEnd;
       set(withOpen(get(), { log }));
-      if (follows) requestAnimationFrame(() => lines()?.scrollTo({ top: lines().scrollHeight, behavior: "instant" }));
+      if (!follows) return;
+      requestAnimationFrame(() => {
+        const drawn = lines();
+        if (drawn?.scrollTop === before) drawn.scrollTo({ top: drawn.scrollHeight, behavior: "instant" }); // else the reader has moved meanwhile
+      });
     },
     closeLog: () => set(withOpen(get(), { log: null })),
     renderOn: alter,

@@ -117,8 +117,8 @@ async function enter(first) {
   return null;
 }
 
-/** message: why; without one, that a session that was open has ended. */
-function signedOut(message = state.session === "in" ? kEnded : null) {
+/** message: why; without one, that a session that was open has ended. Several requests can find that out: the message stays. */
+function signedOut(message = state.session === "in" ? kEnded : state.ui.signInError) {
   closeEvents?.();
   closeEvents = null;
   set(withUi({ ...initialState(), narrow: state.narrow, route: state.route, session: "out" }, { signInError: message }));
