@@ -134,6 +134,11 @@ def headers(build, program):
     return {line.strip() for line in listed.splitlines() if line.startswith("    /usr/")}
 
 
+def archives(build):
+    """The system's archives of which the programs have parts (cmake/libm.cmake)."""
+    return [pathlib.Path(output("g++", "-print-file-name=libm.a").strip()).resolve()] if (build / "libls_m.a").exists() else []
+
+
 def debian_package(path, build, packages):
     """(component of a .deb, what it depends on)."""
     name, version, architecture = output("dpkg-deb", "-f", path, "Package", "Version", "Architecture").splitlines()
@@ -147,6 +152,7 @@ def debian_package(path, build, packages):
                 continue
             needs |= packages.of_files(shared_libraries(file), "shared library")
             needs |= packages.of_files(headers(build, file.name), "headers, compiled in")
+            needs |= packages.of_files(archives(build), "mathematical functions, linked in")
             inside = f"/{file.relative_to(folder)}"
             programs.append({"type": "file", "bom-ref": f"{reference}#{inside.lstrip('/')}", "name": inside, "hashes": digest(file)})
     component = {"type": "application", "bom-ref": reference, "name": name, "version": version, "purl": reference, "hashes": digest(path),

@@ -4,8 +4,8 @@
 
 Each program of build/release/bin is stripped and told (RPATH, which holds for the libraries of its libraries, too) to look for
 them in the folder beside it, whatever the environment says: other libraries could render other pixels. Libraries are those that
-the loader maps here, as Debian has them, all but those of the system's C and C++ runtime. The licences of their packages and a
-bill of materials (CycloneDX) travel with them.
+the loader maps here, as Debian has them, all but those of the system's C and C++ runtime, of which the mathematical functions
+are in the programs (cmake/libm.sh). The licences of their packages and a bill of materials (CycloneDX) travel with them.
 """
 
 import hashlib
@@ -79,6 +79,7 @@ def add_programs(folder, programs, packages):
                 shutil.copyfile(real, libraries / name)
                 (libraries / name).chmod(0o755)
         travels |= packages.owners(sbom.headers(BUILD, program)) - SYSTEM
+    travels |= packages.owners(sbom.archives(BUILD))
     run("patchelf", "--force-rpath", "--set-rpath", f"$ORIGIN/{LIBRARIES}", *[folder / program for program in programs])
     if "RUNPATH" in run("readelf", "-d", *libraries.iterdir()):
         sys.exit("error: a library has a path of its own (RUNPATH), so that its libraries would not be found where they are in the wheel")

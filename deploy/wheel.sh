@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Builds dist/lightshaft-VERSION-py3-none-manylinux_2_36_x86_64.whl: the programs with the shared libraries that they need, the
 # Python package and the demo scene. It installs with pip, without compiler and privileges, where glibc is 2.36 or later: Debian
-# 12 and 13, Ubuntu 24.04. The C library, libstdc++ and libgcc are those of the system. Nothing is downloaded.
+# 12 and 13, Ubuntu 24.04. The C library, libstdc++ and libgcc are those of the system, but for the mathematical functions, which
+# travel in the programs. Nothing is downloaded.
 #   deploy/wheel.sh [--prebuilt] [--out FOLDER]
 # --prebuilt takes the programs of build/release/bin as they are.
 set -euo pipefail
