@@ -6,6 +6,7 @@
 #include "cli/commands/commands.h"
 #include "cli/farm/farm_api.h"
 #include "cli/farm/job_results.h"
+#include "cli/output/awaited_files.h"
 #include "cli/output/console.h"
 #include "cli/output/interrupt.h"
 #include "cli/output/job_options.h"
@@ -21,6 +22,7 @@ struct SubmitFlags {
   std::string scene, name, out, view, report, html, reference;
   JobOptions job;
   FarmOptions farm;
+  std::vector<std::string> after_files;
   bool wait = false, quiet = false;
 };
 
@@ -112,6 +114,11 @@ int run(const SubmitFlags& flags) {
   if (const auto ok = check_view(flags.view, flags.out); !ok) return print_error(ok.error());
   if (!flags.view.empty())
     if (const auto ok = check_view_of_farm(flags); !ok) return print_rejected(ok.error());
+  const auto note = [&](const std::string& line) {
+    if (!flags.quiet) print_note(line);
+  };
+  if (const auto there = await_files(flags.after_files, spec->frames, note); !there)
+    return print_error(there.error());
   if (!flags.reference.empty())
     if (const auto sent = send_reference(flags, *spec); !sent) return print_rejected(sent.error());
   const auto type = bundle_type(flags.scene);
@@ -146,6 +153,11 @@ void add_submit(CLI::App& app, Action& action) {
   add_option(*submit, "--name", flags->name, "NAME", "name of the job in lists; default: the scene's file");
   add_option(*submit, "--reference", flags->reference, "REF.exr",
              "the true image, rendered with another seed: every checkpoint is compared with it");
+  add_option(
+      *submit, "--after-file", flags->after_files, "FILE",
+      "submit once this file is there and has not changed for 5 seconds; # stands for the frame number "
+      "of every frame; can be given again for further files")
+      ->allow_extra_args(false);
   add_view(*submit, flags->view);
   submit->add_flag("--wait", flags->wait, "wait until the job is done");
   add_option(

@@ -46,6 +46,29 @@ def test_submit_renders_the_pixels_of_render(rendering, tmp_path):
     assert alone in (tmp_path / "farm.html").read_text()
 
 
+def test_submit_waits_for_files_that_are_still_written(rendering, tmp_path):
+    scene = write_fog(tmp_path)
+    whole = scene.read_bytes()
+    scene.unlink()
+    waiting = subprocess.Popen([bin_dir() / "lightshaft", "submit", scene, "--after-file", scene, "--after-file", tmp_path / "done.##", "--frames", "1-2"],
+                               env=environment(rendering), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)  # fmt: skip
+    assert waiting.stderr.readline() == f"waits for 3 files, the first is {scene}\n"
+    for name in ("done.01", "done.02"):
+        (tmp_path / name).write_text("complete\n")
+    scene.write_bytes(whole[: len(whole) // 2])
+    # The files are complete 5 seconds after they were seen, but for the scene, which has grown meanwhile.
+    with open(scene, "ab") as file:
+        for byte in whole[len(whole) // 2 :]:
+            file.write(bytes([byte]))
+            file.flush()
+    out, notes = waiting.communicate(timeout=120)
+
+    assert waiting.returncode == 0, notes
+    assert call(rendering, "show", out.split()[0]).returncode == 0
+    refused = call(rendering, "submit", scene, "--after-file", tmp_path / "done.##", code=2)
+    assert "# stands for the frame number, and there are no --frames" in refused.stderr
+
+
 def test_a_farm_compares_with_a_reference_as_render_does(rendering, tmp_path):
     scene = write_fog(tmp_path)
     lightshaft("render", scene, "-o", tmp_path / "right.exr", "--spp", 64, "--seed", 9, "--float")

@@ -1,0 +1,84 @@
+#include "cli/output/awaited_files.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <chrono>
+#include <filesystem>
+#include <set>
+#include <thread>
+
+namespace ls::cli {
+namespace {
+
+constexpr std::chrono::seconds kPause{1};  // between two looks
+
+std::string waits_for(const std::vector<std::string>& files) {
+  return files.size() == 1 ? fmt::format("waits for {}", files.front())
+                           : fmt::format("waits for {} files, the first is {}", files.size(), files.front());
+}
+
+tl::unexpected<Error> bad_pattern(fmt::format_string<const std::string&> why, const std::string& pattern) {
+  return tl::unexpected(Error{Errc::invalid_argument, "--after-file " + fmt::format(why, pattern)});
+}
+
+}  // namespace
+
+std::optional<FileState> file_state(const std::string& path) {
+  struct stat found;
+  if (::stat(path.c_str(), &found) != 0) return {};
+  return FileState{static_cast<std::uint64_t>(found.st_size),
+                   found.st_mtim.tv_sec * 1'000'000'000LL + found.st_mtim.tv_nsec};
+}
+
+Result<AwaitedFiles> AwaitedFiles::of(const std::vector<std::string>& patterns,
+                                      const std::optional<FrameRange>& frames) {
+  AwaitedFiles files;
+  std::set<std::string> known;
+  const auto add = [&](const std::string& path) {
+    if (known.insert(path).second) files.waiting_.push_back(path);
+  };
+  for (const std::string& pattern : patterns) {
+    std::error_code error;
+    if (std::filesystem::is_directory(pattern, error))
+      return bad_pattern("{}: that is a folder; name the last file that is written to it", pattern);
+    const bool numbered_name = has_frame_number(pattern) && !std::filesystem::exists(pattern, error);
+    if (!numbered_name) add(pattern);
+    else if (frames)
+      for (const std::uint32_t frame : frames->frames()) add(numbered(pattern, frame));
+    else
+      return bad_pattern("{}: # stands for the frame number, and there are no --frames", pattern);
+  }
+  return files;
+}
+
+std::vector<std::string> AwaitedFiles::look(
+    double now, const std::function<std::optional<FileState>(const std::string&)>& state) {
+  std::erase_if(waiting_, [&](const std::string& path) {
+    const auto found = state(path);
+    if (!found || found->bytes == 0) {
+      seen_.erase(path);
+      return false;
+    }
+    const auto [seen, fresh] = seen_.try_emplace(path, Seen{*found, now});
+    if (!fresh && seen->second.state != *found) seen->second = {*found, now};
+    return now - seen->second.since >= kQuietSeconds;
+  });
+  return waiting_;
+}
+
+Result<void> await_files(const std::vector<std::string>& patterns, const std::optional<FrameRange>& frames,
+                         const std::function<void(const std::string&)>& note) {
+  auto files = AwaitedFiles::of(patterns, frames);
+  if (!files) return tl::unexpected(files.error());
+  const auto begin = std::chrono::steady_clock::now();
+  std::string told;
+  for (;; std::this_thread::sleep_for(kPause)) {
+    const std::chrono::duration<double> since = std::chrono::steady_clock::now() - begin;
+    const auto waiting = files->look(since.count(), file_state);
+    if (waiting.empty()) return {};
+    if (std::string text = waits_for(waiting); text != told) note(told = std::move(text));
+  }
+}
+
+}  // namespace ls::cli
