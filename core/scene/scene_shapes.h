@@ -118,8 +118,22 @@ enum class FovAxis { x, y, diagonal, smaller, larger };
 // meters: there is no camera. The scene has meters, and each block of pixels of the frame measures one number
 // (core/image/frame/meter_blocks.h).
 enum class Projection { perspective, orthographic, spherical, meters };
+// Where something that moves is at one time of the exposure, from 0 (the shutter opens) to 1 (it closes): scaled along
+// its own axes, then turned by the unit quaternion (x, y, z, w), then moved. core/scene/motion.h says what is between two
+// keys.
+struct MotionKey {
+  double time = 0;
+  Vec3 scale{1, 1, 1};
+  std::array<double, 4> rotation{0, 0, 0, 1};
+  Vec3 translation{0, 0, 0};
+  bool operator==(const MotionKey&) const = default;
+};
 struct Sensor {  // looks along the +z axis of to_world, with +y up and +x to the LEFT, as in Mitsuba
-  Transform to_world;
+  Transform to_world;  // of a camera that moves: in the middle of the exposure
+  // Of a camera that moves during the exposure: in the order of times, the first at 0 and the last at 1, and the shutter
+  // is open from 0 to 1. Otherwise there are no keys, and the shutter opens and closes at 0.
+  std::vector<MotionKey> motion;
+  double shutter_open = 0, shutter_close = 0;
   double fov = 50;  // in degrees, along fov_axis
   FovAxis fov_axis = FovAxis::x;
   double near_clip = 1e-2, far_clip = 1e4;

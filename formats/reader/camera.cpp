@@ -5,6 +5,8 @@
 #include <numbers>
 
 #include "core/base/text/suggest.h"
+#include "core/scene/limits.h"
+#include "core/scene/motion.h"
 #include "core/scene/schema/integrators.h"
 #include "formats/reader/mitsuba_plugins.h"
 #include "formats/reader/reader.h"
@@ -35,9 +37,10 @@ void Reader::read_sensor(const Element& e) {
 // Reads the parameters that depend on the type of the camera.
 void Reader::read_projection(const Element& e, Params& p, Sensor& s) {
   Binder binder(p);
+  const Element* animation = p.take_animation("to_world");
   if (e.get("type") == "spherical") {
     s.projection = Projection::spherical;
-    if (const auto to_world = p.take_transform("to_world")) s.to_world = *to_world;
+    describe_place(binder, s);
   } else if (e.get("type") == "orthographic") {
     s.projection = Projection::orthographic;
     describe_clips(binder, s);
@@ -53,15 +56,71 @@ void Reader::read_projection(const Element& e, Params& p, Sensor& s) {
     }
   }
   if (s.near_clip >= s.far_clip) report_.error(e.at, "near_clip is not nearer than far_clip");
-  if (s.projection == Projection::orthographic) {
-    if (!invertible(s.to_world))
+  if (animation)
+    read_motion(*animation, e, s);
+  else
+    check_place(e, s.to_world, s.projection);
+  if (s.motion.empty()) s.shutter_open = s.shutter_close = 0;
+}
+
+void Reader::check_place(const Element& e, const Transform& to_world, Projection projection) {
+  if (projection == Projection::orthographic) {
+    if (!invertible(to_world))
       report_.error(e.at,
                     "to_world flattens this camera or leaves the range of numbers: it can't be inverted");
-  } else if (!is_rigid(s.to_world)) {
+  } else if (!is_rigid(to_world)) {
     report_.error(e.at,
                   "to_world of a sensor may only move, turn and mirror: this one scales or shears, which "
                   "Mitsuba 3 refuses, too; leave its <scale> out");
   }
+}
+
+// Returns the keys of an <animation> of this camera; fewer than two if something is wrong, which is reported.
+std::vector<MotionKey> Reader::read_keys(const Element& animation, Projection projection) {
+  std::vector<MotionKey> keys;
+  for (const Element& e : animation.children) {
+    const auto time = parse_number(e.get("time"));
+    if (!time) {
+      report_.error(value_place(e, "time"), fmt::format("'time' wants a number, not \"{}\"", e.get("time")));
+      continue;
+    }
+    if (!keys.empty() && !(*time > keys.back().time))
+      report_.error(value_place(e, "time"), fmt::format("the times of an <animation> must ascend: {} comes after {}",
+                                                        *time, keys.back().time));
+    const Transform to_world = read_transform(e, report_);
+    check_place(e, to_world, projection);
+    auto key = motion_key(*time, to_world);
+    if (!key) {
+      report_.error(e.at, "this transform shears or flattens, or leaves the range of numbers: an <animation> can only "
+                          "move, turn, mirror and scale");
+      continue;
+    }
+    if (!keys.empty() && key->scale[0] * keys.front().scale[0] < 0)
+      report_.error(e.at, "this transform mirrors and the first one does not, or the other way round: what is between "
+                          "them would be flat");
+    keys.push_back(*key);
+    if (keys.size() > kMaxMotionKeys) {
+      report_.error(e.at, fmt::format("an <animation> of more than {} transforms", kMaxMotionKeys));
+      return {};
+    }
+  }
+  if (keys.size() < 2 && !report_.has_errors()) report_.error(animation.at, "an <animation> needs at least two <transform time=\"...\">");
+  return keys;
+}
+
+void Reader::read_motion(const Element& animation, const Element& e, Sensor& s) {
+  const auto keys = read_keys(animation, s.projection);
+  if (s.shutter_close < s.shutter_open)
+    return report_.error(e.at, fmt::format("the shutter closes at {} and opens at {}: let it close later",
+                                           s.shutter_close, s.shutter_open));
+  if (keys.size() < 2 || report_.has_errors()) return;
+  if (s.shutter_open == s.shutter_close)
+    report_.warning(animation.at, fmt::format("the camera stands where it is at {}, since the shutter opens and closes "
+                                              "then: give shutter_open and shutter_close",
+                                              s.shutter_open));
+  s.motion = motion_during(keys, s.shutter_open, s.shutter_close);
+  s.to_world = pose_of(key_at(keys, s.shutter_open / 2 + s.shutter_close / 2));
+  s.shutter_open = 0, s.shutter_close = 1;
 }
 
 // Reads the sensor's medium. The name of this parameter is "medium" or absent; any other name is an error,

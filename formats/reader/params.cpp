@@ -26,7 +26,7 @@ Params::Params(Reader& reader, const Element& object) : reader_(reader), object_
     if (reader.report().full()) return;  // further errors would not be shown
     const TagKind kind = kind_of(e);
     if (kind != TagKind::object && kind != TagKind::property && kind != TagKind::transform &&
-        kind != TagKind::reference)
+        kind != TagKind::animation && kind != TagKind::reference)
       continue;
     Child c{&e, nullptr, e.get("name"), false};
     if (kind == TagKind::object) c.object = &e;
@@ -151,6 +151,11 @@ std::optional<std::string> Params::take_string(std::string_view name) {
   return e ? string_value(name, *e) : std::nullopt;
 }
 
+const Element* Params::take_animation(std::string_view name) {
+  const auto of_name = [&](const Child& c) { return c.name == name && !c.taken && c.element->tag == "animation"; };
+  return std::any_of(children_.begin(), children_.end(), of_name) ? take(name) : nullptr;
+}
+
 std::optional<Transform> Params::take_transform(std::string_view name) {
   const Element* e = take(name);
   if (!e) return std::nullopt;
@@ -267,6 +272,9 @@ const Element* Params::object_at(const Element& e) {
 }
 
 void Params::convert(const Field& f, const Element& e, Transform& value) {
+  if (e.tag == "animation")
+    return reader_.report().error(
+        e.at, fmt::format("'{}' of {} is an <animation>: only cameras can move; give a <transform>", f.name, title()));
   if (e.tag != "transform") return wrong_type(f.name, e, "a <transform>");
   value = read_transform(e, reader_.report());
 }

@@ -44,6 +44,8 @@ class Params {
   // absent, or it has another type, which is reported.
   std::optional<std::string> take_string(std::string_view name);
   std::optional<Transform> take_transform(std::string_view name);
+  // As take(), but only of an <animation>.
+  const Element* take_animation(std::string_view name);
 
   // Reads the parameter into `value`. If the parameter is not given, uses the field's fallback, or reports an
   // error if the field is required.

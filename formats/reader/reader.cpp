@@ -136,7 +136,7 @@ void Reader::warn_of_media_around_camera() {
 void Reader::read_child(const Element& child) {
   const TagKind kind = kind_of(child);
   if (kind == TagKind::alias) return;
-  if (kind == TagKind::property || kind == TagKind::transform)
+  if (kind == TagKind::property || kind == TagKind::transform || kind == TagKind::animation)
     return report_.error(
         child.at, fmt::format("<{}> stands in no object: <scene> itself has no parameters", child.tag));
   const Element* e = kind == TagKind::reference ? resolve(child) : &child;

@@ -9,7 +9,6 @@ namespace ls::scene {
 const std::vector<MeaninglessRow>& meaningless_table() {
   static const std::string_view output = "the output format is chosen by the command line or the job";
   static const std::string_view sampling = "it only affects sampling, which Lightshaft chooses itself";
-  static const std::string_view once = "motion is not rendered";
   static const std::vector<MeaninglessRow> rows = [] {
     std::vector<MeaninglessRow> all;
     const auto add = [&](std::string_view tag, std::string_view plugin, const char* parameters,
@@ -55,7 +54,8 @@ const std::vector<MeaninglessRow>& meaningless_table() {
         "resolution quality gradients clamp_neighbor clamp_screen overture quality_adjustment indirect_only "
         "debug",
         sampling);
-    add("sensor", "", "shutter_open shutter_close", once);
+    for (const char* meter : {"irradiancemeter", "radiancemeter", "fluxmeter", "fluencemeter"})
+      add("sensor", meter, "shutter_open shutter_close", "only cameras move");
     add("sensor", "", "srf", "colours are linear RGB");
     add("sensor", "perspective", "focus_distance", "a pinhole has everything in focus");
     add("shape", "", "silhouette_sampling_weight sampling_weight", sampling);

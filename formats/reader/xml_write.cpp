@@ -8,6 +8,7 @@
 
 #include "core/base/overloaded.h"
 #include "core/scene/json/serialize.h"
+#include "core/scene/motion.h"
 #include "core/scene/schema/describe_fields.h"
 #include "core/scene/schema/integrators.h"
 #include "formats/reader/mitsuba_plugins.h"
@@ -263,7 +264,9 @@ class Writer {
     void field(const Field& f, const T& x) {
       const bool lens =
           f.name == "aperture_radius" || f.name == "focus_distance" || f.name == "aperture_scale";
-      const bool clip = f.name.ends_with("_clip"), always = f.name == "to_world" || f.name == "medium";
+      const bool clip = f.name.ends_with("_clip"),
+                 always = f.name == "to_world" || f.name == "medium" || f.name.starts_with("shutter_");
+      if (f.name == "to_world" && !sensor.motion.empty()) return writer.property(f, sensor.motion);
       if (always || (clip && sensor.projection == Projection::orthographic) ||
           (sensor.projection == Projection::perspective && !(lens && is_pinhole(sensor))))
         writer.field(f, x);
@@ -371,6 +374,13 @@ class Writer {
   }
   void property(const Field& f, const Transform& x) {
     if (x != Transform{}) matrix(f.name, x.m);
+  }
+  void property(const Field& f, const std::vector<MotionKey>& keys) {
+    line(fmt::format("<animation name=\"{}\">", f.name));
+    for (const MotionKey& key : keys)
+      line(fmt::format("  <transform time=\"{}\"><matrix value=\"{}\"/></transform>", shortest_number(key.time),
+                       numbers(pose_of(key).m)));
+    line("</animation>");
   }
   void property(const Field& f, const UvTransform& x) {
     if (x != UvTransform{})

@@ -23,6 +23,7 @@ const std::vector<TagRow>& tags() {
     for (const char* tag : {"vector", "point"})
       r.push_back({tag, TagKind::property, {"name"}, {"value", "x", "y", "z"}});
     r.push_back({"transform", TagKind::transform, {"name"}, {}});
+    r.push_back({"animation", TagKind::animation, {"name"}, {}});
     for (const char* tag : {"translate", "scale"})
       r.push_back({tag, TagKind::step, {}, {"value", "x", "y", "z"}});
     r.push_back({"rotate", TagKind::step, {"angle"}, {"value", "x", "y", "z"}});
@@ -43,6 +44,12 @@ const TagRow* row_of(const Element& e) {
   return nullptr;
 }
 
+// The <transform> of a time in an <animation>.
+const TagRow& key_row() {
+  static const TagRow row{"transform", TagKind::transform, {"time"}, {}};
+  return row;
+}
+
 class StructureChecker {
  public:
   explicit StructureChecker(Report& report) : report_(report) {}
@@ -50,7 +57,8 @@ class StructureChecker {
   // The depth of recursion is bounded by kMaxNesting.
   void check(const Element& e, const Element* parent) {
     if (report_.full()) return;
-    const TagRow* row = row_of(e);
+    const bool is_key = parent && parent->tag == "animation" && e.tag == "transform";
+    const TagRow* row = is_key ? &key_row() : row_of(e);
     if (!parent && e.tag != "scene")
       return report_.error(e.at, fmt::format("the root must be <scene>, not <{}>", e.tag));
     if (!row) return unknown_tag(e);
@@ -89,6 +97,11 @@ class StructureChecker {
     const TagRow* above = row_of(parent);
     const TagKind kind = above ? above->kind : TagKind::unknown;
     if (kind == TagKind::unknown) return;
+    if (kind == TagKind::animation) {
+      if (row.kind != TagKind::transform)
+        report_.error(e.at, fmt::format("<{}> can't stand in <animation>: only <transform time=\"...\"> can", e.tag));
+      return;
+    }
     const bool step = row.kind == TagKind::step;
     if (step != (kind == TagKind::transform)) {
       report_.error(

@@ -11,7 +11,7 @@
 
 namespace ls::scene {
 
-enum class TagKind { object, property, transform, step, reference, alias, unknown };
+enum class TagKind { object, property, transform, animation, step, reference, alias, unknown };
 
 // A row of a format's table of elements: the tag, its kind, and the attributes that it must and may have.
 struct TagRow {

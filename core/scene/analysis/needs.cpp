@@ -39,6 +39,7 @@ class Analyst {
     for (const Texture& t : s_.textures) ++n_.textures[kind_of(t)];
     n_.instances = static_cast<std::uint32_t>(s_.instances.size());
     n_.lens = s_.sensor.aperture_radius > 0;
+    n_.camera_motion = !s_.sensor.motion.empty();
     n_.crop = s_.film.has_crop();
     n_.transparent_film = s_.film.transparent;
     n_.meters = static_cast<std::uint32_t>(meter_count(s_));
@@ -191,6 +192,7 @@ class Words {
       return std::move(out_);
     }
     say("thin lens", n_.lens, "the aperture has a radius", "the camera is a pinhole");
+    say("camera motion", n_.camera_motion, "the camera moves while the shutter is open", "the camera stands still");
     say("crop of the frame", n_.crop, "part of the frame", "the whole frame");
     say("transparent film", n_.transparent_film, "the camera does not see the environment",
         "the environment is in the picture");
@@ -307,6 +309,7 @@ std::string canonical_json(const Needs& n) {
          {"boundaries", n.boundaries},
          {"veils", n.null_transmission},
          {"lens", n.lens},
+         {"camera_motion", n.camera_motion},
          {"crop", n.crop},
          {"shapes", n.shapes},
          {"materials", n.materials},

@@ -52,6 +52,8 @@ class Search {
     if (!s_.meters.empty() || !s.interior || s.group || lets_rays_in(s) || !has_interior_behind(s))
       return false;
     const auto box = box_of(s);
+    // Where a camera that moves is at all times is not looked at.
+    if (!s_.sensor.motion.empty()) return false;
     const bool clear = box ? camera_is_outside(s_.sensor, *box) : !s_.sensor.medium;
     return clear && (traits_[s.bsdf.value].black_behind || (box && sealed(s, i, *box)));
   }

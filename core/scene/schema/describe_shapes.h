@@ -138,13 +138,35 @@ void describe(V& v, T& f) {
   v.field(quantity("stddev", "standard deviation", "pixels", {0, 8, true}), f.stddev);
 }
 
+template <class V, Of<MotionKey> T>
+void describe(V& v, T& k) {
+  v.field({.name = "time", .doc = "", .derived = true}, k.time);
+  v.field({.name = "scale", .doc = "", .derived = true}, k.scale);
+  v.field({.name = "rotation", .doc = "", .derived = true}, k.rotation);
+  v.field({.name = "translation", .doc = "", .derived = true}, k.translation);
+}
+
 LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens, orthographic, spherical",
         "looks along the +z of `to_world`, +y up, +x to the left. `orthographic`: parallel rays from a sheet "
         "of 2 by 2 height / width, which `to_world` may scale. `spherical`: all directions by latitude and "
         "longitude, +y in the top row; of the horizon the left edge is -z, a quarter of the width further +x")
 template <class V, Of<Sensor> T>
+void describe_place(V& v, T& s) {
+  v.field({.name = "to_world",
+           .doc = "places and turns the camera; or an `<animation>` of transforms with times, by which it "
+                  "moves while the shutter is open (docs/guide/motion-blur.md)"},
+          s.to_world);
+  v.field({.name = "shutter_open", .doc = "time at which the exposure begins", .unwritten = 0, .elided = true},
+          s.shutter_open);
+  v.field({.name = "shutter_close",
+           .doc = "time at which the exposure ends; at `shutter_open` unless it is given",
+           .unwritten = 0,
+           .elided = true},
+          s.shutter_close);
+}
+template <class V, Of<Sensor> T>
 void describe_clips(V& v, T& s) {
-  v.field({.name = "to_world", .doc = "places and turns the camera"}, s.to_world);
+  describe_place(v, s);
   v.field(quantity("near_clip", "nearest depth that is seen (not `spherical`)", "length", kPositive),
           s.near_clip);
   v.field(quantity("far_clip", "farthest depth that is seen, of surfaces and of media (not `spherical`)",
@@ -191,6 +213,7 @@ void describe(V& v, T& s) {
   describe_perspective(v, s);
   describe_lens(v, s);
   v.field(nested_field("medium", "what the camera is in; the name may be left out", "medium"), s.medium);
+  v.field({.name = "motion", .doc = "keys of the animation", .derived = true, .elided = true}, s.motion);
 }
 
 LS_TYPE(

@@ -5,17 +5,19 @@
 #include <limits>
 
 #include "core/base/overloaded.h"
+#include "core/scene/motion.h"
 #include "worker/render/base/work_counters.h"
 
 namespace ls::render {
 
 Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const TextureTable* textures)
-    : projection_(s.projection), per_pixel_x_(1. / size.width), per_pixel_y_(1. / size.height) {
-  const auto& m = s.to_world.m;
-  axis_x_ = V3d(m[0], m[4], m[8]);
-  axis_y_ = V3d(m[1], m[5], m[9]);
-  axis_z_ = V3d(m[2], m[6], m[10]);
-  origin_ = V3((V3d(m[3], m[7], m[11]) - center) * scale);
+    : projection_(s.projection),
+      center_(center),
+      scale_(scale),
+      pose_(pose(s.to_world)),
+      motion_(s.motion),
+      per_pixel_x_(1. / size.width),
+      per_pixel_y_(1. / size.height) {
   const double aspect = static_cast<double>(size.width) / size.height;
   const double tx = projection_ == Projection::perspective ? tan_half_fov_x(s.fov, s.fov_axis, aspect) : 1,
                ty = tx / aspect;
@@ -31,8 +33,6 @@ Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const 
   near_ = static_cast<float>(s.near_clip * scale);
   spread_ = 1 + s.near_clip / s.focus_distance;
   far_ = static_cast<float>(s.far_clip * scale);
-  lens_x_ = V3(axis_x_ * scale);
-  lens_y_ = V3(axis_y_ * scale);
   pinhole_ = projection_ == Projection::perspective && !(aperture_ > 0);
   if (s.aperture_scale) {
     textures_ = textures;
@@ -40,7 +40,36 @@ Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const 
   }
 }
 
+Camera::Pose Camera::pose(const Transform& to_world) const {
+  const auto& m = to_world.m;
+  Pose p;
+  p.axis_x = V3d(m[0], m[4], m[8]);
+  p.axis_y = V3d(m[1], m[5], m[9]);
+  p.axis_z = V3d(m[2], m[6], m[10]);
+  p.origin = V3((V3d(m[3], m[7], m[11]) - center_) * scale_);
+  p.lens_x = V3(p.axis_x * scale_);
+  p.lens_y = V3(p.axis_y * scale_);
+  return p;
+}
+
+Camera::Pose Camera::pose_at(float time) const {
+  return pose(scene::pose_of(scene::key_at(motion_, double{time})));
+}
+
+[[gnu::cold, gnu::noinline]] CameraRay Camera::ray_at(float time, double fx, double fy, V2 lens) const {
+  CameraRay r = ray(pose_at(time), fx, fy, lens);
+  r.time = time;
+  return r;
+}
+
 bool Camera::usable() const {
+  // Between two keys each part of the pose is between those of the keys.
+  return usable(pose_) && std::all_of(motion_.begin(), motion_.end(), [&](const MotionKey& key) {
+           return usable(pose(scene::pose_of(key)));
+         });
+}
+
+bool Camera::usable(const Pose& pose) const {
   // Before their directions are normalised, the rays of perspective and orthographic cameras depend linearly
   // on the positions on the film and on the lens, so testing a few extreme positions suffices. The rays of a
   // spherical camera all start at one point. An aperture map can only make the lens smaller, so the test
@@ -51,20 +80,20 @@ bool Camera::usable() const {
   for (const double fx : {0., 1.})
     for (const double fy : {0., 1.})
       for (const V2& lens : {V2(0, 0), V2(0, 1), V2(1, 0), V2(1, 1)}) {
-        const CameraRay r = whole.ray(fx / per_pixel_x_, fy / per_pixel_y_, lens);
+        const CameraRay r = whole.ray(pose, fx / per_pixel_x_, fy / per_pixel_y_, lens);
         const float length = dot(r.d, r.d);
         if (!is_finite(r.o) || !(length > .99f && length < 1.01f) || std::isnan(r.t_max)) return false;
       }
   return true;
 }
 
-CameraRay Camera::ray(double fx, double fy, V2 lens) const {
+CameraRay Camera::ray(const Pose& pose, double fx, double fy, V2 lens) const {
   const double x = x0_ + dx_ * fx, y = y0_ + dy_ * fy;
-  if (pinhole_) return perspective_ray(origin_, {x, y, 1});
-  if (projection_ == Projection::spherical) return spherical_ray(fx * per_pixel_x_, fy * per_pixel_y_);
-  if (projection_ == Projection::orthographic) return orthographic_ray(x, y);
+  if (pinhole_) return perspective_ray(pose, pose.origin, {x, y, 1});
+  if (projection_ == Projection::spherical) return spherical_ray(pose, fx * per_pixel_x_, fy * per_pixel_y_);
+  if (projection_ == Projection::orthographic) return orthographic_ray(pose, x, y);
   if (projection_ == Projection::meters) return meter_ray(fx, fy, lens);
-  return lens_ray(x, y, textures_ ? aperture_at(fx * per_pixel_x_, fy * per_pixel_y_) : aperture_, lens);
+  return lens_ray(pose, x, y, textures_ ? aperture_at(fx * per_pixel_x_, fy * per_pixel_y_) : aperture_, lens);
 }
 
 // Returns the radius of the aperture for the film position (u, v): the radius that the sensor gives, times
@@ -74,18 +103,18 @@ float Camera::aperture_at(double u, double v) const {
   return aperture_ * std::clamp(mean_component(textures_->eval(aperture_scale_, uv)), 0.f, 1.f);
 }
 
-CameraRay Camera::lens_ray(double x, double y, float aperture, V2 lens) const {
-  if (!(aperture > 0)) return perspective_ray(origin_, {x, y, 1});
+CameraRay Camera::lens_ray(const Pose& pose, double x, double y, float aperture, V2 lens) const {
+  if (!(aperture > 0)) return perspective_ray(pose, pose.origin, {x, y, 1});
   LS_COUNT(lens);
   const V2 p = concentric_disk(lens) * aperture;
   // All rays of a film position go through the same point of the focal plane, which does not depend on the
   // lens sample.
-  return perspective_ray(origin_ + lens_x_ * p.x + lens_y_ * p.y,
+  return perspective_ray(pose, pose.origin + pose.lens_x * p.x + pose.lens_y * p.y,
                          {x * focus_ - p.x, y * focus_ - p.y, focus_});
 }
 
-CameraRay Camera::perspective_ray(const V3& o, const V3d& local) const {
-  const V3d along = axis_x_ * local.x + axis_y_ * local.y + axis_z_ * local.z;
+CameraRay Camera::perspective_ray(const Pose& pose, const V3& o, const V3d& local) const {
+  const V3d along = pose.axis_x * local.x + pose.axis_y * local.y + pose.axis_z * local.z;
   const double length = along.length();
   const V3 d(along * (1 / length));
   // Clip distances are measured along the camera's axis. The ray starts at the near plane.
@@ -98,7 +127,7 @@ std::pair<V3d, V3d> Camera::before_near_plane(double pixels) const {
   for (const double x : {-pixels, 1 / per_pixel_x_ + pixels})
     for (const double y : {-pixels, 1 / per_pixel_y_ + pixels}) {
       const CameraRay r = ray(x, y, {.5f, .5f});  // from the middle of the lens
-      const V3d end(r.o), lens = end - V3d(r.d) * (double{near_distance(r.d)} * (1 + 1e-3));
+      const V3d end(r.o), lens = end - V3d(r.d) * (double{near_distance(r)} * (1 + 1e-3));
       for (int k = 0; k < 3; ++k) {
         low[k] = std::min({low[k], end[k], lens[k]});
         high[k] = std::max({high[k], end[k], lens[k]});
@@ -108,33 +137,33 @@ std::pair<V3d, V3d> Camera::before_near_plane(double pixels) const {
   const double wide = has_lens() ? double{aperture_} * spread_ : 0;
   for (int k = 0; k < 3; ++k) {
     const double margin = 1e-6 * std::max(std::abs(low[k]), std::abs(high[k])) +
-                          wide * double{std::abs(lens_x_[k]) + std::abs(lens_y_[k])};
+                          wide * double{std::abs(pose_.lens_x[k]) + std::abs(pose_.lens_y[k])};
     low[k] -= margin;
     high[k] += margin;
   }
   return {low, high};
 }
 
-float Camera::near_distance(const V3& d) const {
+float Camera::near_distance(const Pose& pose, const V3& d) const {
   if (projection_ == Projection::spherical || projection_ == Projection::meters) return 0;
-  const double along = axis_z_.length();
+  const double along = pose.axis_z.length();
   if (projection_ == Projection::orthographic) return static_cast<float>(near_ * along);
-  return static_cast<float>(near_ * along / axis_z_.dot(V3d(d)));
+  return static_cast<float>(near_ * along / pose.axis_z.dot(V3d(d)));
 }
 
 // As in Mitsuba, the near plane is mapped by to_world, which may also scale its distance. The ray starts on
 // that plane and has the length far - near.
-CameraRay Camera::orthographic_ray(double x, double y) const {
-  const V3d at = V3d(lens_x_) * x + V3d(lens_y_) * y;
-  return {V3(V3d(origin_) + at + axis_z_ * near_), V3(axis_z_.normalized()), far_ - near_};
+CameraRay Camera::orthographic_ray(const Pose& pose, double x, double y) const {
+  const V3d at = V3d(pose.lens_x) * x + V3d(pose.lens_y) * y;
+  return {V3(V3d(pose.origin) + at + pose.axis_z * near_), V3(pose.axis_z.normalized()), far_ - near_};
 }
 
 // All rays start at the camera's position. u is the azimuth divided by a full turn, from -z towards +x; v is
 // the angle from +y divided by half a turn.
-CameraRay Camera::spherical_ray(double u, double v) const {
+CameraRay Camera::spherical_ray(const Pose& pose, double u, double v) const {
   const double phi = u * 2 * kPiD, theta = v * kPiD;
   const double x = std::sin(phi) * std::sin(theta), y = std::cos(theta), z = -std::cos(phi) * std::sin(theta);
-  return {origin_, V3((axis_x_ * x + axis_y_ * y + axis_z_ * z).normalized()),
+  return {pose.origin, V3((pose.axis_x * x + pose.axis_y * y + pose.axis_z * z).normalized()),
           std::numeric_limits<float>::infinity()};
 }
 

@@ -24,6 +24,7 @@ struct CameraRay {
   // Set if a meter measures along this ray. If the meter has a plate, o is on the plate, and the ray meets
   // the plate at once: its normal is -d.
   const MeterStart* meter = nullptr;
+  float time = 0;  // of the exposure, from 0 to 1; set only if the camera moves
 };
 
 class Camera {
@@ -39,33 +40,51 @@ class Camera {
       : projection_(Projection::meters), pinhole_(false), meters_(&meters), world_(&world) {}
 
   // Returns the ray through the position (fx, fy) of the whole frame, in pixels from its top left corner.
-  // `lens`, in [0, 1)^2, chooses the point on the lens; a camera without a lens ignores it.
-  CameraRay ray(double fx, double fy, V2 lens) const;
+  // `lens`, in [0, 1)^2, chooses the point on the lens; a camera without a lens ignores it. Of a camera that moves it is
+  // the ray in the middle of the exposure.
+  CameraRay ray(double fx, double fy, V2 lens) const { return ray(pose_, fx, fy, lens); }
+  // Returns the ray of a camera that moves at a time of the exposure, from 0 to 1.
+  CameraRay ray_at(float time, double fx, double fy, V2 lens) const;
+  bool moves() const { return !motion_.empty(); }
   // True if the origins and directions of all rays of this camera are in the range of float32.
   bool usable() const;
-  // Returns the distance from the camera, or from its lens, to the start of a ray in direction d.
-  float near_distance(const V3& d) const;
+  // Returns the distance from the camera, or from its lens, to the start of one of its rays.
+  float near_distance(const CameraRay& ray) const {
+    return moves() ? near_distance(pose_at(ray.time), ray.d) : near_distance(pose_, ray.d);
+  }
   // Returns the lower and the upper corner of a box around everything that rays of the frame, and of `pixels`
   // around it, pass between the lens and the near plane, enlarged by a thousandth of its distance. Not for
-  // spherical cameras, which have no near plane.
+  // spherical cameras, which have no near plane, and not for cameras that move.
   std::pair<V3d, V3d> before_near_plane(double pixels) const;
   bool has_lens() const { return aperture_ > 0; }
   Projection projection() const { return projection_; }
 
  private:
+  struct Pose {
+    V3d axis_x, axis_y, axis_z;  // columns of to_world: the camera's axes in the world, not normalised
+    V3 origin;
+    V3 lens_x, lens_y;  // axis_x and axis_y times the scale from scene to world
+  };
+  Pose pose(const Transform& to_world) const;
+  Pose pose_at(float time) const;
+  bool usable(const Pose& pose) const;
+
+  CameraRay ray(const Pose& pose, double fx, double fy, V2 lens) const;
   // Returns the ray from o in the camera-space direction `local`.
-  CameraRay perspective_ray(const V3& o, const V3d& local) const;
-  CameraRay lens_ray(double x, double y, float aperture, V2 lens) const;
-  CameraRay orthographic_ray(double x, double y) const;
-  CameraRay spherical_ray(double u, double v) const;
+  CameraRay perspective_ray(const Pose& pose, const V3& o, const V3d& local) const;
+  CameraRay lens_ray(const Pose& pose, double x, double y, float aperture, V2 lens) const;
+  CameraRay orthographic_ray(const Pose& pose, double x, double y) const;
+  CameraRay spherical_ray(const Pose& pose, double u, double v) const;
+  float near_distance(const Pose& pose, const V3& d) const;
   CameraRay meter_ray(double fx, double fy, V2 lens) const;
   float aperture_at(double u, double v) const;
 
   Projection projection_ = Projection::perspective;
   bool pinhole_ = true;           // true for a perspective camera without a lens
-  V3d axis_x_, axis_y_, axis_z_;  // columns of to_world: the camera's axes in the world, not normalised
-  V3 origin_;
-  V3 lens_x_, lens_y_;  // axis_x_ and axis_y_ times the scale from scene to world
+  V3d center_;
+  double scale_ = 1;
+  Pose pose_;  // of a camera that moves: in the middle of the exposure
+  std::vector<MotionKey> motion_;
   // The film position (fx, fy), in pixels, has the direction (x, y, 1) in camera space, where x = x0_ + dx_ *
   // fx and y = y0_ + dy_ * fy.
   double x0_ = 0, dx_ = 0, y0_ = 0, dy_ = 0;

@@ -141,7 +141,7 @@ void AovPixel::add_surface(const FirstSurface& first, const SampleStream& stream
   hits_ += 1;
   add(Aov::coverage, {1, 0, 0});
   const double distance =
-      (V3d(hit.p) - V3d(ray.o)).dot(V3d(ray.d)) + double{world_.camera.near_distance(ray.d)};
+      (V3d(hit.p) - V3d(ray.o)).dot(V3d(ray.d)) + double{world_.camera.near_distance(ray)};
   add(Aov::depth, {distance / world_.geometry.scale, 0, 0});
   add(Aov::position, V3d(hit.p) / world_.geometry.scale + world_.geometry.center);
   add(Aov::normal, V3d(hit.shading.n));

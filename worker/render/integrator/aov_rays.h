@@ -102,7 +102,7 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
 // other, and the last one is that of the whole.
 template <Features F, template <Features> class Light>
 Opacity PathTracer<F, Light>::opacity(const CameraRay& ray, const DeepTransmittance* deep) {
-  const float near = deep ? world_.camera.near_distance(ray.d) : 0;
+  const float near = deep ? world_.camera.near_distance(ray) : 0;
   const auto depth_of = [&](const V3& p) { return near + dot(p - ray.o, ray.d); };
   const auto mean_of = [](const C3& c) { return (double{c.x} + c.y + c.z) / 3; };
   std::size_t edge = 0;
@@ -240,7 +240,7 @@ DeepProbe PathTracer<F, Light>::deep_probe(const CameraRay& ray) {
   // A ray that passes more surfaces than this ends; the slices are then coarser behind them.
   constexpr int kProbeSegments = 64;
   DeepProbe probe;
-  const float near = world_.camera.near_distance(ray.d);
+  const float near = world_.camera.near_distance(ray);
   const auto depth_of = [&](const V3& p) { return near + dot(p - ray.o, ray.d); };
   ray_ = {ray.o, ray.o, ray.d};
   medium_ = start_medium(ray);

@@ -483,7 +483,7 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
   ray_ = {ray.o, ray.o, ray.d};
   last_.p = ray.o;
   if constexpr (F.split)
-    if (split_->by_depth.wanted) split_->by_depth.begin(ray.o, world_.camera.near_distance(ray.d));
+    if (split_->by_depth.wanted) split_->by_depth.begin(ray.o, world_.camera.near_distance(ray));
   if constexpr (F.media) medium_ = start_medium(ray);
   if constexpr (F.chromatic) hero_ = std::min(2, static_cast<int>(3 * stream_.group(0, Purpose::hero).u(0)));
   if constexpr (kSplits) reference_ = world_.mean_radiance > 0 ? kNoReference : 1;

@@ -41,6 +41,7 @@ struct Variant {
 inline CameraRay camera_ray(const World& w, const SampleStream& stream, int x, int y) {
   const Group g = stream.group(0, Purpose::camera);
   const double fx = x + .5 + w.filter.offset(g.u(0)), fy = y + .5 + w.filter.offset(g.u(1));
+  if (w.camera.moves()) return w.camera.ray_at(stream.group(0, Purpose::time).u(0), fx, fy, {g.u(2), g.u(3)});
   return w.camera.ray(fx, fy, {g.u(2), g.u(3)});
 }
 template <Features F, template <Features> class Light>

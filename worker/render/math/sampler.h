@@ -146,6 +146,7 @@ enum class Purpose : std::uint32_t {
   track_shadow_catcher,
   emissive,
   track_emissive,
+  time,
   end  // not a purpose, but the number of purposes
 };
 

@@ -48,6 +48,7 @@ bool near_plane_hides_boundaries(const World& w) {
   const auto boxes = surface_boxes(w.geometry, [](const SurfaceInfo& s) { return s.transition; });
   if (!boxes) return true;
   if (boxes->empty()) return false;
+  if (w.camera.moves()) return true;  // where its near plane passes is not looked at
   const auto [low, high] = w.camera.before_near_plane(w.filter.reach());
   SurfaceBox region;
   region.lo = V3(low), region.hi = V3(high);
@@ -58,6 +59,38 @@ bool near_plane_hides_boundaries(const World& w) {
     near[box.surface] = true;
   }
   return any_touches(w.geometry, near, region);
+}
+
+Result<void> check_way_of_camera(const World& w) {
+  constexpr int kSteps = 256;
+  const bool bounded = std::ranges::any_of(w.geometry.surfaces, &SurfaceInfo::transition);
+  if (!w.camera.moves() || !bounded) return {};
+  const auto eye_at = [&](int step) {
+    return hidden_part(w, w.camera.ray_at(static_cast<float>(step) / kSteps, w.frame.width / 2., w.frame.height / 2.,
+                                          {.5f, .5f}))
+        .start;
+  };
+  V3 from = eye_at(0);
+  for (int i = 1; i <= kSteps; ++i) {
+    const V3 to = eye_at(i);
+    const V3d way = V3d(to) - V3d(from);
+    const double length = way.length();
+    V3 at = from;
+    const V3 d(length > 0 ? way * (1 / length) : way);
+    for (int hits = 0; length > 0 && hits < 64; ++hits) {
+      const auto left = static_cast<float>((V3d(to) - V3d(at)).dot(V3d(d)));
+      const auto primitive = left > 0 ? w.accel.nearest(at, d, left) : std::nullopt;
+      SurfaceHit hit;
+      if (!primitive || !w.geometry.complete(*primitive, at, d, hit)) break;
+      if (w.geometry.surfaces[hit.surface].transition)
+        return fail(Errc::invalid_argument,
+                    "the camera moves through the boundary of a medium while the shutter is open, but its rays begin "
+                    "in one medium: let its animation end before the boundary, or begin behind it");
+      at = offset_point(hit, d);
+    }
+    from = to;
+  }
+  return {};
 }
 
 }  // namespace ls::render

@@ -11,6 +11,10 @@ namespace ls::render {
 // nothing else.
 bool near_plane_hides_boundaries(const World& w);
 
+// Returns an error if a camera that moves passes a boundary of a medium: its rays begin in one medium, that of the
+// sensor. Looks at the way of the lens' centre, or of the point where its near plane begins, in steps.
+Result<void> check_way_of_camera(const World& w);
+
 // The part of a camera ray before its origin: from a little before the lens, so that a camera that stands on
 // a boundary looks through it, to the near plane.
 struct HiddenPart {
@@ -18,7 +22,7 @@ struct HiddenPart {
   float length = 0;
 };
 inline HiddenPart hidden_part(const World& w, const CameraRay& ray) {
-  const float hidden = w.camera.near_distance(ray.d);
+  const float hidden = w.camera.near_distance(ray);
   const float length = hidden * (1 + 0x1p-10f) + 0x1p-20f * largest(ray.o);
   return {ray.o - ray.d * length, length};
 }

@@ -310,6 +310,7 @@ Result<std::shared_ptr<World>> make_world(const Scene& given, const RenderSettin
                 "principal_point_offset, clip planes, aperture_radius and focus_distance");
   w.filter = PixelFilter(scene.film.filter);
   w.hidden_boundaries = near_plane_hides_boundaries(w);
+  if (auto ok = check_way_of_camera(w); !ok) return tl::unexpected(ok.error());
   const Features found = found_in(w);
   w.needs = scene::needs_of(scene, w.use_media);
   w.need = features_of(w.needs);

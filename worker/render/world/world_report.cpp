@@ -117,6 +117,7 @@ WorldReport describe(const World& w) {
   feature(techniques.has(Technique::emissive_grids), "directions towards emissive grids");
   feature(techniques.has(Technique::path_splitting), "paths that split, or end, by what their pixel shows");
   feature(w.camera.has_lens(), "thin lens");
+  feature(w.camera.moves(), "camera motion");
   feature(!w.geometry.instances.empty(), "instances of groups");
   feature(w.geometry.primitive_count() > w.geometry.triangle_count(), "user geometries in the BVH");
   feature(w.textures.bytes() > 0, "image textures");
