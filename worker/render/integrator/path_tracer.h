@@ -174,6 +174,7 @@ class PathTracer {
   void add_medium_emission_among(float t_max);
   float others_end(std::size_t but, int hero, float t_max, RandomStream streams);
   void add_medium_emission(const Medium& medium, float t_max);
+  C3 closed_emission(const Medium& medium, float t) const;
   Step scatter_on_surface(const SurfaceHit& hit);
   bool passes_null(const SurfaceHit& hit);
   bool may_scatter() const { return world_.depth_allows(depth_ + 1); }
