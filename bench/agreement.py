@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Every scene under a folder: does it load, and does it agree with the reference image that lies beside it?
 
-usage: agreement.py [--scenes DIR] [--only TEXT] [--spp N] [--seeds K] [--size WxH] [--seconds S] [--load-only] [--markdown] [--mitsuba N]
+usage: agreement.py [--scenes DIR] [--only TEXT] [--spp N] [--seeds K] [--size WxH | --across N] [--seconds S] [--load-only] [--markdown] [--mitsuba N [--variant NAME]]
 Without DIR the bench scenes are made and compared with their references. References are found by name: refs/NAME.0.exr and
 NAME.1.exr (independent of each other, so that their noise counts in the standard errors), else refs/NAME_ref_rgb.exr for a scene
 NAME_INTEGRATOR.xml, else ref/NAME_*spp.exr, else a TungstenRender.exr in the scene's own folder. A scene without one is rendered all the same, and its picture must be finite.
@@ -13,10 +13,12 @@ renders, for a single reference does not tell its samples; the share of blocks o
 samples to say'. References are renders by others: what they leave out, a verdict can't know. With --size a reference of a whole
 multiple of that size is averaged down to it. With --mitsuba N the reference is a fresh render by Mitsuba 3 instead: K seeds of N samples with
 the scene's own integrator, at the same size, and its noise counts in the standard errors. The `moment` wrapper is left out; what
-Mitsuba does not load as it is, it is given as `lightshaft convert` writes it. Needs the mitsuba package and an LLVM library.
+Mitsuba does not load as it is, it is given as `lightshaft convert` writes it. Needs the mitsuba package and an LLVM library, or the
+variant scalar_rgb, which needs none.
 Needs numpy and the OpenEXR package of PyPI. A bench, not a test.
 """
 import argparse
+import json
 import os
 import pathlib
 import re
@@ -69,12 +71,21 @@ def inspect(scene):
     return (errors or run.stderr.splitlines() or [f"exit {run.returncode}"])[0].split("error:")[-1].strip()
 
 
+def size_of(scene, options):
+    """The flags for the size that is asked for."""
+    if options.across:
+        told = subprocess.run([BIN / "lightshaft", "inspect", scene, "--json"], capture_output=True, text=True, check=True).stdout
+        own = json.loads(told)["size"]
+        return ["--size", "x".join(str(max(1, round(n * options.across / max(own)))) for n in own)]
+    return ["--size", options.size] if options.size else []
+
+
 def render(scene, options, folder):
     images = []
+    size = size_of(scene, options)
     for seed in range(options.seeds):
         out = folder / f"{seed}.exr"
         limit = ["--time", str(options.seconds)] if options.seconds else []
-        size = ["--size", options.size] if options.size else []
         subprocess.run([BIN / "lightshaft", "render", scene, "-o", out, "--float", "--spp", str(options.spp), "--seed", str(seed),
                         "--threads", "2", "--quiet", *limit, *size], check=True, stderr=subprocess.DEVNULL)
         images.append(load(out))
@@ -84,7 +95,7 @@ def render(scene, options, folder):
 def render_by_mitsuba(scene, options, size, folder):
     os.environ.setdefault("DRJIT_LIBLLVM_PATH", "/usr/lib/x86_64-linux-gnu/libLLVM.so.19.1")
     import mitsuba
-    mitsuba.set_variant("llvm_ad_rgb")
+    mitsuba.set_variant(options.variant)
     text = re.sub(r'<integrator type="moment">\s*(<integrator.*?</integrator>)\s*</integrator>', r"\1", scene.read_text(), flags=re.S)
     try:
         loaded = mitsuba.load_file(str(scene)) if text == scene.read_text() else mitsuba.load_string(text)
@@ -153,7 +164,10 @@ def row(scene, root, options, folder):
     if not found and not options.mitsuba:
         return name, "renders", f"mean {' '.join(f'{x:.4g}' for x in images[0].mean((0, 1)))}"
     if options.mitsuba:
-        references = render_by_mitsuba(scene, options, images[0].shape[1::-1], folder)
+        try:
+            references = render_by_mitsuba(scene, options, images[0].shape[1::-1], folder)
+        except (RuntimeError, StopIteration, subprocess.CalledProcessError) as e:
+            return name, "not rendered by Mitsuba", " ".join(str(e).split())[:200]
     else:
         references = [fit(load(image), images[0].shape) for image in found]
     reference = references[0]
@@ -172,7 +186,9 @@ def main():
     args.add_argument("--spp", type=int, default=128)
     args.add_argument("--seeds", type=int, default=4)
     args.add_argument("--size")
+    args.add_argument("--across", type=int)
     args.add_argument("--mitsuba", type=int, default=0)
+    args.add_argument("--variant", default="llvm_ad_rgb")
     args.add_argument("--seconds", type=float, default=0)
     args.add_argument("--load-only", action="store_true")
     args.add_argument("--markdown", action="store_true")

@@ -46,13 +46,24 @@ def flames():
     return {name: grids.Grid(values.astype("<f4"), corner, voxel) for name, values in (("smoke", core), ("glow", core ** 3))}
 
 
-def fire():
-    """A flame over a dark floor lights its own smoke, a ball and two blocks."""
+def flame(brightness):
+    """The medium "smoke", which gives off light."""
     glow = kit.element("volume", kit.word("filename", "glow.vol"), kit.element("boolean", name="use_grid_bbox", value="true"),
                        type="gridvolume", name="emission")
+    medium = kit.grid("smoke", 3, kit.number("albedo", .5), .3)
+    return medium.replace("</medium>", glow + kit.number("emission_scale", brightness) + "</medium>")
+
+
+def fire_room():
+    """A flame in a room that has no other light (docs/decisions/0049-emissive-grids.md)."""
+    return kit.scene(*walls(), flame(300), kit.box((-.495, .005, -.495), (.495, 1.995, .495), kit.filled("smoke")),
+                     kit.camera((-1.2, 1.5, 2.7), (.5, 1.15, -.6), 72))
+
+
+def fire():
+    """A flame over a dark floor lights its own smoke, a ball and two blocks."""
     return kit.scene(
-        kit.diffuse("ground", .3, .28, .25), kit.diffuse("stone", .5, .5, .5),
-        kit.grid("smoke", 3, kit.number("albedo", .5), .3).replace("</medium>", glow + kit.number("emission_scale", 30) + "</medium>"),
+        kit.diffuse("ground", .3, .28, .25), kit.diffuse("stone", .5, .5, .5), flame(30),
         kit.square(6, -90, (0, -.01, 0), kit.use("ground")),
         kit.ball((.9, .4, .4), .4, kit.use("stone")), kit.box((-1.4, 0, -.4), (-.8, .9, .2), kit.use("stone")), kit.box((-.4, 0, -1.6), (1.2, 1.2, -1.2), kit.use("stone")),
         kit.box((-.495, .005, -.495), (.495, 1.995, .495), kit.filled("smoke")),
@@ -66,5 +77,5 @@ def make(folder):
     folder.mkdir(parents=True, exist_ok=True)
     for name, grid in flames().items():
         vol.write_vol(folder / f"{name}.vol", grid.values.transpose(2, 1, 0), *grid.box())
-    for name, scene in ALL.items():
+    for name, scene in {**ALL, "fire_room": fire_room}.items():
         (folder / f"{name}.xml").write_text(scene())

@@ -2,16 +2,13 @@
 """Stages of USD by others, as they are: what Lightshaft makes of them, beside Blender's import and Cycles.
 
 usage: usd_scenes.py DIR -o FOLDER [--cycles PYTHON] [--only TEXT] [--size WxH] [--spp N]
-       usd_scenes.py DIR --every
 DIR holds github.com/usd-wg/assets at commit 274fa4584dd6afe7e7d84ea30e1ec9c652858d9a. Of each scene of SCENES it
 writes, with --cycles, usd-NAME.jpg: Lightshaft's picture, and right of it that of Cycles, by an interpreter that has
-`bpy`, each with an exposure of its own; and prints a row of a table with the ratio of the means of all but the sky. With --every it reads each
-stage below DIR, and counts what is read and what is refused; an error of another kind than LightshaftError ends
-it. Needs the package lightshaft[usd]; the programs come from LIGHTSHAFT_BIN. A bench, not a test.
+`bpy`, each with an exposure of its own; and prints a row of a table with the ratio of the means of all but the sky.
+Needs the package lightshaft[usd]; the programs come from LIGHTSHAFT_BIN. A bench, not a test.
 """
 
 import argparse
-import collections
 import os
 import pathlib
 import subprocess
@@ -26,7 +23,6 @@ SCENES = {
     "normals": "test_assets/NormalsTextureBiasAndScale/NormalsTextureBiasAndScale.usda",
     "files": "test_assets/TextureFileFormatTests/all_files.usda",
 }
-SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 BOUNCES = 64
 
 
@@ -96,21 +92,6 @@ def pair(name, stage, options):
         print(f"    {warning}", flush=True)
 
 
-def every(root):
-    import lightshaft
-    import lightshaft.usd
-
-    tally = collections.Counter()
-    for path in sorted(path for path in root.rglob("*") if path.suffix in SUFFIXES):
-        try:
-            lightshaft.usd.read(path, allow=[root])
-            tally["read"] += 1
-        except lightshaft.LightshaftError as error:
-            tally["refused"] += 1
-            print(f"{path.relative_to(root)}: {str(error).splitlines()[0][:200]}")
-    print(dict(tally))
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("scenes", type=pathlib.Path)
@@ -119,13 +100,10 @@ def main():
     parser.add_argument("--only", default="")
     parser.add_argument("--size", default="160x120", type=lambda text: tuple(map(int, text.split("x"))))
     parser.add_argument("--spp", default=32, type=int)
-    parser.add_argument("--every", action="store_true")
     parser.add_argument("--as-cycles", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.as_cycles:
         return cycles(options.scenes, options.output, options.size, options.spp)
-    if options.every:
-        return every(options.scenes)
     print("| scene | file | warnings | ours / Cycles: red, green, blue |\n|---|---|---|---|")
     for name, path in SCENES.items():
         if options.only in name:

@@ -39,4 +39,19 @@ Debian 12's gRPC is 1.51.1, without fixes of its own for these; Debian 13 and Ub
 | CVE-2023-1428 | some headers together with more than 8 KB of others end the process | tried with many sets of headers against 1.51.1, without effect |
 | CVE-2023-32731 | a peer's header table gets out of step | came with a change of February 2023 ([#32309](https://github.com/grpc/grpc/pull/32309)), which 1.51.1 does not have |
 | CVE-2023-32732, CVE-2024-7246 | a client makes a proxy's connection to the server fail, or its header table wrong, for other clients of the proxy | workers connect without a proxy that reads HTTP/2; do not put one before the port that strangers reach |
+
+## Known faults of other libraries
+
+Debian mends faults of these packages within Debian 12 ([security tracker](https://security-tracker.debian.org/tracker/)), so `apt upgrade` comes first. What would remain reaches this far. The faults are examples; advisories were not searched library by library.
+
+| library | where faults are to be expected | where strangers' bytes reach it, and what stops them |
+|---|---|---|
+| OpenEXR, Imath | damaged files; overflow in deep scanlines (CVE-2023-5841, up to 3.1.11) | images of scenes: a worker's render child, in its sandbox. References of users: `lightshaft-exr`, likewise. Results of workers are read by code of the coordinator's own, for one uncompressed form. Deep images are written, never read |
+| libpng, libjpeg | damaged files | images of scenes: a worker's render child, in its sandbox |
+| OpenVDB, Blosc | damaged files | `lightshaft-vdb`, a process of its own below the render child, in the same sandbox |
+| libarchive | readers of rare formats, such as RAR (CVE-2025-5914) | bundles of users, in the coordinator: only ZIP and tar with gzip are switched on, with limits on entries and bytes; fuzzed |
+| hiredis | replies with too many elements (CVE-2021-32765) | replies of the farm's own Redis alone |
+| OpenColorIO | look-up tables | configurations of the operator alone |
+| Embree, oneTBB | meshes with wrong indices or numbers | meshes are checked before they are handed over |
+| libxml2 | documents and schemas | not called: it comes along with libarchive, whose XAR reader is off |
 TAIL

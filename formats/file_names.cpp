@@ -50,6 +50,10 @@ std::string why_no_scene(std::string_view file_name) {
   if (is({".vdb", ".nvdb", ".vol"}))
     return "a grid alone has neither light nor camera: name it in a scene, by a <volume type=\"gridvolume\"> "
            "in a <medium type=\"heterogeneous\">";
+  if (is({".ies"}))
+    return "a lamp's photometric file alone is no scene: name it in one, by <emitter "
+           "type=\"goniometric\"><string "
+           "name=\"filename\" value=\"...\"/></emitter>";
   if (is({".exr", ".hdr", ".pfm", ".png", ".jpg", ".jpeg", ".tif", ".tiff"}))
     return "this is an image, not a scene";
   return {};

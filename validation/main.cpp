@@ -199,6 +199,7 @@ ExitCode run(const cases::Options& o) {
 int main(int argc, char** argv) {
   ::signal(SIGPIPE, SIG_IGN);
   CLI::App app(cases::kHelp, "lightshaft-validate");
+  app.set_version_flag("--version", "lightshaft-validate " LIGHTSHAFT_VERSION);
   use_plain_help(app);
   cases::Options options;
   cases::add_options(app, options);

@@ -11,6 +11,7 @@
 #include "cli/farm/farm_api.h"
 #include "cli/farm/farm_tables.h"
 #include "cli/farm/job_results.h"
+#include "cli/farm/tev.h"
 #include "cli/output/console.h"
 #include "cli/output/interrupt.h"
 #include "cli/output/job_options.h"
@@ -33,6 +34,7 @@ struct FarmFlags {
   FarmOptions farm;
   std::string id, frame, spp, target_error, out, report, html, region, fps, exposure, role, user, mix, view;
   std::string state, search, owner, sort, limit, offset, priority, name, worker;
+  std::string tev;  // of --tev: "true", or HOST:PORT; empty: the option was not given
   std::vector<std::string> after;
   JobOptions job;
   bool quiet = false, none = false, denoised = false;
@@ -220,9 +222,47 @@ int video(FarmApi& api, const FarmFlags& flags) {
   return kOk;
 }
 
+std::string tev_address(const FarmFlags& flags) { return flags.tev == "true" ? kTevAddress : flags.tev; }
+
+// Shows the image of a job in tev while it renders.
+class LiveTev {
+ public:
+  LiveTev(FarmApi& api, Tev tev) : api_(api), tev_(std::move(tev)) {}
+
+  // Is called several times a second. Pixels are sent each kCalls times if there are new ones.
+  void look_at(const json& job) {
+    const double spp = number_field(job, "spp_done").value_or(0);
+    const bool over = is_over(job);
+    if (++calls_ % kCalls != 0 && !over) return;
+    if (gone_ || spp <= 0 || (spp == shown_ && !over)) return;
+    shown_ = spp;
+    if (const auto sent = tev_.show(api_, job, over); !sent) {
+      // The job goes on, and so does who follows it.
+      print_note("the image is shown in tev no more: " + plain_text(sent.error().error.message));
+      gone_ = true;
+    }
+  }
+
+ private:
+  static constexpr int kCalls = 8;
+  FarmApi& api_;
+  Tev tev_;
+  int calls_ = -1;
+  double shown_ = 0;  // samples per pixel of the image that tev has
+  bool gone_ = false;
+};
+
 int watch(FarmApi& api, const FarmFlags& flags) {
+  std::optional<LiveTev> live;
+  if (!flags.tev.empty()) {
+    auto tev = Tev::open(tev_address(flags));
+    if (!tev) return print_error(tev.error());
+    live.emplace(api, std::move(*tev));
+  }
   const LastWords words(goes_on(flags.id));
-  const auto end = watch_job(api, flags.id, {flags.quiet, flags.farm.json});
+  const auto end = watch_job(api, flags.id, {flags.quiet, flags.farm.json, [&](const json& job) {
+                                               if (live) live->look_at(job);
+                                             }});
   if (!end) return print_rejected(end.error());
   if (const int code = print_end(*end, flags.quiet || !flags.farm.json); code != kOk) return code;
   if (!flags.farm.json) print(job_text(*end));
@@ -241,9 +281,21 @@ Result<LightMix> mix_of(const std::string& text) {
   return mix;
 }
 
+int show_in_tev(FarmApi& api, const FarmFlags& flags) {
+  if (!flags.mix.empty()) return usage_error("--tev shows the image itself, without --mix");
+  const auto job = api.get(job_path(flags.id));
+  if (!job) return print_rejected(job.error());
+  auto tev = Tev::open(tev_address(flags));
+  if (!tev) return print_error(tev.error());
+  const auto shown = tev->show(api, *job, true);
+  return shown ? kOk : print_rejected(shown.error());
+}
+
 int fetch(FarmApi& api, const FarmFlags& flags) {
   std::string out = flags.out;
-  if (flags.out.empty() && flags.report.empty() && flags.html.empty()) {
+  if (!flags.tev.empty())
+    if (const int code = show_in_tev(api, flags); code != kOk) return code;
+  if (flags.out.empty() && flags.report.empty() && flags.html.empty() && flags.tev.empty()) {
     const auto job = api.get(job_path(flags.id));
     if (!job) return print_rejected(job.error());
     out = default_image(*job);
@@ -265,6 +317,13 @@ int fetch(FarmApi& api, const FarmFlags& flags) {
                         .mix = mix,
                         .view = flags.view,
                         .json = flags.farm.json});
+}
+
+// Adds --tev, an option that may stand without its value: it does not take the next word for it.
+void add_tev(CLI::App& app, std::string& address, const std::string& what) {
+  // A flag without a value is "true".
+  app.add_flag("--tev", address,
+               what + fmt::format("; --tev=HOST:PORT: in one that does not listen at {}", kTevAddress));
 }
 
 // With --frame, replaces the id of a sequence (a job with several frames) in `flags` by the id of that frame,
@@ -340,6 +399,7 @@ void add_farm_commands(CLI::App& app, Action& action) {
   add(app, action, "show", "one job", show, true);
   const auto [watch_command, watching] = add(app, action, "watch", "follow a job until it ends", watch, true);
   watch_command->add_flag("--quiet", watching->quiet, "no progress bar");
+  add_tev(*watch_command, watching->tev, "show the image in the viewer tev while it renders");
   add(app, action, "pause", "pause a job", pause, true);
   add(app, action, "resume", "continue a paused job", resume, true);
   add(app, action, "cancel", "cancel a job for good", cancel, true);
@@ -385,6 +445,8 @@ void add_farm_commands(CLI::App& app, Action& action) {
              "also write the report as JSON; with # in the name, one for each frame");
   add_option(*fetch_command, "--html", fetching->html, "REPORT.html",
              "also write the report as an HTML page; with # in the name, one for each frame");
+  add_tev(*fetch_command, fetching->tev,
+          "show all layers in the viewer tev, and write no file unless one is named");
   const auto [focus_command, looking] = add(
       app, action, "focus", "choose the part of a job's image that gets the next samples first", focus, true);
   add_option(*focus_command, "--region", looking->region, "X0,Y0,X1,Y1",

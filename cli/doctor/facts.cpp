@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "cli/farm/farm_api.h"
+#include "cli/farm/tcp.h"
 #include "cli/output/reply_fields.h"
 #include "core/base/clock.h"
 #include "core/base/machine_memory.h"
@@ -62,6 +63,31 @@ fs::path in_path(const std::string& program) {
     at = end + 1;
   }
   return {};
+}
+
+// Returns true if the interpreter finds NumPy when it is started as python_commands.cpp starts it.
+bool finds_numpy(const fs::path& interpreter) {
+  const char* of_wheel = std::getenv("LIGHTSHAFT_PYTHON");
+  std::vector<std::string> words{interpreter.string()};
+  if (!of_wheel || !*of_wheel) words.insert(words.end(), {"-E", "-s"});
+  words.insert(words.end(),
+               {"-B", "-c", "import importlib.util as u, sys; sys.exit(u.find_spec('numpy') is None)"});
+  const auto started = spawn({.path = interpreter.string(),
+                              .arguments = std::move(words),
+                              .files = {kDevNull, kDevNull, kDevNull},
+                              .inherits = [](std::string_view) { return true; }});
+  if (!started) return false;
+  const int status = wait_for_end(*started);
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+PythonFacts observe_python() {
+  PythonFacts facts = find_python();
+  if (facts.interpreter.empty() || facts.part.empty()) return facts;
+  facts.numpy = finds_numpy(facts.interpreter);
+  facts.makes_scene = !fs::exists(facts.part / "bath" / "bath.xml") &&
+                      fs::exists(facts.part / "../../../scenes/bath/make_bath.py");
+  return facts;
 }
 
 // Observes a folder. If it does not exist, observes the nearest existing folder above it, in which it would
@@ -123,7 +149,22 @@ void ask_readiness(HttpClient& client, FarmFacts& facts) {
   }
 }
 
-void ask_session(HttpClient& client, FarmFacts& facts) {
+// Connects to the address at which the coordinator says that it takes workers, as a worker of this machine
+// would. A port of the coordinator's own machine alone cannot be tried from another one.
+void try_workers_port(const json& answer, const std::string& url, FarmFacts& facts) {
+  const json* join = object_field(answer, "join");
+  const std::string named = join ? text_field(*join, "address") : "";
+  auto address = parse_host_port(named);
+  if (!address) return;
+  if (address->host == "0.0.0.0" || address->host == "::" || address->host == "*")
+    address->host = host_of(url);
+  facts.workers_address = host_port_text(*address);
+  if (is_loopback(address->host) && !is_loopback(host_of(url))) return;
+  if (const auto connected = TcpConnection::open(*address); !connected)
+    facts.workers_trouble = connected.error().message;
+}
+
+void ask_session(HttpClient& client, const std::string& url, FarmFacts& facts) {
   const auto session = client.request("GET", "/api/v1/session");
   if (!session) {
     facts.session_trouble = session.error().message;
@@ -140,8 +181,10 @@ void ask_session(HttpClient& client, FarmFacts& facts) {
   facts.version = text_field(answer, "version");
   const auto workers = client.request("GET", "/api/v1/workers");
   if (!workers || workers->status / 100 != 2) return;
-  if (const json list = json::parse(workers->body, nullptr, false); list.is_object())
+  if (const json list = json::parse(workers->body, nullptr, false); list.is_object()) {
     facts.workers = workers_of(list);
+    try_workers_port(list, url, facts);
+  }
   const auto jobs = client.request("GET", kOpenJobs);
   if (!jobs || jobs->status / 100 != 2) return;
   if (const json list = json::parse(jobs->body, nullptr, false); list.is_object())
@@ -165,7 +208,7 @@ Result<FarmFacts> observe_one(const HttpClient::Options& connection) {
   facts.is_coordinator = health->status == 200 && health->body == "ok\n";
   if (!facts.is_coordinator) return facts;
   ask_readiness(*client, facts);
-  if (facts.has_token) ask_session(*client, facts);
+  if (facts.has_token) ask_session(*client, without_password(connection.url), facts);
   return facts;
 }
 
@@ -207,7 +250,7 @@ MachineFacts observe_machine(const fs::path& cache, const fs::path& data) {
   if (denoiser) facts.denoiser = denoiser->name();
   if (!denoiser) facts.denoiser_trouble = denoiser.error().message;
   facts.redis_server = in_path("redis-server");
-  facts.python = find_python();
+  facts.python = observe_python();
   facts.folders.push_back(observe_folder("cache", cache.empty() ? worker::default_cache() : cache));
   if (!data.empty()) facts.folders.push_back(observe_folder("data", data));
   return facts;

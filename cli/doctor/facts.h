@@ -25,8 +25,11 @@ struct PythonFacts {
   // That of LIGHTSHAFT_PYTHON, which a wheel sets, or python3 in PATH; empty: there is none
   std::filesystem::path interpreter;
   std::filesystem::path part;  // the folder lightshaft_command; empty: it is not where this program looks
+  bool numpy = false;          // true if the interpreter finds NumPy, as `lightshaft up` starts it
+  // True in a checkout, where `lightshaft up` makes the scene of the first picture with NumPy
+  bool makes_scene = false;
 };
-PythonFacts find_python();
+PythonFacts find_python();  // without `numpy` and `makes_scene`
 
 struct MachineFacts {
   std::string processor_target;  // processor for which the program was compiled, such as "x86-64-v3"
@@ -81,6 +84,9 @@ struct FarmFacts {
   std::string session_trouble, role, user, version;
   std::optional<std::vector<WorkerFacts>> workers;
   std::optional<std::vector<StuckJob>> stuck_jobs;  // among the first jobs that have not ended
+  // The workers' port as the coordinator names it, with the host of `url` if it listens on all of its
+  // machine's networks; empty: it does not name one. `workers_trouble`: why no connection was possible.
+  std::string workers_address, workers_trouble;
 };
 
 // Returns one result for each address of `connection`. invalid_argument: an address or the CA file cannot be

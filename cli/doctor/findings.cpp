@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 
+#include "cli/farm/tcp.h"
 #include "cli/output/console.h"
 #include "core/base/safe_text.h"
 #include "core/scene/limits.h"
@@ -88,6 +89,10 @@ Finding of_python(const PythonFacts& facts) {
   if (facts.part.empty())
     return warning("python", "lightshaft_command, a part of this program, is not where it should be",
                    "only `lightshaft up`, `join`, `farm up` and `compare` need it: install Lightshaft again");
+  if (facts.makes_scene && !facts.numpy)
+    return warning("python", fmt::format("{} has no NumPy", facts.interpreter.string()),
+                   "only the first picture of `lightshaft up` needs it: install python3-numpy, or let "
+                   "LIGHTSHAFT_PYTHON name a Python that has it");
   return ok("python", facts.interpreter.string());
 }
 
@@ -109,16 +114,7 @@ Finding of_folder(const FolderFacts& folder) {
   return found;
 }
 
-std::string host_of(const std::string& url) {
-  const std::size_t host = url.find("://") + 3;
-  if (url.compare(host, 1, "[") == 0) return url.substr(host, url.find(']', host) - host + 1);
-  return url.substr(host, url.find_first_of(":/", host) - host);
-}
-
-bool on_this_machine(const std::string& url) {
-  const std::string host = host_of(url);
-  return host == "localhost" || host == "[::1]" || host.starts_with("127.");
-}
+bool on_this_machine(const std::string& url) { return is_loopback(host_of(url)); }
 
 std::string through(const std::string& proxy) { return proxy.empty() ? "" : ", through the proxy " + proxy; }
 
@@ -192,6 +188,22 @@ Finding of_version(const FarmFacts& facts, const std::string& program_version) {
   return warning("version",
                  fmt::format("the coordinator {}, this command is {}", coordinator, program_version),
                  "install the same version everywhere");
+}
+
+Finding of_workers_port(const FarmFacts& facts) {
+  const auto address = parse_host_port(facts.workers_address);
+  if (address && is_loopback(address->host) && !on_this_machine(facts.url))
+    return ok("workers-port", fmt::format("the coordinator takes workers of its own machine alone ({})",
+                                          facts.workers_address));
+  if (facts.workers_trouble.empty())
+    return ok("workers-port", fmt::format("{} can be reached", facts.workers_address));
+  return warning(
+      "workers-port",
+      fmt::format("{}, where the coordinator takes workers, cannot be reached: {}", facts.workers_address,
+                  facts.workers_trouble),
+      fmt::format("only a worker of this machine needs it: let port {} pass the farm's firewall, or "
+                  "give the coordinator --public-grpc HOST:PORT, as other machines reach it",
+                  address ? address->port : ""));
 }
 
 std::string list(const std::set<std::string>& names) {
@@ -322,6 +334,7 @@ std::vector<Finding> judge_farm(const FarmFacts& facts, const std::string& progr
     all.push_back(of_clock(facts));
     all.push_back(of_token(facts));
     if (!facts.role.empty()) all.push_back(of_version(facts, program_version));
+    if (!facts.workers_address.empty()) all.push_back(of_workers_port(facts));
     if (facts.workers) add_workers(all, facts, numeric_class);
     if (facts.stuck_jobs) all.push_back(of_jobs(*facts.stuck_jobs));
   }

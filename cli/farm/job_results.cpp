@@ -199,6 +199,7 @@ FarmApi::Answer<json> watch_job(FarmApi& api, const std::string& id, const Watch
     bar.show(progress_of(*job));
     if (options.json)
       if (const std::string line = dump(*job, -1); line != reported) print(reported = line);
+    if (options.each) options.each(*job);
     if (is_over(*job)) return job;
   }
 }

@@ -1,6 +1,7 @@
 // Follows a job of a farm until it ends, and downloads its results to local files.
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "cli/farm/farm_api.h"
@@ -11,6 +12,8 @@ namespace ls::cli {
 struct WatchOptions {
   bool quiet = false;
   bool json = false;  // print the job as a line of JSON on stdout after each change
+  // Called with the job each time that it was asked for; empty: nothing is called
+  std::function<void(const nlohmann::json& job)> each = {};
 };
 // Waits until the job `id` ends and returns the job. If the coordinator cannot be reached, as during a
 // restart, keeps trying for a while (RetryPolicy), and then returns the error.

@@ -21,9 +21,9 @@
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
 #include "coordinator/service/coordinator.h"
+#include "coordinator/service/pages/report_page.h"
 #include "core/base/safe_text.h"
 #include "core/image/reference/reference.h"
-#include "util/report/job_page.h"
 #include "worker/render/render.h"
 
 namespace ls::cli {
@@ -32,17 +32,6 @@ namespace {
 using coordinator::JobState;
 using coordinator::JobView;
 using nlohmann::json;
-
-// Writes the report as an HTML page to `file`. `report` is the JSON report of this job.
-Result<void> save_html_report(const std::filesystem::path& file, const coordinator::Coordinator& coordinator,
-                              const JobId& job, const std::string& report) {
-  auto image = coordinator.image_png(job);
-  if (!image) return tl::unexpected(image.error());
-  const auto page = report::job_page({report, std::move(*image),
-                                      coordinator.error_png(job).value_or(std::vector<std::byte>{}),
-                                      coordinator.samples_png(job).value_or(std::vector<std::byte>{})});
-  return page ? save_result(file, *page) : tl::unexpected(page.error());
-}
 
 constexpr auto kProgressPeriod = std::chrono::milliseconds(200);
 
@@ -241,8 +230,11 @@ class LocalRender {
     const std::string text = dump(*report) + "\n";
     if (options_.report)
       if (auto saved = save_result(*options_.report, text); !saved) return saved;
-    if (options_.html)
-      if (auto saved = save_html_report(*options_.html, coordinator, job_, text); !saved) return saved;
+    if (options_.html) {
+      const auto page = coordinator::report_page(coordinator, job_, text);
+      if (!page) return tl::unexpected(page.error());
+      if (auto saved = save_result(*options_.html, *page); !saved) return saved;
+    }
     if (!options_.quiet && print_summary)
       print_note(fmt::format("{}: {}", options_.out.string(), report_summary(*report)));
     if (!options_.quiet && print_summary)

@@ -61,6 +61,10 @@ void note_analysis(const scene::Pruned& pruned, const RenderSettings& settings, 
   using nlohmann::json;
   const scene::Needs needs = scene::needs_of(pruned.scene, scene::sees_media(settings.integrator));
   job.needs = canonical_json(needs);
+  const bool is_reported = std::ranges::any_of(
+      job.warnings, [](const std::string& w) { return w.find(scene::kNoLight) != std::string::npos; });
+  if (needs.lights.empty() && needs.area_lights == 0 && !needs.emission && !is_reported)
+    job.warnings.push_back(fmt::format("{}: warning: {}", job.name, scene::kNoLight));
   json parts = json::array(), left_out = json::array();
   for (const scene::Need& part : in_words(needs)) {
     (part.used ? job.features_used : job.features_left_out).push_back(part.part);

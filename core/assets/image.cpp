@@ -10,9 +10,9 @@
 namespace ls {
 namespace {
 
-bool ends_in_tga(std::string_view name) {
+bool ends_in(std::string_view name, const char (&ending)[5]) {
   name = without_gz(name);
-  return name.size() >= 4 && ::strncasecmp(name.data() + name.size() - 4, ".tga", 4) == 0;
+  return name.size() >= 4 && ::strncasecmp(name.data() + name.size() - 4, ending, 4) == 0;
 }
 
 }  // namespace
@@ -28,10 +28,12 @@ Result<ImageData> decode_image(std::string_view name, std::span<const std::byte>
   if (head.starts_with("qoif")) return decode_qoi(name, file, max_pixels);
   for (const std::string_view pfm : {"PF ", "PF\n", "PF\r", "Pf ", "Pf\n", "Pf\r"})
     if (head.starts_with(pfm)) return decode_pfm(name, file, max_pixels);
-  if (ends_in_tga(name)) return decode_tga(name, file, max_pixels);
+  if (head.starts_with("IESNA") || head.starts_with("IES:") || ends_in(name, ".ies"))
+    return decode_ies(name, file, max_pixels);
+  if (ends_in(name, ".tga")) return decode_tga(name, file, max_pixels);
   return bad_argument(
       fmt::format("'{}': by its first bytes this is not a PNG, JPEG, BMP, QOI, OpenEXR, Radiance HDR or "
-                  "PFM image, and its name does not end in .tga",
+                  "PFM image, and its name does not end in .tga or .ies",
                   name));
 }
 

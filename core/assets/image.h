@@ -1,7 +1,7 @@
 // Decodes images. PNG, JPEG, BMP, QOI, OpenEXR, Radiance HDR and PFM are recognised by their first bytes. TGA
-// has no signature and is recognised by the ending of the file's name. An image of more than `max_pixels`
-// pixels is rejected with resource_exhausted, before memory is allocated for it. In all functions `name` is
-// the file's name for messages.
+// and IES files, of which not all have a signature, are recognised by the ending of the file's name, too. An
+// image of more than `max_pixels` pixels is rejected with resource_exhausted, before memory is allocated for
+// it. In all functions `name` is the file's name for messages.
 #pragma once
 
 #include <cstddef>
@@ -45,6 +45,12 @@ Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> f
                              std::uint64_t max_pixels = kMaxImagePixels);
 // PFM: grey or colour, float32 in either byte order.
 Result<ImageData> decode_pfm(std::string_view name, std::span<const std::byte> file,
+                             std::uint64_t max_pixels = kMaxImagePixels);
+// IES files (LM-63-1986 to 2019) of the angle types A, B and C. The result is a square image of all
+// directions in the equal-area form of worker/render/math/equal_area.h: candelas, grey, 512 x 512. +z is
+// straight down for a lamp under a ceiling (types A and B: where the lamp aims), and around it horizontal
+// angles run from +x towards -y.
+Result<ImageData> decode_ies(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
 
 // Makes error messages of one decoder: "'NAME': broken FORMAT: PROBLEM".

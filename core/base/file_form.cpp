@@ -104,7 +104,7 @@ std::string why_perhaps_cut(std::string_view name, std::string_view head, char l
            ::strncasecmp(name.data() + name.size() - end.size(), end.data(), end.size()) == 0;
   };
   const bool is_ply = without_mark(head).starts_with("ply");
-  const bool is_text = is_ply ? head.find("format ascii") != head.npos : ends_in(".obj");
+  const bool is_text = is_ply ? head.find("format ascii") != head.npos : ends_in(".obj") || ends_in(".ies");
   if (!is_text) return {};
   return "ends within a line: it may have been cut short; if it is whole, put a line end at its end";
 }

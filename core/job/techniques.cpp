@@ -31,7 +31,9 @@ constexpr std::array kRows{
     TechniqueRow{Technique::sky_portals, "sky_portals",
                  "looks for the sky through the openings by which its light enters"},
     TechniqueRow{Technique::local_lights, "local_lights",
-                 "chooses lights by which of them reach the place that is lit"}};
+                 "chooses lights by which of them reach the place that is lit"},
+    TechniqueRow{Technique::emissive_grids, "emissive_grids",
+                 "looks for the light of emissive grids, such as fire"}};
 
 constexpr bool in_order() {
   for (std::size_t i = 0; i < kRows.size(); ++i)
@@ -126,7 +128,8 @@ IntegratorSettings with_choice(IntegratorSettings integrator, const TechniqueCho
       Parameter{sky_samples, &IntegratorSettings::sky_samples, kChosenForTheScene},
       Parameter{path_splitting, &IntegratorSettings::path_splitting, kChosenForTheScene},
       Parameter{sky_portals, &IntegratorSettings::sky_portals, kAlways},
-      Parameter{local_lights, &IntegratorSettings::local_lights, kAlways}};
+      Parameter{local_lights, &IntegratorSettings::local_lights, kAlways},
+      Parameter{emissive_grids, &IntegratorSettings::emissive_grids, kAlways}};
   for (const Parameter& p : kParameters) {
     if (choice.with.has(p.technique)) integrator.*p.value = p.with;
     if (choice.without.has(p.technique)) integrator.*p.value = kOff;

@@ -29,6 +29,7 @@ enum class Technique : std::uint8_t {
   path_splitting,   // in scenes with grids: splits or ends paths by what they can still contribute
   sky_portals,      // samples directions towards the sky through openings
   local_lights,     // chooses one of few lights by probabilities that are learned for each place
+  emissive_grids,   // samples directions towards the cells of emissive grids
 };
 
 struct TechniqueRow {

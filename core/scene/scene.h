@@ -291,7 +291,7 @@ struct HeightFogVolume {
 // Noise in octaves (worker/render/media/noise.h): low + (high - low) * (1 + f) / 2, where f is the sum of the
 // octaves divided by the sum of their strengths, limited to [-1, 1]; values below 0 are 0. Octave i has the
 // strength gain^i and scale * lacunarity^i cells per unit of length, measured before to_world. As a density
-// it fills the box from `min` to `max`, before to_world; for any other purpose it is everywhere.
+// or as emission it fills the box from `min` to `max`, before to_world; for any other purpose it is everywhere.
 struct NoiseVolume {
   double scale = 1;
   int octaves = 4;
@@ -567,6 +567,9 @@ struct IntegratorSettings {
   // light with probabilities that depend on the place and are learned from camera paths. 0: chosen for the
   // scene; -1: never; 1: where possible.
   int local_lights = 0;
+  // For "volpath" only: whether next-event estimation also samples directions towards the cells of grids that
+  // give off light, such as fire. 0: chosen for the scene; -1: never; 1: where possible.
+  int emissive_grids = 0;
   // For "volpath" only, in scenes with grids: whether a path may split at its first scattering, and whether
   // Russian roulette may end a path whose throughput has fallen below its value just after that scattering
   // (worker/render/world/roulette.h). 0: chosen for the scene; -1: neither.

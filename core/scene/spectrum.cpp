@@ -94,13 +94,17 @@ double black_body_peak(double kelvin) {
   return kFirst * std::pow(kAtPeak * kelvin / kSecond, 5) / std::expm1(kAtPeak);
 }
 
-std::array<double, 3> black_body_xyz(double kelvin) {
+SpectralCurve black_body_curve(double kelvin) {
   SpectralCurve curve;
   for (double nm = kCieFirst; nm <= kCieLast; nm += 1) {
     curve.nm.push_back(nm);
     curve.value.push_back(kFirst / (nm * nm * nm * nm * nm) / std::expm1(kSecond / (nm * kelvin)));
   }
-  Xyz c = integral(curve, Illuminant::equal_energy);
+  return curve;
+}
+
+std::array<double, 3> black_body_xyz(double kelvin) {
+  Xyz c = integral(black_body_curve(kelvin), Illuminant::equal_energy);
   static const double luminance = white_luminance(Illuminant::equal_energy);
   for (double& x : c) x /= luminance;
   return c;

@@ -28,9 +28,12 @@ Rgb linear_srgb(const SpectralCurve& curve, Illuminant illuminant);
 // Converts CIE 1931 X, Y, Z to linear sRGB.
 Rgb linear_srgb(const std::array<double, 3>& xyz);
 
-// Returns X, Y, Z of the light of a black body at `kelvin` > 0. Its spectral radiance [W/(m^2 sr nm)] is
-// given by Planck's law. X, Y, Z are normalised as in linear_srgb(): a spectral radiance of 1 at all
-// wavelengths would give X = Y = Z = 1.
+// Returns the spectral radiance [W/(m^2 sr nm)] of a black body at `kelvin` > 0 by Planck's law, at each nm
+// from 360 to 830.
+SpectralCurve black_body_curve(double kelvin);
+
+// Returns X, Y, Z of the light of that black body. X, Y, Z are normalised as in linear_srgb(): a spectral
+// radiance of 1 at all wavelengths would give X = Y = Z = 1.
 std::array<double, 3> black_body_xyz(double kelvin);
 
 // Returns the largest value, over all wavelengths, of a black body's spectral radiance [W/(m^2 sr nm)].

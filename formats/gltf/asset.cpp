@@ -9,6 +9,7 @@
 #include "core/base/parse_number.h"
 #include "core/base/safe_text.h"
 #include "core/base/text/suggest.h"
+#include "core/scene/analysis/needs.h"
 #include "core/scene/limits.h"
 #include "formats/file_names.h"
 #include "formats/gltf/support_table.h"
@@ -109,9 +110,12 @@ Choices choices(const ReadOptions& options, const Item& root) {
 
 void check_version(const Item& root) {
   const Item version = root["asset"]["version"];
-  const std::string given = version.text("");
-  if (!given.starts_with("2."))
-    version.error(fmt::format("the asset's version is \"{}\", and only 2.0 is read: convert it", given));
+  // Files of glTF 1 may have a number.
+  const auto* given = version.given() ? std::get_if<std::string>(&version.identity()->is) : nullptr;
+  if (!given)
+    version.error("the asset has no version that is a text, as \"2.0\" is, and only 2.0 is read: convert it");
+  else if (!given->starts_with("2."))
+    version.error(fmt::format("the asset's version is \"{}\", and only 2.0 is read: convert it", *given));
   if (const std::string least = root["asset"]["minVersion"].text("2.0"); least != "2.0")
     root["asset"]["minVersion"].error(fmt::format("it needs glTF {}, and 2.0 is read", least));
 }
@@ -209,9 +213,7 @@ std::optional<Document> load_document(std::string_view file_name, std::string_vi
   if (report.has_errors()) return std::nullopt;
   add_camera(t, stage.cameras, chosen.camera, meshes.box());
   if (!t.has_light)
-    root.warning(
-        "the scene has no light, so that the picture is black: add -D environment=1 for a white sky of "
-        "radiance 1");
+    root.warning(fmt::format("{}: add -D environment=1 for a white sky of radiance 1", kNoLight));
   if (report.has_errors()) return std::nullopt;
   return Document{std::move(t.scene), {}, options.frame, options.labels};
 }

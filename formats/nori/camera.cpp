@@ -27,7 +27,7 @@ std::vector<Parameter> parameters_of(const IntegratorRow& row) {
                  "-1",
                  "longest path in segments, as `max_depth`; -1: no limit",
                  {.min = -1, .max = kMaxDepthSetting}});
-  if (row.name == "photonmapper")
+  if (row.name.ends_with("photonmapper"))
     for (const std::string_view name : {"photonCount", "photonRadius"})
       p.push_back(
           {name, kFloat | kInteger, "", "", kAny, "no photons are shot: the exact answer is rendered"});

@@ -1,6 +1,7 @@
 #include "formats/nori/object.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -314,6 +315,25 @@ void Object::finish_refused() {
   }
 }
 
+// An object that nothing here takes: it is of an unknown type, has not the name of its parameter, or belongs
+// elsewhere.
+void Object::idle_object(const Element& e) {
+  const auto known = plugin_names(e.tag);
+  if (e.find("type") && std::find(known.begin(), known.end(), e.get("type")) == known.end())
+    return void(known_plugin(e, report_));
+  std::vector<std::string> names;
+  for (const Parameter& p : plugin_.parameters)
+    if (p.types & type_of(e)) names.push_back(fmt::format("'{}'", p.name));
+  std::string called;
+  if (const std::string_view name = e.get("name"); !name.empty())
+    called = fmt::format(" called '{}'", name);
+  else if (!names.empty())
+    called = " without a name";
+  report_.error(e.at,
+                fmt::format("{} has no use for a <{}>{}{}", title(), e.tag, called,
+                            names.empty() ? "" : fmt::format(": call it {}", fmt::join(names, " or "))));
+}
+
 void Object::left_over(const Child& c) {
   const std::string_view name = c.e->get("name");
   std::vector<std::string> names;
@@ -323,14 +343,12 @@ void Object::left_over(const Child& c) {
                              fmt::format("'{}' of {} has no effect here: {}", name, title(), p.idle));
     // The parameter is known but was not taken: it has no meaning together with the other parameters.
     if (p.name == name)
-      return report_.error(
-          value_place(*c.e, "name"),
-          fmt::format("'{}' of {} has no meaning beside its other parameters", name, title()));
+      return report_.error(value_place(*c.e, "name"),
+                           fmt::format("'{}' of {} has no meaning here beside its other parameters: {}", name,
+                                       title(), p.meaning));
     names.emplace_back(p.name);
   }
-  if (name.empty() || object_kind(*c.e) == TagKind::object)
-    return report_.error(c.e->at, fmt::format("{} has no use for a <{}>{}", title(), c.e->tag,
-                                              name.empty() ? "" : fmt::format(" called '{}'", name)));
+  if (name.empty() || object_kind(*c.e) == TagKind::object) return idle_object(*c.e);
   report_.error(value_place(*c.e, "name"),
                 fmt::format("{} has no parameter '{}'{}", title(), name, suggestion(name, names)));
 }

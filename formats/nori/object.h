@@ -63,6 +63,7 @@ class Object {
   bool in_range(const Parameter& p, const Element& e, const std::vector<double>& values);
   bool knows(std::string_view parameter) const;
   void left_over(const Child& c);
+  void idle_object(const Element& e);
 
   const Element& e_;
   const Plugin& plugin_;

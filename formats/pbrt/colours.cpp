@@ -33,12 +33,15 @@ double luminance(const Rgb& c) {
   return weights[0] * c[0] + weights[1] * c[1] + weights[2] * c[2];
 }
 
-// Sets negative channels to 0, with a warning: sRGB cannot represent such a colour.
-Rgb within_srgb(Translation& t, const Param& p, Rgb c) {
-  if (std::any_of(c.begin(), c.end(), [](double x) { return x < 0; }) && t.report.takes_warnings())
+constexpr double kNoLimit = std::numeric_limits<double>::max();
+
+// Cuts off channels at 0 and at `most`, with a warning: sRGB cannot represent such a colour.
+Rgb within_srgb(Translation& t, const Param& p, const Rgb& c, double most = kNoLimit) {
+  Rgb out = c;
+  for (double& x : out) x = std::clamp(x, 0., most);
+  if (out != c && t.report.takes_warnings())
     t.report.warning(p.at, fmt::format("'{}' is a colour that sRGB can't hold: it is cut off", p.name));
-  for (double& x : c) x = std::max(x, 0.);
-  return c;
+  return out;
 }
 
 Rgb normalised(const Rgb& c) {
@@ -67,6 +70,11 @@ std::optional<std::vector<double>> numbers_in(std::string_view text) {
 std::optional<SpectralCurve> curve_of(Translation& t, const Param& p) {
   std::vector<double> numbers = p.numbers;
   if (!p.texts.empty()) {
+    for (const std::string_view indices : {"metal-", "glass-"})
+      if (p.texts[0].starts_with(indices))
+        return t.report.refuse(p.at, fmt::format("the spectrum \"{}\" is an index of refraction, which '{}' "
+                                                 "is not: give it as rgb",
+                                                 p.texts[0], p.name));
     const auto text = t.assets.text(p.texts[0]);
     if (!text)
       return t.report.refuse(
@@ -87,6 +95,22 @@ std::optional<SpectralCurve> curve_of(Translation& t, const Param& p) {
       p.at, fmt::format("'{}' wants pairs of a wavelength in nm, which increases, and a value", p.name));
 }
 
+std::optional<double> kelvin_of(Translation& t, const Param& p) {
+  if (p.numbers.size() == 1 && p.texts.empty() && p.numbers[0] > 0 && p.numbers[0] <= 1e6)
+    return p.numbers[0];
+  return t.report.refuse(p.at, fmt::format("'{}' wants one temperature in kelvin, at most 1e6", p.name));
+}
+
+// pbrt divides the spectrum of a black body by its largest value over all wavelengths. Light alone is then
+// scaled to luminance 1.
+std::optional<SpectralCurve> black_body_reflectance(Translation& t, const Param& p) {
+  const auto kelvin = kelvin_of(t, p);
+  if (!kelvin) return std::nullopt;
+  SpectralCurve curve = black_body_curve(*kelvin);
+  for (double& x : curve.value) x /= black_body_peak(*kelvin);
+  return curve;
+}
+
 bool is_rgb(const Param& p) { return p.type == "rgb" && p.numbers.size() == 3 && p.texts.empty(); }
 
 Rgb one_rgb(Translation& t, const Param& p, RgbOf meaning) {
@@ -95,12 +119,12 @@ Rgb one_rgb(Translation& t, const Param& p, RgbOf meaning) {
 }
 
 std::optional<Rgb> black_body(Translation& t, const Param& p) {
-  if (p.numbers.size() != 1 || !p.texts.empty() || !(p.numbers[0] > 0 && p.numbers[0] <= 1e6))
-    return t.report.refuse(p.at, fmt::format("'{}' wants one temperature in kelvin, at most 1e6", p.name));
-  auto xyz = black_body_xyz(p.numbers[0]);
+  const auto kelvin = kelvin_of(t, p);
+  if (!kelvin) return std::nullopt;
+  auto xyz = black_body_xyz(*kelvin);
   const double y = xyz[1];
   if (!std::isnormal(y))
-    return t.report.refuse(p.at, fmt::format("a black body of {} K gives no light", p.numbers[0]));
+    return t.report.refuse(p.at, fmt::format("a black body of {} K gives no light", *kelvin));
   for (double& x : xyz) x /= y;
   return within_srgb(t, p, linear_srgb(xyz));
 }
@@ -137,7 +161,7 @@ std::vector<double> srgb_numbers(Translation& t, const Param& p, RgbOf meaning) 
     const Tristimulus seen = m * given;
     const bool at_most_one = meaning == RgbOf::surface && std::max({given[0], given[1], given[2]}) <= 1;
     for (std::size_t k = 0; k < 3; ++k) {
-      out[i + k] = std::clamp(seen[k], 0., at_most_one ? 1. : std::numeric_limits<double>::max());
+      out[i + k] = std::clamp(seen[k], 0., at_most_one ? 1. : kNoLimit);
       is_cut |= out[i + k] != seen[k];
     }
   }
@@ -161,14 +185,16 @@ std::optional<Rgb> light_colour(Translation& t, const Param& p) {
 std::optional<Rgb> surface_colour(Translation& t, const Param& p, RgbOf meaning) {
   if (is_rgb(p)) return one_rgb(t, p, meaning);
   if (p.type == "float" && p.numbers.size() == 1) return Rgb{p.numbers[0], p.numbers[0], p.numbers[0]};
-  if (p.type != "spectrum")
+  const bool black_body = p.type == "blackbody";
+  if (p.type != "spectrum" && !black_body)
     return t.report.refuse(p.at, fmt::format("'{}' can't be given as {} here", p.name, p.type));
-  const auto curve = curve_of(t, p);
+  const auto curve = black_body ? black_body_reflectance(t, p) : curve_of(t, p);
   if (!curve) return std::nullopt;
   // A constant curve is a grey, even if it does not cover all wavelengths.
   const auto& v = curve->value;
   if (std::all_of(v.begin(), v.end(), [&](double x) { return x == v[0]; })) return Rgb{v[0], v[0], v[0]};
-  return within_srgb(t, p, linear_srgb(*curve, Illuminant::d65));
+  const bool at_most_one = meaning == RgbOf::surface && *std::max_element(v.begin(), v.end()) <= 1;
+  return within_srgb(t, p, linear_srgb(*curve, Illuminant::d65), at_most_one ? 1 : kNoLimit);
 }
 
 Rgb light_colour(Translation& t, Params& params, std::string_view name) {

@@ -63,15 +63,13 @@ class MaterialTranslator {
   }
 
   Element coated() {
-    const auto alpha = roughness();
-    Element out = with_eta(made("bsdf", is_smooth(alpha) ? "plastic" : "roughplastic", p_.at()));
+    const auto alpha = roughness(Images::none);
+    Element out = with_eta(made("bsdf", alpha.is_smooth() ? "plastic" : "roughplastic", p_.at()));
     add_value(t_, out, p_, {"reflectance", "diffuse_reflectance"}, {.5, .5, .5});
     add(out, "boolean", "nonlinear", "true", p_.at());
-    if (!is_smooth(alpha)) {
+    if (!alpha.is_smooth()) {
       add(out, "string", "distribution", "ggx", p_.at());
-      if (alpha.first != alpha.second)
-        p_.error(p_.at(), fmt::format("{} has two roughnesses: only one is known of a coat", p_.title()));
-      add(out, "alpha", alpha.first, p_.at());
+      add(out, "alpha", coat_alpha(alpha, ": only one is known of a coat"), p_.at());
     }
     t_.warn_once(p_.at(),
                  "\"coateddiffuse\" is read as \"plastic\" or \"roughplastic\": light within a rough coat is "
@@ -80,9 +78,9 @@ class MaterialTranslator {
   }
 
   Element conductor() {
-    const auto alpha = roughness();
-    Element out = made("bsdf", is_smooth(alpha) ? "conductor" : "roughconductor", p_.at());
-    if (!is_smooth(alpha)) add_alpha(out, alpha);
+    const auto alpha = roughness(Images::allowed);
+    Element out = made("bsdf", alpha.is_smooth() ? "conductor" : "roughconductor", p_.at());
+    if (!alpha.is_smooth()) add_alpha(out, alpha);
     if (p_.has("reflectance"))
       by_reflectance(out);
     else
@@ -91,22 +89,20 @@ class MaterialTranslator {
   }
 
   Element coated_conductor() {
-    const auto coat = roughness("interface."), metal = roughness("conductor.");
+    const auto coat = roughness(Images::none, "interface."), metal = roughness(Images::none, "conductor.");
     Element out = with_eta(made("bsdf", "coatedconductor", p_.at()), "interface.eta");
-    if (coat.first != coat.second)
-      p_.error(p_.at(), fmt::format("{} has two roughnesses of the interface: only one is known of a coat. "
-                                    "Give interface.roughness",
-                                    p_.title()));
-    add(out, "coat_alpha", is_smooth(coat) ? 0. : coat.first, p_.at());
-    add(out, "alpha_u", is_smooth(metal) ? 0. : metal.first, p_.at());
-    add(out, "alpha_v", is_smooth(metal) ? 0. : metal.second, p_.at());
+    const double alpha =
+        coat_alpha(coat, " of the interface: only one is known of a coat. Give interface.roughness");
+    add(out, "coat_alpha", coat.is_smooth() ? 0. : alpha, p_.at());
+    add(out, "alpha_u", metal.is_smooth() ? 0. : metal.u.number, p_.at());
+    add(out, "alpha_v", metal.is_smooth() ? 0. : metal.v.number, p_.at());
     // pbrt divides eta and k by the coat's index of refraction, even if it computes them from a reflectance.
     // Our `coatedconductor` also divides them, so it gets the undivided values here.
     if (p_.has("reflectance"))
       by_reflectance(out);
     else
       by_indices(out, "conductor.eta", "conductor.k");
-    if (!is_smooth(coat) || !is_smooth(metal))
+    if (!coat.is_smooth() || !metal.is_smooth())
       t_.warn_once(
           p_.at(),
           "a rough \"coatedconductor\" is approximated: pbrt follows light at random between coat and metal, "
@@ -162,9 +158,9 @@ class MaterialTranslator {
   }
 
   Element dielectric() {
-    const auto alpha = roughness();
-    Element out = with_eta(made("bsdf", is_smooth(alpha) ? "dielectric" : "roughdielectric", p_.at()));
-    if (!is_smooth(alpha)) add_alpha(out, alpha);
+    const auto alpha = roughness(Images::allowed);
+    Element out = with_eta(made("bsdf", alpha.is_smooth() ? "dielectric" : "roughdielectric", p_.at()));
+    if (!alpha.is_smooth()) add_alpha(out, alpha);
     return out;
   }
 
@@ -185,39 +181,69 @@ class MaterialTranslator {
     return out;
   }
 
-  using Alpha = std::pair<double, double>;
-  static bool is_smooth(const Alpha& a) { return a.first < kSmooth && a.second < kSmooth; }
+  // A roughness alpha: a number, or the texture that holds it in an image.
+  struct Alpha {
+    double number = 0;
+    std::string image{};
+    bool operator==(const Alpha&) const = default;
+    bool is_smooth() const { return image.empty() && number < kSmooth; }
+  };
+  struct Roughness {
+    Alpha u, v;
+    bool is_smooth() const { return u.is_smooth() && v.is_smooth(); }
+  };
+  enum class Images { none, allowed };
 
   // Returns the roughness alpha along u and v. `layer` is a prefix of the parameters' names, such as
   // "interface.".
-  Alpha roughness(std::string_view layer = "") {
-    const auto one = [&](std::string_view what, double fallback) {
-      const std::string name = fmt::format("{}{}", layer, what);
-      const Param* p = p_.take(name);
+  Roughness roughness(Images images, std::string_view layer = "") {
+    const bool remap = p_.boolean("remaproughness", true);
+    const auto one = [&](std::string_view what, const Alpha& fallback) {
+      const Param* p = p_.take(fmt::format("{}{}", layer, what));
       if (!p) return fallback;
-      if (p->type == "texture") {
-        const Texture* found = find_texture(t_, TextureOf::numbers, p->texts.empty() ? "" : p->texts[0]);
-        if (found && found->value) return (*found->value)[0];
-      } else if (p->numbers.size() == 1 && p->numbers[0] >= 0) {
-        return p->numbers[0];
-      }
-      p_.error(p->at, fmt::format("'{}' of {} wants one number, not an image or a negative one: pbrt takes "
-                                  "the square root of a texture, so render it to one of alpha",
-                                  name, p_.title()));
+      const bool named = p->type == "texture";
+      const Texture* texture =
+          named ? find_texture(t_, TextureOf::numbers, p->texts.empty() ? "" : p->texts[0]) : nullptr;
+      if (texture && !texture->value)
+        return takes_image(*p, images, remap) ? Alpha{0, texture->id} : fallback;
+      const bool given = named ? texture != nullptr : p->numbers.size() == 1;
+      const double x = !given ? -1 : texture ? (*texture->value)[0] : p->numbers[0];
+      if (x >= 0) return Alpha{remap ? std::sqrt(x) : x};
+      p_.error(p->at, named && !given ? fmt::format("'{}' names no Texture that stands before this", p->name)
+                                      : fmt::format("'{}' of {} wants one number that is not negative",
+                                                    p->name, p_.title()));
       return fallback;
     };
-    const double both = one("roughness", 0);
-    Alpha alpha{one("uroughness", both), one("vroughness", both)};
-    if (p_.boolean("remaproughness", true)) alpha = {std::sqrt(alpha.first), std::sqrt(alpha.second)};
-    return alpha;
+    const Alpha both = one("roughness", {});
+    return {one("uroughness", both), one("vroughness", both)};
   }
 
-  void add_alpha(Element& out, const Alpha& a) {
+  // False: the roughness can't be an image, which is reported.
+  bool takes_image(const Param& p, Images images, bool remap) {
+    if (images == Images::allowed && !remap) return true;
+    p_.error(p.at, fmt::format("'{}' of {} is an image: {}", p.name, p_.title(),
+                               images == Images::none
+                                   ? "a layer has one roughness here, a number"
+                                   : "pbrt takes the square root of it, so make it an image of that, and "
+                                     "give \"bool remaproughness\" false"));
+    return false;
+  }
+
+  // The bsdf allows no alpha of 0, which one of u and v may have.
+  void add_alpha(Element& out, const Roughness& a) {
     add(out, "string", "distribution", "ggx", p_.at());
-    // If the surface is rough along only one of u and v, the other alpha may be 0, which the bsdf does not
-    // allow.
-    add(out, "alpha_u", std::max(a.first, 1e-4), p_.at());
-    add(out, "alpha_v", std::max(a.second, 1e-4), p_.at());
+    for (const auto& [name, alpha] : {std::pair{"alpha_u", a.u}, {"alpha_v", a.v}}) {
+      if (alpha.image.empty())
+        add(out, name, std::max(alpha.number, 1e-4), p_.at());
+      else
+        refer(out, name, alpha.image, p_.at());
+    }
+  }
+
+  // Returns the alpha of a coat, which has one.
+  double coat_alpha(const Roughness& a, std::string_view which = {}) {
+    if (a.u != a.v) p_.error(p_.at(), fmt::format("{} has two roughnesses{}", p_.title(), which));
+    return a.u.number;
   }
 
   Element with_eta(Element out, std::string_view name = "eta") {

@@ -9,7 +9,7 @@ using Words = std::vector<Word>;
 constexpr auto kIgnored = Word::Use::ignored;
 constexpr auto kRefused = Word::Use::refused;
 constexpr std::string_view kColour = "rgb|spectrum|blackbody";
-constexpr std::string_view kTextured = "rgb|spectrum|texture";
+constexpr std::string_view kTextured = "rgb|spectrum|blackbody|texture";
 constexpr std::string_view kNumber = "float|texture";
 constexpr std::string_view kRemap =
     "true: alpha is the square root of the roughness; false: the roughness is alpha itself";
@@ -54,8 +54,11 @@ Words film_words() {
 
 Words shape_words() { return {{"alpha", kNumber, "1", "opacity: a mask around the material"}}; }
 
-Words remapped() {
-  return {{"roughness", kNumber, "0", "roughness in both directions"},
+constexpr std::string_view kImageOfAlpha =
+    "roughness in both directions; an image only with remaproughness false";
+
+Words remapped(std::string_view roughness) {
+  return {{"roughness", kNumber, "0", roughness},
           {"uroughness", kNumber, "roughness", "along u"},
           {"vroughness", kNumber, "roughness", "along v"},
           {"remaproughness", "bool", "true", kRemap}};
@@ -276,30 +279,29 @@ void add_materials(std::vector<Row>& r) {
                      {"bumpmap", "texture", "", "an image of heights: a bumpmap around it"}}});
   r.push_back({"Material", "coateddiffuse", true,
                "`plastic` or `roughplastic` (ggx) with nonlinear, on both sides, with a warning",
-               Words{{"reflectance", kTextured, "0.5", "roughness of the base"},
+               Words{{"reflectance", kTextured, "0.5", "colour of the base"},
                      {"eta", "float|spectrum", "1.5", "index of refraction of the coat"}} +
-                   remapped() + layer_words() + material_words()});
-  r.push_back(
-      {"Material", "conductor", true, "`conductor` or `roughconductor` (ggx), on both sides",
-       Words{{"eta", kColour, "metal-Cu-eta", "real part of the index of refraction"},
-             {"k", kColour, "metal-Cu-k", "imaginary part"},
-             {"reflectance", "rgb|spectrum", "", "reflectance at normal incidence, instead of eta and k"}} +
-           remapped() + material_words()});
+                   remapped("roughness in both directions; no image") + layer_words() + material_words()});
+  r.push_back({"Material", "conductor", true, "`conductor` or `roughconductor` (ggx), on both sides",
+               Words{{"eta", kColour, "metal-Cu-eta", "real part of the index of refraction"},
+                     {"k", kColour, "metal-Cu-k", "imaginary part"},
+                     {"reflectance", kColour, "", "reflectance at normal incidence, instead of eta and k"}} +
+                   remapped(kImageOfAlpha) + material_words()});
   r.push_back(
       {"Material", "coatedconductor", true,
        "`coatedconductor`, on both sides; with a warning that it is approximated, unless coat and metal are "
        "smooth",
        Words{{"interface.eta", "float|spectrum", "1.5", "index of refraction of the coat"},
-             {"interface.roughness", kNumber, "0", "roughness of the coat"},
+             {"interface.roughness", kNumber, "0", "roughness of the coat; no image"},
              {"interface.uroughness", kNumber, "interface.roughness",
               "roughness along u; it must be equal to that along v"},
              {"interface.vroughness", kNumber, "interface.roughness", "along v"},
              {"conductor.eta", kColour, "metal-Cu-eta", "real part of the metal's index of refraction"},
              {"conductor.k", kColour, "metal-Cu-k", "imaginary part"},
-             {"reflectance", "rgb|spectrum", "",
+             {"reflectance", kColour, "",
               "reflectance of the metal without the coat at normal incidence, instead of conductor.eta and "
               "conductor.k"},
-             {"conductor.roughness", kNumber, "0", "roughness of the metal in both directions"},
+             {"conductor.roughness", kNumber, "0", "roughness of the metal in both directions; no image"},
              {"conductor.uroughness", kNumber, "conductor.roughness", "along u"},
              {"conductor.vroughness", kNumber, "conductor.roughness", "along v"},
              {"remaproughness", "bool", "true", kRemap}} +
@@ -310,7 +312,7 @@ void add_materials(std::vector<Row>& r) {
   r.push_back({"Material", "dielectric", true, "`dielectric` or `roughdielectric` (ggx)",
                Words{{"eta", "float|spectrum", "1.5",
                       "index of refraction; a glass by name has its index at 588 nm"}} +
-                   remapped() + material_words()});
+                   remapped(kImageOfAlpha) + material_words()});
   r.push_back({"Material", "thindielectric", true,
                "`thindielectric`; light that passes straight through does not count for maxdepth",
                Words{{"eta", "float|spectrum", "1.5", "index of refraction"}} + material_words()});
@@ -502,7 +504,7 @@ std::vector<std::string> types_of(std::string_view directive) {
 
 std::span<const Plain> plain_directives() {
   static constexpr Plain kAll[] = {
-      {"Include", "the text of another file, found from the folder of the main file"},
+      {"Include", "the text of another file, found from the folder of the main file; at most 256 altogether"},
       {"Import", "the same, between an AttributeBegin and an AttributeEnd"},
       {"WorldBegin", "ends the part with the camera; transform and orientation are reset"},
       {"WorldEnd", "nothing (pbrt-v3)"},

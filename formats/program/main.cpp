@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/base/digest.h"
+#include "core/base/helper_program.h"
 #include "core/base/parse_number.h"
 #include "core/base/spawn.h"
 #include "core/scene/json/serialize.h"
@@ -64,8 +65,9 @@ bool serve(Message request) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto seconds = argc == 3 ? ls::parse_number<unsigned>(argv[1]) : std::nullopt;
-  const auto bytes = argc == 3 ? ls::parse_number<std::uint64_t>(argv[2]) : std::nullopt;
+  if (argc != 3) return ls::answer_person("lightshaft-scene", LIGHTSHAFT_VERSION, argc, argv);
+  const auto seconds = ls::parse_number<unsigned>(argv[1]);
+  const auto bytes = ls::parse_number<std::uint64_t>(argv[2]);
   if (!seconds || !bytes) return 2;
   ls::shut_in_helper(*bytes);
   try {

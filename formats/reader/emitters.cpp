@@ -113,9 +113,17 @@ template <>
 void Reader::read_emitter_as<GoniometricEmitter>(const Element& e) {
   Params p(*this, e);
   GoniometricEmitter emitter;
-  if (!p.has("texture"))
-    report_.error(e.at, "emitter \"goniometric\" needs 'texture': the image of its directions");
+  const bool from_file = p.has("filename"), from_texture = p.has("texture");
+  if (from_file == from_texture)
+    report_.error(e.at, from_file
+                            ? "emitter \"goniometric\" has both 'filename' and 'texture': leave one out"
+                            : "emitter \"goniometric\" needs 'filename', an IES file or an image of its "
+                              "directions, or 'texture', such an image");
   bind(p, emitter);
+  if (const auto name = p.take_string("filename"))
+    // `clamp`, since what lies across an edge of the square is not on the other side of the sphere
+    if (const auto file = asset(*name, e.at))
+      emitter.texture = added<TextureIndex>(BitmapTexture{.file = *file, .wrap = Wrap::clamp, .raw = true});
   refuse_attributes(e, emitter.texture, "texture");
   p.finish();
   if (!invertible(emitter.to_world) || !is_similarity(emitter.to_world))

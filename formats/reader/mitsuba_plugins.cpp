@@ -320,7 +320,8 @@ bool is_our_parameter(std::string_view tag, std::string_view plugin, std::string
       {"integrator",
        "",
        {"phase_only", "camera_points", "light_vertices", "equiangular", "lamp_flights", "light_tree",
-        "path_reuse", "shadow_roulette", "sky_samples", "sky_portals", "local_lights", "path_splitting"}},
+        "path_reuse", "shadow_roulette", "sky_samples", "sky_portals", "local_lights", "emissive_grids",
+        "path_splitting"}},
   };
   return std::ranges::any_of(all, [&](const Ours& row) {
     return row.tag == tag && (row.plugin.empty() || row.plugin == plugin) &&

@@ -6,8 +6,13 @@ usage: make_bath.py FOLDER [--setting sketch|small|full] [--grid vdb|vol]
 The same setting gives the same bytes every time. Needs python3-numpy only.
 """
 import argparse
+import importlib.util
 import pathlib
+import sys
 from collections import defaultdict
+
+if importlib.util.find_spec("numpy") is None:
+    sys.exit(f"error: making the bath needs NumPy, which {sys.executable} does not have: install python3-numpy (Debian, Ubuntu), or numpy with its pip")
 
 import furniture
 import hall

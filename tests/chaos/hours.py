@@ -32,7 +32,7 @@ from soak import figures
 from webhook_receiver import signed_by
 
 PLANNED = {"jobs an hour": 150, "workers": 200, "of what the workers could": .3}  # that two hours have 300 jobs
-ESTABLISHED = "01"  # in /proc/net/tcp
+NO_CONNECTION = ("06", "0A")  # TIME_WAIT and LISTEN in /proc/net/tcp
 WAVE = 600.0  # seconds from one wave of jobs to the next
 SHOWN = ("id", "owner", "state", "units_done", "units_total", "core_seconds", "queued_core_seconds", "priority", "spp")
 COUNTED = re.compile(r"lightshaft_(units_freed_total|results_total|audits_total|workers_quarantined_total|tiles_discarded_total|workers\{|units_leased |leases |"
@@ -67,7 +67,7 @@ class Watch(threading.Thread):
 
     def processes(self):
         found, lines = {}, pathlib.Path("/proc/net/tcp").read_text().splitlines()[1:] + pathlib.Path("/proc/net/tcp6").read_text().splitlines()[1:]
-        local = [int(line.split()[1].rpartition(":")[2], 16) for line in lines if line.split()[3] == ESTABLISHED]
+        local = [int(line.split()[1].rpartition(":")[2], 16) for line in lines if line.split()[3] not in NO_CONNECTION]
         for name, process in [("abc"[n], c.coordinator.popen) for n, c in enumerate(self.farm.coordinators)] + \
                 [(w.shown, w.popen) for w in self.farm.workers["steady"]] + [("redis", self.farm.redis.popen)]:
             try:
@@ -76,6 +76,7 @@ class Watch(threading.Thread):
                 pass  # it is dead now, or a child of it ended while it was looked at
         for name, coordinator in zip("abc", self.farm.coordinators):
             if name in found:  # workers keep a connection to coordinators that they have left
+                found[name]["worker_connections"] = local.count(coordinator.grpc)
                 found[name]["connections"] = local.count(coordinator.http) + local.count(coordinator.grpc)
         return found
 

@@ -204,8 +204,12 @@ def processes(run):
 
 
 def idle_files(sample):
-    """(name, open files without connections to users and workers, threads, memory) of each coordinator."""
-    return [(name, process["files"] - process.get("connections", 0), process["threads"], process["memory"])
+    """(name, open files without connections to users and workers, threads, memory) of each coordinator. A connection of a worker is two
+    descriptors: that of its socket, and that by which it is handed to gRPC."""
+    def connections(process):
+        return process.get("connections", 0) + process.get("worker_connections", process.get("connections", 0))
+
+    return [(name, process["files"] - connections(process), process["threads"], process["memory"])
             for name in "abc" if (process := sample["processes"].get(name))]
 
 

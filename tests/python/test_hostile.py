@@ -27,7 +27,7 @@ JOB = {
 
 
 class Stub(http.server.ThreadingHTTPServer):
-    """Answers {path: (status, headers, body)}; the rest with a job. Keeps what it was sent."""
+    """Answers {path, with or without its query: (status, headers, body)}; the rest with a job. Keeps what it was sent."""
 
     def __init__(self):
         super().__init__(("127.0.0.1", 0), _Handler)
@@ -43,7 +43,8 @@ class _Handler(http.server.BaseHTTPRequestHandler):
     def answer(self):
         body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
         self.server.requests.append((self.command, self.path, dict(self.headers), body))
-        status, headers, data = self.server.answers.get(
+        answers = self.server.answers
+        status, headers, data = answers.get(self.path) or answers.get(
             self.path.split("?")[0], (200, {}, json.dumps(JOB).encode())
         )
         self.send_response(status)
@@ -210,6 +211,37 @@ def test_a_table_that_is_none(farm, stub, table):
     stub.answers["/api/v1/jobs/j-1/convergence.csv"] = (200, {}, table)
     with pytest.raises(lightshaft.BadAnswer, match="table"):
         farm.job("j-1").convergence()
+
+
+# ---- pictures of notebooks ----
+
+PNG, DENOISED_PNG = b"\x89PNG the image", b"\x89PNG denoised"
+
+
+@pytest.mark.parametrize(
+    "of_job, asked, shown",
+    [
+        ({"state": "done", "denoise": True}, (200, {}, DENOISED_PNG), DENOISED_PNG),
+        ({"state": "done", "denoise": False}, (200, {}, DENOISED_PNG), PNG),
+        ({"state": "running", "denoise": True}, (200, {}, DENOISED_PNG), PNG),
+        ({"state": "done", "denoise": True}, (503, {}, b"{}"), PNG),
+        ({"state": "cancelled", "denoise": True}, (409, {}, b"{}"), PNG),
+    ],
+    ids=["denoised", "without", "not yet", "library gone", "none"],
+)
+def test_a_notebook_shows_the_denoised_picture_of_a_job_that_has_ended_with_one(
+    stub, of_job, asked, shown
+):
+    stub.answers["/api/v1/jobs/j-1"] = (200, {}, json.dumps({**JOB, **of_job}).encode())
+    stub.answers["/api/v1/jobs/j-1/image.png"] = (200, {}, PNG)
+    stub.answers["/api/v1/jobs/j-1/image.png?layer=denoised"] = asked
+    stub.answers["/api/v1/jobs/j-1/convergence.csv"] = (200, {}, b"core_seconds,relmse\n1,2\n")
+
+    snapshot = lightshaft.Farm(stub.url).job("j-1").snapshot()
+
+    assert snapshot._repr_png_() == shown and snapshot.denoised == (shown is DENOISED_PNG)
+    caption = "denoised" if shown is DENOISED_PNG else "as rendered"
+    assert f"<figcaption>{caption}</figcaption>" in snapshot._repr_html_()
 
 
 # ---- images ----

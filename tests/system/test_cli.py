@@ -171,3 +171,20 @@ def test_inspect_tells_what_the_scene_needs(fog):
     assert any(s["bytes"] > 0 for s in told["structures"])
     text = lightshaft("inspect", fog).stdout
     assert "fog.vol" in text and "72 x 40" in text and not (fog.parent / "fog.exr").exists()
+
+
+def test_a_scene_without_light_is_told_to_be_black(tmp_path):
+    sphere = '<scene version="3.0.0">{}<shape type="sphere"/><sensor type="perspective"/></scene>'
+    dark = tmp_path / "dark.xml"
+    dark.write_text(sphere.format(""))
+    medium = '<medium name="interior" type="homogeneous"><rgb name="emission" value="1 1 1"/></medium>'
+    lights = ['<emitter type="constant"/>', '<shape type="disk"><emitter type="area"/></shape>',
+              f'<shape type="cube"><bsdf type="null"/>{medium}</shape>']
+
+    said = lightshaft("render", dark, "-o", tmp_path / "out.exr", "--size", "4x4", "--spp", 2, "--quiet").stderr
+
+    assert said == f"{dark}: warning: the scene has no light, so that the picture is black\n"
+    for k, light in enumerate(lights):
+        lit = tmp_path / f"lit{k}.xml"
+        lit.write_text(sphere.format(light))
+        assert "the scene has no light" not in lightshaft("inspect", lit).stderr

@@ -2,12 +2,16 @@
 
 import json
 import os
+import pty
+import re
 import signal
 import subprocess
 
 import pytest
 from cli_kit import lightshaft, write_fog
 from local_farm import LocalFarm, bin_dir, wait_until
+
+HELPERS = ["lightshaft-vdb", "lightshaft-denoise", "lightshaft-exr", "lightshaft-scene"]
 
 
 @pytest.fixture(scope="module")
@@ -35,11 +39,22 @@ def test_a_misspelt_command_and_a_misspelt_option_are_suggested_right():
 
 
 @pytest.mark.parametrize("program", ["lightshaft-coordinator", "lightshaft-worker"])
-def test_the_other_programs_suggest_too_and_know_their_version(program):
+def test_the_other_programs_suggest_too(program):
     wrong = subprocess.run([bin_dir() / program, "--log-forma", "json"], capture_output=True, text=True)
     assert wrong.returncode == 2 and "did you mean '--log-format'?" in wrong.stderr
-    version = subprocess.run([bin_dir() / program, "--version"], capture_output=True, text=True)
-    assert version.returncode == 0 and version.stdout.startswith(program + " ")
+
+
+@pytest.mark.parametrize("program", ["lightshaft-coordinator", "lightshaft-worker", *HELPERS, "lightshaft-validate"])
+def test_each_program_knows_its_version(program):
+    version = lightshaft("--version").stdout.split()[1].rstrip(",")
+    told = subprocess.run([bin_dir() / program, "--version"], capture_output=True, text=True)
+    assert (told.returncode, told.stdout, told.stderr) == (0, f"{program} {version}\n", "")
+
+
+@pytest.mark.parametrize("program", HELPERS)
+def test_a_helper_that_a_person_starts_says_what_it_is(program):
+    told = subprocess.run([bin_dir() / program], capture_output=True, text=True)
+    assert told.returncode == 2 and "other programs of Lightshaft start" in told.stderr
 
 
 def test_the_bare_command_shows_its_help():
@@ -55,10 +70,12 @@ def test_help_has_examples_and_no_line_about_other_commands():
         assert "LIGHTSHAFT_LOG" not in lightshaft(command, "--help").stdout
 
 
-def test_output_that_nobody_reads_is_no_error():
+@pytest.mark.parametrize("command", [["completion", "bash"], ["jobs"], ["jobs", "--json"]])
+def test_output_that_nobody_reads_is_no_error(idle, tmp_path, command):
+    submitted(idle, tmp_path)
     read, write = os.pipe()
     os.close(read)
-    done = subprocess.run([bin_dir() / "lightshaft", "completion", "bash"], stdout=write, stderr=subprocess.PIPE, text=True)
+    done = subprocess.run([bin_dir() / "lightshaft", *command], env=environment(idle), stdout=write, stderr=subprocess.PIPE, text=True)
     os.close(write)
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -110,6 +127,36 @@ def test_ctrl_c_in_a_wait_says_that_the_job_goes_on(idle, tmp_path):
     assert waiting.returncode == -signal.SIGINT
     assert f"job {job} continues: lightshaft watch {job} follows it, lightshaft cancel {job} ends it" in error
     assert json.loads(call(idle, "show", job, "--json").stdout)["state"] == "queued"
+
+
+def test_ctrl_c_at_a_terminal_says_that_the_job_goes_on(idle, tmp_path):
+    scene = write_fog(tmp_path)
+    child, terminal = pty.fork()
+    if child == 0:
+        os.execve(bin_dir() / "lightshaft", ["lightshaft", "submit", str(scene), "--wait"], environment(idle))
+    shown = b""
+
+    def read():
+        nonlocal shown
+        try:
+            part = os.read(terminal, 1 << 16)
+        except OSError:  # the other side is closed
+            part = b""
+        shown += part
+        return part
+
+    while not (job := re.search(rb"(?m)^(j-\w+)\r$", shown)):
+        assert read(), shown
+    os.write(terminal, b"\x03")  # the terminal, not this test, makes it a signal
+    while read():
+        pass
+    _, status = os.waitpid(child, 0)
+    os.close(terminal)
+
+    assert os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGINT, shown
+    identity = job[1].decode()
+    assert f"job {identity} continues: lightshaft watch {identity} follows it" in " ".join(shown.decode().split())
+    assert json.loads(call(idle, "show", identity, "--json").stdout)["state"] == "queued"
 
 
 def test_jobs_have_names_and_are_chosen_by_them_and_by_state(idle, tmp_path):

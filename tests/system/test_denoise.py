@@ -1,7 +1,9 @@
 """Denoised layers end to end, with a stand-in for Open Image Denoise (tests/support/fake_oidn.cpp): by the command and on a farm."""
 
+import base64
 import json
 import os
+import re
 import shutil
 
 import pytest
@@ -15,6 +17,12 @@ WITH = {"LIGHTSHAFT_OIDN": str(LIBRARY)}
 
 def render(scene, out, *flags, env=WITH, code=0):
     return lightshaft("render", scene, "-o", out, "--spp", 12, *flags, env={**os.environ, **env}, code=code)
+
+
+def picture_of(page):
+    """The picture of a report (the first image of the page), and its caption."""
+    found = re.search(r'<figure><div class="image"><img [^>]*src="data:image/png;base64,([^"]*)"></div><figcaption>([^<]*)<', page)
+    return base64.b64decode(found[1]), found[2]
 
 
 def test_the_command_adds_layers_and_tells_their_error(fog, tmp_path):
@@ -35,6 +43,11 @@ def test_the_command_adds_layers_and_tells_their_error(fog, tmp_path):
     render(fog, tmp_path / "plain.png")
     render(fog, tmp_path / "out.png", "--denoise")
     assert (tmp_path / "out.png").read_bytes() != (tmp_path / "plain.png").read_bytes()
+    # And so it is in the report; without denoising the image itself.
+    shown, caption = picture_of((tmp_path / "report.html").read_text())
+    assert shown == (tmp_path / "out.png").read_bytes() and caption.startswith("Denoised;")
+    render(fog, tmp_path / "plain.exr", "--html", tmp_path / "plain.html")
+    assert picture_of((tmp_path / "plain.html").read_text()) == ((tmp_path / "plain.png").read_bytes(), "As it was rendered.")
     # The same image again, from other threads and a child process: guides and denoised layers, too.
     render(fog, tmp_path / "again.exr", "--denoise", "--threads", 1, "--isolate")
     assert read(tmp_path / "again.exr")[0] == rows
@@ -83,6 +96,12 @@ def test_on_a_farm_image_picture_and_report_have_it(fog, tmp_path):
         assert picture.startswith(b"\x89PNG") and picture != farm.request("GET", f"/api/v1/jobs/{job}/image.png")
         lightshaft("fetch", job, *to, "-o", tmp_path / "image.png")
         assert (tmp_path / "image.png").read_bytes() == picture
+
+        def report_page(of):
+            return picture_of(farm.request("GET", f"/api/v1/jobs/{of}/report.html").decode())
+
+        assert report_page(job)[0] == picture and report_page(job)[1].startswith("Denoised;")
+        assert report_page(plain) == (farm.request("GET", f"/api/v1/jobs/{plain}/image.png"), "As it was rendered.")
         for path, status, words in ((f"/api/v1/jobs/{plain}/image.png?layer=denoised", 409, "was submitted without"),
                                     (f"/api/v1/jobs/{job}/image.png?layer=depth", 400, "'layer' must be")):
             with pytest.raises(HttpError) as refused:
@@ -96,6 +115,7 @@ def test_on_a_farm_image_picture_and_report_have_it(fog, tmp_path):
         with pytest.raises(HttpError) as refused:
             farm.submit(SCENE, spp=16, denoise="true")
         assert refused.value.status == 409 and "deploy/install-denoiser.sh" in str(refused.value)
+        assert report_page(job) == (farm.request("GET", f"/api/v1/jobs/{job}/image.png"), "As it was rendered.")
 
 
 def test_a_target_error_of_the_denoised_layers_is_one_image_wherever_it_is_rendered(fog, tmp_path):

@@ -3,6 +3,8 @@
 import json
 import os
 import shutil
+import socket
+import sys
 
 import pytest
 from cli_kit import lightshaft
@@ -83,7 +85,7 @@ def test_a_farm_that_renders_is_found_good_and_a_stopped_one_is_not(tmp_path):
         none = doctor(code=1, LIGHTSHAFT_URL=url)
         people = lightshaft("doctor", "--farm", url, env=clean_environment(LIGHTSHAFT_TOKEN=farm.token)).stdout
 
-    assert [statuses(good, name) for name in ("farm", "tls", "clock", "token", "version", "workers", "numeric-class")] == [["ok"]] * 7
+    assert [statuses(good, name) for name in ("farm", "tls", "clock", "token", "version", "workers-port", "workers", "numeric-class")] == [["ok"]] * 8
     assert "admin" in good["token"][0]["what"] and good["farm"][0]["subject"] == url
     assert statuses(wrong, "farm") == ["ok"] and statuses(wrong, "token") == ["problem"]
     assert "does not know" in wrong["token"][0]["what"]
@@ -128,6 +130,35 @@ def test_versions_and_states_of_workers_are_warned_of(stub):
     assert "old" in found["worker-versions"][0]["what"]
     assert any("ill" in check["what"] for check in found["workers"])
     assert "\x1b" not in lightshaft("doctor", "--farm", stub.url, env=clean_environment(LIGHTSHAFT_TOKEN=SECRET)).stdout
+
+
+@pytest.mark.parametrize("named", ["0.0.0.0:{}", "[::]:{}", "localhost:{}", "127.0.0.1:{}"])
+def test_the_workers_port_is_tried_where_the_coordinator_names_it(stub, named):
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+        stub.answers[("GET", "/api/v1/workers")] = [(200, {"workers": [], "join": {"address": named.format(port), "tls": False}})]
+        (open_port,) = doctor("--farm", stub.url, code=0, LIGHTSHAFT_TOKEN=SECRET)["workers-port"]
+    (closed,) = doctor("--farm", stub.url, code=0, LIGHTSHAFT_TOKEN=SECRET)["workers-port"]
+
+    assert open_port["status"] == "ok" and f":{port} can be reached" in open_port["what"]
+    assert closed["status"] == "warning" and "Connection refused" in closed["what"] and f"let port {port} pass" in closed["advice"]
+
+
+@pytest.mark.parametrize("named", ["", "nowhere", "host:99999", "\x1b[2J:1"])
+def test_an_address_that_is_none_is_not_tried(stub, named):
+    stub.answers[("GET", "/api/v1/workers")] = [(200, {"workers": [], "join": {"address": named}})]
+
+    assert "workers-port" not in doctor("--farm", stub.url, code=0, LIGHTSHAFT_TOKEN=SECRET)
+
+
+def test_a_python_without_numpy_is_warned_of_where_up_needs_it(tmp_path):
+    python = tmp_path / "python3"
+    python.write_text('#!/bin/sh\nexec "%s" -S "$@"\n' % sys.executable)  # -S: without the folders of packages
+    python.chmod(0o755)
+
+    (without,) = doctor(code=0, PATH=f"{tmp_path}:{os.environ['PATH']}")["python"]
+
+    assert without["status"] == "warning" and "has no NumPy" in without["what"] and "first picture" in without["advice"]
 
 
 def test_only_questions_are_asked_and_no_password_is_shown(stub):

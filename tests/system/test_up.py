@@ -23,7 +23,9 @@ import pytest
 from local_farm import PATIENCE, ROOT, bin_dir, wait_until
 
 sys.path.insert(0, str(ROOT / "python" / "src"))
-from lightshaft_command import enrolment  # noqa: E402
+from lightshaft_command import enrolment, programs  # noqa: E402
+
+BLURS = bin_dir().parent / "fake_oidn" / "blurs.so"  # in place of Open Image Denoise
 
 SCENE = """<scene version="3.0.0">
   <integrator type="volpath"/>
@@ -76,13 +78,17 @@ class Command:
         assert self.process.wait(timeout=PATIENCE) == code, self.text()
 
 
+OF_LIGHTSHAFT = object()  # the scene that a start without --first-scene renders
+
+
 class Up(Command):
     def __init__(self, folder, *words, program=None, scene=None, browser=None, environment=None):
         self.data = folder / "state"
         if scene is None:
             scene = folder / "scene.xml"
             scene.write_text(SCENE)
-        super().__init__(program or bin_dir() / "lightshaft", "up", "--data", self.data, "--threads", 1, "--first-scene", scene, *words,
+        super().__init__(program or bin_dir() / "lightshaft", "up", "--data", self.data, "--threads", 1,
+                         *([] if scene is OF_LIGHTSHAFT else ["--first-scene", scene]), *words,
                          *([] if browser else ["--no-browser"]), output=folder / "up.txt", folder=folder,
                          environment={**({"BROWSER": f"{browser} %s", "DISPLAY": ":0"} if browser else {}), **(environment or {})})  # fmt: skip
         self.url, self.token = self.said(r"dashboard: *(\S+)/#token=(\w+)").groups()
@@ -184,6 +190,53 @@ def test_a_first_scene_that_is_refused_is_shown_with_the_reason(tmp_path, leaves
     up.said(r"(?m)^the first picture failed: .*\n.*broken\.xml")
     up.interrupt()
     up.ends()
+
+
+def test_a_python_without_numpy_is_told_as_the_reason_why_there_is_no_first_picture(tmp_path, leaves_nothing):
+    subprocess.run(["/usr/bin/python3", "-m", "venv", "--without-pip", tmp_path / "bare"], check=True)
+    python = tmp_path / "bare" / "bin" / "python3"
+
+    up = Up(tmp_path, scene=OF_LIGHTSHAFT, environment={"LIGHTSHAFT_PYTHON": str(python)})
+
+    up.said(rf"(?m)^the first picture failed: .*\n.*NumPy, which {python} does not have: install python3-numpy")
+    up.interrupt()
+    up.ends()
+
+
+@pytest.mark.parametrize("library", [BLURS, "/no/such/library"])
+def test_the_first_picture_is_denoised_where_that_can_be_and_else_it_is_said_what_is_missing(tmp_path, leaves_nothing, library):
+    up = Up(tmp_path, environment={"LIGHTSHAFT_OIDN": str(library)})
+    up.said("first picture, .* after the start")
+
+    (job,) = up.jobs()
+
+    assert job["denoise"] == (library == BLURS)
+    assert ("Open Image Denoise is missing, so noise will be visible in the first picture; to install it: deploy/install-denoiser.sh" in up.text()) != job["denoise"]
+    layer = "&layer=denoised" if job["denoise"] else ""
+    request = urllib.request.Request(f"{up.url}/api/v1/jobs/{job['id']}/image.png?exposure=0{layer}", headers={"Authorization": f"Bearer {up.token}"})
+    with urllib.request.urlopen(request, timeout=PATIENCE) as answer:
+        assert (up.data / "first" / "picture.png").read_bytes() == answer.read()
+    up.interrupt()
+    up.ends()
+
+
+def test_the_denoiser_of_its_own_wheel_is_found_unless_another_is_named(tmp_path, monkeypatch):
+    monkeypatch.setenv("LIGHTSHAFT_OIDN", "/another")
+    programs.find_denoiser()
+    assert os.environ["LIGHTSHAFT_OIDN"] == "/another"
+    monkeypatch.delenv("LIGHTSHAFT_OIDN")
+    programs.find_denoiser()
+    assert "LIGHTSHAFT_OIDN" not in os.environ, "this Python has no pyoidn"
+
+    library = tmp_path / "pyoidn" / "lib.linux" / "libOpenImageDenoise.so.2.3.4"
+    library.parent.mkdir(parents=True)
+    library.touch()
+    (tmp_path / "pyoidn" / "__init__.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("LIGHTSHAFT_OIDN", "")  # so that it is restored
+    monkeypatch.delenv("LIGHTSHAFT_OIDN")
+    programs.find_denoiser()
+    assert os.environ["LIGHTSHAFT_OIDN"] == str(library)
 
 
 def test_killed_programs_are_started_again_where_they_were(tmp_path, leaves_nothing):

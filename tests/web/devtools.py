@@ -111,8 +111,8 @@ class Browser:
             if not self._changed.wait_for(lambda: there() or self._ended, timeout):
                 raise DevToolsError(f"no {method} within {timeout} s")
 
-    def open(self, url, width=1280, height=900, phone=False):
-        """A page of its own, with cookies of its own."""
+    def open(self, url, width=1280, height=900, phone=False, scheme=""):
+        """A page of its own, with cookies of its own. `scheme`: light or dark, instead of what the browser says of this system."""
         context = self.call("Target.createBrowserContext")["browserContextId"]
         target = self.call("Target.createTarget", {"url": "about:blank", "browserContextId": context})["targetId"]
         session = self.call("Target.attachToTarget", {"targetId": target, "flatten": True})["sessionId"]
@@ -121,6 +121,7 @@ class Browser:
             page.call(f"{domain}.enable")
         page.call("Emulation.setDeviceMetricsOverride",
                   {"width": width, "height": height, "deviceScaleFactor": 2 if phone else 1, "mobile": phone})
+        page.call("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": scheme}]})
         page.go(url)
         return page
 
@@ -239,9 +240,9 @@ class Page:
                 out.append(f"blocked: {params['blockedReason']}")
         return out
 
-    def screenshot(self, path, whole=True):
+    def screenshot(self, path, whole=True, quality=50):
         """Of the whole page, or of what fits the window: a PNG, or a .jpg."""
-        form = {"format": "jpeg", "quality": 50} if str(path).endswith(".jpg") else {"format": "png"}
+        form = {"format": "jpeg", "quality": quality} if str(path).endswith(".jpg") else {"format": "png"}
         data = self.call("Page.captureScreenshot", {**form, "captureBeyondViewport": whole})["data"]
         with open(path, "wb") as file:
             file.write(base64.b64decode(data))

@@ -203,7 +203,7 @@ def test_the_denoised_picture_is_offered_where_there_is_one(real_farm, page):
     page.wait("document.querySelector('.image-tools') && !document.querySelector('.image-tools [value=denoised]')")
 
 
-@pytest.mark.parametrize("width", [1280, 375])
+@pytest.mark.parametrize("width", [1280, 768, 375])
 def test_the_report_page_stands_alone(real_farm, page, width):
     """Its own policy is in force: a style or picture that it forbids would be a complaint, and so would any address."""
     markup = "<img src=x onerror=document.title='stolen'>"

@@ -69,7 +69,7 @@ def test_a_job_that_waits_for_others_says_for_which(farm, dashboard):
     why = "It waits for j-7, which is rendering."
     farm.jobs["j-1"] = job(state="queued", units_done=0, waits_for=why, after=[{"id": "j-7", "state": "running"}, {"id": "j-8", "state": None}])
     page = dashboard()
-    assert page.text("[data-job=j-1] .reason") == why
+    assert page.text("[data-job=j-1] .reason") == why and page.text("[data-job=j-1] .pill") == "held"
     page.evaluate("void (location.hash = '#/jobs/j-1')")
     assert page.text(".job-head .sub") == why
     assert "After j-7 (rendering), j-8 (removed)" in " ".join(page.text(".job-facts").split())
@@ -179,6 +179,47 @@ def test_the_log_is_read_on_the_page(farm, dashboard):
     farm.log += "12:00:09 done\n"
     page.click(".job-log button")
     page.wait("document.querySelector('.job-log pre').textContent.includes('12:00:09 done')")
+
+
+def test_an_open_log_follows_its_job_and_shows_its_end(farm, dashboard):
+    farm.jobs["j-1"] = job()
+    farm.log = "".join(f"12:00:01 tile {n} is done\n" for n in range(100))
+    page = dashboard("#/jobs/j-1")
+    page.click(".job-log summary")
+    lines = "document.querySelector('.job-log pre')"
+    at_end = f"{lines}.scrollTop > 0 && {lines}.scrollHeight - {lines}.scrollTop - {lines}.clientHeight < 2"
+    page.wait(at_end)
+
+    farm.log += 50 * "12:00:09 lab-01 was lost\n"
+    farm.change("j-1", progress=0.5)
+    page.wait(f"{lines}.textContent.includes('lab-01 was lost') && {at_end}")
+    # The log does not scroll to its end while somebody reads further up.
+    page.evaluate(f"{lines}.scrollTop = 40")
+    farm.log += "12:00:20 done\n"
+    farm.change("j-1", state="done", progress=1)
+    page.wait(f"{lines}.textContent.endsWith('12:00:20 done\\n')")
+    assert page.evaluate(f"{lines}.scrollTop") == 40
+
+    page.click(".job-log summary")
+    page.wait("!document.querySelector('.job-log').open && document.querySelector('.job-log .help')")
+
+
+def test_who_scrolls_up_while_new_lines_of_a_log_come_stays_there(farm, dashboard):
+    farm.jobs["j-1"] = job()
+    farm.log = "".join(f"12:00:01 tile {n} is done\n" for n in range(100))
+    page = dashboard("#/jobs/j-1")
+    page.click(".job-log summary")
+    lines = "document.querySelector('.job-log pre')"
+    page.wait(f"{lines}.scrollTop > 0")
+    # The reader scrolls between the drawing of the new lines and what the page does next in that frame.
+    page.evaluate(f"new MutationObserver(() => {{ {lines}.scrollTop = 40; }}).observe({lines}, {{ childList: true, characterData: true, subtree: true }})")
+
+    farm.log += "12:00:20 done\n"
+    page.click(".job-log button")
+
+    page.wait(f"{lines}.textContent.endsWith('12:00:20 done\\n')")
+    page.evaluate("new Promise(requestAnimationFrame).then(() => new Promise(requestAnimationFrame))")
+    assert page.evaluate(f"{lines}.scrollTop") == 40
 
 
 def test_what_has_no_sample_is_not_offered_as_a_picture(farm, dashboard):

@@ -73,6 +73,18 @@ def test_a_session_that_ends_leads_back_to_the_sign_in(farm, dashboard):
     assert page.text(".field-error").startswith("Your session has ended")
 
 
+def test_a_late_answer_to_an_ended_session_leaves_the_reason(farm, dashboard):
+    page = dashboard()
+    page.hold_reply("method === 'GET' && url.includes('/workers')")
+    farm.signed_in = False
+    farm.drop_streams()
+    page.wait("window.held && document.querySelector('.field-error')?.innerText.startsWith('Your session has ended')")
+
+    page.release_reply()
+
+    assert page.text(".field-error").startswith("Your session has ended")
+
+
 # ---- jobs ----
 
 def test_jobs_follow_the_event_stream(farm, dashboard):

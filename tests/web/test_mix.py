@@ -213,7 +213,7 @@ def test_a_picture_without_media_apart_has_no_gains_for_them(farm, lit):
     assert page.count(".mix-head input") == 0
 
 
-@pytest.mark.parametrize("width", [1280, 375])
+@pytest.mark.parametrize("width", [1280, 768, 375])
 def test_the_panel_is_used_by_keyboard_alone_and_fits(lit, width):
     page = lit("mix=lamp*v*g1", width=width, height=800, phone=width < 500)
     page.wait("document.querySelectorAll('.mix-part').length === 3 && [...document.styleSheets].some((sheet) => sheet.href?.endsWith('mix.css'))")
@@ -232,6 +232,21 @@ def test_the_panel_is_used_by_keyboard_alone_and_fits(lit, width):
     page.evaluate("document.querySelector('[aria-label=\"Mute sun\"]').focus()")
     page.key(" ", code="Space", virtual=32, text=" ")
     page.wait("location.hash.includes('mix=sun*m*g0.1')")
+
+
+def test_changes_faster_than_the_page_is_drawn_are_all_kept(lit):
+    page = lit("")
+    page.wait("document.querySelector('[aria-label=\"Mute sun\"]')")
+
+    page.evaluate("""(() => {
+      const [gain, mute] = ["sun: gain slider", "Mute sun"].map((name) => document.querySelector(`[aria-label="${name}"]`));
+      gain.value = "1";
+      gain.dispatchEvent(new Event("input", { bubbles: true }));
+      mute.click();
+      document.querySelector('[aria-label="Solo lamp"]').click();
+    })()""")
+
+    assert query(page).endswith("mix=sun*m*g1&mix=lamp*s")
 
 
 @pytest.mark.parametrize("kelvin, x, y", [(2856, 0.44757, 0.40745), (4000, 0.38045, 0.37675), (6500, 0.31352, 0.32363), (10000, 0.28063, 0.28829)])

@@ -30,6 +30,33 @@ def drop(page, names, at):
     }})()""")
 
 
+def drop_from_the_desktop(page, path, at):
+    """As a browser gets it of a file manager: with folders, which a script cannot make."""
+    x, y = page.wait(f"(() => {{ const b = document.querySelector({json.dumps(at)}).getBoundingClientRect(); return [b.left + b.width / 2, b.top + b.height / 2]; }})()")
+    for kind in ("dragEnter", "dragOver", "drop"):
+        page.call("Input.dispatchDragEvent", {"type": kind, "x": x, "y": y, "data": {"items": [], "files": [str(path)], "dragOperationsMask": 1}})
+
+
+def test_a_dropped_folder_is_walked_and_sent_with_what_its_scene_names(farm, dashboard, tmp_path):
+    meshes = tmp_path / "shot" / "meshes"
+    meshes.mkdir(parents=True)
+    (meshes / "ball.obj").write_text("v 0 0 0\n")
+    for n in range(120):  # a browser lists 100 files of a folder at a time
+        (meshes / f"old{n}.obj").touch()
+    (tmp_path / "shot" / "scene.xml").write_text('<scene version="3.0.0"><shape type="obj"><string name="filename" value="meshes/ball.obj"/></shape></scene>')
+    page = dashboard()
+    page.wait("document.querySelector('main h1')")
+
+    drop_from_the_desktop(page, tmp_path / "shot", "main h1")
+
+    page.wait("location.hash === '#/submit' && document.querySelector('.bundle h2')?.innerText === 'scene.xml'")
+    assert "meshes/ball.obj" in page.text(".bundle") and "old119.obj" in page.evaluate("document.querySelector('.bundle').textContent")
+    page.click("form.settings button.primary")
+    page.wait("location.hash === '#/jobs/j-new'")
+    (sent,) = farm.submitted
+    assert list(sent["assets"]) == ["meshes/ball.obj"] and farm.blobs[sent["assets"]["meshes/ball.obj"]] == b"v 0 0 0\n"
+
+
 @pytest.mark.parametrize("route, at", [("#/jobs", "header"), ("#/jobs/j-1", "h1"), ("#/workers", "main"), ("#/submit", "header"), ("#/view/j-1", "float-view")])
 def test_files_dropped_anywhere_make_a_job(farm, dashboard, route, at):
     farm.jobs["j-1"] = job(size=farm.size)

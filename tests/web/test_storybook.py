@@ -41,7 +41,7 @@ FACTS = {
 
 
 @pytest.mark.parametrize("view", FACTS)
-@pytest.mark.parametrize("width", [1280, 375])
+@pytest.mark.parametrize("width", [1280, 768, 375])
 def test_view_shows_its_facts_and_fits_the_screen(open_page, farm, view, width):
     page = open_page(f"{farm.url}/demo.html?view={view}", width=width, height=800, phone=width < 500)
 

@@ -499,7 +499,7 @@ def test_names_of_layers_and_objects_are_shown_as_text(farm, viewer):
     assert markup in page.text("h1") and page.count("#app img") == 0
 
 
-@pytest.mark.parametrize("width", [1280, 375])
+@pytest.mark.parametrize("width", [1280, 768, 375])
 def test_the_viewer_fits_the_screen_and_every_control_is_reached_by_tab(compared, width):
     page = compared("with=j-2", width=width, height=800, phone=width < 500)
     page.wait("document.querySelector('[name=by]')")

@@ -81,8 +81,10 @@ std::string map(const std::vector<std::byte>& png, const char* name, const char*
 std::string pictures(const JobPage& page, const Json& report) {
   std::string out;
   if (!page.image.empty())
-    out += "<figure class=\"image\">" + picture(page.image, escape_html(name_of(report)) + ", the image") +
-           "</figure>\n";
+    out += fmt::format(
+        "<figure><div class=\"image\">{}</div><figcaption>{}</figcaption></figure>\n",
+        picture(page.image, escape_html(name_of(report)) + (page.denoised ? ", denoised" : ", the image")),
+        page.denoised ? "Denoised; the maps are of the image as it was rendered." : "As it was rendered.");
   const bool flagged = number(report, "few_hits_pixels") > 0;
   const std::string maps =
       map(page.error_map, "error",

@@ -15,6 +15,7 @@ namespace ls::report {
 struct JobPage {
   std::string report;                                    // JSON as returned by GET /api/v1/jobs/ID/report
   std::vector<std::byte> image, error_map, samples_map;  // PNG files; empty: not available
+  bool denoised = false;                                 // true: `image` is the denoised picture
 };
 // Generates the page. A part of the page is left out if the report lacks a field that it needs, or the field
 // has the wrong type. invalid_argument: the report is not a JSON object.

@@ -12,6 +12,7 @@
 #include <new>
 #include <string>
 
+#include "core/base/helper_program.h"
 #include "core/base/parse_number.h"
 #include "core/base/spawn.h"
 #include "core/image/reference/exchange.h"
@@ -60,8 +61,9 @@ void decode(std::byte* shared) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto seconds = argc == 3 ? ls::parse_number<unsigned>(argv[1]) : std::nullopt;
-  const auto bytes = argc == 3 ? ls::parse_number<std::uint64_t>(argv[2]) : std::nullopt;
+  if (argc != 3) return ls::answer_person("lightshaft-exr", LIGHTSHAFT_VERSION, argc, argv);
+  const auto seconds = ls::parse_number<unsigned>(argv[1]);
+  const auto bytes = ls::parse_number<std::uint64_t>(argv[2]);
   struct stat info {};
   if (!seconds || !bytes || ::fstat(ls::kHelperFd, &info) != 0) return 2;
   const auto size = static_cast<std::size_t>(info.st_size);

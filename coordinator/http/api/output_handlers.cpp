@@ -8,6 +8,7 @@
 #include "coordinator/base/limits.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/message/json_read.h"
+#include "coordinator/service/pages/report_page.h"
 #include "coordinator/views/views.h"
 #include "core/base/parse_number.h"
 #include "util/report/job_page.h"
@@ -181,13 +182,9 @@ Response get_report(Api& api, const Request&, const JobId& id) {
 }
 
 Response get_report_page(Api& api, const Request&, const JobId& id) {
-  auto image = api.coordinator().image_png(id);
-  if (!image) return problem(image.error());
   auto report = api.coordinator().report_json(id);
   if (!report) return problem(report.error());
-  auto page = report::job_page({std::move(*report), std::move(*image),
-                                api.coordinator().error_png(id).value_or(std::vector<std::byte>{}),
-                                api.coordinator().samples_png(id).value_or(std::vector<std::byte>{})});
+  auto page = coordinator::report_page(api.coordinator(), id, std::move(*report));
   if (!page) return problem(page.error());
   Response response = text_response(200, "text/html; charset=utf-8", std::move(*page));
   response.headers.emplace_back("Content-Security-Policy",

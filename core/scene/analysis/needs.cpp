@@ -271,7 +271,9 @@ class Words {
   void lights() {
     const std::uint32_t sampled = n_.sampled_lights();
     say("next-event estimation", sampled > 0, fmt::format("{} lights to sample", sampled),
-        "no light to sample: paths find what shines");
+        n_.emission
+            ? "no lamp to sample; volpath looks for grids that give off light if that pays (emissive_grids)"
+            : "no light to sample: paths find what shines");
     say("choice among lights", sampled > 1, fmt::format("{} lights", sampled), "one light at most");
     say("area lights", n_.area_lights, "shining shapes");
     say("point and spot lights",

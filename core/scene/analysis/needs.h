@@ -9,11 +9,15 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/scene/scene.h"
 
 namespace ls::scene {
+
+// The text of a warning, to which a reader may add what to do.
+inline constexpr std::string_view kNoLight = "the scene has no light, so that the picture is black";
 
 struct FileNeed {
   std::string name;

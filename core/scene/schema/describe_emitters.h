@@ -144,11 +144,17 @@ void describe(V& v, T& e) {
   describe_links(v, e);
 }
 
-LS_TYPE(GoniometricEmitter, "emitter", "goniometric", "",
-        "light from a point, the origin of `to_world`, with an intensity by direction as of a measured lamp: "
-        "`texture` is a square image of all directions in the equal-area octahedral form of Clarberg (2008) "
-        "and pbrt-v4. Before `to_world` its middle is +z and its corners are -z; right is +x and down +y. "
-        "Its filter is best `nearest`: others blend what lies on different sides of the square's edge")
+LS_TYPE(
+    GoniometricEmitter, "emitter", "goniometric", "",
+    "light from a point, the origin of `to_world`, with an intensity by direction as of a measured lamp: "
+    "`texture` is a square image of all directions in the equal-area octahedral form of Clarberg (2008) "
+    "and pbrt-v4. Before `to_world` its middle is +z and its corners are -z; right is +x and down +y. "
+    "Its `wrap_mode` is best `clamp`: others blend what lies on different sides of the square's edge. "
+    "`filename` may name the image instead, or an IES file (LM-63) of a real lamp, in which +z is straight "
+    "down for a lamp under a ceiling and horizontal angles run from +x towards -y (types A and B: +z is "
+    "where the lamp aims, and the angles turn from it towards +x and +y); its candelas are multiplied by "
+    "`intensity`. An IES file becomes an image of 512 x 512 directions, each about a third of a degree wide; "
+    "one with a narrower beam is refused")
 template <class V, Of<GoniometricEmitter> T>
 void describe(V& v, T& e) {
   v.field({.name = "to_world", .doc = "places, turns and mirrors the light; scaling it has no effect"},

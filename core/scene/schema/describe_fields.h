@@ -90,6 +90,11 @@ void describe(V& v, T& i) {
             "whether 2 to 64 lights are chosen by which of them reach the place that is lit, as camera paths "
             "learned it; 0: if that pays; -1: never; 1: where it is possible",
             i.local_lights);
+  technique(
+      "emissive_grids", {-1, 1}, {"volpath"},
+      "whether light is also looked for in the directions of the cells of grids that give off light, such "
+      "as fire; 0: if that pays; -1: never; 1: where it is possible",
+      i.emissive_grids);
   technique("path_splitting", {-1, 0}, {"volpath"},
             "in scenes with grids, whether paths split at their first scattering if it is in a grid, and "
             "Russian roulette compares their weight with that behind the first scattering; 0: where it is "

@@ -51,7 +51,7 @@ void describe(V& v, T& s) {
 // Describes the box of a volume of noise.
 template <class V, class T>
 void describe_noise_box(V& v, T& s) {
-  v.field({.name = "min", .doc = "corner of the box that it fills as a density", .given_as = "point"}, s.min);
+  v.field({.name = "min", .doc = "corner of the box that it fills as a density or as light", .given_as = "point"}, s.min);
   v.field({.name = "max", .doc = "the opposite corner", .given_as = "point"}, s.max);
   v.field({.name = "to_world", .doc = "moves it, with its box"}, s.to_world);
 }
@@ -76,8 +76,8 @@ void describe(V& v, T& s) {
 LS_TYPE(
     NoiseVolume, "volume", "noise", "",
     "noise in octaves (Perlin's, with hashed gradients), from `low` to `high`, most of it near their mean. "
-    "As a density it fills its box; as anything else, or a part of another volume, it is everywhere. Not "
-    "in Mitsuba")
+    "As a density or as light it fills its box; as anything else, or a part of another volume, it is "
+    "everywhere. Not in Mitsuba")
 template <class V, Of<NoiseVolume> T>
 void describe(V& v, T& s) {
   constexpr double kFar = 1e6;
@@ -108,8 +108,8 @@ void describe(V& v, T& s) {
 LS_TYPE(
     CloudVolume, "volume", "cloud", "",
     "pbrt's cloud: noise that thins out with the height y, 1 at y = 0 and about 0 at y = 1, with edges that "
-    "another noise frays. As a density it fills its box; as anything else, or a part of another volume, it "
-    "is everywhere. Not in Mitsuba")
+    "another noise frays. As a density or as light it fills its box; as anything else, or a part of another "
+    "volume, it is everywhere. Not in Mitsuba")
 template <class V, Of<CloudVolume> T>
 void describe(V& v, T& s) {
   constexpr double kMost = 1e6;

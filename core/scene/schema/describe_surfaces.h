@@ -13,7 +13,7 @@ void describe(V& v, T& t) {
 }
 
 LS_TYPE(BitmapTexture, "texture", "bitmap", "",
-        "an image: PNG, JPEG, BMP, TGA, QOI, EXR, HDR or PFM; (u, v) = (0, 0) is its upper left corner")
+        "an image: PNG, JPEG, BMP, TGA, QOI, EXR, HDR, PFM or IES; (u, v) = (0, 0) is its upper left corner")
 template <class V, Of<BitmapTexture> T>
 void describe(V& v, T& t) {
   v.field({.name = "filename", .doc = "the image", .required = true}, t.file);

@@ -9,6 +9,7 @@ constexpr IntegratorRow kIntegrators[] = {
     {"vol_path", "volpath", {}},
     {"volpath_mis", "volpath", {}},
     {"vol_path_mats", "volpath", {}},
+    {"vol_path_ems", "volpath", {}},
     {"vol_path_mis", "volpath", {}},
     {"path", "path", {}},
     {"path_mats", "path", {}},
@@ -20,6 +21,7 @@ constexpr IntegratorRow kIntegrators[] = {
     {"direct_mis", "path", 2},
     {"whitted", "whitted", {}},
     {"photonmapper", "path", {}, "light is computed without the blur of photon maps"},
+    {"progressive_photonmapper", "path", {}, "light is computed without the blur of photon maps"},
 };
 
 }  // namespace

@@ -112,8 +112,9 @@ class JobSpec(TypedDict):
     techniques: NotRequired[str]
     """Sampling techniques that are used (+NAME) or not used (-NAME), for debugging. Possible are
     equiangular, exponential, camera_points, lamp_directions, lamp_flights, light_vertices, light_tree,
-    path_reuse, shadow_roulette, sky_samples, path_splitting, sky_portals, local_lights. Without it, they
-    are chosen for the scene. Every image is right with any of them; only its noise differs."""
+    path_reuse, shadow_roulette, sky_samples, path_splitting, sky_portals, local_lights, emissive_grids.
+    Without it, they are chosen for the scene. Every image is right with any of them; only its noise
+    differs."""
     aov: NotRequired[list[str]]
     """Further layers of the image (docs/reference/aovs.md). Possible are albedo, alpha, coverage,
     denoising_albedo, denoising_normal, depth, direct, emission, geo_normal, indirect, light_groups,

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import models
-from .errors import BadAnswer, Conflict, NotFound
+from .errors import BadAnswer, Conflict, FarmBusy, NotFound
 from .job import Verdict
 from .steps import Call, Steps, fetch, get_job, job_path, succeed
 
@@ -55,23 +55,35 @@ def take(job: str) -> Steps[Snapshot]:
 
 
 def of_view(view: models.Job) -> Steps[Snapshot]:
-    shown = view["id"]
+    shown, state = view["id"], str(view["state"])
     frames = view.get("frames")
     if frames:  # of a sequence: the frame to look at
-        shown = next(
+        shown, state = next(
             (
-                frame["id"]
+                (frame["id"], str(frame.get("state")))
                 for frame in frames.get("list", [])
                 if frame.get("frame") == frames.get("current")
             ),
-            shown,
+            (shown, state),
         )
     try:
-        png = yield from fetch(job_path(shown, "/image.png"))
+        # While it renders the image itself is shown: denoising it each time would take seconds.
+        png, denoised = yield from _picture(shown, view.get("denoise") is True and state in ENDED)
         curve = yield from get_curve(shown)
     except (NotFound, Conflict):  # nothing is rendered yet
-        png, curve = b"", {}
-    return Snapshot(view, png if png.startswith(b"\x89PNG") else b"", curve)
+        png, denoised, curve = b"", False, {}
+    return Snapshot(view, png if png.startswith(b"\x89PNG") else b"", curve, denoised)
+
+
+def _picture(job: str, denoised: bool) -> Steps[tuple[bytes, bool]]:
+    """Returns a PNG, and whether it is the denoised image: if it cannot be had, it is the image itself."""
+    path = job_path(job, "/image.png")
+    if denoised:
+        try:
+            return (yield from fetch(path + "?layer=denoised")), True
+        except (Conflict, FarmBusy):  # it was not made, or its library is gone
+            pass
+    return (yield from fetch(path)), False
 
 
 def summary(view: models.Job) -> str:
@@ -113,6 +125,8 @@ class Snapshot:
     png: bytes
     """Empty while there is no picture."""
     curve: Curve
+    denoised: bool = False
+    """True if `png` is the denoised image."""
 
     def __repr__(self) -> str:
         return f"<job {self.view['id']}: {summary(self.view)}>"
@@ -133,8 +147,10 @@ class Snapshot:
             if text:
                 lines.append(html.escape(str(text)))
         picture = (
-            '<img alt="the image so far" style="max-width:480px" src="data:image/png;base64,'
+            f'<figure style="margin:0"><img alt="the image{", denoised" if self.denoised else " so far"}" '
+            'style="max-width:480px" src="data:image/png;base64,'
             f'{base64.b64encode(self.png).decode()}">'
+            f"<figcaption>{'denoised' if self.denoised else 'as rendered'}</figcaption></figure>"
             if self.png
             else "<i>no picture yet</i>"
         )

@@ -11,11 +11,12 @@ import urllib.request
 from collections.abc import Iterator
 
 from lightshaft_command.children import Children, how_it_ended, say, start
-from lightshaft_command.programs import PACKAGE, find
+from lightshaft_command.programs import BUNDLED, PACKAGE, find
 
 BUNDLED_SCENE = PACKAGE / "bath" / "bath.xml"  # in a wheel
 BATH = ["--spp", "16"]  # some 25 s of one core; with the denoiser it looks finished
 BATH_EXPOSURE = 0.8
+HOW_TO_DENOISE = f"{sys.executable} -m pip install pyoidn" if BUNDLED.exists() else "deploy/install-denoiser.sh"
 PATIENCE = 60.0  # seconds for one answer of the coordinator
 
 
@@ -60,13 +61,16 @@ class FirstPicture:
                     say("this installation has no scene for a first picture: submit your own")
                     return
                 say("making the scene of the first picture")
-                yield start([sys.executable, "-B", str(maker), str(self.home / "bath")], subprocess.DEVNULL)
+                with self.errors.open("wb") as errors:
+                    yield start([sys.executable, "-B", str(maker), str(self.home / "bath")], subprocess.DEVNULL, None, errors)
                 scene = self.home / "bath" / "bath.xml"
             found = self.home / "doctor.json"
             with found.open("wb") as output:
                 # It may end with 1, for what has nothing to do with the picture.
                 yield start(["/bin/sh", "-c", '"$0" doctor --json; true', lightshaft], output, environment)
             denoise = ["--denoise"] if _has_denoiser(found) else []
+            if not denoise:
+                say(f"Open Image Denoise is missing, so noise will be visible in the first picture; to install it: {HOW_TO_DENOISE}")
             unfinished = self.home / "job.unfinished"
             # Warnings of the scene, or why it is refused.
             with unfinished.open("wb") as output, self.errors.open("wb") as errors:

@@ -137,6 +137,19 @@ def test_a_stage_without_camera_and_light_is_seen_from_its_front(farm, tmp_path,
     assert any("no camera" in t for t in texts) and any("no light" in t for t in texts)
 
 
+@pytest.mark.parametrize("extent", [[(1, 1, 1), (0, 0, 0)], [(1, 1, 0), (1, 1, 0)]])
+def test_a_wrong_extent_hides_nothing(farm, tmp_path, extent):
+    stage = new_stage(tmp_path)
+    square = mesh(stage, "/m", [(0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0)], [(0, 1, 2, 3)])
+    colours(square, [(0, 0, 0)], "constant")
+    square.CreateExtentAttr(extent)
+
+    with pytest.warns(lightshaft.SceneWarning, match="no camera"):
+        shown = image(farm, stage, 4, (40, 40))
+
+    check(shown, 0, 1, 0.25, 0.75)
+
+
 def test_a_camera_that_is_none_is_told(stage):
     made = camera(stage, (0, 0, 10), (0, 0, 0), path="/world/eye")
     made.GetFocalLengthAttr().Set(0.0)

@@ -257,6 +257,23 @@ def shown_border(values):
     return np.ptp(near, axis=0) == 0
 
 
+def test_a_perspective_is_no_placement(tmp_path):
+    stage = new_stage(tmp_path)
+    square = mesh(stage, "/m", [(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 1, 2)])
+    square.AddTransformOp().Set(Gf.Matrix4d(1, 0, 0, 0.5, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1))
+
+    with pytest.raises(lightshaft.StageRejected, match="/m: error: its transform is a perspective"):
+        lightshaft.usd.read(path_of(stage))
+
+
+def test_a_mesh_without_faces_is_told(tmp_path):
+    stage = new_stage(tmp_path)
+    mesh(stage, "/m", [(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 1, 2)])
+    mesh(stage, "/none", [], [])
+
+    assert "/none: warning: it has no faces: nothing of it is seen" in lightshaft.usd.read(path_of(stage)).warnings
+
+
 def test_transforms_visibility_purpose_and_variants(farm, tmp_path):
     stage = new_stage(tmp_path)
     sky(stage)

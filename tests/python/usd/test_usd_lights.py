@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 import pytest
+from PIL import Image
 from stage_kit import (
     Gf,
     NARROW,
@@ -242,6 +243,18 @@ def test_a_dome_stands_as_openexr_says(farm, tmp_path, up, axis, old):
         expected = np.zeros(3)
         expected[i] = 2
         agree(seen(farm, stage, 4, (8, 8), camera=f"/camera{i}"), expected)
+
+
+def test_a_dome_may_have_an_image_of_one_pixel(farm, tmp_path):
+    """A map of the scene format has three rows and two columns at least."""
+    stage = new_stage(tmp_path)
+    Image.new("RGB", (1, 1), (255, 0, 255)).save(tmp_path / "sky.png")
+    dome = UsdLux.DomeLight.Define(stage, "/dome")
+    dome.CreateTextureFileAttr(str(tmp_path / "sky.png"))
+    dome.CreateIntensityAttr(2.0)
+    camera(stage, (0, 0, 0), (0, 0, 1), 5.0)
+
+    agree(seen(farm, stage, 4, (8, 8)), np.array([2.0, 0, 2.0]))
 
 
 def test_the_image_of_a_rect_light_is_upright(farm, tmp_path):

@@ -16,7 +16,7 @@ FOLDERS = ("core", "formats", "util", "proto", "worker", "coordinator", "validat
 # "worker/*" are all areas under worker.
 # What all of the coordinator knows; what talks to its facade, and no further.
 COORDINATOR_BASE = ["core", "util", "coordinator/base", "coordinator/domain", "coordinator/views"]
-FACADE = COORDINATOR_BASE + ["coordinator/store/blobs/blob_store.h", "coordinator/service/coordinator.h"]
+FACADE = COORDINATOR_BASE + ["coordinator/store/blobs/blob_store.h", "coordinator/service/coordinator.h", "coordinator/service/pages/report_page.h"]
 AREAS = {
     # It decides the bits of an image together with worker/render; both are what the build id covers.
     "core": [],

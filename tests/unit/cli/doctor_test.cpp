@@ -37,6 +37,7 @@ FarmFacts good_farm() {
   facts.role = "admin";
   facts.version = "1.0";
   facts.stuck_jobs.emplace();
+  facts.workers_address = "farm.example:50051";
   facts.workers = {{"w1", "connected", "1.0", "abc", false}};
   return facts;
 }
@@ -93,6 +94,7 @@ INSTANTIATE_TEST_SUITE_P(
                      [](MachineFacts& f) { f.denoiser = "", f.denoiser_trouble = "none"; }},
         MachineFault{"python", Status::warning, [](MachineFacts& f) { f.python.interpreter.clear(); }},
         MachineFault{"python", Status::warning, [](MachineFacts& f) { f.python.part.clear(); }},
+        MachineFault{"python", Status::warning, [](MachineFacts& f) { f.python.makes_scene = true; }},
         MachineFault{"cache", Status::problem, [](MachineFacts& f) { f.folders[0].usable = false; }},
         MachineFault{"cache", Status::warning,
                      [](MachineFacts& f) { f.folders[0].free_bytes = (1ull << 30) - 1; }},
@@ -143,6 +145,8 @@ INSTANTIATE_TEST_SUITE_P(
                   [](FarmFacts& f) { f.session_status = 403, f.role = "", f.session_trouble = "no"; }},
         FarmFault{"version", Status::warning, "0.9", [](FarmFacts& f) { f.version = "0.9"; }},
         FarmFault{"version", Status::warning, "does not tell", [](FarmFacts& f) { f.version = ""; }},
+        FarmFault{"workers-port", Status::warning, "let port 50051 pass",
+                  [](FarmFacts& f) { f.workers_trouble = "Connection refused"; }},
         FarmFault{"workers", Status::warning, "none", [](FarmFacts& f) { f.workers->at(0).state = "lost"; }},
         FarmFault{"jobs", Status::warning, "1 unfinished job makes no progress; j-7: lacks a tag",
                   [](FarmFacts& f) {
@@ -174,6 +178,24 @@ TEST(ClockLead, OneMinuteIsTolerated) {
   EXPECT_EQ(find(judge(facts), "clock").status, Status::ok);
   facts.date = 1061;  // at least 60.5 s ahead
   EXPECT_EQ(find(judge(facts), "clock").status, Status::warning);
+}
+
+TEST(Doctor, NumPyIsOptionalWhereTheFirstSceneIsReady) {
+  MachineFacts facts = good_machine();
+  EXPECT_FALSE(facts.python.numpy);
+  EXPECT_EQ(find(judge_machine(facts), "python").status, Status::ok);
+  facts.python.makes_scene = facts.python.numpy = true;
+  EXPECT_EQ(find(judge_machine(facts), "python").status, Status::ok);
+}
+
+TEST(Doctor, PortForWorkersOfTheCoordinatorsMachineAloneIsNotTried) {
+  FarmFacts facts = good_farm();
+  facts.workers_address = "127.0.0.1:50051";
+
+  const Finding found = find(judge(facts), "workers-port");
+
+  EXPECT_EQ(found.status, Status::ok);
+  EXPECT_THAT(found.what, HasSubstr("its own machine alone"));
 }
 
 TEST(Doctor, RequiresNoTlsForThisMachine) {

@@ -127,6 +127,8 @@ TEST(Nvdb, RefusesGridsThatAreNotDensitiesByName) {
   builder.type = 1;
   builder.version = 33u << 21;
   EXPECT_THAT(read(builder.file()).error, HasSubstr("version 33.0; known is version 32"));
+  builder.version = 19;
+  EXPECT_THAT(read(builder.file()).error, HasSubstr("version 19; known is version 32"));
   builder = {};
   builder.hi = {-1, -1, -1};
   EXPECT_THAT(read(builder.file()).error, HasSubstr("is empty"));

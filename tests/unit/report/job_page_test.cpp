@@ -329,6 +329,17 @@ TEST(JobPage, ProvenanceShowsTheRequestedSettings) {
   for (const char* name : {"Samples asked", "Time asked", "Target relMSE"}) expect_not(page_of(report), name);
 }
 
+TEST(JobPage, CaptionSaysWhetherThePictureIsDenoised) {
+  JobPage page{.report = some_report().dump(), .image = {std::byte{1}}};
+  expect(*job_page(page), "<figcaption>As it was rendered.</figcaption>");
+  expect_not(*job_page(page), "Denoised; the maps");
+
+  page.denoised = true;
+
+  expect(*job_page(page), "<figcaption>Denoised; the maps are of the image as it was rendered.</figcaption>");
+  expect(*job_page(page), "alt=\"bath.xml, denoised\"");
+}
+
 TEST(JobPage, SampleLegendMarksItsUpperEndAsOpen) {
   auto page = job_page({some_report().dump(), {}, {std::byte{1}}, {std::byte{2}}});
   ASSERT_TRUE(page);

@@ -17,6 +17,7 @@
 #include <cstring>
 #include <vector>
 
+#include "core/base/helper_program.h"
 #include "core/base/spawn.h"
 #include "util/denoise/exchange.h"
 
@@ -170,7 +171,7 @@ class Run {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 4) return 2;
+  if (argc != 4) return ls::answer_person("lightshaft-denoise", LIGHTSHAFT_VERSION, argc, argv);
   confine(static_cast<unsigned>(std::max(1, std::atoi(argv[3]))));
   struct stat file {};
   if (::fstat(ls::kHelperFd, &file) != 0) return 3;

@@ -4,6 +4,7 @@ import { frameHref } from "./route.js";
 import { displayOf, doneFrames, layerOf, withJob, withOpen, withUi, withoutJob } from "./state.js";
 
 const kVideoPauseMs = 1000;
+const kNearEnd = 8; // pixels: a log that is scrolled to its end, but for these, stays at its end
 
 export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) {
   async function change(id, wanted) {
@@ -99,10 +100,22 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
       return watchVideo(id, api.makeVideo(id, { exposure, fps, view: displayOf(get()), ...(layer === "denoised" ? { layer } : {}) }));
     },
     setState: change,
+    /** Who looks at the end of the log goes on to see its end. */
     readLog: async (id) => {
       const log = await attempt(() => api.log(id));
-      if (log !== undefined && get().open?.shown === id) set(withOpen(get(), { log }));
+      if (log === undefined || get().open?.shown !== id) return;
+      const lines = () => document.querySelector(".job-log pre");
+      const seen = lines();
+      const before = seen?.scrollTop ?? 0;
+      const follows = !seen || seen.scrollHeight - before - seen.clientHeight < kNearEnd;
+      set(withOpen(get(), { log }));
+      if (!follows) return;
+      requestAnimationFrame(() => {
+        const drawn = lines();
+        if (drawn?.scrollTop === before) drawn.scrollTo({ top: drawn.scrollHeight, behavior: "instant" }); // else the reader has moved meanwhile
+      });
     },
+    closeLog: () => set(withOpen(get(), { log: null })),
     renderOn: alter,
     setPriority: (id, priority) => alter(id, { priority }),
     openRename: (id) => {

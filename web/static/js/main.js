@@ -117,8 +117,8 @@ async function enter(first) {
   return null;
 }
 
-/** message: why; without one, that a session that was open has ended. */
-function signedOut(message = state.session === "in" ? kEnded : null) {
+/** message: why; without one, that a session that was open has ended. Several requests can find that out: the message stays. */
+function signedOut(message = state.session === "in" ? kEnded : state.ui.signInError) {
   closeEvents?.();
   closeEvents = null;
   set(withUi({ ...initialState(), narrow: state.narrow, route: state.route, session: "out" }, { signInError: message }));
@@ -183,6 +183,7 @@ async function refreshReport() {
   if (!id || state.jobs?.get(id)?.frames) return; // a sequence whose frames are not known yet
   const report = await api.report(id).catch(() => null); // there is no report before the first checkpoint
   if (report && state.open?.shown === id) set(withOpen(state, { report }));
+  if (state.open?.shown === id && state.open.log !== null) actions.readLog(id);
 }
 
 async function refreshOpen() {

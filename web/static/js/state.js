@@ -53,7 +53,7 @@ export const openJob = (id, shown = id) => ({
   layer: null, // "picture", "denoised", or as a map over the image "error", "samples"; null: the best picture there is
   clock: "seconds", // axis of the plot; or "core_seconds"
   picked: null, // point of the plot under the pointer
-  log: null, // the lines of the job's log, if they were asked for
+  log: null, // the lines of the job's log while it is open
   problem: null, // why the job cannot be shown
   film: null, // {id, playing} while frames of a sequence are scrubbed or played: the frame that is seen
   fps: 24, // pictures per second of what is played, and of a video

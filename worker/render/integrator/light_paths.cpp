@@ -55,6 +55,9 @@ constexpr std::uint64_t kLocalLightTrial = 4;
 constexpr int kLongestLocalLightPath = 6;
 constexpr double kSpreadThatPays = 1.2;
 constexpr double kLocalGainThatPays = 3;
+// Looking for emissive grids pays if the noise of some pixels is more than this many times as high without
+// it, since it traces a ray and walks along it at each vertex.
+constexpr double kEmissiveGainThatPays = 2;
 // A batch ends after this many vertices, since paths may be long.
 constexpr double kLearningVertices = 1 << 15;
 // A batch also ends after this many rays, counting also the boundaries that shadow rays pass: a path may pass
@@ -368,6 +371,21 @@ void learn_local_lights(const IntegratorSettings& settings, int threads, World& 
   if (!visits.places.empty()) w.lights.set_local(&visits);
 }
 
+// Enables next-event estimation towards emissive grids if it pays or the settings request it. Depends on the
+// same data as learn_connections(). The integrator must be `volpath`.
+void learn_emissive(const IntegratorSettings& settings, int threads, World& w) {
+  const bool in_any_case = settings.emissive_grids > 0;
+  if (settings.emissive_grids < 0 || !w.need.emission || !w.depth_allows(1)) return;
+  if (!in_any_case && !pilot_pays(w)) return;
+  EmissiveGrids grids(w.media);
+  if (!grids.any()) return;
+  const auto without = in_any_case ? std::vector<PilotPixel>{} : pilot_pixels(w, kLongestPilot, threads);
+  w.emissive = std::move(grids);
+  if (in_any_case || is_noisier(without, pilot_pixels(w, kLongestPilot, threads), kEmissiveGainThatPays))
+    return;
+  w.emissive = {};
+}
+
 // In scenes with grids, sets up shadow roulette and path splitting. Both need the mean radiance of the image,
 // which is estimated here.
 void learn_roulette(const IntegratorSettings& settings, World& w) {
@@ -395,6 +413,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
     learn_portals(scene.integrator, threads, **world);
     if (!independent) learn_connections(scene.integrator, threads, **world);
     learn_local_lights(scene.integrator, threads, **world);
+    if (settings.integrator == "volpath") learn_emissive(scene.integrator, threads, **world);
     learn_sky_samples(scene.integrator, **world);
     if (!independent) share_tails(scene.integrator, threads, **world);
     if ((*world)->need.grids && !(*world)->need.connected) learn_roulette(scene.integrator, **world);

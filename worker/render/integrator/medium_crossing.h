@@ -88,6 +88,7 @@ auto PathTracer<F, Light>::collide(const Medium& medium, Segment segment, const 
     Light<F>::at_vertex(*this, medium, last_.p, ray_.d);
   }
   if constexpr (F.connected) connect_in(medium, last_.p, ray_.d);
+  if constexpr (F.emission) look_for_emission_in(medium, ray_.d);
   return scatter_in(medium);
 }
 
@@ -159,6 +160,7 @@ auto PathTracer<F, Light>::scatter_by_phase(const Medium& medium) -> Step {
   }
   last_.pdf = s.pdf;
   ray_.d = s.w;
+  if constexpr (F.emission) emissive_.pdf = -1;
   if constexpr (F.visibility) {
     if (world_.ray_flags) [[unlikely]] {
       links_.receiver = world_.medium_links[index_of(medium)];
@@ -205,6 +207,7 @@ auto PathTracer<F, Light>::fly_through_several(const SurfaceHit* end, float reac
   begin_vertex(segment, flight);
   if constexpr (F.aimed) near_lamps_ = LampDirections(world_.lamps, last_.p);
   light_vertex(*met, last_.p, ray_.d);
+  if constexpr (F.emission) look_for_emission_in(*met, ray_.d);
   return scatter_in(*met);
 }
 
@@ -263,7 +266,7 @@ void PathTracer<F, Light>::add_medium_emission_among(float t_max) {
       return light;
     };
     const C3 light = up_to(t_max);
-    if (!is_black(light)) add_along(light, m.light_group, t_max, up_to);
+    if (!is_black(light)) add_along(light, m, t_max, up_to);
   }
 }
 
@@ -302,16 +305,17 @@ void PathTracer<F, Light>::add_medium_emission(const Medium& medium, float t_max
                : closed_emission(medium, t);
   };
   const C3 light = up_to(t_max);
-  if (!is_black(light)) add_along(light, medium.light_group, t_max, up_to);
+  if (!is_black(light)) add_along(light, medium, t_max, up_to);
 }
 
-// Adds `total`, the emission of a medium on the segment ahead, of length t_max. up_to(t) returns that of the
-// first part of the segment. It uses the same random numbers for any t, so that the parts of the emission in
-// the slices of a deep image are each right on average, and add up to the whole.
+// Adds `total`, the emission of the medium on the segment ahead, of length t_max. up_to(t) returns that of
+// the first part of the segment. It uses the same random numbers for any t, so that the parts of the emission
+// in the slices of a deep image are each right on average, and add up to the whole.
 template <Features F, template <Features> class Light>
 template <class UpTo>
-void PathTracer<F, Light>::add_along(const C3& total, LightGroup group, [[maybe_unused]] float t_max,
+void PathTracer<F, Light>::add_along(const C3& total, const Medium& medium, [[maybe_unused]] float t_max,
                                      [[maybe_unused]] const UpTo& up_to) {
+  const LightGroup group = medium.light_group;
   if constexpr (F.split) {
     LightByDepth& deep = split_->by_depth;
     if (deep.wanted && depth_ == 0) [[unlikely]] {
@@ -337,7 +341,7 @@ void PathTracer<F, Light>::add_along(const C3& total, LightGroup group, [[maybe_
       return;
     }
   }
-  add(beta_ * total, group);
+  add(beta_ * total * emissive_weight(medium), group);
 }
 
 template <Features F, template <Features> class Light>

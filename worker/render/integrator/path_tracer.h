@@ -175,6 +175,11 @@ class PathTracer {
   float others_end(std::size_t but, int hero, float t_max, RandomStream streams);
   void add_medium_emission(const Medium& medium, float t_max);
   C3 closed_emission(const Medium& medium, float t) const;
+  float emissive_weight(const Medium& medium);
+  void look_for_emission_on(const SurfaceHit& hit, const V3& wo);
+  void look_for_emission_in(const Medium& medium, const V3& d);
+  void add_emission_at(const EmissiveGrids::Point& point, const C3& weight, OffsetRay ray, Within medium,
+                       RandomStream& stream);
   Step scatter_on_surface(const SurfaceHit& hit);
   bool passes_null(const SurfaceHit& hit);
   bool may_scatter() const { return world_.depth_allows(depth_ + 1); }
@@ -401,7 +406,7 @@ class PathTracer {
       if (depth_ == 0 && split_->by_depth.wanted) split_->by_depth.see(kInfinity);
   }
   template <class UpTo>
-  void add_along(const C3& total, LightGroup group, float t_max, const UpTo& up_to);
+  void add_along(const C3& total, const Medium& medium, float t_max, const UpTo& up_to);
   LightPart part_ahead(bool ahead) const {
     return part_of(depth_ + ahead, depth_ == 0 ? ahead : first_in_medium_);
   }
@@ -463,6 +468,12 @@ class PathTracer {
     scene::LinkIndex blockers = scene::kEverything;  // the list of the light of shadow rays
   };
   std::conditional_t<F.visibility, Links, Nothing> links_;
+  struct Emissive {
+    // The density with which the last vertex found the direction of the current ray by looking for emissive
+    // grids; negative if it is not known yet
+    float pdf = -1;
+  };
+  std::conditional_t<F.emission, Emissive, Nothing> emissive_;
   std::conditional_t<F.reuse, SharingPath, Nothing> sharing_;
   std::conditional_t<F.reuse && F.split, TailByGroup, Nothing> tail_by_group_;
 };
@@ -632,6 +643,7 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   if constexpr (F.connected) {
     if (surface.smooth) connect_on(hit, surface, wo);
   }
+  if constexpr (F.emission) look_for_emission_on(hit, wo);
   const Group g = stream_.group(depth_, Purpose::direction);
   if (depth_ == 1 && world_.sky_samples && surface.smooth) look_for_sky(hit, surface, wo, g);
   const auto s = sample_bsdf(hit, surface, wo, g);
@@ -657,6 +669,7 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   last_.place = {hit.p, hit.shading.n};
   last_.pdf = s->pdf;
   last_.delta = s->delta;
+  if constexpr (F.emission) emissive_.pdf = -1;
   if constexpr (F.visibility) {
     if (world_.ray_flags) [[unlikely]] {
       links_.receiver = world_.surface_links[hit.surface];
@@ -770,6 +783,7 @@ bool PathTracer<F, Light>::survives(float u) {
 }  // namespace ls::render
 
 #include "worker/render/integrator/aov_rays.h"
+#include "worker/render/integrator/emission_nee.h"
 #include "worker/render/integrator/light_hits.h"
 #include "worker/render/integrator/medium_crossing.h"
 #include "worker/render/integrator/path_reuse.h"

@@ -144,6 +144,8 @@ enum class Purpose : std::uint32_t {
   track_direct,
   shadow_catcher,
   track_shadow_catcher,
+  emissive,
+  track_emissive,
   end  // not a purpose, but the number of purposes
 };
 

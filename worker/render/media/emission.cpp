@@ -16,6 +16,35 @@ constexpr double kNoBoundary = std::numeric_limits<double>::infinity();
 // sample.
 constexpr double kOpticalDepthVoxels = 1;
 
+// Returns the emission at the world point p, which has the index coordinates q in the emission grid. For
+// emission per length it is radiance per length. For emission per absorption it is a radiance; this times the
+// absorption coefficient is the radiance per length.
+V3d source_at(const Medium& m, const V3& q, const V3& p) {
+  V3d e(m.emission);
+  if (!m.emitter[0]) return e;
+  if (m.emission_kind == EmissionKind::black_body) {
+    const float kelvin = m.kelvin_offset + m.kelvin_scale * m.emitter[0]->value_anywhere(q);
+    double weight = 1;
+    if (m.weight) {
+      const V3 at = m.weight->to_index(p);
+      weight = m.weight->in_domain(at) ? m.weight->value_anywhere(at) : 0;
+    }
+    return e * V3d(m.peak_one ? black_body_of_peak_one(kelvin) : black_body_radiance(kelvin)) * weight;
+  }
+  for (int c = 0; c < 3; ++c) e[c] *= m.emitter[c]->value_anywhere(q);
+  return e;
+}
+
+// Returns the share of the extinction at the world point p that is absorption.
+C3 absorbing_at(const Medium& m, const V3& p) {
+  if (!m.albedo[0]) return m.absorbing;
+  const C3 scattering = m.scattering_at(p);
+  C3 a(0);
+  for (int k = 0; k < 3; ++k)
+    if (m.sigma_t[k] > 0) a[k] = std::max(0.f, m.sigma_t[k] - scattering[k]) / m.sigma_t[k];
+  return a;
+}
+
 // Walks along a ray through the cells of a grid. The functions take positions as distances from the ray's
 // origin. A position may be in the current cell, in front of it, or past the grid.
 class Steps {
@@ -95,9 +124,7 @@ class EmissionWalk {
     // `emitter_` walks the grid of the first channel. If the channels have different grids, the bounds of the
     // others are unknown, so the cell is assumed to emit.
     if (m_.emitter[1] != m_.emitter[0]) return true;
-    const float hi = emitter_->cell().hi;
-    return m_.emission_kind == EmissionKind::black_body ? m_.kelvin_offset + m_.kelvin_scale * hi >= kColdest
-                                                        : hi > 0;
+    return may_emit(m_, emitter_->cell().hi);
   }
 
   // Returns the end of the interval that begins at `at` and that run() integrates as one. `sampled` is the
@@ -112,36 +139,10 @@ class EmissionWalk {
     return varies ? std::min(to, at + density_.longest()) : to;
   }
 
-  // Returns the emission at distance t. For emission per length it is radiance per length. For emission per
-  // absorption it is a radiance; this times the absorption coefficient is the radiance per length.
-  V3d source(double t) const {
-    V3d e(m_.emission);
-    if (!emitter_) return e;
-    const V3 q = emitter_->index(t);
-    if (m_.emission_kind == EmissionKind::black_body) {
-      const float kelvin = m_.kelvin_offset + m_.kelvin_scale * m_.emitter[0]->value_anywhere(q);
-      return e * V3d(m_.peak_one ? black_body_of_peak_one(kelvin) : black_body_radiance(kelvin)) * weight(t);
-    }
-    for (int c = 0; c < 3; ++c) e[c] *= m_.emitter[c]->value_anywhere(q);
-    return e;
-  }
-  double weight(double t) const {
-    if (!m_.weight) return 1;
-    const V3 q = m_.weight->to_index(o_ + d_ * static_cast<float>(t));
-    return m_.weight->in_domain(q) ? m_.weight->value_anywhere(q) : 0;
-  }
+  V3 point(double t) const { return o_ + d_ * static_cast<float>(t); }
+  V3d source(double t) const { return source_at(m_, emitter_ ? emitter_->index(t) : V3(0), point(t)); }
   double density_at(double t) const { return m_.density->value_anywhere(density_.index(t)); }
   double depth(double a, double b) const { return density_.pass(*m_.density, a, b).integral; }
-
-  // Returns the share of the extinction at distance t that is absorption.
-  C3 absorbing_at(double t) const {
-    if (!m_.albedo[0]) return m_.absorbing;
-    const C3 scattering = m_.scattering_at(o_ + d_ * static_cast<float>(t));
-    C3 a(0);
-    for (int k = 0; k < 3; ++k)
-      if (m_.sigma_t[k] > 0) a[k] = std::max(0.f, m_.sigma_t[k] - scattering[k]) / m_.sigma_t[k];
-    return a;
-  }
 
   // Adds the emission of an interval to the sum: e times `share` times the transmittance up to the interval.
   // Adds it to channel c alone or, if all channels have the same extinction, to all channels.
@@ -196,7 +197,7 @@ class EmissionWalk {
     if (!(absorbed > 0)) return;
     const double t = absorption_point(a, b, s, absorbed, u);
     V3d e = source(t);
-    const C3 absorbing = absorbing_at(t);
+    const C3 absorbing = absorbing_at(m_, point(t));
     for (int k = 0; k < 3; ++k) e[k] = m_.sigma_t[k] > 0 ? e[k] * absorbing[k] : 0;
     add(c, e, absorbed);
   }
@@ -246,6 +247,24 @@ class EmissionWalk {
 };
 
 }  // namespace
+
+C3 emission_at(const Medium& m, const V3& p) {
+  V3 q(0);
+  if (m.emitter[0]) {
+    q = m.emitter[0]->to_index(p);
+    if (!m.emitter[0]->in_domain(q)) return C3(0);
+  }
+  if (m.emission_kind == EmissionKind::per_length) return C3(source_at(m, q, p));
+  const V3 at = m.density->to_index(p);
+  if (!m.density->in_domain(at)) return C3(0);
+  const C3 density = m.by_channel[0] ? densities(m, at) : C3(m.density->value_anywhere(at));
+  return C3(source_at(m, q, p) * V3d(m.sigma_t) * V3d(absorbing_at(m, p)) * V3d(density));
+}
+
+bool may_emit(const Medium& m, float value) {
+  return m.emission_kind == EmissionKind::black_body ? m.kelvin_offset + m.kelvin_scale * value >= kColdest
+                                                     : value > 0;
+}
 
 C3 emission_of_length(const Medium& m, float t_max) {
   C3 light;

@@ -31,6 +31,11 @@ inline C3 emission_of_height(const Medium& m, const V3& o, const V3& d, float t_
 // unit length.
 C3 emission_of_grid(const Medium& m, const V3& o, const V3& d, float t_max, RandomStream stream);
 
+// Returns the emission of a grid at the world point p [radiance per world unit].
+C3 emission_at(const Medium& m, const V3& p);
+// True if a medium with an emission grid may give off light where that grid is at most `value`.
+bool may_emit(const Medium& m, float value);
+
 // The functions below are for the points on an interval of a ray at which emission_of_grid() evaluates the
 // emission.
 

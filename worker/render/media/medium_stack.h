@@ -28,6 +28,7 @@ struct OneMedium {
   static constexpr bool several() { return false; }
   std::uint32_t one() const { return medium; }
   void only(std::uint32_t m) { medium = m; }
+  int count(std::uint32_t m) const { return medium == m; }  // as of MediaState
 };
 
 class MediaState {
@@ -56,6 +57,8 @@ class MediaState {
   // The indices of the media in effect, in ascending order. A medium whose count is 2 is listed twice, and so
   // on.
   std::span<const std::uint32_t> all() const { return {effect_.data(), static_cast<std::size_t>(count_)}; }
+  // How often all() lists the medium m.
+  int count(std::uint32_t m) const { return static_cast<int>(std::ranges::count(all(), m)); }
   bool overflowed() const { return overflowed_; }
 
   // Makes m the only medium (none if m is kNone); for scenes without overlaps.

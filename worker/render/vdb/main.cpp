@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <limits>
 
+#include "core/base/helper_program.h"
 #include "core/base/spawn.h"
 #include "util/sandbox/call_filter.h"
 #include "worker/render/media/vdb_reply.h"
@@ -60,7 +61,7 @@ bool write_all(const void* from, std::uint64_t bytes, std::uint64_t at) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 5) return 2;
+  if (argc != 5) return ls::answer_person("lightshaft-vdb", LIGHTSHAFT_VERSION, argc, argv);
   const std::uint64_t most_values = std::strtoull(argv[3], nullptr, 10),
                       most_bytes = std::strtoull(argv[4], nullptr, 10);
   confine(most_values, most_bytes);

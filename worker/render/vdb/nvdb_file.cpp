@@ -41,9 +41,12 @@ std::vector<Entry> table_of(const NvdbBytes& file) {
     if (!is_magic({reinterpret_cast<const char*>(magic.data()), 8}))
       throw Refused{1, "not a readable NanoVDB file: damaged at byte " + std::to_string(at)};
     const std::uint32_t version = file.get<std::uint32_t>(at + 8), major = version >> 21;
-    if (major != kAbi)
-      throw Refused{1, "a NanoVDB file of version " + std::to_string(major) + "." +
-                           std::to_string(version >> 10 & 0x7ff) + "; known is version 32"};
+    if (major != kAbi)  // early files have a plain number in place of major, minor and patch
+      throw Refused{1,
+                    "a NanoVDB file of version " +
+                        (major == 0 ? std::to_string(version)
+                                    : std::to_string(major) + "." + std::to_string(version >> 10 & 0x7ff)) +
+                        "; known is version 32"};
     const auto count = file.get<std::uint16_t>(at + 12), codec = file.get<std::uint16_t>(at + 14);
     if (codec > kBlosc) throw Refused{1, "a NanoVDB file of unknown compression " + std::to_string(codec)};
     at += 16;

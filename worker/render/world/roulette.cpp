@@ -20,7 +20,7 @@ void learn_splitting(const IntegratorSettings& settings, float mean_radiance, Wo
 }
 
 void learn_shadow_roulette(const IntegratorSettings& settings, float mean_radiance, World& w) {
-  if (settings.shadow_roulette < 0 || !w.lights.can_sample()) return;
+  if (settings.shadow_roulette < 0 || !(w.lights.can_sample() || w.emissive.any())) return;
   w.faint_shadow = kFaintShadowRay * mean_radiance;
 }
 

@@ -15,6 +15,7 @@
 #include "worker/render/camera/camera.h"
 #include "worker/render/geometry/accel.h"
 #include "worker/render/geometry/geometry.h"
+#include "worker/render/lights/emissive_grids.h"
 #include "worker/render/lights/lamp_directions.h"
 #include "worker/render/lights/light_vertices.h"
 #include "worker/render/lights/lights.h"
@@ -109,6 +110,7 @@ class World {
   // With Features::reuse: the number of pixels in a group, whose paths share their tails, that is, the parts
   // from the second vertex on (path_reuse.h)
   int reuse = 0;
+  EmissiveGrids emissive;      // empty unless next-event estimation looks for emissive grids (emission_nee.h)
   bool hide_emitters = false;  // true if camera rays see no light that was not scattered
   bool transparent = false;    // true if camera rays see no environment (FilmSettings::transparent)
   // True if camera rays do not see all of the environment, because of the two members above or

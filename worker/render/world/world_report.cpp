@@ -47,6 +47,7 @@ std::vector<WorldReport::Structure> structures_of(const World& w) {
           {"grid values", values, grids},
           {"majorant cells", cells, grids},
           {"light table", w.lights.table_bytes(), counted(w.lights.count(), "light")},
+          {"emissive cells", w.emissive.bytes(), counted(w.emissive.cell_count(), "cell")},
           {"light tree", w.lights.tree_bytes(),
            w.lights.has_tree()          ? counted(w.lights.in_tree(), "light")
            : w.lights.enough_for_tree() ? "switched off"
@@ -76,6 +77,7 @@ TechniqueSet techniques_of(const World& w) {
   put(w.mean_radiance > 0, Technique::path_splitting);
   put(w.lights.portals(), Technique::sky_portals);
   put(w.lights.local(), Technique::local_lights);
+  put(w.emissive.any(), Technique::emissive_grids);
   return set;
 }
 
@@ -114,6 +116,7 @@ WorldReport describe(const World& w) {
   feature(techniques.has(Technique::shadow_roulette), "shadow rays at random where they could bring little");
   feature(techniques.has(Technique::sky_portals), "directions towards the sky through openings");
   feature(techniques.has(Technique::local_lights), "lights chosen by what reaches a place");
+  feature(techniques.has(Technique::emissive_grids), "directions towards emissive grids");
   feature(techniques.has(Technique::path_splitting), "paths that split, or end, by what their pixel shows");
   feature(w.camera.has_lens(), "thin lens");
   feature(!w.geometry.instances.empty(), "instances of groups");

@@ -138,6 +138,7 @@ def add_framing_camera(
 ) -> None:
     """Adds a camera that shows the whole stage from its front: from +z, or from -y if z points up."""
     problems.warn("the stage", "it has no camera: all of it is seen, from its front")
+    _drop_extents(stage)
     cache = UsdGeom.BBoxCache(time, [UsdGeom.Tokens.default_, UsdGeom.Tokens.render])
     box = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
     if box.IsEmpty():
@@ -156,6 +157,14 @@ def add_framing_camera(
     sensor: dict[str, Any] = {"type": "perspective", "to_world": to_world @ TURNED}
     sensor.update(fov=FRAMED, fov_axis="x", near_clip=NEAR, far_clip=FAR)
     _add(document, "camera", sensor, (width, height), None)
+
+
+def _drop_extents(stage: Usd.Stage) -> None:
+    """Blocks the extents of meshes, which may be wrong, so that the box is computed of their points."""
+    with Usd.EditContext(stage, stage.GetSessionLayer()):
+        for prim in stage.Traverse():
+            if prim.IsA(UsdGeom.PointBased) and prim.GetAttribute("extent").HasAuthoredValue():
+                prim.GetAttribute("extent").Block()
 
 
 def eye(camera: UsdGeom.Camera, time: Usd.TimeCode) -> Matrix:

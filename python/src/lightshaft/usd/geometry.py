@@ -141,6 +141,7 @@ class Geometry:
             self._get(prim, name, []) for name in ("points", "faceVertexCounts", "faceVertexIndices")
         )
         if not len(points) or not len(counts):
+            self._problems.warn(prim, "it has no faces: nothing of it is seen")
             return None
         found = Polygons(np.asarray(points), np.asarray(counts, np.int64), np.asarray(indices, np.int64))
         fault = found.fault()

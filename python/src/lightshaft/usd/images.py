@@ -19,6 +19,7 @@ from .files import Asset, Files
 READ_AS_THEY_ARE = (".png", ".jpg", ".jpeg", ".bmp", ".exr", ".hdr")
 CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2)}
 Pixels = npt.NDArray[np.float32]
+LEAST_OF_A_MAP = (3, 2)  # rows and columns that an `envmap` of the scene format has at least
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,10 +148,20 @@ def _exr_texels(asset: Asset) -> Pixels:
     return np.stack([channels[name] for name in "RGBA" if name in channels], axis=2)
 
 
-def scaled(asset: Asset, colour: list[float]) -> bytes:
-    """Writes an image of light, multiplied by a colour, as EXR."""
+def is_tiny(asset: Asset) -> bool:
+    """True if an image of 8 or 16 bits has fewer rows or columns than a map of the sky needs."""
+    if asset.suffix in (".exr", ".hdr"):
+        return False
+    width, height = _open(asset).size
+    return height < LEAST_OF_A_MAP[0] or width < LEAST_OF_A_MAP[1]
+
+
+def scaled(asset: Asset, colour: list[float], least: tuple[int, int] = (1, 1)) -> bytes:
+    """Writes an image of light, multiplied by a colour, as EXR of at least so many rows and columns."""
     picture = None if asset.suffix in (".exr", ".hdr") else _open(asset)
     texels = _exr_texels(asset) if picture is None else _texels(picture, raw=False)
+    for axis, wanted in enumerate(least):
+        texels = np.repeat(texels, -(-wanted // texels.shape[axis]), axis=axis)
     return exr(np.maximum(texels[:, :, :3], 0) * np.array(colour, np.float32))
 
 

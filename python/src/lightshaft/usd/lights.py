@@ -11,7 +11,7 @@ from pxr import Usd, UsdGeom, UsdLux
 from .document import Document, colour
 from .gprims import cylinder_part, sphere_part
 from .ignored import tell_light
-from .images import Images, exr, scaled
+from .images import LEAST_OF_A_MAP, Images, exr, is_tiny, scaled
 from .links import NONE, Links
 from .meshes import Part
 from .problems import Problems
@@ -155,11 +155,11 @@ class Lights:
         if asset.suffix not in (".exr", ".hdr", ".png", ".jpg", ".jpeg"):
             self._problems.error(prim, f"@{file.path}@: a dome takes EXR, HDR, PNG and JPEG")
             return
-        grey = max(luminance) - min(luminance) <= 1e-6 * max(luminance)
+        kept = max(luminance) - min(luminance) <= 1e-6 * max(luminance) and not is_tiny(asset)
         name = (
             self._document.files.take(asset)
-            if grey
-            else self._document.files.write(scaled(asset, luminance), ".exr")
+            if kept
+            else self._document.files.write(scaled(asset, luminance, LEAST_OF_A_MAP), ".exr")
         )
         self._maps += 1
         pole = prim.GetAttribute("poleAxis")
@@ -171,7 +171,7 @@ class Lights:
             {
                 "type": "envmap",
                 "filename": name,
-                "scale": luminance[0] if grey else 1.0,
+                "scale": luminance[0] if kept else 1.0,
                 # USD's map lies as the scene format's: its middle is +z, a quarter from its left edge is +x.
                 "to_world": _turned(matrix) @ (turn if stands else np.eye(4)),
                 **self._visible.of_sky(),

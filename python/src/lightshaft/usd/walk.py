@@ -109,6 +109,9 @@ class Walk:
         if not np.isfinite(matrix).all():
             self._problems.error(prim, "its transform is not finite")
             return None
+        if not np.array_equal(own[3], (0, 0, 0, 1)):
+            self._problems.error(prim, "its transform is a perspective. Make the last column of its matrix 0, 0, 0, 1")
+            return None
         return matrix if is_usable(matrix) else None  # what is flattened is not seen
 
     def _seen(self, prim: Usd.Prim) -> bool:

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "tests/support/fire.h"
 #include "tests/support/lamp_room.h"
 #include "tests/support/lamp_rooms.h"
 #include "tests/support/lit_cloud.h"
@@ -81,7 +82,8 @@ std::vector<Case> cases() {
           {Technique::sky_samples, test::sky_yard({24, 16})},
           {Technique::path_splitting, test::lit_cloud({24, 16})},
           {Technique::sky_portals, test::SkyRoom{}.builder({24, 16})},
-          {Technique::local_lights, test::LampRooms{}.builder({24, 16})}};
+          {Technique::local_lights, test::LampRooms{}.builder({24, 16})},
+          {Technique::emissive_grids, test::Fire{}.builder({24, 16})}};
 }
 
 // The scene with the parameter set to the value that off_switch() returns.
@@ -102,6 +104,7 @@ SceneBuilder switched_off(const Case& c) {
       {"path_splitting", [&] { i.path_splitting = -1; }},
       {"sky_portals", [&] { i.sky_portals = -1; }},
       {"local_lights", [&] { i.local_lights = -1; }},
+      {"emissive_grids", [&] { i.emissive_grids = -1; }},
       {"distance", [&] {
          i.distance =
              off.value == "exponential" ? DistanceSampling::exponential : DistanceSampling::equiangular;

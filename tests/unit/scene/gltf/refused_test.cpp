@@ -34,6 +34,8 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         Case{"OldVersion", [](GltfFile& f) { f.j["asset"]["version"] = "1.0"; },
              "asset.version: the asset's version is \"1.0\", and only 2.0 is read"},
+        Case{"VersionAsNumber", [](GltfFile& f) { f.j["asset"]["version"] = 1; },
+             ": error: asset.version: the asset has no version that is a text, as \"2.0\" is, and only 2.0 is read"},
         Case{"NoVersion", [](GltfFile& f) { f.j.erase("asset"); }, "and only 2.0 is read"},
         Case{"Draco", [](GltfFile& f) { f.j["extensionsRequired"] = {"KHR_draco_mesh_compression"}; },
              "extensionsRequired[0]: KHR_draco_mesh_compression is not read: unpack the file"},

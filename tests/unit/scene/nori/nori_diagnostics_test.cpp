@@ -42,6 +42,18 @@ TEST(NoriDiagnostics, NameUnknownElements) {
               HasSubstr("is not supported: its falloff differs between versions of Nori"));
 }
 
+TEST(NoriDiagnostics, NameWhatIsWrongWithAnObjectWithoutUse) {
+  const auto diffuse = [](const std::string& inside) {
+    return first(R"(<mesh type="sphere"><bsdf type="diffuse">)" + inside + "</bsdf></mesh>");
+  };
+  EXPECT_THAT(diffuse(R"(<texture type="solid"/>)"),
+              HasSubstr("2:57 Nori has no texture \"solid\"; known here"));
+  EXPECT_THAT(diffuse(R"(<texture type="constant_color"/>)"),
+              HasSubstr("bsdf \"diffuse\" has no use for a <texture> without a name: call it 'albedo'"));
+  EXPECT_THAT(diffuse(R"(<texture type="constant_color" name="kd"/>)"),
+              HasSubstr("bsdf \"diffuse\" has no use for a <texture> called 'kd': call it 'albedo'"));
+}
+
 TEST(NoriDiagnostics, NameWrongTypesAndRanges) {
   const auto sphere = [](const std::string& inside) {
     return first("<mesh type=\"sphere\">" + inside + "</mesh>");

@@ -257,9 +257,11 @@ TEST(NoriScene, ReadsIntegratorsByName) {
   EXPECT_EQ(of("path_mis"), "path -1 0");
   EXPECT_EQ(of("direct_ems"), "path 2 0");
   EXPECT_EQ(of("vol_path_mis"), "volpath -1 0");
+  EXPECT_EQ(of("vol_path_ems"), "volpath -1 0");
   EXPECT_EQ(of("volpath_distant_mis"), "volpath_distant_mis -1 0");
   EXPECT_EQ(of("whitted"), "whitted -1 0");
   EXPECT_EQ(of("photonmapper"), "path -1 1");
+  EXPECT_EQ(of("progressive_photonmapper"), "path -1 1");
   EXPECT_THAT(of("normals"), ::testing::HasSubstr("it does not render light"));
   EXPECT_THAT(of("path_miss"), ::testing::HasSubstr("did you mean 'path_mis'?"));
 }

@@ -146,7 +146,8 @@ what is refused says what to do instead.
   luminance 1, as in pbrt; `stdillum-D65` is white. `scale`, `power` and `illuminance` multiply that. `iso / 100` of the film
   and `shutterclose - shutteropen` of the camera multiply all light.
 - **Surfaces and media**: `rgb` is linear sRGB; pairs are what the CIE observer sees of them under D65, and the same value everywhere
-  is grey. Metals by name are those of [the scene format](scene-format.md#names). Spectra are not followed beyond red, green, blue.
+  is grey. So is a `blackbody`, divided by its largest value over all wavelengths. Of metals by name (`metal-Cu-eta`) Ag, Al, Au and Cu are known, as `eta` and `k`
+  only. Spectra are not followed beyond red, green, blue.
 - **Roughness**: `remaproughness` is true by default, and alpha then the square root of the roughness; the distribution is GGX.
 - **Grids** in the text lie at the centres of their voxels and fade to 0 in the outermost half voxel, as in pbrt: the file has a layer
   of zeros around them, which is the `border` of the volume.

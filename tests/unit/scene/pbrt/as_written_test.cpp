@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/scene/spectrum.h"
 #include "formats/pbrt/vocabulary.h"
 #include "formats/xml/transform_element.h"
 #include "tests/unit/scene/pbrt/pbrt_testing.h"
@@ -216,15 +217,19 @@ TEST(Pbrt, FiltersOfNegativeLobesBecomeGaussians) {
   }
 }
 
-// Returns the reflectance of a diffuse sphere whose colour is given in this space.
-Rgb reflectance(std::string_view space, std::string_view rgb) {
-  const Scene s = pbrt(fmt::format(
-      R"(ColorSpace "{}" Material "diffuse" "rgb reflectance" [ {} ] ColorSpace "srgb" Shape "sphere")",
-      space, rgb));
+// Returns the reflectance of a diffuse sphere.
+Rgb reflectance_of(const Scene& s) {
   for (const Texture& t : s.textures)
     if (const auto* c = std::get_if<ConstantTexture>(&t)) return c->value;
   ADD_FAILURE() << "no constant texture";
   return {};
+}
+
+// Returns the reflectance of a diffuse sphere whose colour is given in this space.
+Rgb reflectance(std::string_view space, std::string_view rgb) {
+  return reflectance_of(pbrt(fmt::format(
+      R"(ColorSpace "{}" Material "diffuse" "rgb reflectance" [ {} ] ColorSpace "srgb" Shape "sphere")",
+      space, rgb)));
 }
 
 void expect_near(const Rgb& got, const Rgb& want, double tolerance) {
@@ -280,6 +285,38 @@ TEST(PbrtColours, ColoursOutsideSrgbAreClippedWithAWarning) {
   EXPECT_THAT(messages(r), HasSubstr("3:42: warning: 'reflectance' has colours that linear sRGB can't hold"));
 }
 
+// pbrt divides a black body by its largest value, and scales only light to luminance 1.
+TEST(PbrtColours, BlackBodiesAsReflectancesHaveAPeakOfOne) {
+  const Rgb got = reflectance_of(pbrt(R"(Material "diffuse" "blackbody reflectance" 4000 Shape "sphere")"));
+
+  scene::SpectralCurve planck;
+  double peak = 0;
+  for (double nm = 300; nm <= 3000; nm += .5) {
+    planck.nm.push_back(nm);
+    planck.value.push_back(1 / (std::pow(nm, 5) * std::expm1(1.438776877503933e7 / (nm * 4000))));
+    peak = std::max(peak, planck.value.back());
+  }
+  for (double& x : planck.value) x /= peak;
+  // Curves are lines between their points, 1 nm or less apart: they miss at most f'' / 8, and f'' of this one
+  // is below 1e-4 of its peak per nm^2 in the visible.
+  expect_near(got, linear_srgb(planck, scene::Illuminant::d65), 5e-5);
+}
+
+TEST(PbrtColours, ReflectancesOfMoreThanOneRedAreCutOff) {
+  const ReadResult r = read_pbrt(
+      pbrt_scene(R"(Material "diffuse" "spectrum reflectance" [ 580 0 590 1 720 1 ] Shape "sphere")"));
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  EXPECT_EQ(reflectance_of(*r.scene)[0], 1);
+  EXPECT_THAT(messages(r), HasSubstr("'reflectance' is a colour that sRGB can't hold: it is cut off"));
+}
+
+TEST(PbrtColours, IndicesOfRefractionAreNoReflectances) {
+  EXPECT_THAT(refusal(R"(Material "diffuse" "spectrum reflectance" "metal-Al-k" Shape "sphere")"),
+              HasSubstr("3:21: error: the spectrum \"metal-Al-k\" is an index of refraction, which "
+                        "'reflectance' is not: give it as rgb"));
+}
+
 TEST(PbrtColours, HaveTheSpaceOfTheirAttributeBlock) {
   const Scene s = pbrt(R"(AttributeBegin ColorSpace "rec2020" AttributeEnd
 Material "diffuse" "rgb reflectance" [ 0.25 0.5 0.25 ] Shape "sphere")");
@@ -304,6 +341,43 @@ Material "diffuse" "texture reflectance" "t" Shape "sphere" "texture alpha" "t")
   EXPECT_EQ(std::get<ConstantTexture>(s.textures.at(diffuse.reflectance.value)).value, (Rgb{.5, .5, .5}));
   EXPECT_THAT(refusal(R"(Texture "t" "float" "constant" Texture "t" "float" "constant")"),
               HasSubstr("a second Texture \"t\" of the type \"float\""));
+}
+
+constexpr std::string_view kRough = R"(Texture "rough" "float" "imagemap" "string filename" "wood.png"
+Material "{}" "texture {}" "rough" "bool remaproughness" {} Shape "sphere")";
+
+TEST(PbrtTextures, MayBeTheAlphaOfMetalAndGlass) {
+  const Scene metal = pbrt(fmt::format(kRough, "conductor", "roughness", "false"));
+  const Scene glass = pbrt(fmt::format(kRough, "dielectric", "uroughness", "false"));
+
+  const auto image_of = [](const Scene& s, TextureIndex t) {
+    return std::holds_alternative<BitmapTexture>(s.textures.at(t.value));
+  };
+  const auto find = [](const Scene& s, auto wanted) {
+    for (const Bsdf& b : s.bsdfs)
+      if (const auto* found = std::get_if<decltype(wanted)>(&b)) return *found;
+    ADD_FAILURE() << "no such bsdf";
+    return wanted;
+  };
+  const auto rough_metal = find(metal, RoughConductorBsdf{});
+  EXPECT_TRUE(image_of(metal, rough_metal.alpha_u) && image_of(metal, rough_metal.alpha_v));
+  const auto rough_glass = find(glass, RoughDielectricBsdf{});
+  EXPECT_TRUE(image_of(glass, rough_glass.alpha_u));
+  EXPECT_FALSE(image_of(glass, rough_glass.alpha_v));
+}
+
+TEST(PbrtTextures, AreRefusedAsRoughnessWithTheReason) {
+  EXPECT_THAT(
+      refusal(fmt::format(kRough, "conductor", "roughness", "true")),
+      HasSubstr("4:23: error: 'roughness' of Material \"conductor\" is an image: pbrt takes the square root "
+                "of it, so make it an image of that, and give \"bool remaproughness\" false"));
+  EXPECT_THAT(
+      refusal(fmt::format(kRough, "coateddiffuse", "vroughness", "false")),
+      HasSubstr("'vroughness' of Material \"coateddiffuse\" is an image: a layer has one roughness here"));
+  EXPECT_THAT(refusal(R"(Material "conductor" "texture roughness" "none" Shape "sphere")"),
+              HasSubstr("'roughness' names no Texture that stands before this"));
+  EXPECT_THAT(refusal(R"(Material "conductor" "float roughness" -1 Shape "sphere")"),
+              HasSubstr("'roughness' of Material \"conductor\" wants one number that is not negative"));
 }
 
 TEST(PbrtTextures, ScaleMultipliesTextures) {

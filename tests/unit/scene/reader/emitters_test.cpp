@@ -153,7 +153,22 @@ TEST(Emitters, GoniometricLightNeedsAnImageAndNoStretchingTransform) {
   EXPECT_EQ(must_read(write_xml(s)), s);
   EXPECT_EQ(deserialize_scene(serialize(s)).value(), s);
 
-  EXPECT_THAT(refusal("<emitter type=\"goniometric\"/>"), HasSubstr("needs 'texture'"));
+  // A file alone is an image that does not repeat
+  const std::string file = "<string name=\"filename\" value=\"wood.png\"/>";
+  const Scene by_file = must_read(with_sensor("<emitter type=\"goniometric\">" + file + "</emitter>"));
+  const auto& light = std::get<GoniometricEmitter>(by_file.emitters.at(0));
+  const auto& bitmap = std::get<BitmapTexture>(by_file.textures.at(light.texture.value));
+  EXPECT_EQ(by_file.assets.at(bitmap.file.value).name, "wood.png");
+  EXPECT_TRUE(bitmap.raw);
+  EXPECT_EQ(bitmap.wrap, Wrap::clamp);
+  EXPECT_EQ(must_read(write_xml(by_file)), by_file);
+
+  EXPECT_THAT(refusal("<emitter type=\"goniometric\"/>"), HasSubstr("needs 'filename'"));
+  EXPECT_THAT(refusal("<emitter type=\"goniometric\">" + image + file + "</emitter>"),
+              HasSubstr("leave one out"));
+  EXPECT_THAT(
+      refusal("<emitter type=\"goniometric\"><string name=\"filename\" value=\"none.ies\"/></emitter>"),
+      HasSubstr("none.ies"));
   EXPECT_THAT(refusal("<emitter type=\"goniometric\">" + image +
                       "<transform name=\"to_world\"><scale x=\"2\"/></transform></emitter>"),
               HasSubstr("not stretch or flatten it"));

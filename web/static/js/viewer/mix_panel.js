@@ -1,6 +1,6 @@
 // The panel of light groups. The factory of nodes is handed in: there is one for the page.
 import { exposure as stops, figure, interval } from "../format.js";
-import { colourOf, hexOf, kKelvin, kMostStops, rowOf, withRow } from "./mix.js";
+import { colourOf, hexOf, kKelvin, kMostStops, rowOf } from "./mix.js";
 
 const kSliderStops = 8;
 const kNeutralKelvin = 6500; // where the slider stands if there is no temperature
@@ -41,19 +41,18 @@ function errorOf(h, { error, waits }, neutral) {
 
 function groupRow(h, { name, apart }, rows, actions) {
   const row = rowOf(rows, name);
-  const change = (more) => actions.set(withRow(rows, name, more));
-  const toggle = (key, text) => h("button", { key, type: "button", class: "small", "aria-pressed": String(row[key]), "aria-label": `${text} ${name}`, onclick: () => change({ [key]: !row[key] }) }, text);
+  const toggle = (key, text) => h("button", { key, type: "button", class: "small", "aria-pressed": String(row[key]), "aria-label": `${text} ${name}`, onclick: () => actions.alter(name, (now) => ({ [key]: !now[key] })) }, text);
+  const changes = (key) => (more) => actions.alter(name, (now) => (now[key] ? { [key]: { ...now[key], ...more } } : {}));
   return h("fieldset", { key: name, class: "mix-group" }, h("legend", null, name),
     h("span", { class: "mix-head" }, toggle("solo", "Solo"), toggle("mute", "Mute"),
-      apart ? h("label", { class: "check" }, h("input", { type: "checkbox", "aria-label": `${name}: media apart`, ".checked": row.volume !== null, onchange: () => change({ volume: row.volume ? null : row.surface }) }), "Media apart") : null),
-    part(h, row.volume ? "Surfaces" : "", name, row.surface, (surface) => change({ surface })),
-    row.volume ? part(h, "Media", name, row.volume, (volume) => change({ volume })) : null);
+      apart ? h("label", { class: "check" }, h("input", { type: "checkbox", "aria-label": `${name}: media apart`, ".checked": row.volume !== null, onchange: () => actions.alter(name, (now) => ({ volume: now.volume ? null : now.surface })) }), "Media apart") : null),
+    part(h, row.volume ? "Surfaces" : "", name, row.surface, changes("surface")),
+    row.volume ? part(h, "Media", name, row.volume, changes("volume")) : null);
 }
 
 /** of: what of the group's light; empty: all. */
-function part(h, of, name, { gain, colour, kelvin }, onChange) {
+function part(h, of, name, { gain, colour, kelvin }, change) {
   const label = (what) => `${name}${of ? `, ${of.toLowerCase()}` : ""}: ${what}`;
-  const change = (more) => onChange({ gain, colour, kelvin, ...more });
   const number = (what, value, min, max, step, set) => h("input", { key: `${what}-number`, type: "number", class: "number", "aria-label": label(what), min, max, step, ".value": value, placeholder: what.endsWith("K") ? "K" : "0",
     onchange: (event) => set(event.currentTarget.value === "" ? null : Math.min(max, Math.max(min, event.currentTarget.valueAsNumber))) });
   const slider = (what, value, text, min, max, step, set, plain) => h("input", { key: what, type: "range", "aria-label": label(`${what} slider`), "aria-valuetext": text, min, max, step, ".value": String(value), oninput: (event) => set(event.currentTarget.valueAsNumber), ondblclick: () => set(plain) });

@@ -1,6 +1,6 @@
 // Light groups in the viewer: the panel, what can be done there, and the error of the mix. This module and what it
 // imports are loaded for the first picture that has light groups.
-import { groupsOf, kMix, mixOf, rowsOf, rowsOfMix, textsOf } from "./mix.js";
+import { groupsOf, kMix, mixOf, rowOf, rowsOf, rowsOfMix, textsOf, withRow } from "./mix.js";
 import { mixPanel } from "./mix_panel.js";
 
 export { MixedSource } from "./mixed_source.js";
@@ -48,6 +48,8 @@ export function makeMixing({ h, layers, get, show, look, settled, job }) {
   const actions = {
     /** rows: of mix.js. Shows the mix, if a picture without it is shown. */
     set: (next) => change(textsOf(next), get().view.layer.startsWith(kMix) ? {} : { layer: kMix }),
+    /** more(row): what changes in a group's row as it is now, which the panel may not show yet. */
+    alter: (name, more) => actions.set(withRow(rows(), name, more(rowOf(rows(), name)))),
     reset: () => change([], { layer: get().plain }),
     async render() {
       show({ mixRefused: null });

@@ -4,7 +4,7 @@ import { displayOf, healthComplaints, isOver, layerOf, mayChange, ownerOf, seesO
 import { duration, jobName, moment, percent, plural } from "../format.js";
 import { downloads } from "../api.js";
 import { againButton, againForm } from "./again.js";
-import { jobActions, notice, progressBar, statePill, stateWord } from "./pieces.js";
+import { jobActions, notice, progressBar, statePill, stateWord, wholeNotice } from "./pieces.js";
 import { imagePanel } from "./job_image.js";
 import { meterPanel } from "./meters.js";
 import { timeSplit } from "./time_split.js";
@@ -22,7 +22,7 @@ const whyStopped = (job) => (job.stopped === "error" && doubtful(job.verdict) ? 
 
 export function jobView(state, actions) {
   const job = state.jobs?.get(state.route.id);
-  if (state.open?.problem && !job) return notice("bad", "This job can't be shown", h("p", null, state.open.problem), h("p", null, h("a", { href: "#/jobs" }, "All jobs")));
+  if (state.open?.problem && !job) return wholeNotice("bad", "This job can't be shown", h("p", null, state.open.problem), h("p", null, h("a", { href: "#/jobs" }, "All jobs")));
   if (!job || !state.open) return h("p", { class: "waiting", key: "waiting" }, "Fetching the job …");
   return h("article", { key: job.id, class: "job" },
     heading(state, job, actions),
@@ -102,8 +102,8 @@ function failure(job) {
   return [h("pre", { key: "cause" }, cause), where ? h("p", { key: "where", class: "failure-where" }, where) : null];
 }
 
-/** What happened to the job, the latest last; it is fetched when it is opened. */
-const logOf = (job, { log }, actions) => h("details", { key: `log ${job.id}`, class: "panel job-log", ontoggle: (event) => (event.currentTarget.open ? actions.readLog(job.id) : null) },
+/** What happened to the job, the latest last. While it is open it is fetched again when the job changes. */
+const logOf = (job, { log }, actions) => h("details", { key: `log ${job.id}`, class: "panel job-log", ontoggle: (event) => (event.currentTarget.open ? actions.readLog(job.id) : actions.closeLog()) },
   h("summary", null, "Log"),
   log === null ? h("p", { key: "waiting", class: "help" }, "Fetching the log …") : h("pre", { key: "lines", tabindex: 0, "aria-label": "Log" }, log || "Nothing has happened yet."),
   log === null ? null : h("button", { key: "again", type: "button", class: "small", onclick: () => actions.readLog(job.id) }, "Read it again"));

@@ -4,7 +4,8 @@ import { isOver, mayChange } from "../state.js";
 import { percent } from "../format.js";
 
 const kStateWords = { queued: "waiting", running: "rendering", paused: "paused", done: "done", failed: "failed", cancelled: "cancelled" };
-export const stateWord = (job) => kStateWords[job.state] ?? job.state;
+/** A job that waits for other jobs is held; one that only waits for a worker is not. */
+export const stateWord = (job) => (job.state === "queued" && job.after?.length > 0 ? "held" : kStateWords[job.state] ?? job.state);
 
 export const statePill = (job) => h("span", { class: `pill state-${safeClass(job.state)}` }, stateWord(job));
 
@@ -21,8 +22,10 @@ export function progressBar(fraction, label, className = "") {
 
 export const workerMark = (colour, name) => h("span", { class: "worker-name" }, h("i", { class: `dot worker-${colour}`, "aria-hidden": "true" }), name);
 
-export const notice = (kind, title, ...body) =>
-  h("section", { class: `notice ${kind}`, role: kind === "bad" ? "alert" : null }, h("h2", null, title), ...body);
+const noticeUnder = (heading) => (kind, title, ...body) =>
+  h("section", { class: `notice ${kind}`, role: kind === "bad" ? "alert" : null }, h(heading, null, title), ...body);
+export const notice = noticeUnder("h2");
+export const wholeNotice = noticeUnder("h1"); // in place of a view
 
 /** One of a few: [[value, label], ...], as radio buttons, which the arrow keys walk along. */
 export const choice = (name, label, options, chosen, onChoose) =>

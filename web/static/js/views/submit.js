@@ -2,11 +2,11 @@
 import { h } from "../dom.js";
 import { bytes, plural } from "../format.js";
 import { kSceneEndings, noScene, scenesAmong } from "../bundle.js";
-import { diagnostics, notice, progressBar } from "./pieces.js";
+import { diagnostics, notice, progressBar, wholeNotice } from "./pieces.js";
 import { mayChange } from "../state.js";
 
 export function submitView(state, actions) {
-  if (!mayChange(state)) return notice("mild", "This token may look, and submit nothing", h("p", null, h("a", { href: "#/jobs" }, "All jobs")));
+  if (!mayChange(state)) return wholeNotice("mild", "This token may look, and submit nothing", h("p", null, h("a", { href: "#/jobs" }, "All jobs")));
   const { submit } = state;
   const busy = submit.phase === "hashing" || submit.phase === "sending";
   return h("section", { key: "submit", class: "submit" },

@@ -9,7 +9,7 @@ import { isOver, mayChange } from "../state.js";
 import { doubtWord, doubtful } from "../verdict.js";
 import { comparable, identifiersOf, nameOf } from "../viewer_actions.js";
 import { legend } from "./job_image.js";
-import { choice, notice } from "./pieces.js";
+import { choice, wholeNotice } from "./pieces.js";
 
 const kLayerNames = { rgb: "Picture", denoised: "Denoised", stderr: "Standard error", error: "Relative error", spp: "Samples", mix: "Mix of light groups", "mix.stderr": "Standard error of the mix", crypto_object: "Objects", crypto_material: "Materials" };
 const kKeys = [
@@ -24,7 +24,7 @@ export function viewerView(state, actions) {
   const job = state.jobs?.get(state.route.id);
   if (!viewer) return h("p", { class: "waiting", key: "waiting" }, "Opening the viewer …");
   const { a, b, view } = viewer;
-  if (!a) return viewer.problem ? notice("bad", "This picture can't be shown", h("p", null, viewer.problem)) : h("p", { class: "waiting", key: "waiting" }, "Asking for the picture's layers …");
+  if (!a) return viewer.problem ? wholeNotice("bad", "This picture can't be shown", h("p", null, viewer.problem)) : h("p", { class: "waiting", key: "waiting" }, "Asking for the picture's layers …");
   const layer = a.layer(view.layer);
   const fits = b && b.size[0] === a.size[0] && b.size[1] === a.size[1];
   const second = fits && b.layer(layer.name).name === layer.name ? b : null;
