@@ -291,7 +291,8 @@ struct HeightFogVolume {
 // Noise in octaves (worker/render/media/noise.h): low + (high - low) * (1 + f) / 2, where f is the sum of the
 // octaves divided by the sum of their strengths, limited to [-1, 1]; values below 0 are 0. Octave i has the
 // strength gain^i and scale * lacunarity^i cells per unit of length, measured before to_world. As a density
-// or as emission it fills the box from `min` to `max`, before to_world; for any other purpose it is everywhere.
+// or as emission it fills the box from `min` to `max`, before to_world; for any other purpose it is
+// everywhere.
 struct NoiseVolume {
   double scale = 1;
   int octaves = 4;

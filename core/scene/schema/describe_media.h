@@ -51,7 +51,9 @@ void describe(V& v, T& s) {
 // Describes the box of a volume of noise.
 template <class V, class T>
 void describe_noise_box(V& v, T& s) {
-  v.field({.name = "min", .doc = "corner of the box that it fills as a density or as light", .given_as = "point"}, s.min);
+  v.field(
+      {.name = "min", .doc = "corner of the box that it fills as a density or as light", .given_as = "point"},
+      s.min);
   v.field({.name = "max", .doc = "the opposite corner", .given_as = "point"}, s.max);
   v.field({.name = "to_world", .doc = "moves it, with its box"}, s.to_world);
 }
@@ -142,7 +144,7 @@ LS_TYPE(
     "t. It fills the box of the other volume. Not in Mitsuba")
 template <class V, Of<RemapVolume> T>
 void describe(V& v, T& s) {
-  v.field({.name = "volume", .doc = "what is mapped", .range = kNonNegative}, s.volume);
+  v.field({.name = "volume", .doc = "what is mapped", .range = kNonNegative, .required = true}, s.volume);
   v.field({.name = "in_low", .doc = "the value that becomes 0, with all below it"}, s.in_low);
   v.field({.name = "in_high", .doc = "the value that becomes 1, with all above it"}, s.in_high);
   v.field({.name = "gamma", .doc = "exponent", .range = {.min = 0, .max = 100, .open_min = true}}, s.gamma);

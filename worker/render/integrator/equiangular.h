@@ -98,17 +98,17 @@ class EquiAngular {
   bool uniform_ = false, limited_ = false;
 };
 
-// Free flight through a medium with lamps (lights without extent). A share of the flights ends at
-// a distance that is sampled equi-angularly about a lamp. Multiply scattered light grows as 1 / distance near
-// a lamp, and plain exponential flights rarely end that near.
+// Free flight through a medium with lamps (lights without extent). A share of the flights ends at a distance
+// that is sampled equi-angularly about a lamp. Multiply scattered light grows as 1 / distance near a lamp,
+// and plain exponential flights rarely end that near.
 inline constexpr float kLampFlightShare = .1f;
 
 // Samples a flight from o along d, through a medium that is no grid, that ends at t_max at the latest; t_max
-// must be finite. `hero` is the
-// colour channel that decides distances (medium.h). There must be at least one lamp. The random number u(1)
-// of `numbers` decides how the distance is sampled: exponentially, with the random bits bits[0], or about a
-// lamp, with u(2). The weight and the densities of the result mean the same as those of free_flight(). The
-// density of a distance is that of the mixture, so the weights follow the balance heuristic.
+// must be finite. `hero` is the colour channel that decides distances (medium.h). There must be at least one
+// lamp. The random number u(1) of `numbers` decides how the distance is sampled: exponentially, with the
+// random bits bits[0], or about a lamp, with u(2). The weight and the densities of the result mean the same
+// as those of free_flight(). The density of a distance is that of the mixture, so the weights follow the
+// balance heuristic.
 template <Features F>
 Flight fly_past_lamps(const Medium& medium, int hero, const Group& numbers, const V3& o, const V3& d,
                       float t_max, const Lamps& lamps) {

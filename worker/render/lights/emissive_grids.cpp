@@ -10,7 +10,8 @@ namespace {
 
 // The emission of a cell is the mean of that at points this many voxels apart along each axis.
 constexpr int kVoxelsPerPoint = 2;
-// The most points along each axis of a cell whose values are computed, which takes longer than to look them up.
+// The most points along each axis of a cell whose values are computed, which takes longer than to look them
+// up.
 constexpr int kComputedPoints = 8;
 // A cell that may emit is chosen at least as often as if it gave off this share of the mean of such cells, as
 // its points may miss what emits in it.

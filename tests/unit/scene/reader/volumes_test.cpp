@@ -143,6 +143,7 @@ TEST(VolumesWithoutFile, AreRefusedWithTheirPlace) {
        "0 < gamma"},
       {density("product", "<volume name=\"second\" type=\"noise\"/>\n<rgb name=\"first\" value=\"1 2 3\"/>"),
        "'first' of volume \"product\" is one number, not a colour"},
+      {density("remap", ""), "volume \"remap\" needs"},
       {density("product", "<volume name=\"second\" type=\"heightfog\"/>"),
        "'sigma_t' of medium \"heterogeneous\" has no box"},
       {in_medium("<volume name=\"sigma_t\" type=\"heightfog\"/>\n<float name=\"emission\" value=\"1\"/>"),
