@@ -86,8 +86,4 @@ Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid) {
   return keep_made(assets, "grid", ".vol", bytes_of(grid));
 }
 
-Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid, const std::string& name) {
-  return kept(assets, name, bytes_of(grid));
-}
-
 }  // namespace ls::scene

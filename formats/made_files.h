@@ -32,8 +32,6 @@ struct MadeGrid {
 // digest of the file's bytes.
 Result<std::string> keep_made(AssetSource& assets, const MadeMesh& mesh);
 Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid);
-// Makes a file of the grid and keeps it under the given name.
-Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid, const std::string& name);
 // Keeps a file with these bytes; its name begins with `kind`, such as "image", and ends in `ending`, such as
 // ".png".
 Result<std::string> keep_made(AssetSource& assets, std::string_view kind, std::string_view ending,

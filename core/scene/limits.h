@@ -63,6 +63,11 @@ inline constexpr int kMaxPhaseNesting = 8;
 // have.
 inline constexpr std::size_t kMaxPhaseAngles = 2520;
 inline constexpr std::size_t kMaxMotionKeys = 1000;
+// Nesting depth of volumes; a product has two
+inline constexpr int kMaxVolumeNesting = 8;
+inline constexpr int kMaxNoiseOctaves = 16;
+// Points of the curve of a volume "remap"
+inline constexpr std::size_t kMaxRampPoints = 64;
 inline constexpr double kMaxTemperature = 1e6;  // temperature of a black body, in kelvin
 inline constexpr std::size_t kMaxDiagnostics = 20;
 inline constexpr std::size_t kMaxExcerptBytes = 160;  // bytes of a source line that a message shows

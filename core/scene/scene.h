@@ -276,7 +276,62 @@ struct GridVolume {
   GridOrder order = GridOrder::x_fastest;  // order of the values in a `.bin`
   bool operator==(const GridVolume&) const = default;
 };
-using Volume = std::variant<ConstVolume, GridVolume>;
+// The volumes below need no file. Each has one channel, and none of them is below 0.
+//
+// A value that falls with height: `value` at the ground and below it, and value * exp(-h / height) at the
+// height h above it (both in scene units before to_world). It has no end. As the density of a heterogeneous
+// medium alone it has flights and transmittances in closed form (worker/render/media/height_fog.h).
+struct HeightFogVolume {
+  double value = 1;
+  double height = 1;                                   // over which the value falls to 1/e
+  Vec3 ground_point{0, 0, 0}, ground_normal{0, 1, 0};  // the normal points up; it has any length above 0
+  Transform to_world;
+  bool operator==(const HeightFogVolume&) const = default;
+};
+// Noise in octaves (worker/render/media/noise.h): low + (high - low) * (1 + f) / 2, where f is the sum of the
+// octaves divided by the sum of their strengths, limited to [-1, 1]; values below 0 are 0. Octave i has the
+// strength gain^i and scale * lacunarity^i cells per unit of length, measured before to_world. As a density
+// or as emission it fills the box from `min` to `max`, before to_world; for any other purpose it is
+// everywhere.
+struct NoiseVolume {
+  double scale = 1;
+  int octaves = 4;
+  double lacunarity = 2, gain = .5;
+  Vec3 offset{0, 0, 0};  // added to the position [cells of the first octave]
+  std::uint64_t seed = 0;
+  double low = 0, high = 1;
+  Vec3 min{0, 0, 0}, max{1, 1, 1};
+  Transform to_world;
+  bool operator==(const NoiseVolume&) const = default;
+};
+// The density of pbrt-v4's medium "cloud" (worker/render/media/cloud.h), 0 to 1. Its box is as of a
+// NoiseVolume.
+struct CloudVolume {
+  double density = 1, wispiness = 1, frequency = 5;
+  Vec3 min{0, 0, 0}, max{1, 1, 1};
+  Transform to_world;
+  bool operator==(const CloudVolume&) const = default;
+};
+// The product of two volumes. As a density it fills the box of the first of them that has one; beyond its box
+// a grid is 0 here.
+struct ProductVolume {
+  VolumeIndex first, second;
+  bool operator==(const ProductVolume&) const = default;
+};
+// Another volume's value v, mapped: to t = (v - in_low) / (in_high - in_low), limited to [0, 1]; to t^gamma;
+// if there are points, to the value there of the curve through them (linear between them, and constant beyond
+// the first and the last); and to out_low + (out_high - out_low) * t. It fills the box of the other volume.
+struct RemapVolume {
+  VolumeIndex volume;
+  double in_low = 0, in_high = 1;
+  double gamma = 1;
+  std::vector<double> positions, values;  // of the curve's points; positions ascend within [0, 1]
+  double out_low = 0, out_high = 1;
+  bool operator==(const RemapVolume&) const = default;
+};
+// Volumes that contain others may be nested at most scene::kMaxVolumeNesting deep.
+using Volume = std::variant<ConstVolume, GridVolume, HeightFogVolume, NoiseVolume, CloudVolume, ProductVolume,
+                            RemapVolume>;
 
 struct IsotropicPhase {
   bool operator==(const IsotropicPhase&) const = default;

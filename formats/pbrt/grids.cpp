@@ -98,7 +98,7 @@ class GridLight {
     const MadeGrid grid = padded(sides, channels, [&](std::size_t i, std::size_t k) {
       return (scales_ ? scales_->numbers[i] : 1) * factor(k);
     });
-    return add_grid(m_, out, name, grid, box_, Filling::border);
+    return add_grid(m_, out, name, grid, box_);
   }
 
   bool of_colour(Element& out, const Param& given) {
@@ -113,7 +113,7 @@ class GridLight {
 
   bool of_temperature(Element& out, const Param& given) {
     const MadeGrid grid = padded(sides_, 1, [&](std::size_t i, std::size_t) { return given.numbers[i]; });
-    return add_black_bodies(m_, out, 1) && add_grid(m_, out, "temperature", grid, box_, Filling::border) &&
+    return add_black_bodies(m_, out, 1) && add_grid(m_, out, "temperature", grid, box_) &&
            add_scales(out, "emission_weight", 1, [](std::size_t) { return 1; });
   }
 
@@ -208,7 +208,7 @@ bool add_colours(MediumSource& m, Element& out, const Param& light, const std::a
   add(out, "emission_scale", scale * kPhotometric * m.t.exposure(), m.p.at());
   const auto numbers = srgb_numbers(m.t, light, RgbOf::light);
   const MadeGrid grid = padded(sides, 3, [&](std::size_t i, std::size_t k) { return numbers[3 * i + k]; });
-  return add_grid(m, out, "source_radiance", grid, box, Filling::border);
+  return add_grid(m, out, "source_radiance", grid, box);
 }
 
 }  // namespace
@@ -222,25 +222,18 @@ bool read_box(MediumSource& m, Box& box) {
   return true;
 }
 
-bool add_grid(MediumSource& m, Element& out, const char* name, const MadeGrid& grid, const Box& box,
-              Filling filling) {
+bool add_grid(MediumSource& m, Element& out, const char* name, const MadeGrid& grid, const Box& box) {
   const auto file = keep_made(m.t.assets, grid);
   if (!file) return m.wrong(m.p.at(), file.error().message);
-  add_volume(m, out, name, *file, box, filling);
-  return true;
-}
-
-void add_volume(MediumSource& m, Element& out, const char* name, const std::string& file, const Box& box,
-                Filling filling) {
   Element volume = made("volume", "gridvolume", m.p.at());
   set(volume, "name", name, m.p.at());
-  add(volume, "string", "filename", file, m.p.at());
-  if (filling == Filling::nodes) add(volume, "boolean", "node_centred", "true", m.p.at());
-  if (filling == Filling::border) add(volume, "boolean", "border", "true", m.p.at());
+  add(volume, "string", "filename", *file, m.p.at());
+  add(volume, "boolean", "border", "true", m.p.at());
   Vec3 size;
   for (std::size_t i = 0; i < 3; ++i) size[i] = box.high[i] - box.low[i];
   place(volume, multiply(m.ctm.to, multiply(moved(box.low).to, scaled(size).to)), m.p.at());
   add(out, std::move(volume));
+  return true;
 }
 
 bool uniform_grid(MediumSource& m, Element& out) {
@@ -253,7 +246,7 @@ bool uniform_grid(MediumSource& m, Element& out) {
   add_albedo(m, out, c.albedo);
   add_extinction(m, out, c.extinction);
   const MadeGrid grid = padded(sides, 1, [&](std::size_t i, std::size_t) { return density->numbers[i]; });
-  return add_grid(m, out, "sigma_t", grid, box, Filling::border) && GridLight(m, sides, box).run(out);
+  return add_grid(m, out, "sigma_t", grid, box) && GridLight(m, sides, box).run(out);
 }
 
 bool rgb_grid(MediumSource& m, Element& out) {
@@ -267,14 +260,14 @@ bool rgb_grid(MediumSource& m, Element& out) {
     if (!fits(m, p, 3, sides)) return false;
   const Colours colours(m.t, a, s, sides);
   add(out, "scale", m.p.number("scale", 1), m.p.at());
-  if (!add_grid(m, out, "sigma_t", colours.extinction(), box, Filling::border)) return false;
+  if (!add_grid(m, out, "sigma_t", colours.extinction(), box)) return false;
   if (const auto albedo = colours.one_albedo()) {
     add_albedo(m, out, *albedo);
   } else {
     m.t.warn_once(m.p.at(),
                   "of an \"rgbgrid\" extinction and albedo are interpolated between voxels, in pbrt "
                   "absorption and scattering");
-    if (!add_grid(m, out, "albedo", colours.albedo(), box, Filling::border)) return false;
+    if (!add_grid(m, out, "albedo", colours.albedo(), box)) return false;
   }
   if (!light) return m.p.take("Lescale"), true;
   return add_colours(m, out, *light, sides, box);

@@ -1,4 +1,4 @@
-// Translates media; grid media are in grids.cpp and cloud.cpp.
+// Translates media; media of grids in the scene's text are in grids.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -145,6 +145,26 @@ bool nanovdb(MediumSource& m, Element& out) {
   }
   add_file_grid(m, out, "temperature", file, temperature);
   return add_black_bodies(m, out, scale);
+}
+
+bool cloud(MediumSource& m, Element& out) {
+  const Coefficients c = coefficients(m);
+  Box box;
+  if (!read_box(m, box)) return false;
+  add_albedo(m, out, c.albedo);
+  add_extinction(m, out, c.extinction);
+  Element volume = made("volume", "cloud", m.p.at());
+  set(volume, "name", "sigma_t", m.p.at());
+  const CloudVolume usual;
+  add(volume, "density", m.p.number("density", usual.density), m.p.at());
+  // pbrt displaces no point if it is below 0.
+  add(volume, "wispiness", std::max(0., m.p.number("wispiness", usual.wispiness)), m.p.at());
+  add(volume, "frequency", m.p.number("frequency", usual.frequency), m.p.at());
+  add(volume, "point", "min", box.low, m.p.at());
+  add(volume, "point", "max", box.high, m.p.at());
+  place(volume, m.ctm.to, m.p.at());
+  add(out, std::move(volume));
+  return true;
 }
 
 }  // namespace

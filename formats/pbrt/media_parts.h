@@ -54,20 +54,12 @@ struct Box {
   Vec3 low{{0, 0, 0}}, high{{1, 1, 1}};
 };
 bool read_box(MediumSource& m, Box& box);  // reads p0 and p1
-// How a grid fills its box. border: the outermost layer of voxels lies outside the box, all other voxels
-// fill it. nodes: the outermost values lie on the faces of the box.
-enum class Filling { border, nodes };
-void add_volume(MediumSource& m, Element& out, const char* name, const std::string& file, const Box& box,
-                Filling filling);
-// Stores the grid as a file, and adds it to `out` as the volume `name`.
-bool add_grid(MediumSource& m, Element& out, const char* name, const MadeGrid& grid, const Box& box,
-              Filling filling);
+// Stores the grid as a file, and adds it to `out` as the volume `name`. The outermost layer of voxels lies
+// outside of the box, which all other voxels fill.
+bool add_grid(MediumSource& m, Element& out, const char* name, const MadeGrid& grid, const Box& box);
 
 // These two are in grids.cpp. Each translates a medium type of pbrt: "uniformgrid" and "rgbgrid".
 bool uniform_grid(MediumSource& m, Element& out);
 bool rgb_grid(MediumSource& m, Element& out);
-
-// In cloud.cpp. Translates pbrt's medium type "cloud".
-bool cloud(MediumSource& m, Element& out);
 
 }  // namespace ls::scene::pbrt

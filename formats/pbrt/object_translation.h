@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "formats/made_files.h"
-#include "formats/pbrt/cloud.h"
 #include "formats/pbrt/parameters.h"
 #include "formats/read.h"
 #include "formats/xml/document.h"
@@ -67,13 +66,6 @@ struct Attributes {
   std::string inside, outside;  // media on the surface's two sides, by name; empty: none
 };
 
-// A cloud, the grid file that was made from it, and the number of nodes of this grid.
-struct MadeCloud {
-  Cloud cloud;
-  std::size_t nodes;
-  std::string file;
-};
-
 // The scene as translated so far.
 struct Translation {
   AssetSource& assets;
@@ -90,7 +82,6 @@ struct Translation {
   // As in pbrt, a texture of numbers and one of colours may have the same name.
   std::map<std::string, Texture> float_textures, colour_textures;
   std::map<std::string, Material> materials;
-  std::vector<MadeCloud> clouds;
 
   // Gives a warning only once per scene.
   void warn_once(const Span& at, std::string text) { report.warning_once(at, std::move(text)); }

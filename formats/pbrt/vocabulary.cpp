@@ -458,8 +458,7 @@ void add_media(std::vector<Row>& r) {
                          {"LeScale", "float", "1", "the name of this parameter in older scenes"}} +
                    temperature_words()});
   r.push_back(
-      {"MakeNamedMedium", "cloud", true,
-       "a `heterogeneous` medium; its density is a formula, from which a `.vol` file is made",
+      {"MakeNamedMedium", "cloud", true, "a `heterogeneous` medium whose density is the volume `cloud`",
        coefficient_words() +
            Words{{"density", "float", "1", "multiplies the noise"},
                  {"wispiness", "float", "1", "how far points are displaced before the noise is evaluated"},

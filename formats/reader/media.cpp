@@ -6,6 +6,7 @@
 
 #include "core/base/file_form.h"
 #include "core/scene/schema/phase_tables.h"
+#include "core/scene/schema/volume_rules.h"
 #include "formats/reader/reader.h"
 #include "formats/xml/transform_element.h"
 
@@ -83,68 +84,74 @@ void check_medium(const Params& p, const Factors& given, const HeterogeneousMedi
 }
 void check_medium(const Params&, const Factors&, const HomogeneousMedium&, Report&) {}
 
-// The places of the lists of a table, for messages. Must be constructed before parameters are taken.
-class TablePlaces {
+// The places of an object's parameters, for messages. Must be constructed before parameters are taken.
+class ParameterPlaces {
  public:
-  explicit TablePlaces(const Params& p) {
+  explicit ParameterPlaces(const Params& p) {
     for (const Element& e : p.object().children) at_.emplace(e.get("name"), &e);
   }
-  void check(const Params& p, const TabulatedPhase& table, Report& report) const {
-    const auto [list, what] = table_problem(table);
-    if (what.empty()) return;
-    const auto e = at_.find(list);
-    report.error(e == at_.end() ? p.object().at : value_place(*e->second, "value"),
-                 fmt::format("'{}' of {} {}", list, p.title(), what));
+  void check(const Params& p, const ParameterProblem& problem, Report& report) const {
+    if (problem.what.empty()) return;
+    const auto e = at_.find(problem.parameter);
+    const bool is_given = e != at_.end();
+    report.error(!is_given                  ? p.object().at
+                 : e->second->find("value") ? value_place(*e->second, "value")
+                                            : e->second->at,
+                 fmt::format("'{}' of {} {}", problem.parameter, p.title(), problem.what));
   }
 
  private:
   std::map<std::string_view, const Element*> at_;
 };
 
-// True if the object has a parameter of this name that is a volume "gridvolume".
-bool has_grid(Reader& reader, const Element& e, std::string_view name) {
+// True if the object has a parameter of this name that is a volume other than "constvolume".
+bool has_varying_volume(Reader& reader, const Element& e, std::string_view name) {
   return std::ranges::any_of(e.children, [&](const Element& c) {
     if (c.get("name") != name || (c.tag != "volume" && c.tag != "ref")) return false;
     const Element* volume = c.tag == "ref" ? reader.resolve(c) : &c;
-    return volume && volume->tag == "volume" && volume->get("type") == "gridvolume";
+    return volume && volume->tag == "volume" && volume->get("type") != "constvolume";
   });
+}
+
+// Checks that concern the file of a grid.
+void check_grid(const GridVolume& volume, std::string_view file, const Element& e, Report& report) {
+  if (volume.order != GridOrder{} && !file.ends_with(".bin"))
+    report.error(e.at, "'order' is of .bin files; others say for themselves how their values lie");
+  if (file.ends_with(".bin") && volume.wrap != Wrap::clamp)
+    report.error(e.at, "a .bin grid ends at its outermost nodes: 'wrap_mode' can only be clamp");
+  if (volume.node_centred && volume.wrap != Wrap::clamp)
+    report.error(e.at, "a grid with node_centred ends at its outermost nodes: 'wrap_mode' can only be clamp");
+  if (volume.border && (!file.ends_with(".vol") || volume.node_centred || volume.wrap != Wrap::clamp))
+    report.error(e.at,
+                 "'border' is of .vol files with values at the centres of voxels: it goes neither with "
+                 "node_centred nor with a wrap_mode other than clamp");
 }
 
 }  // namespace
 
 std::optional<VolumeIndex> Reader::read_volume(const Element& e) {
-  const std::string_view type = e.get("type");
-  Params p(*this, e);
-  if (type == "constvolume") {
-    ConstVolume volume;
+  std::optional<VolumeIndex> read;
+  const auto read_as = [&]<class Kind>() {
+    Params p(*this, e);
+    const ParameterPlaces places(p);
+    Kind volume;
     bind(p, volume);
-    need_inverse(volume.to_world, e, report_);
-    scene_.volumes.emplace_back(volume);
-  } else if (type == "gridvolume") {
-    GridVolume volume;
-    bind(p, volume);
-    if (const auto name = p.take_string("gridname")) volume.grid_name = *name;
-    const std::string_view file =
-        volume.file.value < scene_.assets.size() ? without_gz(scene_.assets[volume.file.value].name) : "";
-    if (volume.order != GridOrder{} && !file.ends_with(".bin"))
-      report_.error(e.at, "'order' is of .bin files; others say for themselves how their values lie");
-    if (file.ends_with(".bin") && volume.wrap != Wrap::clamp)
-      report_.error(e.at, "a .bin grid ends at its outermost nodes: 'wrap_mode' can only be clamp");
-    if (volume.node_centred && volume.wrap != Wrap::clamp)
-      report_.error(e.at,
-                    "a grid with node_centred ends at its outermost nodes: 'wrap_mode' can only be clamp");
-    if (volume.border && (!file.ends_with(".vol") || volume.node_centred || volume.wrap != Wrap::clamp))
-      report_.error(e.at,
-                    "'border' is of .vol files with values at the centres of voxels: it goes neither with "
-                    "node_centred nor with a wrap_mode other than clamp");
-    need_inverse(volume.to_world, e, report_);
-    scene_.volumes.emplace_back(volume);
-  } else {
-    unknown_plugin(e, report_);
-    return std::nullopt;
-  }
-  p.finish();
-  return VolumeIndex{static_cast<std::uint32_t>(scene_.volumes.size() - 1)};
+    if constexpr (std::is_same_v<Kind, GridVolume>) {
+      if (const auto name = p.take_string("gridname")) volume.grid_name = *name;
+      check_grid(
+          volume,
+          volume.file.value < scene_.assets.size() ? without_gz(scene_.assets[volume.file.value].name) : "",
+          e, report_);
+    }
+    if constexpr (requires { volume.to_world; }) need_inverse(volume.to_world, e, report_);
+    p.finish();
+    if (!report_.has_errors()) places.check(p, volume_problem(scene_.volumes, volume), report_);
+    read = added<VolumeIndex>(std::move(volume));
+    if (!report_.has_errors() && nesting_of(scene_.volumes, *read) > kMaxVolumeNesting)
+      read = report_.refuse(e.at, fmt::format("volumes are nested more than {} deep", kMaxVolumeNesting));
+  };
+  if (!with_kind_named<Volume>(e.get("type"), read_as)) unknown_plugin(e, report_);
+  return read;
 }
 
 std::optional<PhaseIndex> Reader::read_phase(const Element& e) {
@@ -152,13 +159,15 @@ std::optional<PhaseIndex> Reader::read_phase(const Element& e) {
   std::optional<PhaseIndex> read;
   const auto read_as = [&]<class Kind>() {
     Kind phase;
-    const TablePlaces places(p);
+    const ParameterPlaces places(p);
     bind(p, phase);
     if constexpr (std::is_same_v<Kind, BlendPhase>)
       if (!read_parts(p, phase)) return;
     p.finish();
     if constexpr (std::is_same_v<Kind, TabulatedPhase>)
-      if (!report_.has_errors()) places.check(p, phase, report_);
+      if (!report_.has_errors()) places.check(p, table_problem(phase), report_);
+    if constexpr (std::is_same_v<Kind, BlendPhase>)
+      if (!report_.has_errors()) places.check(p, phase_problem(scene_.volumes, phase), report_);
     read = added<PhaseIndex>(std::move(phase));
     if constexpr (std::is_same_v<Kind, BlendPhase>)
       if (!report_.has_errors() && nesting_of(scene_.phases, *read) > kMaxPhaseNesting)
@@ -193,7 +202,8 @@ bool Reader::read_parts(Params& p, BlendPhase& blend) {
 }
 
 std::optional<MediumIndex> Reader::read_medium(const Element& e) {
-  if (e.get("type") == "homogeneous" && !e.old && has_grid(*this, e, "albedo")) return read_unbounded(e);
+  if (e.get("type") == "homogeneous" && !e.old && has_varying_volume(*this, e, "albedo"))
+    return read_unbounded(e);
   std::optional<MediumIndex> read;
   if (!with_kind_named<Medium>(e.get("type"), [&]<class Kind>() { read = read_medium_as<Kind>(e); }))
     unknown_plugin(e, report_);
@@ -206,6 +216,7 @@ std::optional<MediumIndex> Reader::read_medium_as(const Element& e) {
   T medium;
   if (e.old) read_old_coefficients(p, medium, report_);
   const Factors given(p);
+  const ParameterPlaces places(p);
   bind(p, medium);
   check_medium(p, given, medium, report_);
   if constexpr (std::is_same_v<T, HeterogeneousMedium>)
@@ -213,6 +224,8 @@ std::optional<MediumIndex> Reader::read_medium_as(const Element& e) {
       report_.error(e.at, fmt::format("'temperature' of {} is one number, not a colour", p.title()));
   const auto given_phase = p.take_only("phase", p.title(), "phase function");
   p.finish();
+  if constexpr (std::is_same_v<T, HeterogeneousMedium>)
+    if (!report_.has_errors()) places.check(p, medium_problem(scene_.volumes, medium), report_);
   if (!given_phase)
     medium.phase = added<PhaseIndex>(IsotropicPhase{});
   else if (const auto index = phase(*given_phase->object, *given_phase->use))
@@ -223,7 +236,7 @@ std::optional<MediumIndex> Reader::read_medium_as(const Element& e) {
   return index;
 }
 
-// Reads a medium "homogeneous" whose albedo is a grid, which Mitsuba 3 allows: a medium "heterogeneous" whose
+// Reads a medium "homogeneous" whose albedo varies, which Mitsuba 3 allows: a medium "heterogeneous" whose
 // density is the same in a box that is larger than any scene.
 std::optional<MediumIndex> Reader::read_unbounded(const Element& e) {
   const auto index = read_medium_as<HeterogeneousMedium>(e);

@@ -325,6 +325,9 @@ void Params::convert(const Field& f, const Element& e, VolumeIndex& value) {
 }
 
 void Params::absent(const Field& f, TextureIndex& value) { value = reader_.add_constant_texture(f.fallback); }
-void Params::absent(const Field& f, VolumeIndex& value) { value = reader_.add_constant_volume(f.fallback); }
+void Params::absent(const Field& f, VolumeIndex& value) {
+  if (f.required) return missing(f.name);
+  value = reader_.add_constant_volume(f.fallback);
+}
 
 }  // namespace ls::scene

@@ -61,7 +61,7 @@ class Reader {
     double low, high;
   };
   const std::optional<Bounds>& bounds(TextureIndex texture);
-  const Rgb* constant(VolumeIndex volume) const;    // nullptr: the volume is a grid
+  const Rgb* constant(VolumeIndex volume) const;    // nullptr: the volume varies
   const Rgb* constant(TextureIndex texture) const;  // nullptr: the texture varies
   std::optional<AssetIndex> asset(const std::string& name, const Span& at);
   // Returns the paths at which to look for the file that the scene calls `name`, the likeliest first.

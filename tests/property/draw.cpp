@@ -125,6 +125,7 @@ VolumeIndex Draw::volume(GridKind kind) {
     if (kind == GridKind::density) v.to_world = translate({-1, -1, -1}) * ls::test::scale(2);
     return SceneBuilder::push<VolumeTag>(scene_.volumes, v);
   }
+  if (c < .45) return computed_volume(kind);
   GridVolume g;
   fill(g);
   const bool bin = c > .85;
@@ -137,6 +138,69 @@ VolumeIndex Draw::volume(GridKind kind) {
   if (bin || g.node_centred) g.wrap = Wrap::clamp;
   if (dice_.chance(.7)) g.to_world = translate({-1, -1, -1}) * ls::test::scale(2);
   return SceneBuilder::push<VolumeTag>(scene_.volumes, g);
+}
+
+// A volume that has a box, and no values above 1 (temperatures: 1600).
+VolumeIndex Draw::computed_volume(GridKind kind) {
+  const auto push = [&](const Volume& v) { return SceneBuilder::push<VolumeTag>(scene_.volumes, v); };
+  const auto place = [&](auto& v) {
+    fill(v);
+    v.min = {-.9, -.8, -.9};
+    v.max = {.9, .7, .8};
+    v.to_world = placement(1, false);
+  };
+  NoiseVolume noise;
+  place(noise);
+  noise.high = std::min(noise.high, 1.);
+  noise.low = wild() ? std::min(noise.low, 1.) : dice_.between(-1, .5);
+  VolumeIndex made = push(noise);
+  if (dice_.chance(.3)) {
+    CloudVolume cloud;
+    place(cloud);
+    made = push(cloud);
+  }
+  if (dice_.chance(.5)) {
+    HeightFogVolume fog;
+    fill(fog);
+    fog.value = std::min(fog.value, 1.);
+    fog.ground_normal = {.2, 1, -.3};
+    const VolumeIndex second = dice_.chance(.5) ? push(fog) : made;
+    made = push(ProductVolume{made, second});
+  }
+  if (kind == GridKind::temperature || dice_.chance(.4)) {
+    RemapVolume r{made};
+    r.in_low = dice_.between(0, .3);
+    r.in_high = r.in_low + dice_.between(.1, 1);
+    r.gamma = dice_.between(.3, 3);
+    r.out_low = dice_.unit();
+    if (dice_.chance(.5)) {
+      r.positions = {.2, .5, .6};
+      r.values = {dice_.unit(), dice_.unit(), dice_.unit()};
+    }
+    if (kind == GridKind::temperature) {
+      r.out_low *= 800;
+      r.out_high = 1600;
+    }
+    made = push(r);
+  }
+  return made;
+}
+
+// Gives the medium a density that falls with height, and makes its other volumes constant.
+void Draw::fill_with_height_fog(HeterogeneousMedium& m) {
+  HeightFogVolume fog;
+  fill(fog);
+  fog.ground_normal = {dice_.between(-1, 1), 1, dice_.between(-1, 1)};
+  const auto constant = [&](double most) {
+    const double v = most * dice_.unit();
+    return SceneBuilder::push<VolumeTag>(scene_.volumes, ConstVolume{{v, v, v}, {}});
+  };
+  m.sigma_t = SceneBuilder::push<VolumeTag>(scene_.volumes, fog);
+  m.albedo = constant(1);
+  m.emission.reset();
+  if (m.source_radiance) m.source_radiance = constant(1);
+  if (m.temperature) m.temperature = constant(1500);
+  if (m.emission_weight) m.emission_weight = constant(1);
 }
 
 PhaseIndex Draw::phase(int depth) {
@@ -175,6 +239,7 @@ MediumIndex Draw::medium() {
   Medium m;
   any(m);
   if (auto* h = std::get_if<HeterogeneousMedium>(&m)) {
+    if (dice_.chance(.2)) fill_with_height_fog(*h);
     // At most one source of light, and none of their factors without it.
     const std::size_t keep = dice_.below(4);
     if (keep != 0) h->emission.reset();

@@ -32,6 +32,7 @@ class Draw {
   TextureIndex texture(const scene::Range& range, int depth = 0);
   BsdfIndex bsdf(int depth = 0);
   VolumeIndex volume(GridKind kind);
+  VolumeIndex computed_volume(GridKind kind);
   PhaseIndex phase(int depth = 0);
   MediumIndex medium();
   double number(const scene::Range& range) {
@@ -61,6 +62,7 @@ class Draw {
     ((Is == i ? static_cast<void>(x.template emplace<Is>()) : void()), ...);
   }
   void share_light(DiffuseTransmissionBsdf& sheet);
+  void fill_with_height_fog(HeterogeneousMedium& m);
   void draw(const scene::Field& f, double& x) { x = number(f.range); }
   void draw(const scene::Field& f, int& x) { x = static_cast<int>(number(f.range)); }
   void draw(const scene::Field& f, std::uint64_t& x) { x = static_cast<std::uint64_t>(number(f.range)); }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <optional>
 
 #include "tests/property/quarters.h"
 #include "tests/support/fire.h"
@@ -38,6 +39,35 @@ TEST(EmissiveGrids, GiveTheSameImageAsPathsThatMeetTheirLight) {
   const auto unseen = [](SceneBuilder& b) {
     b.shape(SphereShape{}, translate({-1, .4, 0}) * scale(.4), b.diffuse(.5)).visible_reflection = false;
   };
+  // The flame's density or its light as volumes that are computed: the grid's values, torn by noise.
+  const auto torn = [](SceneBuilder& b, std::optional<VolumeIndex> HeterogeneousMedium::*light) {
+    const auto push = [&](const Volume& v) { return SceneBuilder::push<VolumeTag>(b.scene.volumes, v); };
+    auto& flame = std::get<HeterogeneousMedium>(b.scene.media.at(0));
+    NoiseVolume noise;
+    noise.scale = 4;
+    noise.octaves = 3;
+    noise.low = -.5;
+    noise.high = 2;
+    const VolumeIndex rips = push(noise);
+    flame.sigma_t = push(ProductVolume{flame.sigma_t, rips});
+    RemapVolume bent{push(ProductVolume{rips, *(flame.*light)})};
+    bent.gamma = 1.5;
+    bent.positions = {.1, .4, 1};
+    bent.values = {0, .7, 1};
+    flame.*light = push(bent);
+  };
+  const auto torn_emission = [=](SceneBuilder& b) { torn(b, &HeterogeneousMedium::emission); };
+  const auto torn_source = [=](SceneBuilder& b) { torn(b, &HeterogeneousMedium::source_radiance); };
+  // The fog around the flame as one that falls with height
+  const auto falling_fog = [](SceneBuilder& b) {
+    HeightFogVolume fog;
+    fog.value = .4;
+    fog.height = .6;
+    b.scene.media.at(1) = std::get<HeterogeneousMedium>(
+        b.scene
+            .media[b.heterogeneous(SceneBuilder::push<VolumeTag>(b.scene.volumes, fog), {.9, .9, .9}).value]);
+    b.scene.media.pop_back();
+  };
   const Rival rivals[] = {{"fire", {}},
                           {"fire by absorption", {.absorbed = true}},
                           {"hot fire over a glossy floor", {.glossy = true, .black_body = true}, {}, "", 64},
@@ -46,7 +76,10 @@ TEST(EmissiveGrids, GiveTheSameImageAsPathsThatMeetTheirLight) {
                           {"fire in fog with a lamp", {.fog = true}, lamp, "aimed"},
                           {"fire behind thin glass", {}, thin_glass},
                           {"fire across haze that glows", {}, overlap},
-                          {"fire and a ball that reflections do not show", {}, unseen}};
+                          {"fire and a ball that reflections do not show", {}, unseen},
+                          {"fire torn by noise", {}, torn_emission},
+                          {"fire by absorption torn by noise", {.absorbed = true}, torn_source},
+                          {"fire in fog that falls with height", {.fog = true}, falling_fog, "height", 96}};
   const double level = tests.level(std::size(rivals) * kQuarters);
   for (const Rival& rival : rivals) {
     const auto scene = [&](int emissive_grids) {

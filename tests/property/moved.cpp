@@ -108,7 +108,12 @@ Scene moved(Scene s, const Move& move_by) {
   for (Shape& shape : s.shapes)
     if (!shape.group) m.place(shape.to_world);
   for (Instance& i : s.instances) m.place(i.to_world);
-  for (Volume& v : s.volumes) std::visit([&](auto& one) { m.place(one.to_world); }, v);
+  for (Volume& v : s.volumes)
+    std::visit(
+        [&](auto& one) {
+          if constexpr (requires { one.to_world; }) m.place(one.to_world);
+        },
+        v);
   for (Bsdf& b : s.bsdfs)
     if (auto* bump = std::get_if<BumpMapBsdf>(&b)) bump->scale *= m.length();
   for (Medium& medium : s.media) move(m, medium);

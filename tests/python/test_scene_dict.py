@@ -126,3 +126,16 @@ def test_the_flag_of_flat_faces_is_no_attribute_of_a_mesh():
     mesh = {"type": "ply", "filename": "a.ply", "face_normals": True}
     text = scene_of_dict({"type": "scene", "mesh": mesh})
     assert '<boolean name="face_normals" value="true"/>' in text.xml and not text.files
+
+
+def test_a_product_is_a_volume_within_media_and_a_texture_elsewhere():
+    noise = {"type": "noise", "scale": 2.0}
+    inner = {"type": "product", "first": noise, "second": 2.0}
+    text = "".join(
+        lines(
+            air={"type": "heterogeneous", "sigma_t": {"type": "product", "first": noise, "second": inner}},
+            wall={"type": "diffuse", "reflectance": {"type": "product", "first": 0.5, "second": 0.5}},
+        )
+    )
+    assert text.count('<volume type="product"') == 2
+    assert text.count('<texture type="product"') == 1

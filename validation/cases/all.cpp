@@ -27,11 +27,12 @@ void Table::exact(std::string id, std::string rows, std::string about,
 Table all_cases() {
   Table t;
   for (AddCases* const add :
-       {add_depths,       add_scales,         add_grids,    add_albedos,  add_phases,     add_lamps,
-        add_light_shapes, add_slabs,          add_single,   add_fields,   add_emission,   add_furnaces,
-        add_direct_light, add_seed,           add_surfaces, add_rooms,    add_interfaces, add_microfacets,
-        add_places,       add_bodies,         add_skies,    add_coatings, add_overlaps,   add_slopes,
-        add_bugs,         add_phase_functions})
+       {add_depths,          add_scales,       add_grids,        add_albedos, add_phases,
+        add_lamps,           add_light_shapes, add_slabs,        add_single,  add_fields,
+        add_emission,        add_furnaces,     add_direct_light, add_seed,    add_surfaces,
+        add_rooms,           add_interfaces,   add_microfacets,  add_places,  add_bodies,
+        add_skies,           add_coatings,     add_overlaps,     add_slopes,  add_bugs,
+        add_phase_functions, add_height_fog})
     add(t);
   return t;
 }

@@ -83,6 +83,7 @@ void Analyst::add(const Medium& medium) {
   if (!m.extinguishes && !m.emits && !m.grids) return;
   n_.media = true;
   n_.grids = n_.grids || m.grids;
+  n_.height = n_.height || m.height;
   n_.chromatic = n_.chromatic || m.chromatic;
   n_.density_files = n_.density_files || m.density_file;
   n_.emission = n_.emission || m.emits;
@@ -125,6 +126,10 @@ void Analyst::lights() {
 }
 
 void Analyst::files() {
+  for (const Volume& v : s_.volumes)
+    if (!std::holds_alternative<ConstVolume>(v) && !std::holds_alternative<GridVolume>(v) &&
+        !std::holds_alternative<HeightFogVolume>(v))
+      ++n_.volumes[kind_of(v)];
   for (const Asset& a : s_.assets) n_.files.push_back({a.name, a.digest, a.bytes, {}});
   for (const Shape& s : s_.shapes)
     if (const auto* mesh = std::get_if<MeshShape>(&s.geometry)) file(mesh->file, "mesh");
@@ -242,6 +247,11 @@ class Words {
     for (const FileNeed& f : n_.files)
       for (const std::string& use : f.uses)
         if (use.starts_with("grid")) grids.push_back(fmt::format("{} of {}", use, f.name));
+    say("fog that falls with height", n_.height,
+        "its flights and transmittances are formulas; path_reuse, which does not know it, is left out", none);
+    say("volumes without a file", !n_.volumes.empty(),
+        listed(n_.volumes) + ", computed at each point that is looked up",
+        "no noise, cloud, product or remap");
     say("volume grids", !grids.empty(), fmt::format("{}", fmt::join(grids, ", ")), "no grid file");
     say("chromatic extinction", n_.chromatic, "extinction differs between channels",
         n_.density_files ? "extinction is grey, but for density files of three channels"
@@ -324,6 +334,8 @@ std::string canonical_json(const Needs& n) {
   // Left out of scenes without them, so that the needs of stored jobs stay the same.
   if (n.transparent_film) j["transparent_film"] = true;
   if (n.phases) j["phases"] = true;
+  if (n.height) j["height"] = true;
+  if (!n.volumes.empty()) j["volumes"] = n.volumes;
   if (n.meters > 0) j["meters"] = n.meters;
   if (n.flagged_shapes > 0) j["flagged_shapes"] = n.flagged_shapes;
   if (n.ray_flags > 0) j["ray_flags"] = n.ray_flags;

@@ -51,6 +51,8 @@ struct Needs {
   // Number of objects of each type. The key is the name of the type (describe.h). Types without objects are
   // left out.
   std::map<std::string, std::uint32_t> shapes, materials, textures, lights, media_kinds;
+  std::map<std::string, std::uint32_t> volumes;  // those that are computed: neither constant nor from files
+  bool height = false;                           // the density of some medium falls with height (heightfog)
   std::uint32_t area_lights = 0, instances = 0;
   std::uint32_t compensated = 0;  // number of rough materials whose setting multiple_scattering is on
   // True if the density of a heterogeneous medium is in a file. The file may have three channels, which makes

@@ -48,6 +48,120 @@ void describe(V& v, T& s) {
   v.field({.name = "order", .doc = "which index of a `.bin` file's values runs fastest"}, s.order);
 }
 
+// Describes the box of a volume of noise.
+template <class V, class T>
+void describe_noise_box(V& v, T& s) {
+  v.field(
+      {.name = "min", .doc = "corner of the box that it fills as a density or as light", .given_as = "point"},
+      s.min);
+  v.field({.name = "max", .doc = "the opposite corner", .given_as = "point"}, s.max);
+  v.field({.name = "to_world", .doc = "moves it, with its box"}, s.to_world);
+}
+
+LS_TYPE(HeightFogVolume, "volume", "heightfog", "",
+        "a value that falls with height, to 1/e over `height`; below the ground it is that of the ground. It "
+        "has no end. As the `sigma_t` of a `heterogeneous` medium whose other volumes are constant it is as "
+        "cheap as a `homogeneous` medium, as rays are followed through it by formulas. Not in Mitsuba")
+template <class V, Of<HeightFogVolume> T>
+void describe(V& v, T& s) {
+  v.field({.name = "value", .doc = "at the ground", .range = kNonNegative}, s.value);
+  v.field(
+      {.name = "height", .doc = "over which the value falls to 1/e", .unit = "length", .range = kPositive},
+      s.height);
+  v.field({.name = "ground_point", .doc = "a point of the ground, which is a plane", .given_as = "point"},
+          s.ground_point);
+  v.field({.name = "ground_normal", .doc = "upwards; of any length", .given_as = "vector"}, s.ground_normal);
+  v.field({.name = "to_world", .doc = "moves the ground; a scale along its normal scales `height` too"},
+          s.to_world);
+}
+
+LS_TYPE(
+    NoiseVolume, "volume", "noise", "",
+    "noise in octaves (Perlin's, with hashed gradients), from `low` to `high`, most of it near their mean. "
+    "As a density or as light it fills its box; as anything else, or a part of another volume, it is "
+    "everywhere. Not in Mitsuba")
+template <class V, Of<NoiseVolume> T>
+void describe(V& v, T& s) {
+  constexpr double kFar = 1e6;
+  v.field({.name = "scale",
+           .doc = "cells of the first octave along a unit of length",
+           .unit = "1/length",
+           .range = {.min = 0, .max = kFar, .open_min = true}},
+          s.scale);
+  v.field({.name = "octaves", .doc = "number of octaves", .range = {.min = 1, .max = kMaxNoiseOctaves}},
+          s.octaves);
+  v.field({.name = "lacunarity", .doc = "cells per cell of the octave before", .range = {.min = 1, .max = 8}},
+          s.lacunarity);
+  v.field({.name = "gain", .doc = "strength relative to the octave before", .range = kUnit}, s.gain);
+  v.field({.name = "offset",
+           .doc = "added to the position, in cells of the first octave",
+           .range = {.min = -kFar, .max = kFar},
+           .given_as = "vector"},
+          s.offset);
+  v.field({.name = "seed", .doc = "another seed is another noise"}, s.seed);
+  v.field({.name = "low",
+           .doc = "the least value; below 0 it makes holes, as values below 0 are 0",
+           .range = {.min = -kFar, .max = kFar}},
+          s.low);
+  v.field({.name = "high", .doc = "the largest value", .range = {.min = 0, .max = kFar}}, s.high);
+  describe_noise_box(v, s);
+}
+
+LS_TYPE(
+    CloudVolume, "volume", "cloud", "",
+    "pbrt's cloud: noise that thins out with the height y, 1 at y = 0 and about 0 at y = 1, with edges that "
+    "another noise frays. As a density or as light it fills its box; as anything else, or a part of another "
+    "volume, it is everywhere. Not in Mitsuba")
+template <class V, Of<CloudVolume> T>
+void describe(V& v, T& s) {
+  constexpr double kMost = 1e6;
+  v.field({.name = "density", .doc = "factor on the noise", .range = {.min = -kMost, .max = kMost}},
+          s.density);
+  v.field({.name = "wispiness", .doc = "how far edges are frayed", .range = {.min = 0, .max = kMost}},
+          s.wispiness);
+  v.field({.name = "frequency",
+           .doc = "cells of the noise along a unit of length",
+           .unit = "1/length",
+           .range = {.min = -kMost, .max = kMost}},
+          s.frequency);
+  describe_noise_box(v, s);
+}
+
+LS_TYPE(ProductVolume, "volume", "product", "",
+        "the product of two volumes of one channel each; it fills the box of the first of them that has one. "
+        "Not in Mitsuba")
+template <class V, Of<ProductVolume> T>
+void describe(V& v, T& s) {
+  v.field({.name = "first", .doc = "a number or a volume; a grid is 0 beyond its box", .range = kNonNegative},
+          s.first);
+  v.field({.name = "second", .doc = "likewise", .range = kNonNegative}, s.second);
+}
+
+LS_TYPE(
+    RemapVolume, "volume", "remap", "",
+    "another volume of one channel, mapped: t = (value - in_low) / (in_high - in_low), limited to [0, 1]; "
+    "t to the power of `gamma`; the curve through points, if there are any; out_low + (out_high - out_low) "
+    "t. It fills the box of the other volume. Not in Mitsuba")
+template <class V, Of<RemapVolume> T>
+void describe(V& v, T& s) {
+  v.field({.name = "volume", .doc = "what is mapped", .range = kNonNegative, .required = true}, s.volume);
+  v.field({.name = "in_low", .doc = "the value that becomes 0, with all below it"}, s.in_low);
+  v.field({.name = "in_high", .doc = "the value that becomes 1, with all above it"}, s.in_high);
+  v.field({.name = "gamma", .doc = "exponent", .range = {.min = 0, .max = 100, .open_min = true}}, s.gamma);
+  v.field({.name = "positions",
+           .doc = "ascending, at which the curve has its points; beyond the first and the last it is level",
+           .range = kUnit,
+           .elided = true},
+          s.positions);
+  v.field({.name = "values",
+           .doc = "of the curve, as many as `positions`",
+           .range = kNonNegative,
+           .elided = true},
+          s.values);
+  v.field({.name = "out_low", .doc = "what 0 becomes", .range = kNonNegative}, s.out_low);
+  v.field({.name = "out_high", .doc = "what 1 becomes", .range = kNonNegative}, s.out_high);
+}
+
 LS_TYPE(IsotropicPhase, "phase", "isotropic", "",
         "scatters equally into all directions; what a medium has if none is given")
 template <class V, Of<IsotropicPhase> T>

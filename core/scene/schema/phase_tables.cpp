@@ -25,8 +25,8 @@ std::vector<NamedList> lists_of(const TabulatedPhase& t) {
 
 double cosine_of_degrees(double angle) { return std::cos(angle * std::numbers::pi / 180); }
 
-TableProblem problem_of_places(std::string_view name, const std::vector<double>& at, double first,
-                               double last, double (*cosine_of)(double)) {
+ParameterProblem problem_of_places(std::string_view name, const std::vector<double>& at, double first,
+                                   double last, double (*cosine_of)(double)) {
   for (std::size_t i = 1; i < at.size(); ++i) {
     if (!(at[i] > at[i - 1]))
       return {name, fmt::format("must ascend: number {} is {} after {}", i + 1, at[i], at[i - 1])};
@@ -42,7 +42,7 @@ TableProblem problem_of_places(std::string_view name, const std::vector<double>&
 
 }  // namespace
 
-TableProblem table_problem(const TabulatedPhase& t) {
+ParameterProblem table_problem(const TabulatedPhase& t) {
   const bool coloured = !t.red.empty() || !t.green.empty() || !t.blue.empty();
   if (t.values.empty() == !coloured)
     return {"values", coloured ? "is given beside 'red', 'green' and 'blue'; give one or the other"

@@ -6,16 +6,12 @@
 #include <vector>
 
 #include "core/scene/scene.h"
+#include "core/scene/schema/parameter_problem.h"
 
 namespace ls::scene {
 
-// Returns what is wrong with the table, as a predicate ("has 3 values and 2 angles"), and the name of the
-// list that it is about. Both are empty if nothing is.
-struct TableProblem {
-  std::string_view list;
-  std::string what;
-};
-TableProblem table_problem(const TabulatedPhase& table);
+// Looks for what is wrong with the table. The parameter of the result is one of its lists.
+ParameterProblem table_problem(const TabulatedPhase& table);
 
 // The contents of a table without problems. `values` has one list, or one for each colour.
 struct PhaseValues {

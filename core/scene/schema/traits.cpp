@@ -121,7 +121,13 @@ struct TraitsOfMedium {
   const std::vector<Volume>& volumes;
 
   const ConstVolume* constant(VolumeIndex v) const { return std::get_if<ConstVolume>(&volumes[v.value]); }
-  bool zero(VolumeIndex v) const { return constant(v) && all_zero(constant(v)->value); }
+  const HeightFogVolume* height_fog(VolumeIndex v) const {
+    return std::get_if<HeightFogVolume>(&volumes[v.value]);
+  }
+  bool zero(VolumeIndex v) const {
+    if (const HeightFogVolume* fog = height_fog(v)) return fog->value == 0;
+    return constant(v) && all_zero(constant(v)->value);
+  }
 
   MediumTraits operator()(const HomogeneousMedium& m) const {
     Rgb sigma_t = m.sigma_t;
@@ -145,8 +151,9 @@ struct TraitsOfMedium {
     if (const ConstVolume* c = constant(m.sigma_t))
       for (std::size_t i = 0; i < 3; ++i) sigma_t[i] *= c->value[i];
     t.chromatic = !is_grey(sigma_t);
-    t.grids = true;
-    t.density_file = !constant(m.sigma_t);
+    t.height = height_fog(m.sigma_t) != nullptr;
+    t.grids = !t.height;
+    t.density_file = std::holds_alternative<GridVolume>(volumes[m.sigma_t.value]);
     return t;
   }
 };

@@ -53,8 +53,11 @@ struct MediumTraits {
   bool extinguishes = false;  // true if the extinction is above 0 somewhere
   bool scatters = false;
   bool emits = false;
-  bool chromatic = false;     // true if red, green, blue extinctions differ; a grid file is taken to be grey
-  bool grids = false;         // true for a HeterogeneousMedium, whose coefficients are volumes
+  bool chromatic = false;  // true if red, green, blue extinctions differ; a grid file is taken to be grey
+  // True for a HeterogeneousMedium, whose coefficients are volumes, unless its density falls with height
+  // alone
+  bool grids = false;
+  bool height = false;        // true if its density is a HeightFogVolume
   bool density_file = false;  // true if the extinction comes from a grid file
 };
 

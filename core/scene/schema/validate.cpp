@@ -16,6 +16,7 @@
 #include "core/scene/schema/phase_tables.h"
 #include "core/scene/schema/traits.h"
 #include "core/scene/transform.h"
+#include "core/scene/schema/volume_rules.h"
 
 namespace ls::scene {
 namespace {
@@ -38,6 +39,7 @@ class ValueChecker {
     walker.walk(s_.sensor);
     if (wrong_.empty()) check_bsdf_nesting();
     if (wrong_.empty()) check_texture_nesting();
+    if (wrong_.empty()) check_volumes();
     if (wrong_.empty()) check_phases();
     if (wrong_.empty()) check_groups();
     if (wrong_.empty()) check_crop();
@@ -81,6 +83,28 @@ class ValueChecker {
         if ((*traits)[side.value].transmits || (*traits)[side.value].two_sided)
           wrong_ = "scene.bsdfs: a twosided bsdf holds one that lets light through, or another twosided";
     }
+  }
+  // Each list is checked before what refers to it.
+  void check_volumes() {
+    if (nested_too_deep(s_.volumes)) {
+      wrong_ =
+          fmt::format("scene.volumes contain each other in a circle or more than {} deep", kMaxVolumeNesting);
+      return;
+    }
+    const auto check_each = [&](std::string_view list, const auto& all, const auto& problem_of) {
+      for (std::size_t i = 0; i < all.size() && wrong_.empty(); ++i)
+        if (const ParameterProblem p = problem_of(all[i]); !p.what.empty())
+          wrong_ = fmt::format("scene.{}[{}]: '{}' {}", list, i, p.parameter, p.what);
+    };
+    check_each("volumes", s_.volumes, [&](const Volume& v) { return volume_problem(s_.volumes, v); });
+    check_each("phases", s_.phases, [&](const Phase& p) {
+      const auto* blend = std::get_if<BlendPhase>(&p);
+      return blend ? phase_problem(s_.volumes, *blend) : ParameterProblem{};
+    });
+    check_each("media", s_.media, [&](const Medium& m) {
+      const auto* volumes = std::get_if<HeterogeneousMedium>(&m);
+      return volumes ? medium_problem(s_.volumes, *volumes) : ParameterProblem{};
+    });
   }
   void check_phases() {
     if (nested_too_deep(s_.phases))

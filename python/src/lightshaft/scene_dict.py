@@ -62,6 +62,7 @@ class _Writer:
         self.lines: list[str] = []
         self.paths: list[str] = []
         self.files: dict[str, bytes] = {}
+        self.inside: list[str] = []  # the elements that are being written
 
     def add(self, depth: int, path: str, line: str) -> None:
         if len(self.lines) >= MAX_ELEMENTS:
@@ -121,7 +122,7 @@ class _Writer:
     def write_object(
         self, depth: int, path: str, key: str, kind: str, value: Mapping[str, Any], names_it: bool
     ) -> None:
-        element = _element_of(path, key, kind)
+        element = _element_of(path, key, kind, self.inside[-1] if self.inside else "")
         name = value.get("id", key if names_it else None)
         if name is not None and not isinstance(name, str):
             raise _wrong(path, "an 'id' must be a string")
@@ -136,8 +137,10 @@ class _Writer:
         if not inner:
             return self.add(depth, path, f"{head}/>")
         self.add(depth, path, f"{head}>")
+        self.inside.append(element)
         for inner_key, inner_value in inner.items():
             self.write(depth + 1, path, inner_key, inner_value)
+        self.inside.pop()
         self.add(depth, path, f"</{element}>")
 
     def with_files(self, path: str, kind: str, values: dict[str, Any]) -> dict[str, Any]:
@@ -202,7 +205,8 @@ class _Writer:
             )
 
 
-def _element_of(path: str, key: str, kind: str) -> str:
+def _element_of(path: str, key: str, kind: str, parent: str) -> str:
+    """Some kinds, such as 'product', are of several elements: the key or the parent says which, else it is the first."""
     elements = ELEMENTS.get(kind)
     if elements is None:
         near = difflib.get_close_matches(kind, ELEMENTS, 1)
@@ -210,6 +214,8 @@ def _element_of(path: str, key: str, kind: str) -> str:
             path,
             f"there is no plugin of type {kind!r}" + (f"; did you mean {near[0]!r}?" if near else ""),
         )
+    if "volume" in elements and parent in ("medium", "volume", "phase"):
+        return "volume"
     return key if key in elements else elements[0]
 
 

@@ -71,7 +71,7 @@ inline double exact_integral(const Grid& g, const V3d& o, const V3d& d, double t
   if (!(part.t0 < part.t1)) return 0;
   // `cuts` contains all crossings of the planes that separate the field's polynomial pieces, in order.
   // Between two successive cuts the field is one polynomial.
-  const double offset = g.filter_ == VolumeFilter::trilinear ? 0 : .5;
+  const double offset = g.lookup_ == Lookup::trilinear ? 0 : .5;
   std::vector<double> cuts{part.t0, part.t1};
   for (int k = 0; k < 3; ++k) {
     if (di[k] == 0) continue;
@@ -83,7 +83,7 @@ inline double exact_integral(const Grid& g, const V3d& o, const V3d& d, double t
   std::sort(cuts.begin(), cuts.end());
   const auto at = [&](double t) {
     const V3d q = oi + di * t;
-    if (g.filter_ == VolumeFilter::nearest) return static_cast<double>(g.nearest(V3(q)));
+    if (g.lookup_ == Lookup::nearest) return static_cast<double>(g.nearest(V3(q)));
     double v = 0;
     int c[3];
     double f[3];

@@ -75,7 +75,7 @@ TEST(EmissionPoints, FollowTheirDensity) {
       compare(
           tally, fmt::format("where {} absorbs", s), kLength,
           // Simpson's rule misses a sixth of a step at each of about 16 jumps of at most s / absorbed.
-          g.filter() == kNearest ? 16 * kLength / kEmissionCells / 64 / 6 * s / absorbed : 1e-4,
+          g.lookup() == Lookup::nearest ? 16 * kLength / kEmissionCells / 64 / 6 * s / absorbed : 1e-4,
           [&](double t) {
             const V3 p = kFrom + kAlong * static_cast<float>(t);
             return absorption_pdf(s, value_at(g, p), std::exp(-depth(t)), absorbed);

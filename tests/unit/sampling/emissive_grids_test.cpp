@@ -8,12 +8,14 @@
 #include <deque>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/support/chi_square.h"
 #include "tests/support/sphere_cells.h"
 #include "tests/unit/render/grids.h"
 #include "worker/render/math/random.h"
+#include "worker/render/media/field.h"
 
 namespace ls::render {
 namespace {
@@ -64,6 +66,9 @@ class EmissiveCases {
     const Grid& wide =
         add({{12, 12, 12}, random_values({12, 12, 12}, 8, true), flat, V3d(0), V3d(11, 11, 11), 1});
     all.push_back({"voxels of unlike sides", {emitting(wide)}, {5, -2, .2f}});
+    const Grid& torn = add({noise_, Affine{}, V3d(0), V3d(11, 9, 12), 4});
+    all.push_back({"noise", {emitting(torn)}, {4, 5, 6}});
+    all.push_back({"noise by absorption", {by_absorption(torn)}, {4, 5, -6}});
   }
   std::vector<EmissiveCase> all;
 
@@ -76,6 +81,14 @@ class EmissiveCases {
     m.emitter = {};
     return m;
   }
+  static Field noise() {
+    NoiseVolume v;
+    v.scale = .4;
+    std::vector<Field::Part> parts;
+    parts.emplace_back(Field::Noisy{Affine::scale_translate(v.scale, V3d(0)), FractalNoise(v), -.2f, 1});
+    return Field(std::move(parts));
+  }
+  const Field noise_ = noise();
   std::deque<Grid> grids_;  // a deque, since media point at its elements
 };
 

@@ -36,6 +36,8 @@ struct Features {
   bool reuse = false;
   // Some medium has a phase function other than Henyey-Greenstein's (phase_function.h).
   bool phases = false;
+  // The density of some medium falls with height, in closed form (height_fog.h).
+  bool height = false;
   bool operator==(const Features&) const = default;
 
   constexpr bool covers(const Features& need) const {
@@ -43,7 +45,7 @@ struct Features {
            (emission || !need.emission) && (overlaps || !need.overlaps) && (passing || !need.passing) &&
            (aimed || !need.aimed) && (connected || !need.connected) && (whitted || !need.whitted) &&
            (reuse || !need.reuse) && (split || !need.split) && (visibility || !need.visibility) &&
-           (phases || !need.phases);
+           (phases || !need.phases) && (height || !need.height);
   }
   constexpr Features with(bool Features::*feature) const {
     Features more = *this;
@@ -53,7 +55,8 @@ struct Features {
 };
 inline constexpr Features kEveryScene{
     .media = true, .grids = true, .chromatic = true, .emission = true, .overlaps = true, .passing = true};
-inline constexpr Features kEverything =
-    kEveryScene.with(&Features::phases).with(&Features::split).with(&Features::visibility);
+// Everything that media may be
+inline constexpr Features kAnyMedia = kEveryScene.with(&Features::phases).with(&Features::height);
+inline constexpr Features kEverything = kAnyMedia.with(&Features::split).with(&Features::visibility);
 
 }  // namespace ls::render

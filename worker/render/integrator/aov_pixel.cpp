@@ -158,14 +158,14 @@ void AovPixel::add_surface(const FirstSurface& first, const SampleStream& stream
 }
 
 void AovPixel::add_guide(const CameraRay& ray, const SampleStream& stream, std::size_t half) {
-  const DenoisingGuide guide = PathTracer<kEveryScene>(world_, stream).denoising_guide(ray);
+  const DenoisingGuide guide = PathTracer<kAnyMedia>(world_, stream).denoising_guide(ray);
   if (is_finite(guide.albedo)) add(Aov::denoising_albedo, V3d(guide.albedo), half);
   const V3d& n = guide.normal;
   if (std::isfinite(n.x + n.y + n.z)) add(Aov::denoising_normal, n, half);
 }
 
 void AovPixel::add_opacity(const CameraRay& ray, const SampleStream& stream, std::size_t half) {
-  constexpr Features kFeatures = kEveryScene.with(&Features::visibility);
+  constexpr Features kFeatures = kAnyMedia.with(&Features::visibility);
   const bool deep = slices_.records() > 0;
   const DeepTransmittance slices{edges_.between, edges_.surfaces, through_};
   if (deep) std::ranges::fill(through_, 0.0);

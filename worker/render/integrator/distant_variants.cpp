@@ -12,6 +12,7 @@ std::span<const Variant> distant_variants() {
       variant<Features{.media = true, .grids = true, .passing = true}, SegmentNee>("grey grids"),
       variant<kEveryScene, SegmentNee>("everything"),
       variant<kEveryScene.with(&Features::phases), SegmentNee>("everything, any phase function"),
+      variant<kAnyMedia, SegmentNee>("everything, fog that falls with height"),
       kDistantSplitVariant,
   };
   return kVariants;

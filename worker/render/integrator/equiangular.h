@@ -14,7 +14,7 @@
 #include "worker/render/lights/light_kind.h"
 #include "worker/render/math/math.h"
 #include "worker/render/math/sampler.h"
-#include "worker/render/media/medium.h"
+#include "worker/render/media/optical_depth.h"
 
 namespace ls::render {
 
@@ -98,26 +98,33 @@ class EquiAngular {
   bool uniform_ = false, limited_ = false;
 };
 
-// Free flight through a homogeneous medium with lamps (lights without extent). A share of the flights ends at
-// a distance that is sampled equi-angularly about a lamp. Multiply scattered light grows as 1 / distance near
-// a lamp, and plain exponential flights rarely end that near.
+// Free flight through a medium with lamps (lights without extent). A share of the flights ends at a distance
+// that is sampled equi-angularly about a lamp. Multiply scattered light grows as 1 / distance near a lamp,
+// and plain exponential flights rarely end that near.
 inline constexpr float kLampFlightShare = .1f;
 
-// Samples a flight from o along d that ends at t_max at the latest; t_max must be finite. `hero` is the
-// colour channel that decides distances (medium.h). There must be at least one lamp. The random number u(1)
-// of `numbers` decides how the distance is sampled: exponentially, with the random bits bits[0], or about a
-// lamp, with u(2). The weight and the densities of the result mean the same as those of free_flight(). The
-// density of a distance is that of the mixture, so the weights follow the balance heuristic.
-inline Flight fly_past_lamps(const Medium& medium, int hero, const Group& numbers, const V3& o, const V3& d,
-                             float t_max, const Lamps& lamps) {
+// Samples a flight from o along d, through a medium that is no grid, that ends at t_max at the latest; t_max
+// must be finite. `hero` is the colour channel that decides distances (medium.h). There must be at least one
+// lamp. The random number u(1) of `numbers` decides how the distance is sampled: exponentially, with the
+// random bits bits[0], or about a lamp, with u(2). The weight and the densities of the result mean the same
+// as those of free_flight(). The density of a distance is that of the mixture, so the weights follow the
+// balance heuristic.
+template <Features F>
+Flight fly_past_lamps(const Medium& medium, int hero, const Group& numbers, const V3& o, const V3& d,
+                      float t_max, const Lamps& lamps) {
   const auto about = [&](std::size_t i) { return EquiAngular(o, d, t_max, lamps.position[i]); };
+  const OpticalDepthIn<F> depths(medium, o, d, t_max);
   Flight f;
   if (const float choice = numbers.u(1); choice < kLampFlightShare) {
     const auto lamp = static_cast<std::size_t>(choice / kLampFlightShare * static_cast<float>(lamps.count));
     f.t = about(std::min(lamp, lamps.count - 1)).sample(numbers.u(2)).t;
   } else {
     const float s = medium.sigma_t[hero];
-    f.t = s > 0 ? exponential(numbers.bits[0]) / s : kInfinity;
+    f.t = kInfinity;
+    if (s > 0) {
+      const DepthPoint end = depths.after(exponential(numbers.bits[0]) / s);
+      if (end.rate > 0) f.t = end.t;
+    }
   }
   f.scattered = f.t < t_max;
   const float length = f.scattered ? f.t : t_max;
@@ -127,11 +134,12 @@ inline Flight fly_past_lamps(const Medium& medium, int hero, const Group& number
     near *= kLampFlightShare / static_cast<float>(lamps.count);
   }
   // For each channel: the transmittance, and the density of this flight if the channel were the hero
+  const DepthPoint at_end = depths.at(length);
   C3 through, pdf;
   for (int c = 0; c < 3; ++c) {
-    through[c] = std::exp(-medium.sigma_t[c] * length);
+    through[c] = std::exp(-medium.sigma_t[c] * at_end.x);
     const float alone = (1 - kLampFlightShare) * through[c];
-    pdf[c] = f.scattered ? medium.sigma_t[c] * alone + near : alone;
+    pdf[c] = f.scattered ? medium.sigma_t[c] * at_end.rate * alone + near : alone;
   }
   const float own = pdf[hero];
   // If the hero's density underflows to 0, the transmittance is 0, too
@@ -140,7 +148,7 @@ inline Flight fly_past_lamps(const Medium& medium, int hero, const Group& number
     return f;
   }
   for (int c = 0; c < 3; ++c) {
-    f.weight[c] = (f.scattered ? medium.sigma_s[c] * through[c] : through[c]) / own;
+    f.weight[c] = (f.scattered ? medium.sigma_s[c] * at_end.rate * through[c] : through[c]) / own;
     f.density[c] = pdf[c] / own;
   }
   return f;

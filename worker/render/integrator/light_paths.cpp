@@ -195,10 +195,12 @@ constexpr Features kSurfaces{.passing = true, .connected = true};
 constexpr Features kMedia{.media = true, .grids = true, .passing = true, .connected = true};
 constexpr Features kAimed = kMedia.with(&Features::aimed);
 constexpr Features kAnyPhase = kAimed.with(&Features::phases);
+constexpr Features kWithHeight = kAnyPhase.with(&Features::height);
 
 template <class GoOn>
 Learned learn(const World& w, std::uint64_t paths, int threads, const GoOn& go_on,
               const Lesson& lesson = {}) {
+  if (w.need.height) return learn_with<kWithHeight, CameraSegmentNee>(w, paths, threads, go_on, lesson);
   if (w.need.phases) return learn_with<kAnyPhase, CameraSegmentNee>(w, paths, threads, go_on, lesson);
   if (w.need.aimed) return learn_with<kAimed, CameraSegmentNee>(w, paths, threads, go_on, lesson);
   return w.need.media ? learn_with<kMedia, VertexNee>(w, paths, threads, go_on, lesson)
@@ -210,12 +212,13 @@ bool can_learn(const World& w) {
   Features need = w.need;
   need.split = false;
   need.connected = true;
-  return kAnyPhase.covers(need);
+  return kWithHeight.covers(need);
 }
 
 // Traces a set of light vertices. It uses a path tracer with the features of the camera paths, because the
 // MIS weights depend on how directions are sampled.
 LightVertices trace(const World& w, std::uint64_t seed, std::uint32_t set, std::uint64_t rays) {
+  if (w.need.height) return trace_with<kWithHeight>(w, seed, set, rays);
   if (w.need.phases) return trace_with<kAnyPhase>(w, seed, set, rays);
   if (w.need.aimed) return trace_with<kAimed>(w, seed, set, rays);
   return w.need.media ? trace_with<kMedia>(w, seed, set, rays) : trace_with<kSurfaces>(w, seed, set, rays);

@@ -51,7 +51,7 @@ template <Features F, template <Features> class Light>
 Flight PathTracer<F, Light>::flight_through(const Medium& medium, float t_max) {
   const Group numbers = stream_.group(segment_, Purpose::flight);
   if (F.aimed && world_.lamp_flights && !medium.grid && std::isfinite(t_max))
-    return fly_past_lamps(medium, hero_, numbers, ray_.start, ray_.d, t_max, world_.lamps);
+    return fly_past_lamps<F>(medium, hero_, numbers, ray_.start, ray_.d, t_max, world_.lamps);
   return free_flight<F>(medium, hero_, numbers.bits[0], ray_.start, ray_.d, t_max,
                         stream_.stream(segment_, Purpose::track_flight), counters_);
 }
@@ -258,7 +258,7 @@ void PathTracer<F, Light>::add_medium_emission_among(float t_max) {
         const float t = std::min(ends[static_cast<std::size_t>(c)], most);
         if (t != last) {
           up_to_last = m.grid ? emission_of_grid(m, ray_.start, ray_.d, t, RandomStream(mix64(key)))
-                              : emission_of_length(m, t);
+                              : closed_emission(m, t);
           last = t;
         }
         light[c] = up_to_last[c];
@@ -284,6 +284,15 @@ float PathTracer<F, Light>::others_end(std::size_t but, int hero, float t_max, R
   return t_max;
 }
 
+// Returns the emission of a medium that is no grid along the first part, of length t, of the segment ahead.
+template <Features F, template <Features> class Light>
+C3 PathTracer<F, Light>::closed_emission(const Medium& medium, float t) const {
+  if constexpr (F.height) {
+    if (medium.height) return emission_of_height(medium, ray_.start, ray_.d, t);
+  }
+  return emission_of_length(medium, t);
+}
+
 // Adds the medium's emission along the whole segment ahead, of length t_max, independently of where the
 // path's flight will end. Like a light that is hit, the emission counts at the path's current depth.
 template <Features F, template <Features> class Light>
@@ -293,7 +302,7 @@ void PathTracer<F, Light>::add_medium_emission(const Medium& medium, float t_max
   const auto up_to = [&](float t) {
     return medium.grid
                ? emission_of_grid(medium, ray_.start, ray_.d, t, stream_.stream(segment_, Purpose::emission))
-               : emission_of_length(medium, t);
+               : closed_emission(medium, t);
   };
   const C3 light = up_to(t_max);
   if (!is_black(light)) add_along(light, medium, t_max, up_to);

@@ -174,6 +174,7 @@ class PathTracer {
   void add_medium_emission_among(float t_max);
   float others_end(std::size_t but, int hero, float t_max, RandomStream streams);
   void add_medium_emission(const Medium& medium, float t_max);
+  C3 closed_emission(const Medium& medium, float t) const;
   float emissive_weight(const Medium& medium);
   void look_for_emission_on(const SurfaceHit& hit, const V3& wo);
   void look_for_emission_in(const Medium& medium, const V3& d);

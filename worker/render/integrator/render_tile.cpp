@@ -32,6 +32,8 @@ std::span<const Variant> plain_variants() {
       variant<Features{.media = true, .grids = true, .chromatic = true, .passing = true}>("chromatic grids"),
       variant<kEveryScene>("everything"),
       variant<kEveryScene.with(&Features::phases)>("everything, any phase function"),
+      variant<Features{.media = true, .passing = true, .height = true}>("grey fog that falls with height"),
+      variant<kAnyMedia>("everything, fog that falls with height"),
       kSplitVariant,
   };
   return kVariants;

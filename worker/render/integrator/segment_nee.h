@@ -190,7 +190,7 @@ class SegmentNee {
 
   template <class Path>
   static Vertex vertex_at(const Path& path, const Medium& medium, const Plan& plan,
-                          const OpticalDepth::Point& at_point) {
+                          const DepthPoint& at_point) {
     const float flight =
         over_channels(path, medium, [&](float sigma) { return sigma * std::exp(-sigma * at_point.x); });
     const DistanceSampling distance = path.world_.distance;
@@ -215,7 +215,7 @@ class SegmentNee {
                       const LightChoice& choice, bool by_angle, std::uint32_t bits, RandomStream& stream) {
     const OpticalDepthIn<F>& s = plan.depths;
     const Pivot pivot = choice.has_place ? path.world_.lights.pivot(choice) : Pivot(V3(0));
-    OpticalDepth::Point at_point;
+    DepthPoint at_point;
     V3 p;
     float e_angle = 0;
     if (by_angle) {

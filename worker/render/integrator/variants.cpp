@@ -26,6 +26,10 @@ std::span<const Variant> aimed_variants() {
       variant<kEveryScene.with(&Features::aimed), CameraSegmentNee>("everything, aimed"),
       variant<kEveryScene.with(&Features::aimed).with(&Features::phases), CameraSegmentNee>(
           "everything, aimed, any phase function"),
+      variant<Features{.media = true, .passing = true, .aimed = true, .height = true}, CameraSegmentNee>(
+          "grey fog that falls with height, aimed"),
+      variant<kAnyMedia.with(&Features::aimed), CameraSegmentNee>(
+          "everything, aimed, fog that falls with height"),
       kAimedSplitVariant,
   };
   return kVariants;
@@ -41,7 +45,9 @@ std::span<const Variant> connected_variants() {
       variant<kAll, CameraSegmentNee>("grey media, aimed and connected"),
       variant<kAll.with(&Features::phases), CameraSegmentNee>(
           "grey media, aimed and connected, any phase function"),
-      variant<kAll.with(&Features::phases).with(&Features::split), CameraSegmentNee>(
+      variant<kAll.with(&Features::phases).with(&Features::height), CameraSegmentNee>(
+          "grey media, aimed and connected, fog that falls with height"),
+      variant<kAll.with(&Features::phases).with(&Features::height).with(&Features::split), CameraSegmentNee>(
           "grey media, aimed and connected, and light in parts"),
   };
   return kVariants;

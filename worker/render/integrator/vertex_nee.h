@@ -29,7 +29,7 @@ namespace ls::render {
 // hero (the channel that decides distances: medium.h). `density` is each channel's density of the path so
 // far, relative to that of the hero.
 template <Features F>
-float flight_pdf(const Medium& m, [[maybe_unused]] const C3& density, const OpticalDepth::Point& at_point) {
+float flight_pdf(const Medium& m, [[maybe_unused]] const C3& density, const DepthPoint& at_point) {
   if constexpr (F.chromatic) {
     float num = 0;
     for (int c = 0; c < 3; ++c) num += density[c] * (m.sigma_t[c] * std::exp(-m.sigma_t[c] * at_point.x));
@@ -97,7 +97,7 @@ class VertexNee {
     v.d = path.ray_.d;
     v.length = depths.to() - depths.from();
     v.t = t - depths.from();
-    const OpticalDepth::Point at_point = depths.at(t);
+    const DepthPoint at_point = depths.at(t);
     v.flight_pdf = flight_pdf<F>(medium, path.density_, at_point);
     // Equi-angular sampling is assumed to find this vertex even if the flight density underflows to 0,
     // because sample_equiangular() samples points there too.
@@ -159,7 +159,7 @@ class VertexNee {
     if (!(length > 0)) return;
     const V3 o = path.ray_.start + path.ray_.d * depths.from();
     const EquiAngular::Sample s = EquiAngular(o, path.ray_.d, length, lights.pivot(choice)).sample(g.u(3));
-    const OpticalDepth::Point at_point = depths.at(depths.from() + s.t);
+    const DepthPoint at_point = depths.at(depths.from() + s.t);
     const V3 p = path.ray_.moved_off_ends(s.p, segment, at_point.t);
     const C3 scattering = at_point.rate > 0 ? depths.scattering(at_point, p) : C3(0);
     if (is_black(scattering)) return;

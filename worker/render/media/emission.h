@@ -2,10 +2,11 @@
 // of an estimate at the collisions of free flights. So it also works in media without extinction, in which
 // there are no collisions, and deep inside opaque media.
 //
-// In a homogeneous medium it has a closed form. In a grid the ray is divided into intervals, at most one
-// voxel long where the fields vary. The optical depth of an interval is exact (Grid::pass). Each channel's
-// emission is estimated from one point of the interval, or two if the interval is optically thick and not
-// uniform; without extinction it is integrated exactly. Every term is unbiased, and hence also the sum.
+// In a homogeneous medium and in fog that falls with height it has a closed form. In a grid the ray is
+// divided into intervals, at most one voxel long where the fields vary. The optical depth of an interval is
+// exact (Grid::pass). Each channel's emission is estimated from one point of the interval, or two if the
+// interval is optically thick and not uniform; without extinction it is integrated exactly. Every term is
+// unbiased, and hence also the sum.
 #pragma once
 
 #include <algorithm>
@@ -18,6 +19,13 @@ namespace ls::render {
 // Returns the attenuated emission over the length t_max of a homogeneous medium. t_max may be infinite; the
 // result is infinite if the integral diverges.
 C3 emission_of_length(const Medium& m, float t_max);
+
+// Returns the attenuated emission along o + t d, from t = 0 to t_max, of a medium whose density falls with
+// height. Such a medium emits in proportion to its density: as a homogeneous one over the length that holds
+// as much of it.
+inline C3 emission_of_height(const Medium& m, const V3& o, const V3& d, float t_max) {
+  return emission_of_length(m, static_cast<float>(HeightRay(*m.height, o, d).depth(t_max)));
+}
 
 // Returns an unbiased estimate of the attenuated emission of a grid along o + t d, from t = 0 to t_max. d has
 // unit length.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "worker/render/media/field.h"
+
 namespace ls::render {
 namespace {
 
@@ -20,7 +22,7 @@ Grid::Grid(std::array<int, 3> size, std::vector<float> values, const Affine& wor
       lo_(domain_lo),
       hi_(domain_hi),
       exact_(world_to_index),
-      filter_(filter),
+      lookup_(filter == VolumeFilter::trilinear ? Lookup::trilinear : Lookup::nearest),
       wrap_(wrap) {
   // Only grids that are repeated and interpolated need the extra nodes of repeat_ends(). A mirrored grid
   // equals a clamped one within half a voxel of its ends, and without interpolation wrapping has no effect
@@ -36,6 +38,14 @@ Grid::Grid(std::array<int, 3> size, std::vector<float> values, const Affine& wor
   for (float v : values_) max_value_ = std::max(max_value_, v);
   use_cells(wanted_cell_size(density_to_sigma));
 }
+
+Grid::Grid(const Field& field, const Affine& world_to_index, V3d domain_lo, V3d domain_hi, int cell_size)
+    : lo_(domain_lo), hi_(domain_hi), exact_(world_to_index), lookup_(Lookup::field), field_(&field) {
+  use_cells(cell_size);
+  for (const MacroCell& cell : macro_) max_value_ = std::max(max_value_, cell.hi);
+}
+
+float Grid::computed(const V3& index) const { return field_->value(index); }
 
 // Surrounds the grid by one layer of nodes copied from the opposite end. So interpolation needs no special
 // case at the ends, and macro cells also bound the values interpolated there. All index coordinates grow by
@@ -115,7 +125,56 @@ void Grid::use_cells(int cell_size) {
   std::size_t i = 0;
   for (int z = 0; z < cells_[2]; ++z)
     for (int y = 0; y < cells_[1]; ++y)
-      for (int x = 0; x < cells_[0]; ++x) macro_[i++] = bound_cell(x, y, z);
+      for (int x = 0; x < cells_[0]; ++x)
+        macro_[i++] = lookup_ == Lookup::field ? bound_field(x, y, z) : bound_cell(x, y, z);
+}
+
+// Bounds the field in a macro cell by its bounds in kBoxesPerSide^3 boxes. Each is enlarged by .01 voxels, as
+// cells with values are (bound_cell).
+MacroCell Grid::bound_field(int x, int y, int z) const {
+  constexpr double kMargin = .01;
+  const double side = double{1} * cell_size_ / kBoxesPerSide;
+  const V3d corner = V3d(lo_) + V3d(x, y, z) * cell_size_;
+  float least = std::numeric_limits<float>::infinity(), most = 0;
+  double sum = 0;
+  int count = 0;
+  for (int k = 0; k < kBoxesPerSide; ++k)
+    for (int j = 0; j < kBoxesPerSide; ++j)
+      for (int i = 0; i < kBoxesPerSide; ++i) {
+        const V3d from = corner + V3d(i, j, k) * side, to = from + V3d(side + kMargin);
+        // The last cell along an axis may reach beyond the domain.
+        if (count > 0 && (from.x > hi_.x || from.y > hi_.y || from.z > hi_.z)) continue;
+        const ValueBounds in = field_->bounds(from - V3d(kMargin), to);
+        least = std::min(least, in.lo);
+        most = std::max(most, in.hi);
+        sum += (double{in.lo} + in.hi) / 2;
+        ++count;
+      }
+  MacroCell m;
+  m.hi = most * kInflate;
+  m.control = least == most ? least : std::clamp(static_cast<float>(sum / count), least, most);
+  m.residual = least == most ? 0 : std::max(m.hi - m.control, m.control - least) * kInflate;
+  return m;
+}
+
+ValueBounds Grid::bounds(const V3d& lo, const V3d& hi) const {
+  if (lookup_ == Lookup::field) return field_->bounds(lo, hi);
+  bool outside = false;
+  int a[3], b[3];
+  for (int k = 0; k < 3; ++k) {
+    outside = outside || lo[k] < lo_[k] || hi[k] > hi_[k];
+    if (lo[k] > hi_[k] || hi[k] < lo_[k]) return {0, 0};
+    const auto node = [&](double at) { return std::clamp(static_cast<int>(at), 0, size_[k] - 1); };
+    a[k] = node(std::floor(std::max(lo[k], double{lo_[k]})));
+    b[k] = node(std::ceil(std::min(hi[k], double{hi_[k]})));
+  }
+  ValueBounds out{std::numeric_limits<float>::infinity(), 0};
+  for (int k = a[2]; k <= b[2]; ++k)
+    for (int j = a[1]; j <= b[1]; ++j) {
+      const float* row = values_.data() + (static_cast<std::size_t>(k) * size_[1] + j) * size_[0];
+      for (int i = a[0]; i <= b[0]; ++i) out = {std::min(out.lo, row[i]), std::max(out.hi, row[i])};
+    }
+  return {outside ? 0 : out.lo / kInflate, out.hi * kInflate};
 }
 
 MacroCell Grid::bound_cell(int x, int y, int z) const {
@@ -150,11 +209,84 @@ MacroCell Grid::bound_cell(int x, int y, int z) const {
   return m;
 }
 
+namespace {
+
+// Integrates a function by Simpson's rule, on intervals that are halved until the rule and its halves agree,
+// and stops where the integral reaches a wanted value.
+template <class Value>
+class Quadrature {
+ public:
+  Quadrature(const Value& value, double wanted, double tolerance)
+      : value_(value), wanted_(wanted), tolerance_(tolerance) {}
+
+  // Adds the integral from a to b, which go on from the end of the interval before. Returns true at the
+  // wanted value.
+  bool add(double a, double b) {
+    return add({a, value_(a)}, {(a + b) / 2, value_((a + b) / 2)}, {b, value_(b)}, 0);
+  }
+  double integral() const { return integral_; }
+  double end() const { return end_; }  // where the wanted value is reached
+
+ private:
+  struct At {
+    double t, value;
+  };
+  static double rule(const At& a, const At& m, const At& b) {
+    return (b.t - a.t) / 6 * (a.value + 4 * m.value + b.value);
+  }
+  bool add(const At& a, const At& m, const At& b, int depth) {
+    constexpr int kMostHalvings = 10;
+    const At left{(a.t + m.t) / 2, value_((a.t + m.t) / 2)}, right{(m.t + b.t) / 2, value_((m.t + b.t) / 2)};
+    const double first = rule(a, left, m), second = rule(m, right, b);
+    const double difference = std::abs(first + second - rule(a, m, b));
+    if (difference > 15 * tolerance_ * (b.t - a.t) && depth < kMostHalvings)
+      return add(a, left, m, depth + 1) || add(m, right, b, depth + 1);
+    return take(a, left, m, first) || take(m, right, b, second);
+  }
+  bool take(const At& a, const At& m, const At& b, double whole) {
+    if (integral_ + whole < wanted_) {
+      integral_ += whole;
+      return false;
+    }
+    // The point is found by bisection in the integral of the parabola through the three values.
+    const double rest = (wanted_ - integral_) / (b.t - a.t), bend = 2 * (a.value - 2 * m.value + b.value),
+                 slope = -3 * a.value + 4 * m.value - b.value;
+    double lo = 0, hi = 1;
+    for (int i = 0; i < 40; ++i) {
+      const double u = (lo + hi) / 2;
+      (u * (a.value + u * (slope / 2 + u * bend / 3)) < rest ? lo : hi) = u;
+    }
+    end_ = a.t + hi * (b.t - a.t);
+    integral_ = wanted_;
+    return true;
+  }
+
+  const Value& value_;
+  const double wanted_, tolerance_;
+  double integral_ = 0, end_ = 0;
+};
+
+}  // namespace
+
+Passage Grid::pass_field(const V3d& o, const V3d& d, double t0, double t1, double wanted) const {
+  // Intervals of at most half a voxel, with an error of at most this share of the largest density
+  constexpr double kInterval = .5, kTolerance = 1e-7;
+  const auto value = [&](double t) { return static_cast<double>(computed(V3(o + d * t))); };
+  Quadrature sum(value, wanted, kTolerance * max_value_);
+  const double length = t1 - t0;
+  const int count = static_cast<int>(std::clamp(std::ceil(length * d.length() / kInterval), 1., 4096.));
+  for (int i = 0; i < count; ++i)
+    if (sum.add(t0 + length * i / count, t0 + length * (i + 1) / count))
+      return {true, static_cast<float>(sum.end()), wanted};
+  return {false, static_cast<float>(t1), sum.integral()};
+}
+
 Passage Grid::pass(const V3& origin, const V3& direction, float t0, float t1, double wanted) const {
   const V3d o(origin), d(direction);
+  if (lookup_ == Lookup::field) return pass_field(o, d, t0, t1, wanted);
   const auto value_at = [&](double t) {
     const V3 q(o + d * t);
-    return static_cast<double>(filter_ == VolumeFilter::trilinear ? trilinear(q) : nearest(q));
+    return static_cast<double>(lookup_ == Lookup::trilinear ? trilinear(q) : nearest(q));
   };
   // Along a line a trilinear field is a cubic, for which two-point Gauss-Legendre quadrature is exact.
   const auto integral = [&](double a, double length) {
@@ -163,7 +295,7 @@ Passage Grid::pass(const V3& origin, const V3& direction, float t0, float t1, do
   };
   // The planes that separate the field's polynomial pieces go through the nodes or, without interpolation,
   // half way between them.
-  const double offset = filter_ == VolumeFilter::trilinear ? 0 : .5;
+  const double offset = lookup_ == Lookup::trilinear ? 0 : .5;
   double plane[3], exit[3];
   for (int k = 0; k < 3; ++k) {
     exit[k] = std::numeric_limits<double>::infinity();

@@ -1,5 +1,5 @@
-// A dense grid of scalar values, with trilinear interpolation or without interpolation. Its macro cells,
-// which are blocks of voxels, store bounds of its values.
+// A dense grid of scalar values, with trilinear interpolation or without interpolation, or a field that is
+// computed at each lookup (field.h). Its macro cells, which are blocks of voxels, store bounds of its values.
 #pragma once
 
 #include <algorithm>
@@ -14,8 +14,14 @@
 #include "worker/render/base/work_counters.h"
 #include "worker/render/math/math.h"
 #include "worker/render/math/transform.h"
+#include "worker/render/math/value_bounds.h"
 
 namespace ls::render {
+
+class Field;
+
+// How a grid finds a value: by interpolation, from the nearest node, or by computing a field.
+enum class Lookup : std::uint8_t { trilinear, nearest, field };
 
 // The stored data of one macro cell: bounds of the density in it, inflated so that values interpolated in
 // float32 stay within them, and the control value for ratio tracking.
@@ -45,18 +51,24 @@ class Grid {
   Grid(std::array<int, 3> size, std::vector<float> values, const Affine& world_to_index, V3d domain_lo,
        V3d domain_hi, double density_to_sigma, VolumeFilter filter = VolumeFilter::trilinear,
        Wrap wrap = Wrap::clamp);
+  // A grid with a field in place of values, whose index coordinates are those of the field. `cell_size` is
+  // the width of the macro cells [voxels, a power of two]. The field must outlive the grid.
+  Grid(const Field& field, const Affine& world_to_index, V3d domain_lo, V3d domain_hi, int cell_size);
+  // The number of boxes, along each axis, in which a field is bounded for one macro cell.
+  static constexpr int kBoxesPerSide = 4;
 
   // Returns the index coordinates of the world point p. They are computed in double: if the grid is small in
   // its world, the terms are large and nearly cancel.
   V3 to_index(const V3& p) const { return V3(exact_.point(V3d(p))); }
   const Affine& world_to_index() const { return exact_; }
-  VolumeFilter filter() const { return filter_; }
-  // Returns the value at index coordinates inside the domain. kFilter must equal filter(). It is a template
-  // parameter so that a caller that needs many values tests filter() only once.
-  template <VolumeFilter kFilter>
+  Lookup lookup() const { return lookup_; }
+  // Returns the value at index coordinates inside the domain. kLookup must equal lookup(). It is a template
+  // parameter so that a caller that needs many values tests lookup() only once.
+  template <Lookup kLookup>
   float value(const V3& index) const {
     LS_COUNT(density);
-    if constexpr (kFilter == VolumeFilter::trilinear) return trilinear(index);
+    if constexpr (kLookup == Lookup::trilinear) return trilinear(index);
+    if constexpr (kLookup == Lookup::field) return computed(index);
     return nearest(index);
   }
   // Returns the value at any index coordinates, with the grid's own filter. Beyond the domain the grid
@@ -64,7 +76,7 @@ class Grid {
   float value_anywhere(const V3& index) const {
     LS_COUNT(density);
     const V3 q = wrap_ == Wrap::clamp ? index : wrapped(index);
-    return filter_ == VolumeFilter::trilinear ? trilinear(q) : nearest(q);
+    return lookup_ == Lookup::trilinear ? trilinear(q) : untrilinear(q);
   }
   float trilinear(const V3& index) const {
     int cell[3];
@@ -92,6 +104,11 @@ class Grid {
     for (int k = 0; k < 3; ++k) i[k] = static_cast<std::size_t>(std::min(std::max(0.f, q[k]), top_[k]) + .5f);
     return values_[(i[2] * size_[1] + i[1]) * size_[0] + i[0]];
   }
+  float untrilinear(const V3& index) const {
+    return lookup_ == Lookup::nearest ? nearest(index) : computed(index);
+  }
+  // Bounds the values in the box [lo, hi], in index coordinates, of a grid that is 0 outside of its domain.
+  ValueBounds bounds(const V3d& lo, const V3d& hi) const;
 
   int cell_size() const { return cell_size_; }
   std::array<int, 3> cells() const { return cells_; }
@@ -121,9 +138,10 @@ class Grid {
   // Returns the number of values above `limit`.
   std::uint64_t count_above(float limit) const;
 
-  // Integrates the field voxel by voxel along origin + t direction, in index coordinates, over the finite
-  // interval [t0, t1]. It stops early where the integral reaches `wanted`. Exact up to float32 rounding. Used
-  // instead of tracking where a tracker would have more collisions than the ray crosses voxels.
+  // Integrates the values along origin + t direction, in index coordinates, over the finite interval [t0,
+  // t1]. It stops early where the integral reaches `wanted`. Stored values are integrated voxel by voxel,
+  // exactly up to float32 rounding; a field by adaptive quadrature, about as exactly. Used instead of
+  // tracking where a tracker would have more collisions than the ray crosses voxels.
   Passage pass(const V3& origin, const V3& direction, float t0, float t1,
                double wanted = std::numeric_limits<double>::infinity()) const;
 
@@ -134,7 +152,10 @@ class Grid {
   void repeat_ends();
   V3 wrapped(const V3& index) const;
   int wanted_cell_size(double density_to_sigma) const;
+  float computed(const V3& index) const;
   MacroCell bound_cell(int x, int y, int z) const;
+  MacroCell bound_field(int x, int y, int z) const;
+  Passage pass_field(const V3d& o, const V3d& d, double t0, double t1, double wanted) const;
 
   std::array<int, 3> size_{}, last_{};
   std::array<float, 3> top_{};
@@ -142,7 +163,8 @@ class Grid {
   std::vector<float> values_;
   V3 lo_, hi_;
   Affine exact_;  // world to index, not rounded to float32
-  VolumeFilter filter_ = VolumeFilter::trilinear;
+  Lookup lookup_ = Lookup::trilinear;
+  const Field* field_ = nullptr;  // set with Lookup::field
   Wrap wrap_ = Wrap::clamp;
   // True if the given nodes are surrounded by a layer of nodes copied from the opposite end
   bool padded_ = false;

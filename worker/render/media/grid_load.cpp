@@ -9,6 +9,7 @@
 #include "core/base/file_form.h"
 #include "core/base/overloaded.h"
 #include "worker/render/base/build_stop.h"
+#include "worker/render/media/field_build.h"
 #include "worker/render/media/vdb_process.h"
 
 namespace ls::render {
@@ -141,6 +142,15 @@ Result<LoadedVolume> load_volume(const Volume& volume, const AssetLoader& files,
                  [&](const GridVolume& v) {
                    return is_vdb(files.name(v.file)) ? vdb_file(v, files, center, scale, to_sigma)
                                                      : vol_file(v, files, center, scale, to_sigma);
+                 },
+                 [&](const auto&) -> Result<LoadedVolume> {
+                   auto built = build_field(volume, files, center, scale);
+                   if (!built) return tl::unexpected(built.error());
+                   LoadedVolume out;
+                   out.channels.push_back(std::move(built->grid));
+                   out.clamped = built->clamped;
+                   out.field = std::move(built->field);
+                   return out;
                  }},
       volume);
 }

@@ -81,8 +81,8 @@ C3 densities(const Medium& m, const V3& index) {
   C3 rho;
   for (int c = 0; c < 3; ++c) {
     const Grid& g = grid_of(m, c);
-    rho[c] = g.filter() == VolumeFilter::trilinear ? g.value<VolumeFilter::trilinear>(index)
-                                                   : g.value<VolumeFilter::nearest>(index);
+    rho[c] =
+        g.lookup() == Lookup::trilinear ? g.value<Lookup::trilinear>(index) : g.value<Lookup::nearest>(index);
   }
   return rho;
 }
@@ -186,13 +186,19 @@ C3 transmittance_to_points(const Medium& m, const V3& o, const V3& d, float t1, 
     // Without extinction nothing is watched.
     std::fill_n(through, points.size(), C3(1));
     const detail::WatchedPoints watch{points, through};
-    return m.density->filter() == VolumeFilter::nearest
-               ? detail::transmittance_grid<true, VolumeFilter::nearest>(m, o, d, 0, t1, stream, watch)
-               : detail::transmittance_grid<true, VolumeFilter::trilinear>(m, o, d, 0, t1, stream, watch);
+    switch (m.density->lookup()) {
+      case Lookup::trilinear:
+        return detail::transmittance_grid<true, Lookup::trilinear>(m, o, d, 0, t1, stream, watch);
+      case Lookup::nearest:
+        return detail::transmittance_grid<true, Lookup::nearest>(m, o, d, 0, t1, stream, watch);
+      case Lookup::field:
+        return detail::transmittance_grid<true, Lookup::field>(m, o, d, 0, t1, stream, watch);
+    }
   }
   const auto up_to = [&](float t) {
-    return m.grid ? transmittance_channels(m, o, d, 0, t, stream)
-                  : detail::transmittance_homogeneous<true>(m, t);
+    if (m.grid) return transmittance_channels(m, o, d, 0, t, stream);
+    return m.height ? detail::transmittance_height<true>(m, o, d, 0, t)
+                    : detail::transmittance_homogeneous<true>(m, t);
   };
   for (std::size_t i = 0; i < points.size(); ++i) through[i] = points[i] > 0 ? up_to(points[i]) : C3(1);
   return up_to(t1);
@@ -218,6 +224,8 @@ Flight passed(const Medium& m, int hero, const V3& o, const V3& d, float t) {
     depth = 0;
     for (CellWalk w(*m.density, o, d, 0, t); w.next();)
       if (w.cell().hi > 0) depth += m.density->pass(w.origin(), w.direction(), w.begin(), w.end()).integral;
+  } else if (m.height) {
+    depth = HeightRay(*m.height, o, d).depth(t);
   }
   Flight f;
   f.t = t;

@@ -1,6 +1,6 @@
-// Participating media: free flight and transmittance. In homogeneous media both have a closed form. Grids use
-// delta tracking with local majorants, and residual ratio tracking (Novak et al. 2014) with one control value
-// per macro cell.
+// Participating media: free flight and transmittance. In homogeneous media and in fog that falls with height
+// (height_fog.h) both have a closed form. Grids use delta tracking with local majorants, and residual ratio
+// tracking (Novak et al. 2014) with one control value per macro cell.
 //
 // Chromatic extinction: one channel, the hero, drawn once per path, decides every distance. A flight returns
 // the path weight relative to the hero (`weight`), and for each channel the density of the sampled flight
@@ -12,6 +12,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -24,6 +25,7 @@
 #include "worker/render/math/random.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/grid.h"
+#include "worker/render/media/height_fog.h"
 #include "worker/render/media/phase.h"
 #include "worker/render/media/phase_function.h"
 
@@ -52,9 +54,13 @@ struct Medium {
   bool grid = false;
   EquiangularMode equiangular_mode = EquiangularMode::none;
   // For a homogeneous medium: the extinction and scattering coefficients [1/world unit]. For a grid: sigma_t
-  // is the extinction per unit of density, and sigma_s is the albedo times sigma_t.
+  // is the extinction per unit of density, and sigma_s is the albedo times sigma_t; so too if `height` is
+  // set.
   C3 sigma_t{0, 0, 0}, sigma_s{0, 0, 0};
   const Grid* density = nullptr;
+  // Set, in a medium that is not a grid, if its density falls with height. Only code with Features::height
+  // sees it; all coefficients are those at the ground.
+  std::optional<HeightProfile> height;
   // Set if the density differs between channels: one density grid per channel, all of the same shape and with
   // macro cells of the same size. Then `density` is the mean of the three. It determines where points on a
   // ray are sampled for next-event estimation (optical_depth.h); free flights and transmittance use the three
@@ -165,14 +171,13 @@ inline float transmittance_ratio(float sigma_c, float sigma_hero, float length) 
   return diff == 0 ? 1.f : std::exp(-diff * length);
 }
 
-template <bool kChromatic>
-Flight fly_homogeneous(const Medium& m, int hero, float depth, float t_max) {
-  Flight f;
+// Sets the weight and the densities of a flight whose end is set. depth() returns the integral of the density
+// along the flight, where the coefficients are those at the density 1.
+template <bool kChromatic, class Depth>
+void weigh(Flight& f, const Medium& m, int hero, const Depth& depth) {
   const float s = m.sigma_t[hero];
-  f.t = s > 0 ? depth / s : kInfinity;
-  f.scattered = f.t < t_max;
   if constexpr (kChromatic) {
-    const float length = f.scattered ? f.t : t_max;
+    const float length = depth();
     for (int c = 0; c < 3; ++c) f.weight[c] = f.density[c] = transmittance_ratio(m.sigma_t[c], s, length);
     if (f.scattered) {
       for (int c = 0; c < 3; ++c) {
@@ -183,6 +188,27 @@ Flight fly_homogeneous(const Medium& m, int hero, float depth, float t_max) {
   } else if (f.scattered) {
     for (int c = 0; c < 3; ++c) f.weight[c] = m.sigma_s[c] / s;
   }
+}
+
+template <bool kChromatic>
+Flight fly_homogeneous(const Medium& m, int hero, float depth, float t_max) {
+  Flight f;
+  const float s = m.sigma_t[hero];
+  f.t = s > 0 ? depth / s : kInfinity;
+  f.scattered = f.t < t_max;
+  weigh<kChromatic>(f, m, hero, [&] { return f.scattered ? f.t : t_max; });
+  return f;
+}
+
+template <bool kChromatic>
+Flight fly_height(const Medium& m, int hero, float depth, const V3& o, const V3& d, float t_max) {
+  const HeightRay ray(*m.height, o, d);
+  Flight f;
+  const float s = m.sigma_t[hero], x = s > 0 ? depth / s : kInfinity;
+  f.t = s > 0 ? static_cast<float>(ray.distance(x)) : kInfinity;
+  f.scattered = f.t < t_max;
+  if (!f.scattered) f.t = t_max;
+  weigh<kChromatic>(f, m, hero, [&] { return f.scattered ? x : static_cast<float>(ray.depth(t_max)); });
   return f;
 }
 
@@ -190,10 +216,14 @@ Flight fly_homogeneous(const Medium& m, int hero, float depth, float t_max) {
 // exactly through the cell's voxels instead. A cell of 4 voxels costs about as much as 16 collisions, and no
 // tracker gets stuck in it however dense it is (1e9 collisions and more: docs/measurements/stability.md N10).
 inline constexpr float kExactDepth = 16;
+// The same for fields that are computed at each lookup, whose integrals take hundreds of lookups.
+inline constexpr float kExactFieldDepth = 512;
+template <Lookup kLookup>
+inline constexpr float kExactDepthOf = kLookup == Lookup::field ? kExactFieldDepth : kExactDepth;
 
 // Samples a free flight through a grid. `depth` is the optical depth up to the first tentative collision;
 // the random numbers of later collisions come from `stream`.
-template <bool kChromatic, VolumeFilter kFilter>
+template <bool kChromatic, Lookup kLookup>
 Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d, float t_max,
                 RandomStream stream, MediumCounters& counters) {
   Flight f;
@@ -229,7 +259,7 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
   };
   for (CellWalk w(*m.density, o, d, 0, t_max); w.next();) {
     const float hi = w.cell().hi, length = w.end() - w.begin(), rate = s * hi, room = rate * length;
-    if (s_max * hi * length > kExactDepth) [[unlikely]] {
+    if (s_max * hi * length > kExactDepthOf<kLookup>) [[unlikely]] {
       // A hero without extinction passes through the cell, but the other channels still need the integral.
       const Passage p = m.density->pass(w.origin(), w.direction(), w.begin(), w.end(),
                                         s > 0 ? double{depth} / s : std::numeric_limits<double>::infinity());
@@ -244,7 +274,7 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
       float gone = depth;
       for (; gone < room; gone += stream.exponential()) {
         const float t = std::min(w.begin() + gone / rate, w.end());
-        const float rho = m.density->value<kFilter>(w.index(t));
+        const float rho = m.density->value<kLookup>(w.index(t));
         if (rho > hi) ++counters.majorant_violations;
         if (stream.uniform() * hi < rho) return scatter(w.entry() + t, passed + double{gone} / s);
         if constexpr (kChromatic) ++nulls;
@@ -288,7 +318,7 @@ struct WatchedPoints {
   }
 };
 
-template <bool kChromatic, VolumeFilter kFilter, class Watch = Unwatched>
+template <bool kChromatic, Lookup kLookup, class Watch = Unwatched>
 C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream,
                       [[maybe_unused]] Watch watch = {}) {
   const float s_max = kChromatic ? max_component(m.sigma_t) : m.sigma_t.x;
@@ -311,7 +341,7 @@ C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float
     const MacroCell& cell = w.cell();
     const float length = w.end() - w.begin(), rate = s_max * cell.residual, room = rate * length;
     if constexpr (Watch::kWatches) watch.pass(w.entry() + w.begin(), [&](float) { return estimate(0); });
-    if (room > kExactDepth) [[unlikely]] {
+    if (room > kExactDepthOf<kLookup>) [[unlikely]] {
       if constexpr (Watch::kWatches)
         watch.pass(w.entry() + w.end(), [&](float t) {
           const auto to = std::clamp(static_cast<float>(t - w.entry()), w.begin(), w.end());
@@ -330,7 +360,7 @@ C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float
         for (; gone < room; gone += stream.exponential()) {
           const float t = w.begin() + gone / rate;
           if constexpr (Watch::kWatches) watch.pass(w.entry() + t, within);
-          const float r = (m.density->value<kFilter>(w.index(t)) - cell.control) / cell.residual;
+          const float r = (m.density->value<kLookup>(w.index(t)) - cell.control) / cell.residual;
           for (int c = 0; c < kChannels; ++c) factor[c] *= 1 - r * (kChromatic ? m.sigma_t[c] / s_max : 1.f);
         }
         left = gone - room;
@@ -379,17 +409,27 @@ C3 transmittance_homogeneous(const Medium& m, float length) {
   }
 }
 
-// Grids without interpolation are rare. Their functions are not inlined, so that they do not slow down the
-// code for other grids.
 template <bool kChromatic>
-[[gnu::noinline]] Flight fly_nearest(const Medium& m, int hero, float depth, const V3& o, const V3& d,
-                                     float t_max, RandomStream stream, MediumCounters& counters) {
-  return fly_grid<kChromatic, VolumeFilter::nearest>(m, hero, depth, o, d, t_max, stream, counters);
+C3 transmittance_height(const Medium& m, const V3& o, const V3& d, float t0, float t1) {
+  const HeightRay ray(*m.height, o + d * t0, d);
+  return transmittance_homogeneous<kChromatic>(m, static_cast<float>(ray.depth(double{t1} - t0)));
+}
+
+// Grids without interpolation, and fields, are rare. Their functions are not inlined, so that they do not
+// slow down the code for other grids.
+template <bool kChromatic>
+[[gnu::noinline]] Flight fly_uncommon(const Medium& m, int hero, float depth, const V3& o, const V3& d,
+                                      float t_max, RandomStream stream, MediumCounters& counters) {
+  if (m.density->lookup() == Lookup::field)
+    return fly_grid<kChromatic, Lookup::field>(m, hero, depth, o, d, t_max, stream, counters);
+  return fly_grid<kChromatic, Lookup::nearest>(m, hero, depth, o, d, t_max, stream, counters);
 }
 template <bool kChromatic>
-[[gnu::noinline]] C3 transmittance_nearest(const Medium& m, const V3& o, const V3& d, float t0, float t1,
-                                           RandomStream stream) {
-  return transmittance_grid<kChromatic, VolumeFilter::nearest>(m, o, d, t0, t1, stream);
+[[gnu::noinline]] C3 transmittance_uncommon(const Medium& m, const V3& o, const V3& d, float t0, float t1,
+                                            RandomStream stream) {
+  if (m.density->lookup() == Lookup::field)
+    return transmittance_grid<kChromatic, Lookup::field>(m, o, d, t0, t1, stream);
+  return transmittance_grid<kChromatic, Lookup::nearest>(m, o, d, t0, t1, stream);
 }
 
 }  // namespace detail
@@ -405,11 +445,13 @@ Flight free_flight(const Medium& m, int hero, std::uint32_t bits, const V3& o, c
       if (m.by_channel[0]) [[unlikely]]
         return fly_channels(m, hero, depth, o, d, t_max, stream, counters);
     }
-    if (m.grid && m.density->filter() == VolumeFilter::nearest) [[unlikely]]
-      return detail::fly_nearest<F.chromatic>(m, hero, depth, o, d, t_max, stream, counters);
+    if (m.grid && m.density->lookup() != Lookup::trilinear) [[unlikely]]
+      return detail::fly_uncommon<F.chromatic>(m, hero, depth, o, d, t_max, stream, counters);
     if (m.grid)
-      return detail::fly_grid<F.chromatic, VolumeFilter::trilinear>(m, hero, depth, o, d, t_max, stream,
-                                                                    counters);
+      return detail::fly_grid<F.chromatic, Lookup::trilinear>(m, hero, depth, o, d, t_max, stream, counters);
+  }
+  if constexpr (F.height) {
+    if (m.height) return detail::fly_height<F.chromatic>(m, hero, depth, o, d, t_max);
   }
   return detail::fly_homogeneous<F.chromatic>(m, hero, depth, t_max);
 }
@@ -424,8 +466,8 @@ Flight passed(const Medium& m, int hero, const V3& o, const V3& d, float t);
 C3 transmittance_to_points(const Medium& m, const V3& o, const V3& d, float t1, RandomStream stream,
                            std::span<const float> points, C3* through);
 
-// Returns an unbiased estimate of the transmittance along o + t d between t0 and t1; in homogeneous media the
-// exact value.
+// Returns an unbiased estimate of the transmittance along o + t d between t0 and t1; the exact value in media
+// that are no grids.
 template <Features F>
 C3 transmittance(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream) {
   if constexpr (F.grids) {
@@ -433,10 +475,12 @@ C3 transmittance(const Medium& m, const V3& o, const V3& d, float t0, float t1, 
       if (m.by_channel[0]) [[unlikely]]
         return transmittance_channels(m, o, d, t0, t1, stream);
     }
-    if (m.grid && m.density->filter() == VolumeFilter::nearest) [[unlikely]]
-      return detail::transmittance_nearest<F.chromatic>(m, o, d, t0, t1, stream);
-    if (m.grid)
-      return detail::transmittance_grid<F.chromatic, VolumeFilter::trilinear>(m, o, d, t0, t1, stream);
+    if (m.grid && m.density->lookup() != Lookup::trilinear) [[unlikely]]
+      return detail::transmittance_uncommon<F.chromatic>(m, o, d, t0, t1, stream);
+    if (m.grid) return detail::transmittance_grid<F.chromatic, Lookup::trilinear>(m, o, d, t0, t1, stream);
+  }
+  if constexpr (F.height) {
+    if (m.height) return detail::transmittance_height<F.chromatic>(m, o, d, t0, t1);
   }
   return detail::transmittance_homogeneous<F.chromatic>(m, t1 - t0);
 }

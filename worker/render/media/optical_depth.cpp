@@ -12,7 +12,8 @@ float rate_of(const MacroCell& cell) { return std::max(cell.control, cell.hi * 0
 
 }  // namespace
 
-void OpticalDepth::measure() {
+template <bool kHeight>
+void OpticalDepthOf<kHeight>::measure() {
   double total = 0;
   to_ = 0;
   for (CellWalk w(*medium_->density, o_, d_, 0, t_max_); w.next();) {
@@ -25,7 +26,8 @@ void OpticalDepth::measure() {
   total_ = static_cast<float>(total);
 }
 
-OpticalDepth::Point OpticalDepth::grid_at(float t) const {
+template <bool kHeight>
+DepthPoint OpticalDepthOf<kHeight>::grid_at(float t) const {
   double passed = 0;
   Point last{t, 0, 0, {0, 0, 0}};
   for (CellWalk w(*medium_->density, o_, d_, 0, t_max_); w.next();) {
@@ -43,9 +45,13 @@ OpticalDepth::Point OpticalDepth::grid_at(float t) const {
   return t <= to_ ? last : Point{t, total_, 0, {0, 0, 0}};
 }
 
-void OpticalDepth::at_each(std::span<const float> t, std::span<double> x) const {
+template <bool kHeight>
+void OpticalDepthOf<kHeight>::at_each(std::span<const float> t, std::span<double> x) const {
   if (!medium_->grid) {
-    for (std::size_t i = 0; i < t.size(); ++i) x[i] = std::clamp(t[i], 0.f, t_max_);
+    for (std::size_t i = 0; i < t.size(); ++i) {
+      x[i] = std::clamp(t[i], 0.f, t_max_);
+      if (falls()) x[i] = height().depth(x[i]);
+    }
     return;
   }
   double passed = 0;
@@ -58,7 +64,8 @@ void OpticalDepth::at_each(std::span<const float> t, std::span<double> x) const 
   for (; i < t.size(); ++i) x[i] = passed;
 }
 
-OpticalDepth::Point OpticalDepth::grid_after(float x) const {
+template <bool kHeight>
+DepthPoint OpticalDepthOf<kHeight>::grid_after(float x) const {
   double passed = 0;
   for (CellWalk w(*medium_->density, o_, d_, 0, t_max_); w.next();) {
     const float rate = rate_of(w.cell());
@@ -72,12 +79,16 @@ OpticalDepth::Point OpticalDepth::grid_after(float x) const {
   return {to_, total_, 0, {0, 0, 0}};  // reached only if rounding has put x beyond total_
 }
 
-C3 OpticalDepth::grid_scattering(const Point& at_point, const V3& p) const {
+template <bool kHeight>
+C3 OpticalDepthOf<kHeight>::grid_scattering(const Point& at_point, const V3& p) const {
   if (medium_->by_channel[0]) return medium_->scattering_at(p) * densities(*medium_, at_point.index);
   const Grid& g = *medium_->density;
   const float density =
-      g.filter() == VolumeFilter::trilinear ? g.trilinear(at_point.index) : g.nearest(at_point.index);
+      g.lookup() == Lookup::trilinear ? g.trilinear(at_point.index) : g.untrilinear(at_point.index);
   return medium_->scattering_at(p) * density;
 }
+
+template class OpticalDepthOf<false>;
+template class OpticalDepthOf<true>;
 
 }  // namespace ls::render

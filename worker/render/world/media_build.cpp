@@ -8,6 +8,7 @@
 #include "core/scene/schema/traits.h"
 #include "worker/render/math/blackbody.h"
 #include "worker/render/math/transform.h"
+#include "worker/render/media/field_build.h"
 #include "worker/render/media/grid_load.h"
 #include "worker/render/world/phase_build.h"
 
@@ -94,6 +95,7 @@ struct HeteroBuilder {
   std::array<const Grid*, 3> keep(LoadedVolume& volume) {
     w.inputs.add(HealthCause::negative_density, volume.clamped);
     for (Grid& g : volume.channels) w.grids.push_back(std::move(g));
+    if (volume.field) w.fields.push_back(std::move(volume.field));
     const std::size_t n = volume.channels.size(), first = w.grids.size() - n;
     return {&w.grids[first], &w.grids[first + (n == 1 ? 0 : 1)], &w.grids[first + (n == 1 ? 0 : 2)]};
   }
@@ -234,8 +236,37 @@ Result<void> HeteroBuilder::black_bodies(const Volume& temperature) {
   return shine(out, EmissionKind::black_body, k, largest * heaviest);
 }
 
+// Makes a medium whose density falls with height and whose other volumes are constant.
+Result<Medium> height_fog(const Scene& scene, const HeterogeneousMedium& m, const HeightFogVolume& fog,
+                          const AssetLoader& files, World& w) {
+  const double value = fog.value / w.geometry.scale;
+  HeteroBuilder b{scene, m, files, w, m.scale * value, {}, {}};
+  b.sigma = times(m.tint, b.per_unit);
+  if (auto ok = check_extinction(b.sigma, 1, w.geometry.scale); !ok) return tl::unexpected(ok.error());
+  auto profile = height_profile(fog, w.geometry.center, w.geometry.scale);
+  if (!profile) return tl::unexpected(profile.error());
+  b.out.height = *profile;
+  b.out.sigma_t = color(b.sigma);
+  set_phase(scene, m.phase, w.phases, b.out);
+  if (auto ok = b.albedo(); !ok) return tl::unexpected(ok.error());
+  if (scene::traits_of(m, scene.volumes).emits)
+    if (auto ok = b.set_emission(); !ok) return tl::unexpected(ok.error());
+  if (b.out.emission_kind != EmissionKind::none) {
+    // From light per absorption to radiance per length at the ground
+    Rgb emission{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto i = static_cast<int>(c);
+      emission[c] = b.sigma[c] * b.out.absorbing[i] * b.out.emission[i];
+    }
+    if (auto ok = shine(b.out, EmissionKind::per_length, emission, 1); !ok) return tl::unexpected(ok.error());
+  }
+  return b.out;
+}
+
 Result<Medium> heterogeneous(const Scene& scene, const HeterogeneousMedium& m, const AssetLoader& files,
                              World& w) {
+  if (const auto* fog = std::get_if<HeightFogVolume>(&scene.volumes.at(m.sigma_t.value)))
+    return height_fog(scene, m, *fog, files, w);
   HeteroBuilder b{scene, m, files, w, m.scale / w.geometry.scale, {}, {}};
   b.out.grid = true;
   set_phase(scene, m.phase, w.phases, b.out);

@@ -61,9 +61,12 @@ PhaseMaker::Made PhaseMaker::operator()(const BlendPhase& p) const {
     wrong = fmt::format("has {} values below 0; its values are from 0 to 1", loaded->clamped);
   else if (grid.max_value() > 1)
     wrong = fmt::format("reaches {}; its values are from 0 to 1", grid.max_value());
-  if (!wrong.empty())
-    return fail(Errc::invalid_argument, fmt::format("{}: the weight of a blendphase {}",
-                                                    files.name(std::get<GridVolume>(weight).file), wrong));
+  if (!wrong.empty()) {
+    const auto* file = std::get_if<GridVolume>(&weight);
+    return fail(Errc::invalid_argument, fmt::format("{}the weight of a blendphase {}",
+                                                    file ? files.name(file->file) + ": " : "", wrong));
+  }
+  if (loaded->field) w.fields.push_back(std::move(loaded->field));
   blend.grid = &w.grids.emplace_back(std::move(loaded->channels[0]));
   return blend;
 }

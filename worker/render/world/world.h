@@ -4,6 +4,7 @@
 #pragma once
 
 #include <deque>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -18,6 +19,7 @@
 #include "worker/render/lights/lamp_directions.h"
 #include "worker/render/lights/light_vertices.h"
 #include "worker/render/lights/lights.h"
+#include "worker/render/media/field.h"
 #include "worker/render/media/medium.h"
 #include "worker/render/media/medium_stack.h"
 #include "worker/render/render.h"
@@ -35,8 +37,9 @@ class World {
   Geometry geometry;
   TextureTable textures;
   BsdfTable bsdfs;
-  std::deque<Grid> grids;  // a deque, since media point at its elements
-  PhaseFunctions phases;   // those of media that are not Henyey-Greenstein's, by their index in the scene
+  std::deque<Grid> grids;                            // a deque, since media point at its elements
+  std::vector<std::unique_ptr<const Field>> fields;  // those that grids look their values up in
+  PhaseFunctions phases;  // those of media that are not Henyey-Greenstein's, by their index in the scene
   std::vector<Medium> media;
   std::deque<ClearRegion> clear_regions;  // a deque, since media point at its elements
   Lights lights;

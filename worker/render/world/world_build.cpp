@@ -29,7 +29,8 @@ Features features_of(const scene::Needs& n) {
           .emission = n.emission,
           .passing = n.boundaries || n.null_transmission,
           .visibility = n.flagged_shapes > 0 || n.ray_flags > 0 || n.linked_lights > 0,
-          .phases = n.phases};
+          .phases = n.phases,
+          .height = n.height};
 }
 
 // Returns the features that the finished world requires. Except for `overlaps` and `chromatic`, features_of()
@@ -52,6 +53,7 @@ Features found_in(const World& w) {
     f.grids = f.grids || m.grid;
     f.chromatic = f.chromatic || m.chromatic();
     f.phases = f.phases || m.other_phases;
+    f.height = f.height || m.height;
   };
   use(w.camera_medium);
   for (const MeterStart& m : w.meters.starts()) use(m.ambience);

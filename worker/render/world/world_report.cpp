@@ -27,6 +27,7 @@ std::string primitives(const Geometry& g) {
 
 std::vector<WorldReport::Structure> structures_of(const World& w) {
   std::uint64_t values = 0, cells = 0, value_count = 0;
+  for (const auto& field : w.fields) values += field->bytes();
   for (const Grid& g : w.grids) {
     cells += g.majorant_bytes();
     values += g.bytes() - g.majorant_bytes();
@@ -89,6 +90,7 @@ WorldReport describe(const World& w) {
   };
   feature(w.need.media, "participating media");
   feature(w.need.grids, "density grids, majorants and their trackers");
+  feature(w.need.height, "fog that falls with height");
   feature(w.need.chromatic, "spectral weights for extinction that differs between channels");
   feature(w.need.phases, "phase functions other than Henyey-Greenstein's");
   feature(w.need.emission, "light given off by media");

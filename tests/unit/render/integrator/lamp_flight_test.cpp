@@ -44,7 +44,7 @@ void fly(const Medium& medium, const Lamps& all, Take take) {
   for (int i = 0; i < 1 << 20; ++i) {
     const auto bits = [&] { return random.bits(); };
     const Group numbers{{bits(), bits(), bits(), bits()}};
-    take(fly_past_lamps(medium, i % 3, numbers, {0, 0, 0}, {1, 0, 0}, kEnd, all));
+    take(fly_past_lamps<kAnyMedia>(medium, i % 3, numbers, {0, 0, 0}, {1, 0, 0}, kEnd, all));
   }
 }
 
@@ -74,6 +74,30 @@ TEST(LampFlight, HasTheMeanFreePathOfTheMedium) {
               << s;
       }
     }
+}
+
+// In fog that falls along the ray, the same with the depth X = 1 - e^(-end) in place of the length, and for
+// the mean of the depth x = 1 - e^(-t) times the weight.
+TEST(LampFlight, HasTheMeanDepthOfFogThatFallsWithHeight) {
+  const C3 sigma(.5f, 3, 30);
+  Medium medium = homogeneous(sigma, {.9f * sigma.x, .5f * sigma.y, .8f * sigma.z});
+  medium.height = HeightProfile{{1, 0, 0}, 0};
+  Moments scattered[3], depth[3], passed[3];
+  fly(medium, lamps({{1, .01f, 0}, {.1f, 1, 0}}), [&](const Flight& f) {
+    for (int c = 0; c < 3; ++c) {
+      const double w = f.weight[c] / mean(f.density);
+      scattered[c].add(f.scattered ? w : 0);
+      depth[c].add(f.scattered ? w * -std::expm1(-double{f.t}) : 0);
+      passed[c].add(f.scattered ? 0 : w);
+    }
+  });
+  for (int c = 0; c < 3; ++c) {
+    const double s = sigma[c], all = -std::expm1(-double{kEnd}), rest = std::exp(-s * all),
+                 albedo = double{medium.sigma_s[c]} / s;
+    EXPECT_NEAR(scattered[c].mean(), albedo * (1 - rest), 5 * scattered[c].error()) << s;
+    EXPECT_NEAR(passed[c].mean(), rest, 5 * passed[c].error()) << s;
+    EXPECT_NEAR(depth[c].mean(), albedo * (1 - (1 + s * all) * rest) / s, 5 * depth[c].error()) << s;
+  }
 }
 
 // A flight passes a lamp at the distance D in a thin medium, and the light is 1 / r^2. Plain flights through

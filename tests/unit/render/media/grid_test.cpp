@@ -22,12 +22,12 @@ TEST(Grid, InterpolatesToItsNodesAndClampsBeyondThem) {
     for (int y = 0; y < 3; ++y)
       for (int x = 0; x < 2; ++x)
         // The tolerance allows for three lerps of numbers below 1, each rounded twice.
-        EXPECT_NEAR(g.value<kTrilinear>(V3(x, y, z)), values[static_cast<std::size_t>((z * 3 + y) * 2 + x)],
-                    6 * 0x1p-25);
+        EXPECT_NEAR(g.value<Lookup::trilinear>(V3(x, y, z)),
+                    values[static_cast<std::size_t>((z * 3 + y) * 2 + x)], 6 * 0x1p-25);
 
-  EXPECT_EQ(g.value<kTrilinear>(V3(-.4f, -.4f, -.4f)), values.front());
-  EXPECT_EQ(g.value<kTrilinear>(V3(1.5f, 2.5f, 3.5f)), g.value<kTrilinear>(V3(1, 2, 3)));
-  EXPECT_FLOAT_EQ(g.value<kTrilinear>(V3(.5f, 0, 0)), (values[0] + values[1]) / 2);
+  EXPECT_EQ(g.value<Lookup::trilinear>(V3(-.4f, -.4f, -.4f)), values.front());
+  EXPECT_EQ(g.value<Lookup::trilinear>(V3(1.5f, 2.5f, 3.5f)), g.value<Lookup::trilinear>(V3(1, 2, 3)));
+  EXPECT_FLOAT_EQ(g.value<Lookup::trilinear>(V3(.5f, 0, 0)), (values[0] + values[1]) / 2);
 }
 
 TEST(Grid, DiagonalOfTheProductOfCoordinatesIsTheRootOfThreeQuarters) {
@@ -63,7 +63,7 @@ TEST(Grid, VoxelsAreConstantWithoutInterpolation) {
         for (int x = 0; x < 3; ++x)
           for (const float off : {-.49f, 0.f, .2f, .49f}) {
             const V3 p(static_cast<float>(x) + off, static_cast<float>(y) - off, static_cast<float>(z) + off);
-            ASSERT_EQ(g.value<kNearest>(g.to_index(p)),
+            ASSERT_EQ(g.value<Lookup::nearest>(g.to_index(p)),
                       values[static_cast<std::size_t>((z * 2 + y) * 3 + x)]);
           }
   }
@@ -292,7 +292,7 @@ TEST(CellWalk, BoundsHoldAtEveryPointOfEveryCell) {
       for (CellWalk w(g, r.o, r.d, 0, 100); w.next();) {
         for (int i = 0; i <= 8; ++i) {
           const V3 q = w.index(w.begin() + (w.end() - w.begin()) * static_cast<float>(i) / 8);
-          const float v = g.filter() == kNearest ? g.value<kNearest>(q) : g.value<kTrilinear>(q);
+          const float v = g.value_anywhere(q);
           ASSERT_LE(v, w.cell().hi);
           ASSERT_LE(std::abs(v - w.cell().control), w.cell().residual);
         }
@@ -349,8 +349,8 @@ TEST(CellWalk, DistinguishesVoxelsOfASmallDistantGrid) {
         // Index coordinates up to 128, and distances along them, are each rounded by one unit in the last
         // place.
         ASSERT_LT(off.length(), 6 * 128 * 0x1p-23);
-        ASSERT_LE(g.value<kTrilinear>(w.index(t)), w.cell().hi);
-        ASSERT_LE(std::abs(g.value<kTrilinear>(w.index(t)) - w.cell().control), w.cell().residual);
+        ASSERT_LE(g.value<Lookup::trilinear>(w.index(t)), w.cell().hi);
+        ASSERT_LE(std::abs(g.value<Lookup::trilinear>(w.index(t)) - w.cell().control), w.cell().residual);
       }
     }
   }

@@ -33,6 +33,19 @@ TEST(EmissiveGrids, AreNotLookedForByOtherIntegrators) {
   }
 }
 
+// Where fog falls with height, its light is in proportion to its density, without an end and without cells.
+TEST(EmissiveGrids, AreNotFogThatFallsWithHeight) {
+  const auto is_used_in = [](bool falls) {
+    SceneBuilder b = Fire{.absorbed = true, .emissive_grids = 1}.builder({24, 16});
+    auto& flame = std::get<HeterogeneousMedium>(b.scene.media.at(0));
+    flame.source_radiance = SceneBuilder::push<VolumeTag>(b.scene.volumes, ConstVolume{{1, 1, 1}, {}});
+    if (falls) flame.sigma_t = SceneBuilder::push<VolumeTag>(b.scene.volumes, HeightFogVolume{});
+    return is_used(b);
+  };
+  EXPECT_TRUE(is_used_in(false));
+  EXPECT_FALSE(is_used_in(true));
+}
+
 // The camera is in a glowing cloud that fills the scene and hides all else: paths meet its light anyway. What
 // was learned leaves the image unchanged.
 TEST(EmissiveGrids, AreNotLookedForWhereThatDoesNotPay) {

@@ -84,13 +84,22 @@ SceneBuilder veiled(SceneBuilder builder) {
   return builder;
 }
 
+HeightFogVolume falling_fog() {
+  HeightFogVolume v;
+  v.value = 1.5;
+  v.height = .5;
+  v.ground_point = {0, -.5, 0};
+  v.ground_normal = {.1, 1, 0};
+  return v;
+}
+
 std::vector<Named> scenes() {
   std::vector<Named> all;
-  all.push_back({"surfaces", room(), 7});
+  all.push_back({"surfaces", room(), 8});
   all.push_back({"homogeneous grey", with_medium([](SceneBuilder& k) {
                    return k.homogeneous({.8, .8, .8}, {.9, .5, .2}, .3);
                  }),
-                 5});
+                 6});
   all.push_back({"homogeneous chromatic", with_medium([](SceneBuilder& k) {
                    return k.homogeneous({0, .8, 3}, {.9, .9, .9}, -.3);
                  }),
@@ -121,7 +130,7 @@ std::vector<Named> scenes() {
                    return k.heterogeneous(k.grid({6, 5, 4}, three, kBox, 3), {.9, .6, .9}, 1, .5);
                  }),
                  2});
-  all.push_back({"veils", veiled(room()), 6});
+  all.push_back({"veils", veiled(room()), 7});
   all.push_back({"veils and a chromatic medium", veiled(with_medium([](SceneBuilder& k) {
                    return k.homogeneous({0, .8, 3}, {.9, .9, .9}, -.3);
                  })),
@@ -151,6 +160,22 @@ std::vector<Named> scenes() {
                    return m;
                  }),
                  0});
+  all.push_back(
+      {"fog that falls with height", with_medium([](SceneBuilder& k) {
+         return k.heterogeneous(k.push<VolumeTag>(k.scene.volumes, falling_fog()), {.9, .6, .9}, 1, .5);
+       }),
+       0});
+  all.push_back(
+      {"noise in a cloud, mapped", with_medium([](SceneBuilder& k) {
+         const auto put = [&](const Volume& v) { return k.push<VolumeTag>(k.scene.volumes, v); };
+         NoiseVolume noise;
+         noise.scale = 3;
+         noise.to_world = kBox;
+         const VolumeIndex product = put(ProductVolume{put(noise), k.grid({6, 5, 4}, cloud(), kBox)});
+         const VolumeIndex falling = put(ProductVolume{product, put(falling_fog())});
+         return k.heterogeneous(put(RemapVolume{falling, 0, 2, 1.5, {}, {}, 0, 3}), {.9, .6, .9}, 1, .5);
+       }),
+       3});
   return all;
 }
 
@@ -164,8 +189,9 @@ TEST(World, EveryVariantThatCoversASceneGivesTheSameBits) {
     const auto world = test::world_of(n.builder);
     const auto names = covering_variants(*world);
     const TileResult first = render(*world);
-    // Two more variants are the one for all phase functions and the one for AOVs of light.
-    EXPECT_EQ(names.size(), n.variants + 2) << n.name;
+    // Three more variants are the one for all phase functions, the one for fog that falls with height and the
+    // one for AOVs of light; for fog that falls with height there is one of its own in place of the first.
+    EXPECT_EQ(names.size(), n.variants + 3) << n.name;
     EXPECT_EQ(names.front(), describe(*world).variant);
     EXPECT_EQ(first.health.nonfinite + first.health.negative + first.health.majorant_violations, 0u)
         << n.name;
@@ -267,7 +293,12 @@ SceneBuilder scaled(SceneBuilder builder, int k) {
     if (auto* h = std::get_if<HomogeneousMedium>(&m))
       for (double& e : h->emission) e /= f;
   }
-  for (Volume& volume : builder.scene.volumes) std::visit([&](auto& v) { move(v.to_world); }, volume);
+  for (Volume& volume : builder.scene.volumes)
+    std::visit(
+        [&](auto& v) {
+          if constexpr (requires { v.to_world; }) move(v.to_world);
+        },
+        volume);
   for (int row = 0; row < 3; ++row)
     builder.scene.sensor.to_world.m[static_cast<std::size_t>(4 * row + 3)] *= f;
   builder.scene.sensor.near_clip *= f;

@@ -132,7 +132,7 @@ what is refused says what to do instead.
 
 - **Files** are found from the folder of the main file. An absolute name is used as it is on the command line; a coordinator
   knows only what was sent along.
-- **Meshes and grids in the text** (`trianglemesh`, `bilinearmesh`, `uniformgrid`, `rgbgrid`, `cloud`) are written as files, which `submit`
+- **Meshes and grids in the text** (`trianglemesh`, `bilinearmesh`, `uniformgrid`, `rgbgrid`) are written as files, which `submit`
   sends along and `convert` puts beside its XML. Over HTTP the sender does that.
 - **Camera**: pbrt has +x on the right, our sensors on the left, so `to_world` is the inverse of the transform before `Camera` times
   scale(-1, 1, 1). Coordinates of the world stay as they are. A camera that is scaled alike along all axes keeps its picture, and its
@@ -161,9 +161,7 @@ what is refused says what to do instead.
   them, pbrt's colours of thick media differ.
 - **Rgbgrid**: if the albedo is the same in all voxels, the medium is that of pbrt. If it differs, it is interpolated between voxels,
   where pbrt interpolates absorption and scattering: a warning says so, and values at the centres of voxels are the same.
-- **Clouds** by formula become a grid from face to face of their box, of 4 nodes along a cell of their finest noise: of frequency times
-  15.7 cells per unit or, with wispiness, 19.9. One grid has at most 2^24 nodes, those of a file 2^25: a finer cloud gets fewer
-  nodes a cell, with a warning, and is refused below 2.
+- **Clouds** are formulas here as in pbrt: the volume `cloud` computes the same density at each point that is looked up, to float32.
 - **Depth**: `maxdepth` counts scatterings; `max_depth` of ours is one more. `thindielectric` does not count here.
 - **Sides**: a sphere, disk or cylinder turns its normal to the other side if it is mirrored by its transform, and once more by
   ReverseOrientation; a mesh by ReverseOrientation alone. If a mirrored sphere, disk or cylinder gives light on one side, that is a

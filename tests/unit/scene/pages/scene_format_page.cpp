@@ -25,6 +25,7 @@ struct Column {
 };
 Column column(const Field&, double x) { return {"float", fmt::format("{}", x)}; }
 Column column(const Field&, int x) { return {"integer", fmt::format("{}", x)}; }
+Column column(const Field&, std::uint64_t x) { return {"integer", fmt::format("{}", x)}; }
 Column column(const Field&, bool x) { return {"boolean", x ? "true" : "false"}; }
 Column column(const Field&, const std::string& x) {
   return {"string", x.empty() ? "" : fmt::format("\"{}\"", x)};
@@ -250,6 +251,33 @@ to the same bits, files named by SHA-256. Objects that nothing uses are left out
   number a voxel or a colour. Colours outside of sRGB are cut off at 0. Such light counts like that of an emitter that a path meets:
   `max_depth` 1 shows it, `hide_emitters` hides it where the camera looks straight at it. It lights the scene where paths come by:
   next-event estimation does not look for it.
+
+## Volumes without a file
+
+- `noise`, `cloud`, `product` and `remap` are computed at each point that is looked up, with no resolution of their own. They stand
+  wherever a grid may: as a density, an albedo, a light given off, a temperature, the weight of a `blendphase`. Each has one
+  channel; the `tint` of the medium gives a density its colour.
+- As a density a volume ends at its box: that of a `noise` or a `cloud` from `min` to `max`, moved by `to_world`; of a `remap` that
+  of the volume within; of a `product` that of its first volume that has one. A light given off ends there too. As an albedo or a
+  weight, and within a `product`, a `noise` or a `cloud` is everywhere, a grid 0 beyond its box.
+- A `heightfog` has no box. As the `sigma_t` of a medium it fills all that the medium fills: a shape, or everything around the camera
+  and without an end, if the sensor names the medium. The albedo of such a medium and the light that it gives off (`source_radiance`
+  or `temperature`) are the same everywhere. Where they have to vary, or the fog has to have holes, make it a `product` with a
+  volume that has a box. Higher up than some 700 times `height` there is no fog left that double could tell.
+- Exponential fog that goes on below the ground, as some programs have it, is one whose ground is at the lowest point of the scene,
+  with the density there.
+
+```xml
+<medium type="heterogeneous" id="morning">
+  <volume name="sigma_t" type="product">
+    <volume name="first" type="noise">
+      <float name="scale" value="0.5"/> <integer name="octaves" value="5"/> <float name="low" value="-0.5"/> <float name="high" value="1.5"/>
+      <point name="min" x="-20" y="0" z="-20"/> <point name="max" x="20" y="8" z="20"/>
+    </volume>
+    <volume name="second" type="heightfog"> <float name="value" value="0.4"/> <float name="height" value="1.5"/> </volume>
+  </volume>
+</medium>
+```
 
 ## Boundaries of media
 
