@@ -8,9 +8,9 @@ from .problems import ExportError
 TURNED = ((-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1))  # looks along +z with +x to the left
 
 
-def add_camera(document, problems, camera, scene, size, medium, matrix_class):
+def add_camera(document, problems, camera, scene, size, medium, matrix_class, poses):
     """Adds the camera. `medium`: the id of the medium around the camera, or None. `matrix_class`: Blender's
-    Matrix."""
+    Matrix. `poses`: its matrices by times; empty if it does not move."""
     data, name = camera.data, camera.name
     render = scene.render
     if abs(render.pixel_aspect_x - render.pixel_aspect_y) > 1e-6:
@@ -35,9 +35,10 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class):
             "Render Properties > Light Paths: Fast GI Approximation has no effect: all light is traced"
         )
     width, height = size
-    if abs(camera.matrix_world.determinant()) < 1e-30:
+    poses = poses or {0: camera.matrix_world}
+    if any(abs(pose.determinant()) < 1e-30 for pose in poses.values()):
         raise ExportError(f"camera '{name}': its scale is 0. Set it to 1")
-    to_world = unscaled(camera.matrix_world, matrix_class) @ matrix_class(TURNED)
+    inner = matrix_class(TURNED)
     fit = data.sensor_fit if data.sensor_fit != "AUTO" else ("HORIZONTAL" if width >= height else "VERTICAL")
     frame = width if fit == "HORIZONTAL" else height
     values = {"near_clip": float(data.clip_start), "far_clip": float(data.clip_end)}
@@ -46,8 +47,8 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class):
         plugin = "orthographic"
         half = data.ortho_scale / 2 * width / frame
         step = data.ortho_scale
-        to_world = to_world @ matrix_class.Translation((-data.shift_x * step, data.shift_y * step, 0))
-        to_world = to_world @ matrix_class.Diagonal((half, half, 1, 1))
+        inner = inner @ matrix_class.Translation((-data.shift_x * step, data.shift_y * step, 0))
+        inner = inner @ matrix_class.Diagonal((half, half, 1, 1))
     else:
         # Where the fit is automatic the sensor's width is along the longer side.
         sensor = data.sensor_height if data.sensor_fit == "VERTICAL" else data.sensor_width
@@ -64,8 +65,17 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class):
                 problems.unsupported(
                     f"camera '{name}': Aperture > Blades and Ratio. Lightshaft's lens is round: set them to 0 and 1"
                 )
+    to_world = {time: unscaled(pose, matrix_class) @ inner for time, pose in poses.items()}
+    if len(to_world) > 1:
+        values["shutter_open"], values["shutter_close"] = float(min(to_world)), float(max(to_world))
+    else:
+        to_world = to_world.popitem()[1]
     if render.use_motion_blur:
-        problems.unsupported("Render Properties: Motion Blur. Lightshaft renders an instant: switch it off")
+        problems.warning(
+            "Render Properties > Motion Blur is of the camera alone: what else moves is rendered where it is at the frame"
+        )
+        if scene.cycles.rolling_shutter_type != "NONE":
+            problems.unsupported("Render Properties > Motion Blur: Rolling Shutter. Set it to None")
     transparent = True if render.film_transparent else None
     film = element(
         "film",

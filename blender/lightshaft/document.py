@@ -19,8 +19,8 @@ def element(kind, plugin, name=None, *children, **values):
 
 
 def parameter(name, value):
-    """Makes a parameter of the type of its value: three numbers become a colour, 4 x 4 numbers a transform, and an
-    element stays as it is."""
+    """Makes a parameter of the type of its value: three numbers become a colour, 4 x 4 numbers a transform, such
+    numbers by times an animation, and an element stays as it is."""
     if isinstance(value, ElementTree.Element):
         # Another element: a texture can be a parameter of several objects, under another name in each.
         named = ElementTree.Element(value.tag, {**value.attrib, "name": name})
@@ -34,12 +34,21 @@ def parameter(name, value):
         return ElementTree.Element("float", name=name, value=repr(value))
     if isinstance(value, str):
         return ElementTree.Element("string", name=name, value=value)
+    if isinstance(value, dict):
+        animation = ElementTree.Element("animation", name=name)
+        for time, matrix in sorted(value.items()):
+            animation.append(transform(matrix, time=repr(float(time))))
+        return animation
     rows = [list(row) if hasattr(row, "__len__") else row for row in value]
     if len(rows) == 4:
-        transform = ElementTree.Element("transform", name=name)
-        transform.append(ElementTree.Element("matrix", value=numbers(x for row in rows for x in row)))
-        return transform
+        return transform(rows, name=name)
     return ElementTree.Element("rgb", name=name, value=numbers(rows))
+
+
+def transform(rows, **attributes):
+    result = ElementTree.Element("transform", **attributes)
+    result.append(ElementTree.Element("matrix", value=numbers(x for row in rows for x in row)))
+    return result
 
 
 def numbers(values):

@@ -32,13 +32,15 @@ class Shape:
         self.tree = None
 
 
-def export(depsgraph, folder, size):
-    """Returns (path of scene.xml, its Document, warnings). Raises ExportError, which lists all errors."""
-    return Exporter(depsgraph, folder, size).run()
+def export(depsgraph, folder, size, poses):
+    """Returns (path of scene.xml, its Document, warnings). Raises ExportError, which lists all errors. `poses`: see
+    poses_of_camera()."""
+    return Exporter(depsgraph, folder, size, poses).run()
 
 
 class Exporter:
-    def __init__(self, depsgraph, folder, size):
+    def __init__(self, depsgraph, folder, size, poses):
+        self.poses = poses
         self.depsgraph, self.size, self.scene = depsgraph, size, depsgraph.scene_eval
         self.problems = Problems(self.scene.lightshaft.unsupported == "LEAVE_OUT")
         self.document = Document(folder)
@@ -72,7 +74,7 @@ class Exporter:
         camera = camera.evaluated_get(self.depsgraph)
         eye = camera.matrix_world.translation
         around = next((medium for medium, contains in self.bodies if contains(eye)), None)
-        add_camera(self.document, self.problems, camera, self.scene, self.size, around, Matrix)
+        add_camera(self.document, self.problems, camera, self.scene, self.size, around, Matrix, self.poses)
         self.problems.raise_errors()
         drop_empty_sets(self.document.root)
         return self.document.save(), self.document, self.problems.warnings
@@ -127,6 +129,8 @@ class Exporter:
             )
 
     def may_see(self, centre, radius):
+        if self.poses:
+            return True  # what a camera that moves passes is not looked at
         camera = self.scene.camera.evaluated_get(self.depsgraph)
         return may_see(camera, self.scene, self.size, centre, radius, Matrix)
 

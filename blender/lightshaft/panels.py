@@ -53,6 +53,16 @@ class LIGHTSHAFT_PT_film(LightshaftPanel):
         return context.scene.render
 
 
+class LIGHTSHAFT_PT_motion_blur(LightshaftPanel):
+    bl_label = "Motion Blur"
+    bl_context = "render"
+    rows = ("use_motion_blur", "motion_blur_position", "motion_blur_shutter")
+
+    @staticmethod
+    def owner(context):
+        return context.scene.render
+
+
 class LIGHTSHAFT_PT_object(LightshaftPanel):
     bl_label = "Ray Visibility"
     bl_context = "object"
@@ -144,6 +154,7 @@ class LIGHTSHAFT_PT_passes(LightshaftPanel):
 CLASSES = (
     LIGHTSHAFT_PT_render,
     LIGHTSHAFT_PT_film,
+    LIGHTSHAFT_PT_motion_blur,
     LIGHTSHAFT_PT_object,
     LIGHTSHAFT_PT_object_light_group,
     LIGHTSHAFT_PT_world,

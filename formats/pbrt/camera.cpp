@@ -199,6 +199,26 @@ class SettingsTranslator {
   // Mirrors the camera: pbrt's has +x on the right, ours on the left.
   static Transform facing(const Transform& world) { return multiply(world, scaled(Vec3{{-1, 1, 1}}).to); }
 
+  // Places a camera. place_of(m): its to_world, where m is the matrix from camera to world. It is an <animation> if the
+  // camera moves.
+  template <class F>
+  void place_camera(Element& out, Params& p, F place_of) {
+    const Transform start = place_of(s_.camera_ctm.from);
+    if (s_.camera_end_ctm.to == s_.camera_ctm.to) return place(out, start, p.at());
+    Element animation = made("animation", "", p.at());
+    set(animation, "name", "to_world", p.at());
+    for (const auto& [time, to_world] :
+         {std::pair(s_.start_time, start), std::pair(s_.end_time, place_of(s_.camera_end_ctm.from))}) {
+      Element key = made("transform", "", p.at());
+      set(key, "time", fmt::format("{}", time), p.at());
+      add(key, matrix_step(to_world.m, p.at()));
+      add(animation, std::move(key));
+    }
+    add(out, std::move(animation));
+    add(out, "shutter_open", p.number("shutteropen", 0), p.at());
+    add(out, "shutter_close", p.number("shutterclose", 1), p.at());
+  }
+
   Element orthographic(Params& p) {
     Element out = made("sensor", "orthographic", p.at());
     // Our frame is 2 wide before to_world, and has the shape of the film.
@@ -207,7 +227,7 @@ class SettingsTranslator {
     if (const auto w = window(p))
       shown = then(moved(Vec3{{-w->x, w->y, 0}}),
                    scaled(Vec3{{w->half_width, w->half_height * frame_aspect(), 1}}));
-    place(out, multiply(facing(s_.camera_ctm.from), shown.to), p.at());
+    place_camera(out, p, [&](const Transform& world) { return multiply(facing(world), shown.to); });
     return out;
   }
 
@@ -219,7 +239,7 @@ class SettingsTranslator {
     window(p);  // it does not change what this camera sees
     Element out = made("sensor", "spherical", p.at());
     const Transform axes{{0, 0, -1, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 1}};
-    place(out, multiply(without_scale(s_.camera_ctm.from).rigid, axes), p.at());
+    place_camera(out, p, [&](const Transform& world) { return multiply(without_scale(world).rigid, axes); });
     return out;
   }
 
@@ -256,18 +276,17 @@ class SettingsTranslator {
     }
     // Here a perspective camera must have no scale. A uniform scale changes only the sizes of the lens radius
     // and the focus distance in the world, so these two are multiplied by it instead.
-    const auto [world, scale] = without_scale(s_.camera_ctm.from);
+    const double scale = without_scale(s_.camera_ctm.from).scale;
     const double focus = p.number("focaldistance", 1e6);
     if (radius > 0) {
       add(out, "aperture_radius", radius * scale, p.at());
       add(out, "focus_distance", focus * scale, p.at());
     }
-    Transform placed = facing(world);
-    if (shown && (shown->half_width < 0 || shown->half_height < 0))
-      placed = multiply(
-          placed,
-          scaled(Vec3{{std::copysign(1, shown->half_width), std::copysign(1, shown->half_height), 1}}).to);
-    place(out, placed, p.at());
+    const double mirror_x = shown ? std::copysign(1, shown->half_width) : 1,
+                 mirror_y = shown ? std::copysign(1, shown->half_height) : 1;
+    place_camera(out, p, [&](const Transform& of_world) {
+      return multiply(facing(without_scale(of_world).rigid), scaled(Vec3{{mirror_x, mirror_y, 1}}).to);
+    });
     return out;
   }
 

@@ -236,9 +236,11 @@ class Loader {
     setting(d, settings_.camera);
     expose(d);
     settings_.camera_ctm = now_.ctm;
+    settings_.camera_end_ctm = now_.end_ctm;
     settings_.camera_medium = now_.outside;
-    Placed world = now_.ctm;
-    std::swap(world.to, world.from);
+    System world{now_.ctm, now_.end_ctm};
+    std::swap(world.start.to, world.start.from);
+    std::swap(world.end.to, world.end.from);
     systems_["camera"] = world;
   }
   void accelerator(const Token& d) {
@@ -307,14 +309,18 @@ class Loader {
   void world_begin(const Token& d) {
     if (in_world_) return report_.error(d.at, "a second WorldBegin: a file has one scene");
     in_world_ = true;
-    now_.at_start = true;
-    now_.ctm = {};
+    now_.at_start = now_.at_end = true;
+    now_.ctm = now_.end_ctm = {};
     systems_["world"] = {};
   }
   void world_end(const Token&) {}
   void attribute_begin(const Token& d) { push(d); }
   void attribute_end(const Token& d) { pop(d); }
 
+  // A coordinate system, at the two times.
+  struct System {
+    Placed start, end;
+  };
   struct Saved {
     Attributes attributes;
     Span at;
@@ -333,7 +339,7 @@ class Loader {
     saved_.pop_back();
   }
 
-  void grow(const Placed& inner) { set_ctm(then(now_.ctm, inner)); }
+  void grow(const Placed& inner) { set_ctm({then(now_.ctm, inner), then(now_.end_ctm, inner)}); }
   void identity(const Token&) { set_ctm({}); }
   void translate(const Token& d) {
     if (const auto n = numbers(d, 3)) grow(moved(Vec3{{(*n)[0], (*n)[1], (*n)[2]}}));
@@ -367,13 +373,13 @@ class Loader {
     return p;
   }
   void transform(const Token& d) {
-    if (const auto p = matrix(d)) set_ctm(*p);
+    if (const auto p = matrix(d)) set_ctm({*p, *p});
   }
   void concat_transform(const Token& d) {
     if (const auto p = matrix(d)) grow(*p);
   }
   void coordinate_system(const Token& d) {
-    if (const auto name = quoted(d)) systems_[*name] = now_.ctm;
+    if (const auto name = quoted(d)) systems_[*name] = {now_.ctm, now_.end_ctm};
   }
   void coord_sys_transform(const Token& d) {
     const auto name = quoted(d);
@@ -393,17 +399,28 @@ class Loader {
       return;
     }
     now_.at_start = which != "EndTime";
-    if (!now_.at_start)
-      t_.warn_once(
-          d.at,
-          "transforms of EndTime are left out: motion is not rendered here, and the picture shows the "
-          "scene as it is at StartTime");
+    now_.at_end = which != "StartTime";
   }
-  // Sets the current transform, unless only that of EndTime is active.
-  void set_ctm(const Placed& ctm) {
-    if (now_.at_start) now_.ctm = ctm;
+  // Sets those of the two current transforms that are active.
+  void set_ctm(const System& ctm) {
+    if (now_.at_start) now_.ctm = ctm.start;
+    if (now_.at_end) now_.end_ctm = ctm.end;
   }
-  void transform_times(const Token& d) { (void)numbers(d, 2); }
+  // Warns if what is placed by the current transforms would move.
+  void place_still(const Token& d) {
+    if (now_.ctm.to != now_.end_ctm.to)
+      t_.warn_once(d.at, fmt::format("this {} moves in pbrt; it is shown where it is at StartTime: only cameras move",
+                                     d.text));
+  }
+  void transform_times(const Token& d) {
+    const auto n = numbers(d, 2);
+    if (!n) return;
+    if (!((*n)[0] < (*n)[1]))
+      return report_.error(d.at, fmt::format("TransformTimes end at {} and begin at {}: let them end later", (*n)[1],
+                                             (*n)[0]));
+    settings_.start_time = (*n)[0];
+    settings_.end_time = (*n)[1];
+  }
   void reverse_orientation(const Token&) { now_.reversed = !now_.reversed; }
   void attribute(const Token& d) {
     report_.error(d.at, "Attribute is not read: write the parameters into each of the objects");
@@ -461,6 +478,7 @@ class Loader {
   }
   void light_source(const Token& d) {
     need_world(d);
+    place_still(d);
     if (auto p = object(d)) add_light(t_, *p, now_.ctm);
   }
   void area_light_source(const Token& d) {
@@ -471,6 +489,7 @@ class Loader {
     const auto name = quoted(d);
     if (!name) return;
     const Span at = last_;
+    place_still(d);
     auto p = named("MakeNamedMedium", at);
     if (p) add_medium(t_, *name, *p, now_.ctm);
   }
@@ -483,6 +502,7 @@ class Loader {
   }
   void shape_(const Token& d) {
     need_world(d);
+    place_still(d);
     auto p = object(d);
     if (!p) return;
     Attributes a = now_;
@@ -516,6 +536,7 @@ class Loader {
     const auto name = quoted(d);
     if (!name) return;
     if (group_) return report_.error(d.at, "an ObjectInstance within an ObjectBegin: put its shapes here");
+    place_still(d);
     Element out = made("shape", "instance", last_);
     refer(out, "", object_id(*name), last_);
     place(out, now_.ctm.to, last_);
@@ -569,7 +590,7 @@ class Loader {
   // While an imported file is read: the size of saved_ when the file began. Entries of saved_ are blocks that
   // are still open, such as AttributeBegin; the file cannot end the blocks that began before it.
   std::size_t floor_ = 0;
-  std::map<std::string, Placed> systems_;
+  std::map<std::string, System> systems_;
   std::optional<Element> group_;
   bool in_world_ = false, lost_ = false;
   Tokens* tokens_ = nullptr;

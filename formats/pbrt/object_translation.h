@@ -56,9 +56,9 @@ struct AreaLight {
 
 // The state that AttributeBegin saves and AttributeEnd restores.
 struct Attributes {
-  Placed ctm;  // with motion, that of the time at which the shutter opens
-  // False if transforms that follow are those of the time at which the shutter closes (ActiveTransform).
-  bool at_start = true;
+  Placed ctm, end_ctm;  // of the first and of the second of TransformTimes
+  // Which of the two the transforms that follow change (ActiveTransform).
+  bool at_start = true, at_end = true;
   bool reversed = false;
   ColourSpace space = ColourSpace::rec709;
   Material material;
@@ -141,7 +141,8 @@ std::optional<Element> shape(Translation& t, Params& p, const Attributes& attrib
 // does not have the directive.
 struct Settings {
   std::optional<Params> film, camera, filter, sampler, integrator;
-  Placed camera_ctm;
+  Placed camera_ctm, camera_end_ctm;
+  double start_time = 0, end_time = 1;  // TransformTimes
   std::string camera_medium;
 };
 double exposure_of(Settings& s);  // returns the value for Translation::exposure_factor

@@ -21,19 +21,26 @@ inline constexpr std::size_t kQuarters = 4 * 3;
 struct Quarters {
   std::array<double, kQuarters> mean{}, variance{};  // of the mean
 };
-inline Quarters quarters_of(const SceneBuilder& builder, std::uint64_t spp, int seeds, std::uint64_t first) {
+using QuarterImage = std::array<double, kQuarters>;
+inline QuarterImage quarter_image(const SceneBuilder& builder, std::uint64_t spp, std::uint64_t seed) {
+  const auto world = world_of(builder, seed, 2);
+  const auto sums = render::render_tile(*world, {0, 0, kSide, kSide}, {0, spp}, nullptr, nullptr).sums;
+  QuarterImage image{};
+  for (std::size_t plane = 0; plane < 6; ++plane)
+    for (std::size_t p = 0; p < kSide * kSide; ++p) {
+      const std::size_t right = p % kSide >= kSide / 2, below = p / kSide >= kSide / 2;
+      image[(2 * below + right) * 3 + plane % 3] +=
+          double{sums[plane * kSide * kSide + p]} / (static_cast<double>(spp) * kSide * kSide / 4);
+    }
+  return image;
+}
+// image(i): number i of `seeds` independent images
+template <class Image>
+Quarters quarters_of(int seeds, Image&& image_of) {
   Quarters all;
-  std::array<double, kQuarters> squares{};
+  QuarterImage squares{};
   for (int i = 0; i < seeds; ++i) {
-    const auto world = world_of(builder, first + static_cast<std::uint64_t>(i), 2);
-    const auto sums = render::render_tile(*world, {0, 0, kSide, kSide}, {0, spp}, nullptr, nullptr).sums;
-    std::array<double, kQuarters> image{};
-    for (std::size_t plane = 0; plane < 6; ++plane)
-      for (std::size_t p = 0; p < kSide * kSide; ++p) {
-        const std::size_t right = p % kSide >= kSide / 2, below = p / kSide >= kSide / 2;
-        image[(2 * below + right) * 3 + plane % 3] +=
-            double{sums[plane * kSide * kSide + p]} / (static_cast<double>(spp) * kSide * kSide / 4);
-      }
+    const QuarterImage image = image_of(i);
     for (std::size_t q = 0; q < kQuarters; ++q) {
       all.mean[q] += image[q] / seeds;
       squares[q] += image[q] * image[q] / seeds;
@@ -42,6 +49,10 @@ inline Quarters quarters_of(const SceneBuilder& builder, std::uint64_t spp, int 
   for (std::size_t q = 0; q < kQuarters; ++q)
     all.variance[q] = (squares[q] - all.mean[q] * all.mean[q]) / (seeds - 1);
   return all;
+}
+inline Quarters quarters_of(const SceneBuilder& builder, std::uint64_t spp, int seeds, std::uint64_t first) {
+  return quarters_of(seeds,
+                     [&](int i) { return quarter_image(builder, spp, first + static_cast<std::uint64_t>(i)); });
 }
 
 // Fails if the means of two ways to render the same image, each over `seeds` images, differ at this level.

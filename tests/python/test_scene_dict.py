@@ -139,3 +139,27 @@ def test_a_product_is_a_volume_within_media_and_a_texture_elsewhere():
     )
     assert text.count('<volume type="product"') == 2
     assert text.count('<texture type="product"') == 1
+
+
+def test_transforms_by_times_are_an_animation():
+    moved = np.eye(4)
+    moved[0, 3] = 2
+    text = "".join(lines(eye={"type": "perspective", "shutter_close": 1.0, "to_world": {1.0: moved, 0: np.eye(4)}}))
+    assert '<animation name="to_world">' in text
+    assert text.index('<transform time="0.0"><matrix value="1') < text.index('<transform time="1.0"><matrix value="1')
+
+
+@pytest.mark.parametrize(
+    "keys, words",
+    [
+        ({0.0: np.eye(4), "1": np.eye(4)}, "'type'"),
+        ({(0,): np.eye(4)}, "the keys of an animation are times"),
+        ({True: np.eye(4)}, "the keys of an animation are times"),
+        ({0.0: 3.0}, "a transform (4 x 4 numbers) at each of its times"),
+        ({float("nan"): np.eye(4)}, "nan"),
+    ],
+)
+def test_an_animation_of_anything_else_is_refused(keys, words):
+    with pytest.raises(SceneDictError) as error:
+        scene_of_dict({"type": "scene", "eye": {"type": "perspective", "to_world": keys}})
+    assert words in str(error.value)

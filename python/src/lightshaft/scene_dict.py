@@ -80,7 +80,9 @@ class _Writer:
                 path,
                 f"dictionaries are nested more than {MAX_NESTING} deep (does one contain itself?)",
             )
-        if isinstance(value, Mapping):
+        if isinstance(value, Mapping) and value and not any(isinstance(k, str) for k in value):
+            self.write_animation(depth, path, key, value)
+        elif isinstance(value, Mapping):
             self.write_dict(depth, path, key, value, names_it)
         else:
             self.write_value(depth, path, key, value)
@@ -97,6 +99,22 @@ class _Writer:
             self.write_colour(depth, path, key, kind, value)
         else:
             self.write_object(depth, path, key, kind, value, names_it)
+
+    def write_animation(self, depth: int, path: str, key: str, value: Mapping[Any, Any]) -> None:
+        """Writes transforms by their times, as of a camera that moves."""
+        self.add(depth, path, f"<animation name={_quoted(path, key)}>")
+        for time in value:
+            if isinstance(time, bool) or not isinstance(time, (int, float, np.integer, np.floating)):
+                raise _wrong(path, f"the keys of an animation are times, not {time!r}")
+        for time in sorted(value):
+            at = f"{path}[{time!r}]"
+            matrix = self.array_of(at, value[time])
+            if matrix.shape not in ((3, 3), (4, 4)):
+                raise _wrong(at, "an animation has a transform (4 x 4 numbers) at each of its times")
+            text = " ".join(map(_number, _numbers(at, matrix.ravel(), (9, 16))))
+            number = _number(_numbers(at, float(time), (1,))[0])
+            self.add(depth + 1, at, f'<transform time="{number}"><matrix value="{text}"/></transform>')
+        self.add(depth, path, "</animation>")
 
     def write_reference(self, depth: int, path: str, key: str, value: Mapping[str, Any]) -> None:
         if not isinstance(value.get("id"), str) or set(value) != {"type", "id"}:
@@ -171,9 +189,7 @@ class _Writer:
         else:
             self.write_array(depth, path, key, value)
 
-    def write_array(self, depth: int, path: str, key: str, value: Any) -> None:
-        """Writes three numbers as a point or vector, which the format does not distinguish, and 9 or 16 numbers as
-        a transform."""
+    def array_of(self, path: str, value: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
         given = getattr(value, "matrix", value)
         try:
             array = np.asarray(given, dtype=np.float64)
@@ -185,6 +201,12 @@ class _Writer:
             ) from None
         if array.ndim == 3 and array.shape[-1] == 1:  # a transform of Dr.Jit, with one entry
             array = array[..., 0]
+        return array
+
+    def write_array(self, depth: int, path: str, key: str, value: Any) -> None:
+        """Writes three numbers as a point or vector, which the format does not distinguish, and 9 or 16 numbers as
+        a transform."""
+        array = self.array_of(path, value)
         if array.shape == (3,):
             text = " ".join(map(_number, _numbers(path, array, (3,))))
             self.add(depth, path, f'<point name={_quoted(path, key)} value="{text}"/>')

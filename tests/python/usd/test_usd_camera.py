@@ -164,3 +164,29 @@ def test_a_clipping_range_clips(farm, stage, clipping, seen):
     made = camera(stage, (0.5, 0.5, 10), (0.5, 0.5, 0), 4.0)
     made.CreateClippingRangeAttr(Gf.Vec2f(*clipping))
     assert (image(farm, stage, 4, (8, 8)).mean() < 0.5) == seen
+
+
+def test_a_camera_that_moves_while_its_shutter_is_open_blurs(farm, stage):
+    """It moves by 1 along x from frame 0 to frame 1, below a prim that moves by 1 more in that time."""
+    stage.SetStartTimeCode(0)
+    stage.SetEndTimeCode(1)
+    rail = UsdGeom.Xformable(UsdGeom.Xform.Define(stage, "/rail")).AddTranslateOp()
+    made = camera(stage, (0, 0, 10), (0, 0, 0), path="/rail/camera")
+    begin = UsdGeom.Xformable(made).GetOrderedXformOps()[0]
+    matrix = begin.Get()
+    for time in (0, 1):
+        rail.Set((time, 0, 0), time)
+        begin.Set(matrix * moved(time, 0, 0), time)
+    sharp = 1 - image(farm, stage, 4, (80, 40))[17, :, 0]
+    made.GetShutterCloseAttr().Set(1.0)
+
+    with pytest.warns(lightshaft.SceneWarning, match="the motion of the camera alone"):
+        blurred = 1 - image(farm, stage, 64, (80, 40))[17, :, 0]
+
+    # The square, 1 wide, passes a pixel for half of the time at most, and 3 of the frame's width, which is twice its height.
+    width = 2 * 20 * math.tan(math.radians(20))
+    assert sharp.max() > 0.99 and (sharp > 0.02).mean() == pytest.approx(1 / width, abs=2 / 80)
+    # 64 samples that are dark or not: five standard errors of a share of a half
+    assert blurred.max() == pytest.approx(0.5, abs=5 * 0.5 / 8)
+    assert (blurred > 0.02).mean() == pytest.approx(3 / width, abs=2 / 80)
+    assert blurred.sum() == pytest.approx(sharp.sum(), rel=0.1)

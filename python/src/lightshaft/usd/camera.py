@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-from pxr import Usd, UsdGeom
+from pxr import Gf, Usd, UsdGeom
 
 from ..errors import StageRejected
 from .document import Document
@@ -18,6 +18,7 @@ from .transforms import Matrix, column_matrix, is_usable, scale, translation, un
 TURNED = scale(-1, 1, -1)  # looks along +z with +x to the left
 NEAR, FAR = 1e-4, 1e7  # of the depths that are seen, unless the camera says otherwise
 WIDTH = 960  # pixels of a frame whose size nobody gives
+STEPS = 9  # times of the exposure at which a camera's place is asked for, beside those that the stage has
 FRAMED = 50.0  # degrees of the view of a stage without a camera
 TENTH = 0.1  # apertures and focal lengths are in tenths of a scene unit
 
@@ -93,20 +94,23 @@ def add_camera(
     # The frame holds all of the aperture: where its shape differs it shows more.
     wide = width / height >= across / along
     shown = (along * width / height, along) if wide else (across, across * height / width)
-    matrix = column_matrix(camera.ComputeLocalToWorldTransform(time))
-    if not is_usable(matrix):
-        raise StageRejected(f"{camera.GetPath()}: its transform flattens the camera to nothing")
-    matrix = unscaled(matrix)
+    poses = _poses(camera, time, get("shutter:open", 0.0), get("shutter:close", 0.0))
     tell_prim(prim, problems)
     shift = get("horizontalApertureOffset", 0.0), get("verticalApertureOffset", 0.0)
     sensor: dict[str, Any] = {"type": "perspective"}
+    if len(poses) > 1:
+        sensor["shutter_open"], sensor["shutter_close"] = min(poses), max(poses)
+
+    def place(inner: Matrix) -> None:
+        matrices = {at: pose @ inner for at, pose in poses.items()}
+        sensor["to_world"] = matrices if len(matrices) > 1 else matrices.popitem()[1]
+
     if str(prim.GetAttribute("projection").Get(time)) == "orthographic":
         sensor["type"] = "orthographic"
-        matrix = matrix @ translation(shift[0] * TENTH, shift[1] * TENTH, 0)
         half = shown[0] * TENTH / 2
-        sensor["to_world"] = matrix @ TURNED @ scale(half, half, 1)
+        place(translation(shift[0] * TENTH, shift[1] * TENTH, 0) @ TURNED @ scale(half, half, 1))
     else:
-        sensor["to_world"] = matrix @ TURNED
+        place(TURNED)
         axis = 1 if wide else 0
         sensor["fov_axis"] = "xy"[axis]
         sensor["fov"] = 2 * math.degrees(math.atan(shown[axis] / (2 * focal)))
@@ -119,6 +123,33 @@ def add_camera(
             sensor["focus_distance"] = distance
     sensor["near_clip"], sensor["far_clip"] = _clipping(problems, prim, time)
     _add(document, str(camera.GetPath()), sensor, (width, height), medium)
+
+
+def _poses(
+    camera: UsdGeom.Camera, time: Usd.TimeCode, opens: float, closes: float
+) -> dict[float, Matrix]:
+    """Returns where the camera is, without its scale, by times relative to that of the frame. One: it does not move."""
+
+    def pose(at: Usd.TimeCode) -> Matrix:
+        matrix = column_matrix(camera.ComputeLocalToWorldTransform(at))
+        if not is_usable(matrix):
+            raise StageRejected(f"{camera.GetPath()}: its transform flattens the camera to nothing")
+        return unscaled(matrix)
+
+    if time.IsNumeric() and not time.IsEarliestTime() and opens < closes:
+        frame = time.GetValue()
+        times = {frame + float(step) for step in np.linspace(opens, closes, STEPS)}
+        during = Gf.Interval(frame + opens, frame + closes)
+        prim = camera.GetPrim()
+        while prim:
+            if prim.IsA(UsdGeom.Xformable):
+                times.update(UsdGeom.Xformable(prim).GetTimeSamplesInInterval(during))
+            prim = prim.GetParent()
+        poses = {at - frame: pose(Usd.TimeCode(at)) for at in sorted(times)}
+        first = next(iter(poses.values()))
+        if any((other != first).any() for other in poses.values()):
+            return poses
+    return {0.0: pose(time)}
 
 
 def _clipping(problems: Problems, prim: Usd.Prim, time: Usd.TimeCode) -> tuple[float, float]:

@@ -56,7 +56,7 @@ def tell_prim(prim: Usd.Prim, problems: Problems) -> None:
             problems.warn(prim, f"{name} has no effect: {NO_EFFECT[name]}")
     shutter = [prim.GetAttribute(f"shutter:{end}") for end in ("open", "close")]
     if all(shutter) and shutter[0].Get() != shutter[1].Get():
-        problems.warn(prim, f"shutter:open and shutter:close have no effect: {MOTION}")
+        problems.warn(prim, "shutter:open and shutter:close blur the motion of the camera alone")
     mode = UsdGeom.ModelAPI(prim).GetModelDrawModeAttr()
     if mode and mode.HasAuthoredValue() and str(mode.Get()) not in ("default", "inherited"):
         problems.warn(prim, f"model:drawMode {mode.Get()} has no effect: the model itself is rendered")

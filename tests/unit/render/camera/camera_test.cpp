@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/scene/analysis/camera_view.h"
+#include "core/scene/motion.h"
 #include "core/scene/transform.h"
 #include "tests/support/render_check.h"
 #include "worker/render/math/random.h"
@@ -114,6 +115,87 @@ TEST(Camera, CircleOfConfusionIsTheApertureSeenThroughThePointInFocus) {
   EXPECT_LE(widest, .2 * 3 / 2 + 1e-5);
   EXPECT_GT(widest,
             .2 * 3 / 2 * .99);  // the outermost 1 % of the radius has 2 % of 4000 points
+}
+
+// A camera that moves along and turns by 120 degrees.
+Sensor moving(Projection projection = Projection::perspective) {
+  Sensor s;
+  s.projection = projection;
+  s.near_clip = .5;
+  Transform end = test::translate({1, 2, 3}) * test::rotate_y(120);
+  if (projection == Projection::orthographic) end = end * test::scale(2, 3, .5);
+  s.motion = {*scene::motion_key(0, {}), *scene::motion_key(.25, test::translate({0, 1, 0}) * test::rotate_x(50)),
+              *scene::motion_key(1, end)};
+  s.to_world = scene::pose_of(scene::key_at(s.motion, .5));
+  return s;
+}
+
+TEST(Camera, OfAnyTimeHasTheRaysOfOneThatStandsThere) {
+  for (const Projection projection : {Projection::perspective, Projection::orthographic, Projection::spherical})
+    for (const double aperture : {0., .3}) {
+      if (aperture > 0 && projection != Projection::perspective) continue;
+      Sensor s = moving(projection);
+      s.aperture_radius = aperture;
+      const Camera moves = camera(s);
+      EXPECT_TRUE(moves.moves());
+      for (const float time : {0.f, .125f, .25f, .7f, 1.f}) {
+        Sensor still = s;
+        still.to_world = scene::pose_of(scene::key_at(s.motion, double{time}));
+        still.motion.clear();
+        const Camera stands = camera(still);
+        EXPECT_FALSE(stands.moves());
+        for (const double f : {0., .4, 1.}) {
+          const CameraRay a = moves.ray_at(time, 200 * f, 60 * f, {.3f, .8f}), b = stands.ray(200 * f, 60 * f, {.3f, .8f});
+          EXPECT_EQ(a.o, b.o);
+          EXPECT_EQ(a.d, b.d);
+          EXPECT_EQ(a.t_max, b.t_max);
+          EXPECT_EQ(a.time, time);
+          EXPECT_EQ(moves.near_distance(a), stands.near_distance(b));
+        }
+      }
+      EXPECT_EQ(moves.ray(50, 50, {}).d, moves.ray_at(.5f, 50, 50, {}).d);
+    }
+}
+
+TEST(Camera, IsUsableOnlyIfAllItsKeysAre) {
+  Sensor s = moving();
+  EXPECT_TRUE(camera(s).usable());
+  s.motion[1].translation = {{1e300, 0, 0}};
+  EXPECT_FALSE(camera(s).usable());
+}
+
+// What a camera sees of the half plane x > 0, which shines, while it slides along it by half its frame: the share of the
+// exposure and of the pixel's width that falls on it.
+TEST(Camera, SlidesPastAnEdgeWithATrapezoid) {
+  constexpr int kWidth = 16;
+  constexpr std::uint64_t kSamples = 4096;
+  test::SceneBuilder b(FrameSize{kWidth, 1});
+  b.scene.film.filter = BoxFilter{};
+  b.shape(RectangleShape{}, test::translate({50, 0, 0}) * test::rotate_x(180) * test::scale(50, 50, 1), b.diffuse(0))
+      .emitter = AreaEmitter{b.texture({1, 1, 1})};
+  Sensor& s = b.scene.sensor;
+  s.projection = Projection::orthographic;
+  // The frame is 2 wide, and its left is +x of the world.
+  const auto at = [](double x) { return test::look_at({x, 0, -1}, {x, 0, 0}, {0, 1, 0}); };
+  s.motion = {*scene::motion_key(0, at(-.5)), *scene::motion_key(1, at(.5))};
+  s.to_world = at(0);
+  s.shutter_close = 1;
+
+  const auto world = test::world_of(b, 5, 1);
+  const auto sums = render_tile(*world, {0, 0, kWidth, 1}, {0, kSamples}, nullptr, nullptr).sums;
+
+  for (int x = 0; x < kWidth; ++x) {
+    // The pixel sees the place t - .5 + 1 - (x + 1 - u) / 8 for u and t from 0 to 1.
+    const double w = 1 / 8., c = (x + 1) * w - .5;
+    const auto above = [](double v) { return std::max(0., v) * std::max(0., v) / 2; };
+    // P(u w + t > c), by inclusion and exclusion at the corners of the unit square
+    const double share = 1 - (above(c) - above(c - 1) - above(c - w) + above(c - w - 1)) / w;
+    double got = 0;
+    for (int half = 0; half < 2; ++half) got += double{sums[static_cast<std::size_t>(half * 3 * kWidth + x)]} / kSamples;
+    // Samples see the light or do not: the variance is at most that of independent ones.
+    const double error = std::sqrt(std::max(share * (1 - share), 1e-12) / kSamples);
+    EXPECT_NEAR(got, share, test::kStandardErrors * error + 1e-6) << "pixel " << x;
+  }
 }
 
 TEST(Camera, RaysRunFromTheNearToTheFarPlane) {

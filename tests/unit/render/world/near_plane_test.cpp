@@ -7,6 +7,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/scene/motion.h"
 #include "tests/support/render_check.h"
 
 namespace ls::render {
@@ -101,6 +102,48 @@ TEST(NearPlane, IsCheckedOnlyIfABoundaryMayLieBeforeIt) {
   EXPECT_FALSE(asked(-1.2, 0));
   EXPECT_FALSE(asked(-1.05, 3));
   EXPECT_FALSE(asked(0, 0)) << "inside, away from the faces";
+}
+
+// A camera that moves along x by `way` before a body whose face is at `face`.
+SceneBuilder passing_by(double face, double way, bool named) {
+  SceneBuilder builder({16, 16});
+  builder.environment();
+  builder.look({0, 0, 0}, {0, 1, 0});
+  const MediumIndex fog = builder.homogeneous({1, 1, 1}, {0, 0, 0});
+  builder.container(CubeShape{}, translate({face + 5, 0, 0}) * scale(5), builder.null(), fog);
+  if (named) builder.scene.sensor.medium = fog;
+  Sensor& s = builder.scene.sensor;
+  const Transform begin = s.to_world, end = translate({way, 0, 0}) * begin;
+  s.motion = {*scene::motion_key(0, begin), *scene::motion_key(1, end)};
+  s.to_world = translate({way / 2, 0, 0}) * begin;
+  s.shutter_close = 1;
+  return builder;
+}
+
+TEST(NearPlane, ACameraThatMovesStaysInItsMedium) {
+  const auto built = [](const SceneBuilder& b) {
+    return build_world(b.scene, test::settings_of(b.scene), b.files, 1);
+  };
+  for (const double way : {1., -1., 1e-3}) EXPECT_TRUE(built(passing_by(way > 0 ? 2 * way : 1, way, false))) << way;
+  EXPECT_TRUE(built(passing_by(-5, 1, true)));
+  for (const double face : {.5, .01, .99}) {
+    const auto refused = built(passing_by(face, 1, false));
+    ASSERT_FALSE(refused) << face;
+    EXPECT_EQ(refused.error().code, Errc::invalid_argument);
+    EXPECT_NE(refused.error().message.find("the camera moves through the boundary of a medium"), std::string::npos);
+  }
+}
+
+TEST(NearPlane, HidesBoundariesFromACameraThatMoves) {
+  // The face is between the lens and the near plane at all times.
+  SceneBuilder builder = before_sky(-1.05, .1);
+  builder.container(CubeShape{}, scale(1, 1, 100), builder.null(), builder.homogeneous({1, 1, 1}, {0, 0, 0}));
+  Sensor& s = builder.scene.sensor;
+  const Transform begin = s.to_world;
+  s.motion = {*scene::motion_key(0, begin), *scene::motion_key(1, translate({0, 0, 3}) * begin)};
+  s.to_world = begin;
+  s.shutter_close = 1;
+  expect_transmitted(builder, std::exp(-1.95), "moving");
 }
 
 }  // namespace

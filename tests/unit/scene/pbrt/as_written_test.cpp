@@ -492,8 +492,47 @@ AttributeBegin ActiveTransform EndTime AttributeEnd Translate 7 0 0 Shape "spher
   ASSERT_TRUE(r.scene) << messages(r);
   EXPECT_EQ(origin_of(r.scene->shapes.at(0).to_world), (Vec3{{1, 2, 0}}));
   EXPECT_EQ(origin_of(r.scene->shapes.at(1).to_world), (Vec3{{7, 0, 0}}));
-  EXPECT_THAT(messages(r), HasSubstr("4:1: warning: transforms of EndTime are left out"));
+  EXPECT_THAT(messages(r), HasSubstr("4:67: warning: this Shape moves in pbrt; it is shown where it is at StartTime"));
+  EXPECT_EQ(r.diagnostics.size(), 1u);
   EXPECT_THAT(refusal("ActiveTransform Middle"), HasSubstr("wants one of All, StartTime and EndTime"));
+  EXPECT_THAT(refusal("TransformTimes 1 1"), HasSubstr("TransformTimes end at 1 and begin at 1"));
+}
+
+ReadResult camera_that_moves(std::string_view before, std::string_view camera) {
+  return read_pbrt(fmt::format("{}\nCamera {}\nWorldBegin Shape \"sphere\"\n", before, camera));
+}
+
+TEST(Pbrt, CamerasMoveBetweenTheirTwoTransforms) {
+  const std::string_view aside =
+      "LookAt 0 0 -5  0 0 0  0 1 0 ActiveTransform EndTime Translate -2 0 0 ActiveTransform All";
+  const ReadResult r = camera_that_moves(aside, R"("perspective")");
+  ASSERT_TRUE(r.scene) << messages(r);
+  const auto& keys = r.scene->sensor.motion;
+  ASSERT_EQ(keys.size(), 2u);
+  EXPECT_EQ(keys[0].translation, (Vec3{{0, 0, -5}}));
+  EXPECT_EQ(keys[1].translation, (Vec3{{2, 0, -5}}));
+  EXPECT_TRUE(quiet(r)) << messages(r);
+
+  const auto half = camera_that_moves(fmt::format("TransformTimes 0 2 {}", aside),
+                                      R"("perspective" "float shutteropen" 1 "float shutterclose" 1.5)");
+  ASSERT_TRUE(half.scene) << messages(half);
+  ASSERT_EQ(half.scene->sensor.motion.size(), 2u);
+  EXPECT_EQ(half.scene->sensor.motion[0].translation, (Vec3{{1, 0, -5}}));
+  EXPECT_EQ(half.scene->sensor.motion[1].translation, (Vec3{{1.5, 0, -5}}));
+
+  for (const char* type : {R"("orthographic")", R"("spherical" "string mapping" "equirectangular")"})
+    EXPECT_EQ(camera_that_moves(aside, type).scene->sensor.motion.size(), 2u) << type;
+}
+
+TEST(Pbrt, NamedCoordinateSystemsHaveBothTransforms) {
+  const ReadResult r = camera_that_moves(
+      "ActiveTransform EndTime Translate 3 0 0 ActiveTransform All CoordinateSystem \"rail\" Identity Translate 9 9 9 "
+      "CoordSysTransform \"rail\"",
+      R"("perspective")");
+  ASSERT_TRUE(r.scene) << messages(r);
+  ASSERT_EQ(r.scene->sensor.motion.size(), 2u);
+  EXPECT_EQ(r.scene->sensor.motion[1].translation, (Vec3{{-3, 0, 0}}));
+  EXPECT_TRUE(quiet(r)) << messages(r);
 }
 
 }  // namespace

@@ -1,0 +1,122 @@
+// The image of a camera that moves is the mean of those of cameras that stand where it passes.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "core/scene/motion.h"
+#include "tests/property/quarters.h"
+#include "tests/support/significance.h"
+#include "worker/render/math/random.h"
+#include "worker/render/world/world.h"
+
+namespace ls::test {
+namespace {
+
+struct Shot {
+  const char* name;
+  std::function<void(SceneBuilder&)> change = [](SceneBuilder&) {};
+  const char* variant = "";
+};
+
+// A room of fog with a lamp, before which the camera moves aside, turns and rises.
+SceneBuilder room() {
+  SceneBuilder b(FrameSize{kSide, kSide});
+  b.scene.integrator.max_depth = 4;
+  const BsdfIndex white = b.diffuse(.7), red = b.bsdf(DiffuseBsdf{b.texture({.6, .2, .1})});
+  b.shape(CubeShape{}, scale(2, 1, 1), white).flip_normals = true;
+  b.shape(SphereShape{}, translate({.6, -.6, .3}) * scale(.35), red);
+  b.lamp(RectangleShape{}, translate({.3, .98, 0}) * rotate_x(90) * scale(.3), {4, 5, 6});
+  const MediumIndex air = b.homogeneous({.3, .3, .3}, {.9, .8, .7}, .4);
+  b.container(CubeShape{}, scale(1.97, .97, .97), b.null(), air);
+  b.scene.sensor.medium = air;
+  return b;
+}
+
+void move(Sensor& s, const std::vector<Transform>& poses) {
+  std::vector<MotionKey> keys;
+  for (const Transform& pose : poses)
+    keys.push_back(scene::motion_key(static_cast<double>(keys.size()), pose).value());
+  s.motion = scene::motion_during(keys, 0, static_cast<double>(keys.size() - 1));
+  s.to_world = scene::pose_of(scene::key_at(s.motion, .5));
+  s.shutter_close = 1;
+}
+
+SceneBuilder stopped(SceneBuilder b, double time) {
+  Sensor& s = b.scene.sensor;
+  s.to_world = scene::pose_of(scene::key_at(s.motion, time));
+  s.motion.clear();
+  s.shutter_close = 0;
+  return b;
+}
+
+// An image of this many stills, each at a random time of its part of the exposure.
+constexpr int kStills = 16;
+QuarterImage of_stills(const SceneBuilder& moving, std::uint64_t spp, std::uint64_t seed) {
+  render::RandomStream dice(seed);
+  QuarterImage mean{};
+  for (int k = 0; k < kStills; ++k) {
+    const double time = (k + double{dice.uniform()}) / kStills;
+    const QuarterImage still = quarter_image(stopped(moving, time), spp / kStills, seed * kStills + static_cast<std::uint64_t>(k));
+    for (std::size_t q = 0; q < kQuarters; ++q) mean[q] += still[q] / kStills;
+  }
+  return mean;
+}
+
+TEST(CameraMotion, GivesTheMeanOfStills) {
+  constexpr int kSeeds = 24;
+  constexpr std::uint64_t kSpp = 64;
+  Tests tests("property/camera_motion");
+  const auto lens = [](SceneBuilder& b) {
+    b.scene.sensor.aperture_radius = .1;
+    b.scene.sensor.focus_distance = 1.5;
+  };
+  const auto orthographic = [](SceneBuilder& b) {
+    Sensor& s = b.scene.sensor;
+    s.projection = Projection::orthographic;
+    s.near_clip = 1e-3;
+    move(s, {look_at({-1.5, .1, 0}, {1, 0, 0}, {0, 1, 0}) * scale(.5, .5, 1),
+             look_at({-1.5, .1, .3}, {1, -.3, 0}, {0, 1, 0}) * scale(.8, .6, 1)});
+  };
+  const auto around = [](SceneBuilder& b) { b.scene.sensor.projection = Projection::spherical; };
+  const auto shared = [](SceneBuilder& b) { b.scene.integrator.path_reuse = 8; };
+  const auto grid = [](SceneBuilder& b) {
+    std::vector<float> density;
+    for (int i = 0; i < 27; ++i) density.push_back(.1f * static_cast<float>(i % 5));
+    const VolumeIndex v =
+        b.grid({3, 3, 3}, density, translate({-1.97, -.97, -.97}) * scale(2 * 1.97, 2 * .97, 2 * .97));
+    b.scene.media[0] = b.scene.media[b.heterogeneous(v, {.9, .8, .7}).value];
+    b.scene.media.pop_back();
+  };
+  const auto sun = [](SceneBuilder& b) {  // through the ceiling, which is taken away with its lamp
+    b.scene.shapes.erase(b.scene.shapes.begin());
+    b.scene.emitters.push_back(DirectionalEmitter{{.3, -1, .2}, {1, 1, 1}});
+    b.scene.integrator.light_vertices = 1;
+  };
+  const Shot shots[] = {
+      {"fog"},
+      {"a thin lens", lens},
+      {"orthographic", orthographic},
+      {"spherical", around},
+      {"a grid", grid},
+      {"shared paths", shared, "shared"},
+      {"a sun, connected", sun, "connected"},
+  };
+  const double level = tests.level(std::size(shots) * kQuarters);
+  for (const Shot& shot : shots) {
+    SceneBuilder b = room();
+    b.scene.sensor.fov = 70;
+    move(b.scene.sensor, {look_at({-1.6, .1, -.5}, {.5, -.2, 0}, {0, 1, 0}),
+                          look_at({-1.5, .3, 0}, {.6, -.2, .3}, {.2, 1, 0}),
+                          look_at({-1.2, .5, .6}, {.6, -.6, .2}, {.3, 1, 0})});
+    shot.change(b);
+    ASSERT_THAT(estimate(b, 2).variant, testing::HasSubstr(shot.variant)) << shot.name;
+    expect_same_quarters(
+        shot.name, level, quarters_of(b, kSpp, kSeeds, 100),
+        quarters_of(kSeeds, [&](int i) { return of_stills(b, kSpp, 900 + static_cast<std::uint64_t>(i)); }), kSeeds);
+  }
+  tests.close();
+}
+
+}  // namespace
+}  // namespace ls::test
