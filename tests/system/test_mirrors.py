@@ -1,4 +1,4 @@
-"""A scene whose files hold its mirror image under transforms that mirror them back looks like the scene itself: glTF and XML."""
+"""A scene whose files hold its mirror image under transforms that mirror them back looks like the scene itself: glTF, XML and pbrt."""
 
 import base64
 import itertools
@@ -213,3 +213,81 @@ def test_rectangles_and_cubes_of_xml_look_the_same_if_mirrored(tmp_path, twice):
     expected = seen((1, 1, 1))
     for mirror in (X, (-1, -1, 1)):
         agree(expected, seen(mirror))
+
+
+def pbrt_room(folder, camera="", world="", ball=""):
+    """A lamp, a ball of glass full of dye, a sheet with a normal map and an instance of a ball, before a grey sky, as pbrt-v4 has it. `camera`
+    stands before its LookAt, `world` before all shapes and `ball` before the ball of glass."""
+    (folder / "map.png").write_bytes(png([*LEANING, 0.85]))
+    (folder / "room.pbrt").write_text(f"""Film "rgb" "integer xresolution" {SIZE} "integer yresolution" {SIZE}
+PixelFilter "box"
+Integrator "volpath"
+{camera}
+LookAt 0 0 6  0 0 0  0 1 0
+Camera "perspective" "float fov" 50
+WorldBegin
+LightSource "infinite" "rgb L" [0.3 0.3 0.3]
+{world}
+MakeNamedMedium "dye" "string type" "homogeneous" "rgb sigma_a" [0.1 0.7 1.5] "rgb sigma_s" [0 0 0]
+Texture "lean" "spectrum" "imagemap" "string filename" "map.png"
+AttributeBegin
+  AreaLightSource "diffuse" "rgb L" [1 0.5 0.2]
+  Translate -1.3 1.3 0 Rotate 20 0 1 0
+  Shape "trianglemesh" "point3 P" [-1 -1 0  1 -1 0  1 1 0  -1 1 0] "integer indices" [0 1 2 0 2 3]
+AttributeEnd
+AttributeBegin
+  Translate 1.3 1.3 0
+  Material "dielectric"
+  MediumInterface "dye" "" {ball}
+  Shape "sphere"
+AttributeEnd
+AttributeBegin
+  Translate 1.3 -1.3 0
+  Material "diffuse" "string normalmap" "map.png"
+  Shape "trianglemesh" "point3 P" [-1 -1 0  1 -1 0  1 1 0  -1 1 0] "point2 uv" [0 0 1 0 1 1 0 1] "integer indices" [0 1 2 0 2 3]
+AttributeEnd
+ObjectBegin "ball" Material "diffuse" "rgb reflectance" [0.2 0.6 0.9] Shape "sphere" "float radius" 0.5 ObjectEnd
+AttributeBegin Translate -1.3 -1.3 0 Rotate 30 0 0 1 Scale 1 2 1 ObjectInstance "ball" AttributeEnd
+""")
+    return folder / "room.pbrt"
+
+
+def blocks(folder, *room):
+    """Means of 8 x 8 pixels, and their standard errors."""
+    scene, out = pbrt_room(folder, *room), folder / "room.exr"
+    lightshaft("render", scene, "-o", out, "--spp", 64, "--size", f"{SIZE}x{SIZE}", "--float", "--quiet")
+    channels = read(out)[0]
+
+    def of(names, combine):
+        planes = np.stack([np.array(channels[c], float) for c in names], axis=2)
+        return combine(planes.reshape(SIZE // 8, 8, SIZE // 8, 8, 3))
+
+    mean = of("RGB", lambda p: p.mean(axis=(1, 3)))
+    error = of(["stderr.R", "stderr.G", "stderr.B"], lambda p: np.sqrt((p**2).sum(axis=(1, 3))) / 64)
+    return mean, error
+
+
+def alike(one, two):
+    """Of 48 figures each within five standard errors, and 0.2 % for pixels whose two halves are equal by chance."""
+    apart = np.abs(one[0] - two[0]) - 5 * np.hypot(one[1], two[1]) - 2e-3 * one[0]
+    assert apart.max() < 0, apart.max(axis=2)
+
+
+@pytest.mark.parametrize("mirror", ["Scale -1 1 1", "Scale 1 -1 1"])
+def test_a_mirrored_world_of_pbrt_before_a_mirrored_camera_looks_the_same(tmp_path, mirror):
+    """As in pbrt, a quadric that is mirrored has its inside outside, so that exporters reverse it."""
+    expected = blocks(tmp_path)
+    assert expected[0][0, 3, 0] > 0.5, "the lamp shines at the camera"
+
+    alike(expected, blocks(tmp_path, mirror, mirror, "ReverseOrientation"))
+    with pytest.raises(AssertionError):
+        alike(expected, blocks(tmp_path, mirror, mirror))
+
+
+@pytest.mark.parametrize("mirror, turn", [("Scale -1 1 1", np.s_[:, ::-1]), ("Scale 1 -1 1", np.s_[::-1])])
+def test_a_mirrored_camera_of_pbrt_shows_the_mirrored_picture(tmp_path, mirror, turn):
+    expected, seen = blocks(tmp_path), blocks(tmp_path, mirror)
+
+    alike(expected, (seen[0][turn], seen[1][turn]))
+    with pytest.raises(AssertionError):
+        alike(expected, seen)
