@@ -9,6 +9,6 @@ if(LIGHTSHAFT_ARCH MATCHES "^x86-64-v[34]$" AND NOT LIGHTSHAFT_SANITIZE AND NOT 
     message(WARNING "Programs take mathematical functions from the system that they run on, and may render other bits there: ${why}")
   else()
     target_link_libraries(ls_flags INTERFACE ${own_libm})
-    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_LIST_DIR}/libm.sh)
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_LIST_DIR}/libm.sh ${libm})
   endif()
 endif()

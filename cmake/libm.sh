@@ -31,7 +31,7 @@ for member in "${chosen[@]}"; do
     $3 == "i" && $1 == member {address[$4] = $2}
     $3 == "T" && $1 == member "-fma" && sub(/_fma$/, "", $4) {fused[$4]}
     END {
-      for (base in fused) for (name in address) if (address[name] == address[base])
+      for (base in fused) if (base in address) for (name in address) if (address[name] == address[base])
         printf ".globl %s; .type %s,@function; .p2align 4; %s: jmp %s_fma; .size %s,.-%s\n", name, name, name, base, name, name
     }' symbols > "jump-$member.s"
   [ -s "jump-$member.s" ] || continue
@@ -46,4 +46,4 @@ for jump in "${jumps[@]}"; do "$cc" -c "$jump.s" -o "$jump.o"; done
 "$nm" "$out.new" 2> /dev/null | awk '$1 == "U" {wanted[$2]} NF == 3 {there[$3]} END {for (name in wanted) if (!(name in there)) print name}' |
   sed -n 's/^__\([a-z0-9]*\)$/--redefine-sym __\1=\1/p' > left
 "$objcopy" @left "$out.new"
-mv "$out.new" "$out"
+cmp -s "$out.new" "$out" || mv "$out.new" "$out"  # programs are not linked again without need

@@ -72,7 +72,7 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class, po
         to_world = to_world.popitem()[1]
     if render.use_motion_blur:
         problems.warning(
-            "Render Properties > Motion Blur is of the camera alone: what else moves is rendered where it is at the frame"
+            "Render Properties > Motion Blur applies to the camera only; everything else is rendered where it is at the frame"
         )
         if scene.cycles.rolling_shutter_type != "NONE":
             problems.unsupported("Render Properties > Motion Blur: Rolling Shutter. Set it to None")

@@ -30,5 +30,5 @@ def poses_of_camera(engine, depsgraph):
             poses[time] = camera.evaluated_get(depsgraph).matrix_world.copy()
     finally:
         engine.frame_set(frame, subframe)
-    first = poses[opens]
+    first = poses[opens]  # the field of view and the focus are those of the frame
     return poses if any(pose != first for pose in poses.values()) else {}

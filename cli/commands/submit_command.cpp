@@ -6,7 +6,7 @@
 #include "cli/commands/commands.h"
 #include "cli/farm/farm_api.h"
 #include "cli/farm/job_results.h"
-#include "cli/output/awaited_files.h"
+#include "cli/output/files_to_come.h"
 #include "cli/output/console.h"
 #include "cli/output/interrupt.h"
 #include "cli/output/job_options.h"
@@ -117,7 +117,7 @@ int run(const SubmitFlags& flags) {
   const auto note = [&](const std::string& line) {
     if (!flags.quiet) print_note(line);
   };
-  if (const auto there = await_files(flags.after_files, spec->frames, note); !there)
+  if (const auto there = wait_for_files(flags.after_files, spec->frames, note); !there)
     return print_error(there.error());
   if (!flags.reference.empty())
     if (const auto sent = send_reference(flags, *spec); !sent) return print_rejected(sent.error());

@@ -63,6 +63,7 @@ inline constexpr int kMaxPhaseNesting = 8;
 // have.
 inline constexpr std::size_t kMaxPhaseAngles = 2520;
 inline constexpr std::size_t kMaxMotionKeys = 1000;
+inline constexpr double kMaxTime = 1e9;  // of a key and of the shutter, in either direction
 // Nesting depth of volumes; a product has two
 inline constexpr int kMaxVolumeNesting = 8;
 inline constexpr int kMaxNoiseOctaves = 16;

@@ -1,7 +1,7 @@
 // Motion by keys: where something is at times of the exposure, and between them.
 #pragma once
 
-#include <optional>
+#include <array>
 #include <span>
 #include <vector>
 
@@ -9,18 +9,40 @@
 
 namespace ls::scene {
 
-// Decomposes a transform: a scaling along the axes, then a turn, then a move. A mirrored one has a negative scale along
-// x. Returns nullopt if the transform shears by more than a thousandth of a radian, or cannot be inverted.
-std::optional<MotionKey> motion_key(double time, const Transform& t);
-Transform pose_of(const MotionKey& key);
+// True if the transform only scales along its own axes (and may mirror), turns and moves, and can be inverted. Its axes may
+// be off a right angle by a thousandth of a radian, which is lost where it moves.
+bool can_move(const Transform& t);
 
-// Returns the key at this time. Between two keys, scale and place are interpolated linearly, and the turn at a constant
-// rate along the shorter way (slerp: Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985), as in Mitsuba
-// 3. Before the first key and after the last one nothing moves. `keys` are at least one, in the order of their times.
-MotionKey key_at(std::span<const MotionKey> keys, double time);
+// A motion with its transforms taken apart, for the poses between its keys.
+class Motion {
+ public:
+  Motion() = default;
+  // `keys`: none, or at least one, in the order of their times, whose transforms can_move().
+  explicit Motion(std::span<const MotionKey> keys);
+
+  bool empty() const { return keys_.empty(); }
+  std::span<const MotionKey> keys() const { return keys_; }
+  // Returns the pose at this time: at a key its transform, bit for bit. Between two keys, scale and place are interpolated
+  // linearly, and the turn at a constant rate along the shorter way (slerp: Shoemake, "Animating rotation with quaternion
+  // curves", SIGGRAPH 1985), as in Mitsuba 3. Before the first key and after the last one nothing moves. Not if empty().
+  Transform at(double time) const;
+
+ private:
+  struct Parts {
+    Vec3 scale;  // the first is negative if the transform mirrors
+    std::array<double, 4> rotation;  // a unit quaternion x, y, z, w
+    Vec3 translation;
+  };
+  static Parts parts_of(const Transform& t);
+  static Transform pose_of(const Parts& parts);
+  static Parts between(const Parts& a, const Parts& b, double t);
+
+  std::vector<MotionKey> keys_;
+  std::vector<Parts> parts_;  // of each key
+};
 
 // Returns the part of a motion that happens between two times, with the times of the result from 0 to 1. Empty if nothing
 // moves between them.
-std::vector<MotionKey> motion_during(std::span<const MotionKey> keys, double open, double close);
+std::vector<MotionKey> motion_during(const Motion& motion, double open, double close);
 
 }  // namespace ls::scene

@@ -118,14 +118,11 @@ enum class FovAxis { x, y, diagonal, smaller, larger };
 // meters: there is no camera. The scene has meters, and each block of pixels of the frame measures one number
 // (core/image/frame/meter_blocks.h).
 enum class Projection { perspective, orthographic, spherical, meters };
-// Where something that moves is at one time of the exposure, from 0 (the shutter opens) to 1 (it closes): scaled along
-// its own axes, then turned by the unit quaternion (x, y, z, w), then moved. core/scene/motion.h says what is between two
-// keys.
+// Where something that moves is at one time of the exposure, from 0 (the shutter opens) to 1 (it closes).
+// core/scene/motion.h says what is between two keys.
 struct MotionKey {
   double time = 0;
-  Vec3 scale{1, 1, 1};
-  std::array<double, 4> rotation{0, 0, 0, 1};
-  Vec3 translation{0, 0, 0};
+  Transform to_world;
   bool operator==(const MotionKey&) const = default;
 };
 struct Sensor {  // looks along the +z axis of to_world, with +y up and +x to the LEFT, as in Mitsuba

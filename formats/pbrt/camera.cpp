@@ -215,6 +215,10 @@ class SettingsTranslator {
       add(animation, std::move(key));
     }
     add(out, std::move(animation));
+    if (const double end = without_scale(s_.camera_end_ctm.from).scale;
+        std::abs(end / without_scale(s_.camera_ctm.from).scale - 1) > 1e-6 && p.has("lensradius"))
+      t_.warn_once(p.at(), "the scale of this camera changes while the shutter is open: its lens keeps the size and the "
+                           "focus of the beginning");
     add(out, "shutter_open", p.number("shutteropen", 0), p.at());
     add(out, "shutter_close", p.number("shutterclose", 1), p.at());
   }

@@ -237,6 +237,8 @@ class Loader {
     expose(d);
     settings_.camera_ctm = now_.ctm;
     settings_.camera_end_ctm = now_.end_ctm;
+    settings_.start_time = start_time_;
+    settings_.end_time = end_time_;
     settings_.camera_medium = now_.outside;
     System world{now_.ctm, now_.end_ctm};
     std::swap(world.start.to, world.start.from);
@@ -406,7 +408,7 @@ class Loader {
     if (now_.at_start) now_.ctm = ctm.start;
     if (now_.at_end) now_.end_ctm = ctm.end;
   }
-  // Warns if what is placed by the current transforms would move.
+  // Warns of shapes that move. Lights and media are where they are at StartTime in pbrt, too.
   void place_still(const Token& d) {
     if (now_.ctm.to != now_.end_ctm.to)
       t_.warn_once(d.at, fmt::format("this {} moves in pbrt; it is shown where it is at StartTime: only cameras move",
@@ -418,8 +420,8 @@ class Loader {
     if (!((*n)[0] < (*n)[1]))
       return report_.error(d.at, fmt::format("TransformTimes end at {} and begin at {}: let them end later", (*n)[1],
                                              (*n)[0]));
-    settings_.start_time = (*n)[0];
-    settings_.end_time = (*n)[1];
+    start_time_ = (*n)[0];
+    end_time_ = (*n)[1];
   }
   void reverse_orientation(const Token&) { now_.reversed = !now_.reversed; }
   void attribute(const Token& d) {
@@ -478,7 +480,6 @@ class Loader {
   }
   void light_source(const Token& d) {
     need_world(d);
-    place_still(d);
     if (auto p = object(d)) add_light(t_, *p, now_.ctm);
   }
   void area_light_source(const Token& d) {
@@ -489,7 +490,6 @@ class Loader {
     const auto name = quoted(d);
     if (!name) return;
     const Span at = last_;
-    place_still(d);
     auto p = named("MakeNamedMedium", at);
     if (p) add_medium(t_, *name, *p, now_.ctm);
   }
@@ -591,6 +591,7 @@ class Loader {
   // are still open, such as AttributeBegin; the file cannot end the blocks that began before it.
   std::size_t floor_ = 0;
   std::map<std::string, System> systems_;
+  double start_time_ = 0, end_time_ = 1;  // TransformTimes
   std::optional<Element> group_;
   bool in_world_ = false, lost_ = false;
   Tokens* tokens_ = nullptr;

@@ -142,7 +142,7 @@ std::optional<Element> shape(Translation& t, Params& p, const Attributes& attrib
 struct Settings {
   std::optional<Params> film, camera, filter, sampler, integrator;
   Placed camera_ctm, camera_end_ctm;
-  double start_time = 0, end_time = 1;  // TransformTimes
+  double start_time = 0, end_time = 1;  // TransformTimes before the camera
   std::string camera_medium;
 };
 double exposure_of(Settings& s);  // returns the value for Translation::exposure_factor

@@ -23,7 +23,7 @@ Words operator+(Words a, const Words& b) {
 Words camera_words() {
   return {{"shutteropen", "float", "0", "see shutterclose"},
           {"shutterclose", "float", "1",
-           "all light is multiplied by shutterclose - shutteropen; cameras that move do so in between"},
+           "all light is multiplied by shutterclose - shutteropen; a camera can move between them"},
           {"frameaspectratio", "float", "that of the film",
            "width divided by height of the visible area; the pixels of `perspective` must be square"},
           {"screenwindow", "float", "-1 to 1 along the shorter side of the frame",
@@ -537,9 +537,9 @@ std::span<const Plain> plain_directives() {
        "no effect, with a warning. forcediffuse and disablepixeljitter would change pixels, so they are "
        "refused unless they are false"},
       {"ActiveTransform",
-       "All, StartTime or EndTime. Cameras move; of all else that moves the picture shows the place at "
-       "StartTime, with a warning"},
-      {"TransformTimes", "of the camera's two transforms"},
+       "All, StartTime or EndTime. Cameras move. Everything else is where it is at StartTime, with a "
+       "warning for shapes"},
+      {"TransformTimes", "the times of the camera's two transforms"},
       {"Attribute", "refused: write the parameter into each object"},
   };
   return kAll;

@@ -63,63 +63,67 @@ void Reader::read_projection(const Element& e, Params& p, Sensor& s) {
   if (s.motion.empty()) s.shutter_open = s.shutter_close = 0;
 }
 
-void Reader::check_place(const Element& e, const Transform& to_world, Projection projection) {
+// Reports a transform of a camera of this kind that is not allowed. Returns whether it is.
+bool Reader::check_place(const Element& e, const Transform& to_world, Projection projection) {
   if (projection == Projection::orthographic) {
-    if (!invertible(to_world))
-      report_.error(e.at,
-                    "to_world flattens this camera or leaves the range of numbers: it can't be inverted");
-  } else if (!is_rigid(to_world)) {
+    if (invertible(to_world)) return true;
+    report_.error(e.at, "to_world flattens this camera or leaves the range of numbers: it can't be inverted");
+  } else {
+    if (is_rigid(to_world)) return true;
     report_.error(e.at,
                   "to_world of a sensor may only move, turn and mirror: this one scales or shears, which "
                   "Mitsuba 3 refuses, too; leave its <scale> out");
   }
+  return false;
 }
 
-// Returns the keys of an <animation> of this camera; fewer than two if something is wrong, which is reported.
+// Returns the keys of an <animation> of this camera. What is wrong is reported.
 std::vector<MotionKey> Reader::read_keys(const Element& animation, Projection projection) {
   std::vector<MotionKey> keys;
   for (const Element& e : animation.children) {
     const auto time = parse_number(e.get("time"));
-    if (!time) {
-      report_.error(value_place(e, "time"), fmt::format("'time' wants a number, not \"{}\"", e.get("time")));
+    if (!time || !(std::abs(*time) <= kMaxTime)) {
+      report_.error(value_place(e, "time"), fmt::format("'time' wants a number of at most {:g} in size, not \"{}\"",
+                                                        kMaxTime, e.get("time")));
       continue;
     }
     if (!keys.empty() && !(*time > keys.back().time))
       report_.error(value_place(e, "time"), fmt::format("the times of an <animation> must ascend: {} comes after {}",
                                                         *time, keys.back().time));
     const Transform to_world = read_transform(e, report_);
-    check_place(e, to_world, projection);
-    auto key = motion_key(*time, to_world);
-    if (!key) {
-      report_.error(e.at, "this transform shears or flattens, or leaves the range of numbers: an <animation> can only "
-                          "move, turn, mirror and scale");
+    if (!check_place(e, to_world, projection)) continue;
+    if (!can_move(to_world)) {
+      report_.error(e.at, "this transform shears: an <animation> can only move, turn, mirror and scale");
       continue;
     }
-    if (!keys.empty() && key->scale[0] * keys.front().scale[0] < 0)
-      report_.error(e.at, "this transform mirrors and the first one does not, or the other way round: what is between "
-                          "them would be flat");
-    keys.push_back(*key);
+    if (!keys.empty() && (determinant3(to_world) < 0) != (determinant3(keys.front().to_world) < 0))
+      report_.error(e.at, "this transform mirrors and the first one does not, or the other way round: between them the "
+                          "camera would be flat");
+    keys.push_back({*time, to_world});
     if (keys.size() > kMaxMotionKeys) {
       report_.error(e.at, fmt::format("an <animation> of more than {} transforms", kMaxMotionKeys));
-      return {};
+      break;
     }
   }
-  if (keys.size() < 2 && !report_.has_errors()) report_.error(animation.at, "an <animation> needs at least two <transform time=\"...\">");
+  if (keys.empty() && !report_.has_errors())
+    report_.error(animation.at, "an <animation> needs a <transform time=\"...\"> for each of its times");
   return keys;
 }
 
 void Reader::read_motion(const Element& animation, const Element& e, Sensor& s) {
-  const auto keys = read_keys(animation, s.projection);
+  const Motion motion(read_keys(animation, s.projection));
   if (s.shutter_close < s.shutter_open)
     return report_.error(e.at, fmt::format("the shutter closes at {} and opens at {}: let it close later",
                                            s.shutter_close, s.shutter_open));
-  if (keys.size() < 2 || report_.has_errors()) return;
-  if (s.shutter_open == s.shutter_close)
+  if (report_.has_errors()) return;
+  if (s.shutter_open == s.shutter_close && motion.keys().size() > 1)
     report_.warning(animation.at, fmt::format("the camera stands where it is at {}, since the shutter opens and closes "
                                               "then: give shutter_open and shutter_close",
                                               s.shutter_open));
-  s.motion = motion_during(keys, s.shutter_open, s.shutter_close);
-  s.to_world = pose_of(key_at(keys, s.shutter_open / 2 + s.shutter_close / 2));
+  s.motion = motion_during(motion, s.shutter_open, s.shutter_close);
+  if (s.motion.size() > kMaxMotionKeys)
+    return report_.error(animation.at, fmt::format("more than {} transforms are within the exposure", kMaxMotionKeys));
+  s.to_world = s.motion.empty() ? motion.at(s.shutter_open) : Motion(s.motion).at(.5);
   s.shutter_open = 0, s.shutter_close = 1;
 }
 

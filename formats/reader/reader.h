@@ -154,7 +154,7 @@ class Reader {
   void finish_meters();
   void read_projection(const Element& e, Params& p, Sensor& sensor);
   void read_sensor_medium(Params& p, std::optional<MediumIndex>& medium_of_sensor);
-  void check_place(const Element& e, const Transform& to_world, Projection projection);
+  bool check_place(const Element& e, const Transform& to_world, Projection projection);
   std::vector<MotionKey> read_keys(const Element& animation, Projection projection);
   void read_motion(const Element& animation, const Element& e, Sensor& s);
   void read_fov(Params& p, Sensor& sensor);

@@ -379,7 +379,7 @@ class Writer {
     line(fmt::format("<animation name=\"{}\">", f.name));
     for (const MotionKey& key : keys)
       line(fmt::format("  <transform time=\"{}\"><matrix value=\"{}\"/></transform>", shortest_number(key.time),
-                       numbers(pose_of(key).m)));
+                       numbers(key.to_world.m)));
     line("</animation>");
   }
   void property(const Field& f, const UvTransform& x) {

@@ -36,15 +36,15 @@ SceneBuilder room() {
 void move(Sensor& s, const std::vector<Transform>& poses) {
   std::vector<MotionKey> keys;
   for (const Transform& pose : poses)
-    keys.push_back(scene::motion_key(static_cast<double>(keys.size()), pose).value());
-  s.motion = scene::motion_during(keys, 0, static_cast<double>(keys.size() - 1));
-  s.to_world = scene::pose_of(scene::key_at(s.motion, .5));
+    keys.push_back({static_cast<double>(keys.size()), pose});
+  s.motion = scene::motion_during(scene::Motion(keys), 0, static_cast<double>(keys.size() - 1));
+  s.to_world = scene::Motion(s.motion).at(.5);
   s.shutter_close = 1;
 }
 
 SceneBuilder stopped(SceneBuilder b, double time) {
   Sensor& s = b.scene.sensor;
-  s.to_world = scene::pose_of(scene::key_at(s.motion, time));
+  s.to_world = scene::Motion(s.motion).at(time);
   s.motion.clear();
   s.shutter_close = 0;
   return b;

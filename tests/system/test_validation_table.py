@@ -77,11 +77,14 @@ def test_a_steep_table_of_a_phase_function_is_read_and_one_with_a_negative_value
     assert "scene.xml:3:" in said and "'values'" in said
 
 
-def test_shutters_that_mean_nothing_are_warned_of(tmp_path):
-    for close in ("0", "1"):
-        said = inspected(tmp_path, 0, sensor=f'<float name="shutter_open" value="0"/><float name="shutter_close" value="{close}"/>').stderr
-        assert "'shutter_close'" in said and "motion is not rendered" in said
-    assert "motion" not in inspected(tmp_path, 0).stderr
+def test_a_closed_shutter_stops_a_camera_with_a_warning(tmp_path):
+    moving = '<animation name="to_world"><transform time="0"/><transform time="1"><translate x="1"/></transform></animation>'
+    for close, stops in (("0", True), ("1", False)):
+        sensor = f'<float name="shutter_open" value="0"/><float name="shutter_close" value="{close}"/>'
+        assert "shutter" not in inspected(tmp_path, 0, sensor=sensor).stderr
+        said = inspected(tmp_path, 0, sensor=sensor + moving)
+        assert ("give shutter_open and shutter_close" in said.stderr) == stops
+        assert ("the camera moves while the shutter is open" in said.stdout) == (not stops)
 
 
 NO_NUMBERS = {"inf": "wants a", "-inf": "wants a", "nan": "wants a", "-1": "out of its range"}

@@ -319,7 +319,6 @@ std::string canonical_json(const Needs& n) {
          {"boundaries", n.boundaries},
          {"veils", n.null_transmission},
          {"lens", n.lens},
-         {"camera_motion", n.camera_motion},
          {"crop", n.crop},
          {"shapes", n.shapes},
          {"materials", n.materials},
@@ -334,6 +333,7 @@ std::string canonical_json(const Needs& n) {
   // Left out of scenes without them, so that the needs of stored jobs stay the same.
   if (n.transparent_film) j["transparent_film"] = true;
   if (n.phases) j["phases"] = true;
+  if (n.camera_motion) j["camera_motion"] = true;
   if (n.height) j["height"] = true;
   if (!n.volumes.empty()) j["volumes"] = n.volumes;
   if (n.meters > 0) j["meters"] = n.meters;

@@ -141,9 +141,7 @@ void describe(V& v, T& f) {
 template <class V, Of<MotionKey> T>
 void describe(V& v, T& k) {
   v.field({.name = "time", .doc = "", .derived = true}, k.time);
-  v.field({.name = "scale", .doc = "", .derived = true}, k.scale);
-  v.field({.name = "rotation", .doc = "", .derived = true}, k.rotation);
-  v.field({.name = "translation", .doc = "", .derived = true}, k.translation);
+  v.field({.name = "to_world", .doc = "", .derived = true}, k.to_world);
 }
 
 LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens, orthographic, spherical",
@@ -156,10 +154,15 @@ void describe_place(V& v, T& s) {
            .doc = "places and turns the camera; or an `<animation>` of transforms with times, by which it "
                   "moves while the shutter is open (docs/guide/motion-blur.md)"},
           s.to_world);
-  v.field({.name = "shutter_open", .doc = "time at which the exposure begins", .unwritten = 0, .elided = true},
+  v.field({.name = "shutter_open",
+           .doc = "time at which the exposure begins; 0 unless it is given",
+           .range = {-kMaxTime, kMaxTime},
+           .unwritten = 0,
+           .elided = true},
           s.shutter_open);
   v.field({.name = "shutter_close",
-           .doc = "time at which the exposure ends; at `shutter_open` unless it is given",
+           .doc = "time at which the exposure ends; 0 unless it is given",
+           .range = {-kMaxTime, kMaxTime},
            .unwritten = 0,
            .elided = true},
           s.shutter_close);

@@ -45,7 +45,7 @@ class ValueChecker {
     if (wrong_.empty()) check_crop();
     if (wrong_.empty()) check_labels();
     if (wrong_.empty()) check_meters();
-    if (wrong_.empty()) check_motion(s_.sensor.motion);
+    if (wrong_.empty()) check_motion(s_.sensor);
     if (wrong_.empty() && LinkLists(s_).too_many())
       wrong_ = fmt::format("scene: the lights have more than {} different lists of receivers and blockers",
                            kMostLinkLists);
@@ -173,27 +173,32 @@ class ValueChecker {
     else if (count > 0 && s_.film != film_of_meters(count))
       wrong_ = "scene.film is not that of the scene's meters";
   }
-  // Times from 0 to 1 that ascend, unit quaternions, and scales that neither vanish nor change their signs.
-  void check_motion(const std::vector<MotionKey>& keys) {
-    if (s_.sensor.shutter_open != 0 || s_.sensor.shutter_close != (keys.empty() ? 0 : 1))
+  // Checks that times ascend from 0 to 1, and that the camera can move by its keys and to_world is among its poses.
+  void check_motion(const Sensor& sensor) {
+    const std::vector<MotionKey>& keys = sensor.motion;
+    if (sensor.shutter_open != 0 || sensor.shutter_close != (keys.empty() ? 0 : 1))
       wrong_ = "scene.sensor has a shutter that is not that of its motion";
-    if (keys.empty()) return;
+    if (keys.empty() || !wrong_.empty()) return;
     if (keys.size() < 2 || keys.size() > kMaxMotionKeys || keys.front().time != 0 || keys.back().time != 1) {
-      wrong_ = fmt::format("scene.sensor.motion has not 2 to {} keys from 0 to 1", kMaxMotionKeys);
+      wrong_ = fmt::format("scene.sensor.motion must have 2 to {} keys, the first at time 0 and the last at 1",
+                           kMaxMotionKeys);
       return;
     }
-    for (std::size_t i = 0; i < keys.size() && wrong_.empty(); ++i) {
-      const MotionKey& k = keys[i];
-      if (i > 0 && !(k.time > keys[i - 1].time)) wrong_ = fmt::format("scene.sensor.motion[{}] is not later", i);
-      const auto& q = k.rotation;
-      // 1e-9: the rounding of double when a quaternion is normalised, with a large margin
-      if (!(std::abs(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1) < 1e-9))
-        wrong_ = fmt::format("scene.sensor.motion[{}] has a rotation that is not of unit length", i);
-      for (std::size_t c = 0; c < 3; ++c)
-        if (!(k.scale[c] * keys[0].scale[c] > 0))
-          wrong_ = fmt::format("scene.sensor.motion[{}] has a scale of 0, or of another sign than the first", i);
-      if (!invertible(pose_of(k))) wrong_ = fmt::format("scene.sensor.motion[{}] can't be inverted", i);
+    const auto fail = [&](std::size_t i, std::string_view what) {
+      if (wrong_.empty()) wrong_ = fmt::format("scene.sensor.motion[{}] {}", i, what);
+    };
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      if (i > 0 && !(keys[i].time > keys[i - 1].time)) fail(i, "is not later than the one before");
+      if (!can_move(keys[i].to_world)) fail(i, "shears, or can't be inverted");
+      if ((determinant3(keys[i].to_world) < 0) != (determinant3(keys[0].to_world) < 0))
+        fail(i, "mirrors unlike the first");
     }
+    if (!wrong_.empty()) return;
+    // Machines may round the pose between two keys otherwise.
+    const Transform middle = Motion(keys).at(.5);
+    for (std::size_t i = 0; i < 16; ++i)
+      if (!(std::abs(sensor.to_world.m[i] - middle.m[i]) <= 1e-9 * (1 + std::abs(middle.m[i]))))
+        wrong_ = "scene.sensor.to_world is not the pose in the middle of its motion";
   }
   static std::string problem_of(const Meter& m, int shapes) {
     const bool on_shape = m.points.empty();

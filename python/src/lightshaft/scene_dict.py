@@ -112,7 +112,7 @@ class _Writer:
             if matrix.shape not in ((3, 3), (4, 4)):
                 raise _wrong(at, "an animation has a transform (4 x 4 numbers) at each of its times")
             text = " ".join(map(_number, _numbers(at, matrix.ravel(), (9, 16))))
-            number = _number(_numbers(at, float(time), (1,))[0])
+            number = _number(_numbers(at, time, (1,))[0])
             self.add(depth + 1, at, f'<transform time="{number}"><matrix value="{text}"/></transform>')
         self.add(depth, path, "</animation>")
 

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "core/base/overloaded.h"
-#include "core/scene/motion.h"
 #include "worker/render/base/work_counters.h"
 
 namespace ls::render {
@@ -53,7 +52,7 @@ Camera::Pose Camera::pose(const Transform& to_world) const {
 }
 
 Camera::Pose Camera::pose_at(float time) const {
-  return pose(scene::pose_of(scene::key_at(motion_, double{time})));
+  return pose(motion_.at(double{time}));
 }
 
 [[gnu::cold, gnu::noinline]] CameraRay Camera::ray_at(float time, double fx, double fy, V2 lens) const {
@@ -64,8 +63,8 @@ Camera::Pose Camera::pose_at(float time) const {
 
 bool Camera::usable() const {
   // Between two keys each part of the pose is between those of the keys.
-  return usable(pose_) && std::all_of(motion_.begin(), motion_.end(), [&](const MotionKey& key) {
-           return usable(pose(scene::pose_of(key)));
+  return usable(pose_) && std::ranges::all_of(motion_.keys(), [&](const MotionKey& key) {
+           return usable(pose(key.to_world));
          });
 }
 
@@ -76,6 +75,7 @@ bool Camera::usable(const Pose& pose) const {
   // leaves it out and uses the whole lens.
   if (projection_ == Projection::meters) return true;  // Meters::build() has tested them
   Camera whole = *this;
+  whole.motion_ = {};
   whole.textures_ = nullptr;
   for (const double fx : {0., 1.})
     for (const double fy : {0., 1.})
@@ -172,7 +172,7 @@ CameraRay Camera::spherical_ray(const Pose& pose, double u, double v) const {
   const MeterStart& start = meters_->at(static_cast<int>(x), static_cast<int>(y));
   const Meters::Point from =
       meters_->point(start, *world_, {static_cast<float>(fx - x), static_cast<float>(fy - y)}, lens);
-  return {from.p, start.has_plate() ? -from.d : from.d, std::numeric_limits<float>::infinity(), &start};
+  return {from.p, start.has_plate() ? -from.d : from.d, std::numeric_limits<float>::infinity(), 0, &start};
 }
 
 PixelFilter::PixelFilter(const ReconstructionFilter& filter) {

@@ -9,6 +9,7 @@
 
 #include "core/image/frame/frame.h"
 #include "core/scene/analysis/camera_view.h"
+#include "core/scene/motion.h"
 #include "core/scene/scene.h"
 #include "worker/render/camera/meters.h"
 #include "worker/render/math/math.h"
@@ -21,10 +22,10 @@ using scene::tan_half_fov_x;
 struct CameraRay {
   V3 o, d;      // d has unit length
   float t_max;  // distance along the ray at which the camera clips it; may be infinite
+  float time = 0;  // of the exposure, from 0 to 1; set only if the camera moves
   // Set if a meter measures along this ray. If the meter has a plate, o is on the plate, and the ray meets
   // the plate at once: its normal is -d.
   const MeterStart* meter = nullptr;
-  float time = 0;  // of the exposure, from 0 to 1; set only if the camera moves
 };
 
 class Camera {
@@ -50,7 +51,8 @@ class Camera {
   bool usable() const;
   // Returns the distance from the camera, or from its lens, to the start of one of its rays.
   float near_distance(const CameraRay& ray) const {
-    return moves() ? near_distance(pose_at(ray.time), ray.d) : near_distance(pose_, ray.d);
+    if (!moves() || projection_ == Projection::spherical) return near_distance(pose_, ray.d);
+    return near_distance(pose_at(ray.time), ray.d);
   }
   // Returns the lower and the upper corner of a box around everything that rays of the frame, and of `pixels`
   // around it, pass between the lens and the near plane, enlarged by a thousandth of its distance. Not for
@@ -84,7 +86,7 @@ class Camera {
   V3d center_;
   double scale_ = 1;
   Pose pose_;  // of a camera that moves: in the middle of the exposure
-  std::vector<MotionKey> motion_;
+  scene::Motion motion_;
   // The film position (fx, fy), in pixels, has the direction (x, y, 1) in camera space, where x = x0_ + dx_ *
   // fx and y = y0_ + dy_ * fy.
   double x0_ = 0, dx_ = 0, y0_ = 0, dy_ = 0;

@@ -61,34 +61,58 @@ bool near_plane_hides_boundaries(const World& w) {
   return any_touches(w.geometry, near, region);
 }
 
+namespace {
+
+// True if the way from one point to another passes a boundary of a medium.
+bool passes_boundary(const World& w, const V3& from, const V3& to) {
+  constexpr int kMost = 64;  // surfaces that are passed at most
+  const V3d way = V3d(to) - V3d(from);
+  const double length = way.length();
+  if (!(length > 0)) return false;
+  const V3 d(way * (1 / length));
+  V3 at = from;
+  for (int i = 0; i < kMost; ++i) {
+    const auto left = static_cast<float>((V3d(to) - V3d(at)).dot(V3d(d)));
+    const auto primitive = left > 0 ? w.accel.nearest(at, d, left) : std::nullopt;
+    SurfaceHit hit;
+    if (!primitive || !w.geometry.complete(*primitive, at, d, hit)) return false;
+    if (w.geometry.surfaces[hit.surface].transition) return true;
+    at = offset_point(hit, d);
+  }
+  return false;
+}
+
+}  // namespace
+
 Result<void> check_way_of_camera(const World& w) {
   constexpr int kSteps = 256;
   const bool bounded = std::ranges::any_of(w.geometry.surfaces, &SurfaceInfo::transition);
   if (!w.camera.moves() || !bounded) return {};
-  const auto eye_at = [&](int step) {
-    return hidden_part(w, w.camera.ray_at(static_cast<float>(step) / kSteps, w.frame.width / 2., w.frame.height / 2.,
-                                          {.5f, .5f}))
-        .start;
+  // Corners and middle of the frame, by the middle of the lens and by points of its rim.
+  struct Track {
+    double x, y;
+    V2 lens;
   };
-  V3 from = eye_at(0);
-  for (int i = 1; i <= kSteps; ++i) {
-    const V3 to = eye_at(i);
-    const V3d way = V3d(to) - V3d(from);
-    const double length = way.length();
-    V3 at = from;
-    const V3 d(length > 0 ? way * (1 / length) : way);
-    for (int hits = 0; length > 0 && hits < 64; ++hits) {
-      const auto left = static_cast<float>((V3d(to) - V3d(at)).dot(V3d(d)));
-      const auto primitive = left > 0 ? w.accel.nearest(at, d, left) : std::nullopt;
-      SurfaceHit hit;
-      if (!primitive || !w.geometry.complete(*primitive, at, d, hit)) break;
-      if (w.geometry.surfaces[hit.surface].transition)
+  std::vector<Track> tracks{{.5, .5, {.5f, .5f}}};
+  if (w.camera.projection() == Projection::orthographic)
+    for (const double x : {0., 1.})
+      for (const double y : {0., 1.}) tracks.push_back({x, y, {.5f, .5f}});
+  if (w.camera.has_lens())
+    for (const V2& lens : {V2(0, .5f), V2(.5f, 0), V2(1, .5f), V2(.5f, 1)}) tracks.push_back({.5, .5, lens});
+  for (const Track& track : tracks) {
+    const auto begin_at = [&](int step) {
+      const auto time = static_cast<float>(step) / kSteps;
+      return hidden_part(w, w.camera.ray_at(time, track.x * w.frame.width, track.y * w.frame.height, track.lens)).start;
+    };
+    V3 from = begin_at(0);
+    for (int step = 1; step <= kSteps; ++step) {
+      const V3 to = begin_at(step);
+      if (passes_boundary(w, from, to))
         return fail(Errc::invalid_argument,
                     "the camera moves through the boundary of a medium while the shutter is open, but its rays begin "
                     "in one medium: let its animation end before the boundary, or begin behind it");
-      at = offset_point(hit, d);
+      from = to;
     }
-    from = to;
   }
   return {};
 }

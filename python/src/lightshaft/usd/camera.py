@@ -18,6 +18,7 @@ from .transforms import Matrix, column_matrix, is_usable, scale, translation, un
 TURNED = scale(-1, 1, -1)  # looks along +z with +x to the left
 NEAR, FAR = 1e-4, 1e7  # of the depths that are seen, unless the camera says otherwise
 WIDTH = 960  # pixels of a frame whose size nobody gives
+MOST_POSES = 500
 STEPS = 9  # times of the exposure at which a camera's place is asked for, beside those that the stage has
 FRAMED = 50.0  # degrees of the view of a stage without a camera
 TENTH = 0.1  # apertures and focal lengths are in tenths of a scene unit
@@ -94,7 +95,14 @@ def add_camera(
     # The frame holds all of the aperture: where its shape differs it shows more.
     wide = width / height >= across / along
     shown = (along * width / height, along) if wide else (across, across * height / width)
-    poses = _poses(camera, time, get("shutter:open", 0.0), get("shutter:close", 0.0))
+    opens, closes = get("shutter:open", 0.0), get("shutter:close", 0.0)
+    if opens < closes and time.IsNumeric():
+        problems.warn(prim, "shutter:open and shutter:close: only the camera's motion is blurred")
+        for name in ("focalLength", "focusDistance", "fStop", "horizontalAperture", "verticalAperture"):
+            attribute = prim.GetAttribute(name)
+            if len({attribute.Get(time.GetValue() + at) for at in (opens, closes)}) > 1:
+                problems.warn(prim, f"{name} changes while the shutter is open: its value at the frame is taken")
+    poses = _poses(camera, time, opens, closes)
     tell_prim(prim, problems)
     shift = get("horizontalApertureOffset", 0.0), get("verticalApertureOffset", 0.0)
     sensor: dict[str, Any] = {"type": "perspective"}
@@ -136,7 +144,7 @@ def _poses(
             raise StageRejected(f"{camera.GetPath()}: its transform flattens the camera to nothing")
         return unscaled(matrix)
 
-    if time.IsNumeric() and not time.IsEarliestTime() and opens < closes:
+    if time.IsNumeric() and opens < closes:
         frame = time.GetValue()
         times = {frame + float(step) for step in np.linspace(opens, closes, STEPS)}
         during = Gf.Interval(frame + opens, frame + closes)
@@ -145,6 +153,8 @@ def _poses(
             if prim.IsA(UsdGeom.Xformable):
                 times.update(UsdGeom.Xformable(prim).GetTimeSamplesInInterval(during))
             prim = prim.GetParent()
+        if len(times) > MOST_POSES:
+            times = {frame + float(step) for step in np.linspace(opens, closes, MOST_POSES)}
         poses = {at - frame: pose(Usd.TimeCode(at)) for at in sorted(times)}
         first = next(iter(poses.values()))
         if any((other != first).any() for other in poses.values()):

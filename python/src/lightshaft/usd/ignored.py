@@ -12,7 +12,7 @@ SILENT = {
     *("SkelRoot", "Skeleton", "SkelAnimation", "BlendShape", "OpenVDBAsset"),
     *("RenderSettings", "RenderProduct", "RenderVar", "RenderPass", "Backdrop", "Collection"),
 }
-MOTION = "motion blur is not supported"
+MOTION = "only the camera's motion is blurred"
 NO_EFFECT = {
     "velocities": MOTION,
     "accelerations": MOTION,
@@ -54,9 +54,6 @@ def tell_prim(prim: Usd.Prim, problems: Problems) -> None:
         name = attribute.GetName()
         if name in NO_EFFECT and _says_something(attribute):
             problems.warn(prim, f"{name} has no effect: {NO_EFFECT[name]}")
-    shutter = [prim.GetAttribute(f"shutter:{end}") for end in ("open", "close")]
-    if all(shutter) and shutter[0].Get() != shutter[1].Get():
-        problems.warn(prim, "shutter:open and shutter:close blur the motion of the camera alone")
     mode = UsdGeom.ModelAPI(prim).GetModelDrawModeAttr()
     if mode and mode.HasAuthoredValue() and str(mode.Get()) not in ("default", "inherited"):
         problems.warn(prim, f"model:drawMode {mode.Get()} has no effect: the model itself is rendered")

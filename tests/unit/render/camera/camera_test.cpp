@@ -124,9 +124,9 @@ Sensor moving(Projection projection = Projection::perspective) {
   s.near_clip = .5;
   Transform end = test::translate({1, 2, 3}) * test::rotate_y(120);
   if (projection == Projection::orthographic) end = end * test::scale(2, 3, .5);
-  s.motion = {*scene::motion_key(0, {}), *scene::motion_key(.25, test::translate({0, 1, 0}) * test::rotate_x(50)),
-              *scene::motion_key(1, end)};
-  s.to_world = scene::pose_of(scene::key_at(s.motion, .5));
+  s.motion = {{0, {}}, {.25, test::translate({0, 1, 0}) * test::rotate_x(50)},
+              {1, end}};
+  s.to_world = scene::Motion(s.motion).at(.5);
   return s;
 }
 
@@ -140,7 +140,7 @@ TEST(Camera, OfAnyTimeHasTheRaysOfOneThatStandsThere) {
       EXPECT_TRUE(moves.moves());
       for (const float time : {0.f, .125f, .25f, .7f, 1.f}) {
         Sensor still = s;
-        still.to_world = scene::pose_of(scene::key_at(s.motion, double{time}));
+        still.to_world = scene::Motion(s.motion).at(double{time});
         still.motion.clear();
         const Camera stands = camera(still);
         EXPECT_FALSE(stands.moves());
@@ -160,7 +160,7 @@ TEST(Camera, OfAnyTimeHasTheRaysOfOneThatStandsThere) {
 TEST(Camera, IsUsableOnlyIfAllItsKeysAre) {
   Sensor s = moving();
   EXPECT_TRUE(camera(s).usable());
-  s.motion[1].translation = {{1e300, 0, 0}};
+  s.motion[1].to_world.m[3] = 1e300;
   EXPECT_FALSE(camera(s).usable());
 }
 
@@ -177,7 +177,7 @@ TEST(Camera, SlidesPastAnEdgeWithATrapezoid) {
   s.projection = Projection::orthographic;
   // The frame is 2 wide, and its left is +x of the world.
   const auto at = [](double x) { return test::look_at({x, 0, -1}, {x, 0, 0}, {0, 1, 0}); };
-  s.motion = {*scene::motion_key(0, at(-.5)), *scene::motion_key(1, at(.5))};
+  s.motion = {{0, at(-.5)}, {1, at(.5)}};
   s.to_world = at(0);
   s.shutter_close = 1;
 

@@ -114,7 +114,7 @@ SceneBuilder passing_by(double face, double way, bool named) {
   if (named) builder.scene.sensor.medium = fog;
   Sensor& s = builder.scene.sensor;
   const Transform begin = s.to_world, end = translate({way, 0, 0}) * begin;
-  s.motion = {*scene::motion_key(0, begin), *scene::motion_key(1, end)};
+  s.motion = {{0, begin}, {1, end}};
   s.to_world = translate({way / 2, 0, 0}) * begin;
   s.shutter_close = 1;
   return builder;
@@ -140,7 +140,7 @@ TEST(NearPlane, HidesBoundariesFromACameraThatMoves) {
   builder.container(CubeShape{}, scale(1, 1, 100), builder.null(), builder.homogeneous({1, 1, 1}, {0, 0, 0}));
   Sensor& s = builder.scene.sensor;
   const Transform begin = s.to_world;
-  s.motion = {*scene::motion_key(0, begin), *scene::motion_key(1, translate({0, 0, 3}) * begin)};
+  s.motion = {{0, begin}, {1, translate({0, 0, 3}) * begin}};
   s.to_world = begin;
   s.shutter_close = 1;
   expect_transmitted(builder, std::exp(-1.95), "moving");

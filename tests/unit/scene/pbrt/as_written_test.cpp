@@ -509,16 +509,16 @@ TEST(Pbrt, CamerasMoveBetweenTheirTwoTransforms) {
   ASSERT_TRUE(r.scene) << messages(r);
   const auto& keys = r.scene->sensor.motion;
   ASSERT_EQ(keys.size(), 2u);
-  EXPECT_EQ(keys[0].translation, (Vec3{{0, 0, -5}}));
-  EXPECT_EQ(keys[1].translation, (Vec3{{2, 0, -5}}));
+  EXPECT_EQ(origin_of(keys[0].to_world), (Vec3{{0, 0, -5}}));
+  EXPECT_EQ(origin_of(keys[1].to_world), (Vec3{{2, 0, -5}}));
   EXPECT_TRUE(quiet(r)) << messages(r);
 
   const auto half = camera_that_moves(fmt::format("TransformTimes 0 2 {}", aside),
                                       R"("perspective" "float shutteropen" 1 "float shutterclose" 1.5)");
   ASSERT_TRUE(half.scene) << messages(half);
   ASSERT_EQ(half.scene->sensor.motion.size(), 2u);
-  EXPECT_EQ(half.scene->sensor.motion[0].translation, (Vec3{{1, 0, -5}}));
-  EXPECT_EQ(half.scene->sensor.motion[1].translation, (Vec3{{1.5, 0, -5}}));
+  EXPECT_EQ(origin_of(half.scene->sensor.motion[0].to_world), (Vec3{{1, 0, -5}}));
+  EXPECT_EQ(origin_of(half.scene->sensor.motion[1].to_world), (Vec3{{1.5, 0, -5}}));
 
   for (const char* type : {R"("orthographic")", R"("spherical" "string mapping" "equirectangular")"})
     EXPECT_EQ(camera_that_moves(aside, type).scene->sensor.motion.size(), 2u) << type;
@@ -531,7 +531,7 @@ TEST(Pbrt, NamedCoordinateSystemsHaveBothTransforms) {
       R"("perspective")");
   ASSERT_TRUE(r.scene) << messages(r);
   ASSERT_EQ(r.scene->sensor.motion.size(), 2u);
-  EXPECT_EQ(r.scene->sensor.motion[1].translation, (Vec3{{-3, 0, 0}}));
+  EXPECT_EQ(origin_of(r.scene->sensor.motion[1].to_world), (Vec3{{-3, 0, 0}}));
   EXPECT_TRUE(quiet(r)) << messages(r);
 }
 

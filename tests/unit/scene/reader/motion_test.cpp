@@ -4,7 +4,7 @@
 
 #include "core/scene/json/serialize.h"
 #include "core/scene/limits.h"
-#include "core/scene/motion.h"
+#include "core/scene/transform.h"
 #include "formats/reader/xml_write.h"
 #include "tests/unit/scene/scene_testing.h"
 
@@ -31,9 +31,9 @@ TEST(CameraAnimation, IsCutToTheExposure) {
 
   ASSERT_EQ(s.sensor.motion.size(), 2u);
   EXPECT_EQ(s.sensor.motion[0].time, 0);
-  EXPECT_EQ(s.sensor.motion[0].translation, (Vec3{{.5, 0, -5}}));
+  EXPECT_EQ(origin_of(s.sensor.motion[0].to_world), (Vec3{{.5, 0, -5}}));
   EXPECT_EQ(s.sensor.motion[1].time, 1);
-  EXPECT_EQ(s.sensor.motion[1].translation, (Vec3{{1.5, 0, -5}}));
+  EXPECT_EQ(origin_of(s.sensor.motion[1].to_world), (Vec3{{1.5, 0, -5}}));
   EXPECT_EQ(s.sensor.to_world.m[3], 1);  // in the middle of the exposure
   EXPECT_EQ(s.sensor.shutter_open, 0);
   EXPECT_EQ(s.sensor.shutter_close, 1);
@@ -81,11 +81,36 @@ TEST(CameraAnimation, SurvivesWritingAndJson) {
   const auto json = deserialize_scene(serialize(s));
   ASSERT_TRUE(json);
   EXPECT_EQ(*json, s);
-  const Scene again = must_read(write_xml(s));
-  ASSERT_EQ(again.sensor.motion.size(), 2u);
-  for (std::size_t k = 0; k < 2; ++k)
-    for (std::size_t i = 0; i < 16; ++i)
-      EXPECT_NEAR(scene::pose_of(again.sensor.motion[k]).m[i], scene::pose_of(s.sensor.motion[k]).m[i], 1e-14);
+  EXPECT_EQ(must_read(write_xml(s)), s);
+  const Scene turns = must_read(camera(shutter("0.1", "0.9") + "<animation name=\"to_world\"><transform time=\"0\"/>"
+                                       "<transform time=\"0.7\"><rotate x=\"0.6\" y=\"0.8\" angle=\"77.7\"/></transform>"
+                                       "<transform time=\"1\"><rotate z=\"1\" angle=\"33.3\"/></transform></animation>"));
+  EXPECT_EQ(turns.sensor.motion.size(), 3u);
+  EXPECT_EQ(must_read(write_xml(turns)), turns);
+}
+
+TEST(CameraAnimation, OfOneTransformStandsStill) {
+  const std::string one = R"(<animation name="to_world"><transform time="3"><translate x="1"/></transform></animation>)";
+  const std::string still = "<transform name=\"to_world\"><translate x=\"1\"/></transform>";
+  for (const std::string& opened : {std::string(), shutter("0", "1")})
+    EXPECT_EQ(must_read(camera(opened + one)), must_read(camera(still)));
+}
+
+TEST(CameraAnimation, ThatHoldsDuringTheExposureIsThatOfAStillCamera) {
+  const std::string pose = "<lookat origin=\"1, 2, 3\" target=\"-.3, .2, .1\" up=\"0, 1, 0\"/>";
+  const auto held = must_read(camera(shutter("0.3", "0.7") + "<animation name=\"to_world\"><transform time=\"0\">" + pose +
+                                     "</transform><transform time=\"1\">" + pose + "</transform><transform time=\"2\"/>"
+                                     "</animation>"));
+  EXPECT_EQ(held, must_read(camera("<transform name=\"to_world\">" + pose + "</transform>")));
+}
+
+TEST(CameraAnimation, AtMostAThousandTransformsAreWithinTheExposure) {
+  std::string keys = "<animation name=\"to_world\">";
+  for (std::size_t i = 0; i < scene::kMaxMotionKeys; ++i)
+    keys += fmt::format("<transform time=\"{}\"><translate x=\"{}\"/></transform>", i, i);
+  keys += "</animation>";
+  EXPECT_EQ(must_read(camera(shutter("0", "999") + keys)).sensor.motion.size(), scene::kMaxMotionKeys);
+  EXPECT_THAT(messages(read(camera(shutter("-1", "1000") + keys))), HasSubstr("more than 1000 transforms are within"));
 }
 
 TEST(CameraAnimation, IsRefusedWithThePlaceOfWhatIsWrong) {
@@ -107,17 +132,18 @@ TEST(CameraAnimation, IsRefusedWithThePlaceOfWhatIsWrong) {
       {keys(a + key("0", "")), 6, "must ascend: 0 comes after 0"},
       {keys(a + key("nan", "")), 6, "'time' wants a number, not \"nan\""},
       {keys(a + key("soon", "")), 6, "'time' wants a number, not \"soon\""},
-      {keys(a), 4, "needs at least two"},
-      {keys(""), 4, "needs at least two"},
+      {keys(""), 4, "needs a <transform time="},
       {keys(a + "<transform><translate x=\"1\"/></transform>"), 6, "<transform> needs the attribute 'time'"},
       {keys(a + "<transform name=\"x\" time=\"1\"/>"), 6, "<transform> has no attribute 'name'"},
       {keys(a + "<translate x=\"1\"/>"), 6, "<translate> can't stand in <animation>"},
       {keys(a + "<float name=\"time\" value=\"1\"/>"), 6, "<float> can't stand in <animation>"},
-      {keys(a + key("1", "<scale value=\"2\"/>")), 2, "may only move, turn and mirror"},
+      {keys(a + key("1", "<scale value=\"2\"/>")), 6, "may only move, turn and mirror"},
       {keys(a + key("1", "<matrix value=\"1 0.0005 0 0 1 0 0 0 1\"/>")), 0, ""},
       {keys(a + key("1", "<scale x=\"-1\"/>")), 6, "this transform mirrors and the first one does not"},
       {keys(a + key("1", "<matrix value=\"1 2\"/>")), 6, "<matrix> wants 9 or 16 numbers"},
       {keys(a + key("1e400", "")), 6, "'time' wants a number"},
+      {keys(a + key("1e10", "")), 6, "'time' wants a number of at most 1e+09 in size, not \"1e10\""},
+      {camera(shutter("-1e300", "1") + kAside), 3, "shutter_open"},
       {keys(many), 1005, "of more than 1000 transforms"},
       {camera(shutter("1", "0") + kAside), 2, "the shutter closes at 0 and opens at 1: let it close later"},
       {camera(shutter("0", "nan") + kAside), 3, "shutter_close"},
@@ -148,8 +174,8 @@ TEST(CameraAnimation, OrthographicCamerasMayScaleAndNotShear) {
   };
   const auto grown = scaled("2 0 0 0 3 0 0 0 1");
   ASSERT_TRUE(grown.scene);
-  EXPECT_EQ(grown.scene->sensor.motion[1].scale, (Vec3{{2, 3, 1}}));
-  EXPECT_THAT(messages(scaled("1 0.5 0 0 1 0 0 0 1")), HasSubstr("this transform shears or flattens"));
+  EXPECT_EQ(grown.scene->sensor.motion[1].to_world.m[5], 3);
+  EXPECT_THAT(messages(scaled("1 0.5 0 0 1 0 0 0 1")), HasSubstr("this transform shears"));
   EXPECT_THAT(messages(scaled("1 0 0 0 1 0 0 0 0")), HasSubstr("can't be inverted"));
 }
 
@@ -162,12 +188,14 @@ TEST(CameraAnimation, HostileJsonIsRefused) {
     return r ? std::string() : r.error().message;
   };
   EXPECT_EQ(refused([](Sensor&) {}), "");
-  EXPECT_THAT(refused([](Sensor& s) { s.motion.pop_back(); }), HasSubstr("has not 2 to 1000 keys from 0 to 1"));
-  EXPECT_THAT(refused([](Sensor& s) { s.motion[1].time = .5; }), HasSubstr("keys from 0 to 1"));
-  EXPECT_THAT(refused([](Sensor& s) { s.motion.insert(s.motion.begin() + 1, s.motion[0]); }), HasSubstr("[1] is not later"));
-  EXPECT_THAT(refused([](Sensor& s) { s.motion[1].rotation[3] = 2; }), HasSubstr("not of unit length"));
-  EXPECT_THAT(refused([](Sensor& s) { s.motion[1].scale[0] = 0; }), HasSubstr("a scale of 0, or of another sign"));
-  EXPECT_THAT(refused([](Sensor& s) { s.motion[1].scale[1] = -1; }), HasSubstr("of another sign"));
+  EXPECT_THAT(refused([](Sensor& s) { s.motion.pop_back(); }), HasSubstr("must have 2 to 1000 keys, the first at time 0"));
+  EXPECT_THAT(refused([](Sensor& s) { s.motion[1].time = .5; }), HasSubstr("the last at 1"));
+  EXPECT_THAT(refused([](Sensor& s) { s.motion.insert(s.motion.begin() + 1, s.motion[0]); }),
+              HasSubstr("[1] is not later"));
+  EXPECT_THAT(refused([](Sensor& s) { s.motion[1].to_world.m[1] = 2; }), HasSubstr("[1] shears, or can't be inverted"));
+  EXPECT_THAT(refused([](Sensor& s) { s.motion[1].to_world.m[0] = 0; }), HasSubstr("can't be inverted"));
+  EXPECT_THAT(refused([](Sensor& s) { s.motion[1].to_world.m[5] = -1; }), HasSubstr("[1] mirrors unlike the first"));
+  EXPECT_THAT(refused([](Sensor& s) { s.to_world.m[3] = 7; }), HasSubstr("is not the pose in the middle"));
   EXPECT_THAT(refused([](Sensor& s) { s.shutter_close = 2; }), HasSubstr("a shutter that is not that of its motion"));
   EXPECT_THAT(refused([](Sensor& s) { s.motion.clear(); }), HasSubstr("a shutter that is not that of its motion"));
 }

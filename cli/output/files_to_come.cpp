@@ -1,4 +1,4 @@
-#include "cli/output/awaited_files.h"
+#include "cli/output/files_to_come.h"
 
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <set>
 #include <thread>
+
+#include "core/base/clock.h"
 
 namespace ls::cli {
 namespace {
@@ -26,14 +28,14 @@ tl::unexpected<Error> bad_pattern(fmt::format_string<const std::string&> why, co
 
 std::optional<FileState> file_state(const std::string& path) {
   struct stat found;
-  if (::stat(path.c_str(), &found) != 0) return {};
+  if (::stat(path.c_str(), &found) != 0 || !S_ISREG(found.st_mode)) return {};
   return FileState{static_cast<std::uint64_t>(found.st_size),
                    found.st_mtim.tv_sec * 1'000'000'000LL + found.st_mtim.tv_nsec};
 }
 
-Result<AwaitedFiles> AwaitedFiles::of(const std::vector<std::string>& patterns,
+Result<FilesToCome> FilesToCome::of(const std::vector<std::string>& patterns,
                                       const std::optional<FrameRange>& frames) {
-  AwaitedFiles files;
+  FilesToCome files;
   std::set<std::string> known;
   const auto add = [&](const std::string& path) {
     if (known.insert(path).second) files.waiting_.push_back(path);
@@ -52,7 +54,7 @@ Result<AwaitedFiles> AwaitedFiles::of(const std::vector<std::string>& patterns,
   return files;
 }
 
-std::vector<std::string> AwaitedFiles::look(
+std::vector<std::string> FilesToCome::look(
     double now, const std::function<std::optional<FileState>(const std::string&)>& state) {
   std::erase_if(waiting_, [&](const std::string& path) {
     const auto found = state(path);
@@ -67,17 +69,17 @@ std::vector<std::string> AwaitedFiles::look(
   return waiting_;
 }
 
-Result<void> await_files(const std::vector<std::string>& patterns, const std::optional<FrameRange>& frames,
+Result<void> wait_for_files(const std::vector<std::string>& patterns, const std::optional<FrameRange>& frames,
                          const std::function<void(const std::string&)>& note) {
-  auto files = AwaitedFiles::of(patterns, frames);
+  auto files = FilesToCome::of(patterns, frames);
   if (!files) return tl::unexpected(files.error());
-  const auto begin = std::chrono::steady_clock::now();
-  std::string told;
+  const SystemClock clock;
+  const TimePoint begin = clock.now();
+  std::string reported;
   for (;; std::this_thread::sleep_for(kPause)) {
-    const std::chrono::duration<double> since = std::chrono::steady_clock::now() - begin;
-    const auto waiting = files->look(since.count(), file_state);
+    const auto waiting = files->look(seconds(clock.now() - begin), file_state);
     if (waiting.empty()) return {};
-    if (std::string text = waits_for(waiting); text != told) note(told = std::move(text));
+    if (std::string text = waits_for(waiting); text != reported) note(reported = std::move(text));
   }
 }
 
