@@ -116,11 +116,17 @@ def instructions(binary, scene, folder):
 
 
 # By name: the flags of worker/render/base/features.h in their order, without those that are not set at the end.
+ALL, ANY_PHASE, HEIGHT = (1, 1, 1, 1, 1, 1), (0, 0, 0, 1), (0, 0, 0, 1, 1)
 INSTANTIATIONS = {"surfaces": (), "surfaces that light passes": (0, 0, 0, 0, 0, 1), "homogeneous grey media": (1, 0, 0, 0, 0, 1),
                   "homogeneous chromatic media": (1, 0, 1, 0, 0, 1), "grey grids": (1, 1, 0, 0, 0, 1), "chromatic grids": (1, 1, 1, 0, 0, 1),
-                  "everything": (1, 1, 1, 1, 1, 1), "everything, and light in parts": (1, 1, 1, 1, 1, 1, 1, 1),
+                  "everything": ALL, "everything, any phase function": ALL + (0, 0, 0) + ANY_PHASE,
+                  "grey fog that falls with height": (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1),
+                  "everything, fog that falls with height": ALL + (0, 0, 0) + HEIGHT, "everything, and light in parts": ALL + (1, 1, 0) + HEIGHT,
                   "homogeneous grey media, aimed": (1, 0, 0, 0, 0, 1, 0, 0, 1), "grey grids, aimed": (1, 1, 0, 0, 0, 1, 0, 0, 1),
-                  "everything, aimed": (1, 1, 1, 1, 1, 1, 0, 0, 1), "everything, aimed, and light in parts": (1, 1, 1, 1, 1, 1, 1, 1, 1)}
+                  "everything, aimed": ALL + (0, 0, 1), "everything, aimed, any phase function": ALL + (0, 0, 1) + ANY_PHASE,
+                  "grey fog that falls with height, aimed": (1, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 1),
+                  "everything, aimed, fog that falls with height": ALL + (0, 0, 1) + HEIGHT,
+                  "everything, aimed, and light in parts": ALL + (1, 1, 1) + HEIGHT}
 
 
 def inclusive(callgrind):

@@ -51,9 +51,9 @@ TEST(EmissiveGrids, GiveTheSameImageAsPathsThatMeetTheirLight) {
     const VolumeIndex rips = push(noise);
     flame.sigma_t = push(ProductVolume{flame.sigma_t, rips});
     RemapVolume bent{push(ProductVolume{rips, *(flame.*light)})};
-    bent.gamma = 1.5;
-    bent.positions = {.1, .4, 1};
-    bent.values = {0, .7, 1};
+    bent.gamma = .7;
+    bent.positions = {0, .3, 1};
+    bent.values = {0, .8, 1};
     flame.*light = push(bent);
   };
   const auto torn_emission = [=](SceneBuilder& b) { torn(b, &HeterogeneousMedium::emission); };

@@ -25,6 +25,7 @@ def inspect(scene, *flags):
 
 HOMOGENEOUS = '<medium name="interior" type="homogeneous"><rgb name="sigma_t" value="{}"/><rgb name="albedo" value="0.9, 0.8, 0.6"/></medium>'
 GLOWING = HOMOGENEOUS.format("1").replace("</medium>", '<rgb name="emission" value="0.3, 0.2, 0"/></medium>')
+FALLING = '<medium name="interior" type="heterogeneous"><volume name="sigma_t" type="heightfog"/><float name="albedo" value="0.9"/></medium>'
 LAMP = re.compile(r'  <shape type="rectangle">.*?</shape>\n', re.S)
 SPOT = ('<emitter type="spot"><transform name="to_world"><lookat origin="1, 2, 1" target="0, 0, 0" up="0, 1, 0"/></transform>'
         '<rgb name="intensity" value="30, 28, 24"/></emitter>\n')
@@ -46,6 +47,8 @@ VARIED = {
     "chromatic": (GRID.sub(HOMOGENEOUS.format("0.5, 1.5, 3"), FOG), 2),
     "glowing": (GRID.sub(GLOWING, FOG), 1),
     "vacuum": (GRID.sub("", FOG), 5),
+    "fog that falls with height": (GRID.sub(FALLING, FOG), 2),
+    "noise": (GRID.sub(FALLING.replace("heightfog", "noise"), FOG), 3),
     # What the scenes are like that are used to compare renderers.
     "spot in fog": (LAMP.sub(SPOT, GRID.sub(HOMOGENEOUS.format("0.25"), FOG)).replace(SKY, ""), 4),
     "extinctions of 1 to 16": (GRID.sub(HOMOGENEOUS.format("0.3, 1.2, 4.8"), FOG.replace('<shape type="cube">', '<shape type="sphere">')), 2),

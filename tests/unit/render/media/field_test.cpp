@@ -116,8 +116,7 @@ TEST(Field, MacroCellsBoundAllValues) {
     }
     EXPECT_GT(sum, 0);
     // Trackers find collisions at the rate of the bound, of which this share is real.
-    EXPECT_GT(sum / bound, .1);
-    EXPECT_LE(g.max_value() * 0 + sum / kPoints, g.max_value());
+    EXPECT_GT(sum / bound, .05);
   }
 }
 
