@@ -387,7 +387,8 @@ void add_farm_commands(CLI::App& app, Action& action) {
       "  lightshaft jobs --state running,queued\n"
       "  lightshaft jobs --search chapel --sort=-submitted --limit 20");
   add_option(*jobs_command, "--state", listing->state, "STATE,...",
-             "only jobs in these states: queued, running, paused, done, failed, cancelled");
+             "only jobs in these states: queued, held (queued, and waiting for other jobs), running, paused, done, "
+             "failed, cancelled");
   add_option(*jobs_command, "--search", listing->search, "TEXT",
              "only jobs with this text in their name or id");
   add_option(*jobs_command, "--owner", listing->owner, "USER", "only jobs of this user");
