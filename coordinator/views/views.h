@@ -310,7 +310,7 @@ struct WorkerView {
   bool fake = false;     // true for a fake worker (for tests), which invents its pixels instead of rendering
   int threads = 1;
   std::vector<std::string> tags;
-  std::string state;     // "connected", "draining", "lost", "sick"
+  std::string state;     // "connected", "draining", "restarting", "lost", "sick"
   std::string activity;  // what it does now, in its own words, or what is wrong with it
   std::string job;       // id of the job that it works on; empty: none
   std::uint64_t units_done = 0;
