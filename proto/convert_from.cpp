@@ -163,6 +163,7 @@ Result<FromWorker> hello_from(const pb::Hello& in) {
   hello.fake = in.fake();
   hello.platform = platform;
   hello.brief_bytes = in.brief_bytes();
+  hello.restarts = in.restarts();
   return hello;
 }
 
@@ -242,6 +243,11 @@ Result<FromWorker> failure_from(const pb::UnitFailure& in) {
   return failure;
 }
 
+Result<FromWorker> draining_from(const pb::Draining& in) {
+  LS_TRY(refused, text_from(in.refused(), limits::kTextBytes, "draining.refused"));
+  return WorkerDraining{in.withdrawn(), in.restarts(), sendable(refused, limits::kReasonBytes)};
+}
+
 Result<FromWorker> returned_from(const pb::LeaseReturned& in) {
   LS_TRY(lease, id_from(in.lease(), "returned.lease"));
   LS_TRY(units, list_from(in.units(), limits::kUnitsPerLease, "returned.units", key_from));
@@ -294,7 +300,7 @@ Result<FromWorker> from_wire(const pb::FromWorker& in) {
     case pb::FromWorker::kReturned:
       return returned_from(in.returned());
     case pb::FromWorker::kDraining:
-      return WorkerDraining{in.draining().withdrawn()};
+      return draining_from(in.draining());
     case pb::FromWorker::MESSAGE_NOT_SET:
       break;
   }
@@ -329,7 +335,7 @@ Result<ToWorker> from_wire(const pb::ToWorker& in) {
       return RecallLease{LeaseId{lease}};
     }
     case pb::ToWorker::kDrain:
-      return DrainNow{in.drain().withdrawn()};
+      return DrainNow{in.drain().withdrawn(), in.drain().restart()};
     case pb::ToWorker::MESSAGE_NOT_SET:
       break;
   }

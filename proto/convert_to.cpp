@@ -86,6 +86,7 @@ void put(const WorkerHello& hello, pb::FromWorker& out) {
   h->set_platform(sendable(hello.platform, limits::kNameBytes));
   if (hello.secret) h->set_secret(*hello.secret);
   h->set_brief_bytes(hello.brief_bytes);
+  h->set_restarts(hello.restarts);
 }
 
 void put(const WorkerProgress& progress, pb::FromWorker& out) {
@@ -144,7 +145,12 @@ void put(const LeaseReturned& returned, pb::FromWorker& out) {
   out.mutable_returned()->set_unknown_job(returned.unknown_job);
 }
 
-void put(const WorkerDraining& d, pb::FromWorker& out) { out.mutable_draining()->set_withdrawn(d.withdrawn); }
+void put(const WorkerDraining& d, pb::FromWorker& out) {
+  pb::Draining* draining = out.mutable_draining();
+  draining->set_withdrawn(d.withdrawn);
+  draining->set_restarts(d.restarts);
+  draining->set_refused(sendable(d.refused, limits::kReasonBytes));
+}
 void put(const Welcome& welcome, pb::ToWorker& out) {
   out.mutable_welcome()->set_worker(welcome.worker.value);
   out.mutable_welcome()->set_epoch(welcome.epoch);
@@ -189,7 +195,10 @@ void put(const RecallLease& recall, pb::ToWorker& out) {
   out.mutable_recall_lease()->set_lease(recall.lease.value);
 }
 
-void put(const DrainNow& d, pb::ToWorker& out) { out.mutable_drain()->set_withdrawn(d.withdrawn); }
+void put(const DrainNow& d, pb::ToWorker& out) {
+  out.mutable_drain()->set_withdrawn(d.withdrawn);
+  out.mutable_drain()->set_restart(d.restart);
+}
 
 }  // namespace
 

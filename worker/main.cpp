@@ -1,11 +1,13 @@
 // lightshaft-worker: runs the agent, and a render child process of this same executable.
-// Exit codes: 0 drained cleanly, 1 failed, 2 bad usage.
+// Exit codes: 0 drained cleanly, 1 failed, 2 bad usage. Where the coordinator asks for it, the process starts
+// its program again instead of ending.
 #include <fmt/format.h>
 #include <signal.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstdio>
+#include <optional>
 #include <random>
 #include <thread>
 
@@ -20,6 +22,7 @@
 #include "worker/client/client.h"
 #include "worker/machine.h"
 #include "worker/options.h"
+#include "worker/own_program.h"
 #ifdef LIGHTSHAFT_RENDERER
 #include "worker/inprocess.h"
 #include "worker/render/render.h"
@@ -82,7 +85,9 @@ std::unique_ptr<worker::CoordinatorLink> link_to(const worker::Options& options)
   return std::make_unique<worker::LinkRing>(std::move(links), std::hash<std::string>()(options.name));
 }
 
-int run_worker(const worker::Options& options, const sigset_t& signals) {
+// Returns the exit code; nullopt: the program is to be restarted, and nothing of this run is left.
+std::optional<int> run_worker(const worker::Options& options, const worker::OwnProgram& program,
+                              const sigset_t& signals) {
   const auto tracer = trace::tracer_from_environment("lightshaft-worker", LIGHTSHAFT_VERSION, options.name);
   if (!tracer) {
     failed(tracer.error());
@@ -108,6 +113,7 @@ int run_worker(const worker::Options& options, const sigset_t& signals) {
   worker::AgentOptions agent_options;
   agent_options.threads = options.threads;
   agent_options.idle_limit = from_seconds(options.idle_seconds);
+  agent_options.may_restart = [&program] { return program.check(); };
   agent_options.hello.name = options.name;
   agent_options.hello.build = LIGHTSHAFT_VERSION;
   agent_options.hello.memory_bytes = options.memory_limit;
@@ -121,12 +127,15 @@ int run_worker(const worker::Options& options, const sigset_t& signals) {
   std::jthread signal_thread([&] { obey_signals(agent, signals); });
   const auto ended = agent.run();
   pthread_kill(signal_thread.native_handle(), SIGUSR1);
-  return ended ? 0 : failed(ended.error());
+  signal_thread.join();  // a SIGTERM that it still took asks for the end
+  if (!ended) return failed(ended.error());
+  return agent.to_restart() ? std::nullopt : std::optional(0);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  const ls::worker::OwnProgram program(argc, argv);
   const auto parsed = ls::worker::parse_options(argc, argv);
   if (const int* code = std::get_if<int>(&parsed)) return *code;
   const auto& options = std::get<ls::worker::Options>(parsed);
@@ -139,5 +148,7 @@ int main(int argc, char** argv) {
   for (const int signal : {SIGTERM, SIGINT, SIGUSR1}) sigaddset(&signals, signal);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
-  return run_worker(options, signals);
+  if (const auto code = run_worker(options, program, signals)) return *code;
+  log_info("", "starting the program again: " + program.path().string());
+  return failed(program.restart());
 }

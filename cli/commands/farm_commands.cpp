@@ -33,7 +33,7 @@ using nlohmann::json;
 struct FarmFlags {
   FarmOptions farm;
   std::string id, frame, spp, target_error, out, report, html, region, fps, exposure, role, user, mix, view;
-  std::string state, search, owner, sort, limit, offset, priority, name, worker;
+  std::string state, search, owner, sort, limit, offset, priority, name, worker, restarted;
   std::string tev;  // of --tev: "true", or HOST:PORT; empty: the option was not given
   std::vector<std::string> after;
   JobOptions job;
@@ -72,25 +72,42 @@ int print_lines(const FarmApi::Answer<std::string>& text) {
   }
   return kOk;
 }
-// Prints the log of the worker with this name or id. Of several workers with the name each log is printed.
-int worker_log(FarmApi& api, const FarmFlags& flags) {
+// Calls act(worker, path in the API) for each worker with this name or id, until it returns an exit code
+// other than kOk. `connected`: only for workers that are connected, if one of them is.
+template <class Act>
+int for_workers(FarmApi& api, const std::string& wanted, bool connected, Act act) {
   const auto answer = api.get("/api/v1/workers");
   if (!answer) return print_rejected(answer.error());
-  bool found = false;
-  for (const json& worker : objects_field(*answer, "workers")) {
-    const std::string id = text_field(worker, "id");
-    if (id != flags.worker && text_field(worker, "name") != flags.worker) continue;
-    found = true;
-    if (const int code = print_lines(api.text("/api/v1/workers/" + percent_encode(id) + "/log")); code != kOk)
+  std::vector<json> found;
+  for (const json& worker : objects_field(*answer, "workers"))
+    if (text_field(worker, "id") == wanted || text_field(worker, "name") == wanted) found.push_back(worker);
+  const auto lost = [](const json& worker) { return text_field(worker, "state") == "lost"; };
+  if (connected && !std::ranges::all_of(found, lost)) std::erase_if(found, lost);
+  if (found.empty())
+    return print_error(
+        {Errc::not_found,
+         fmt::format("there is no worker \"{}\"; `lightshaft workers` lists them", plain_text(wanted))});
+  for (const json& worker : found)
+    if (const int code = act(worker, "/api/v1/workers/" + percent_encode(text_field(worker, "id")));
+        code != kOk)
       return code;
-  }
-  if (found) return kOk;
-  return print_error(
-      {Errc::not_found,
-       fmt::format("there is no worker \"{}\"; `lightshaft workers` lists them", plain_text(flags.worker))});
+  return kOk;
+}
+int restart_workers(FarmApi& api, const FarmFlags& flags) {
+  return for_workers(api, flags.restarted, true, [&](const json& worker, const std::string& path) -> int {
+    const auto asked = api.ask(path, {{"state", "restarting"}});
+    if (!asked) return print_rejected(asked.error());
+    print(fmt::format("{} ({}) finishes its units and restarts its program",
+                      plain_text(text_field(worker, "name")), plain_text(text_field(worker, "id"))));
+    return kOk;
+  });
 }
 int workers(FarmApi& api, const FarmFlags& flags) {
-  if (!flags.worker.empty()) return worker_log(api, flags);
+  if (!flags.restarted.empty()) return restart_workers(api, flags);
+  if (!flags.worker.empty())
+    return for_workers(api, flags.worker, false, [&](const json&, const std::string& path) {
+      return print_lines(api.text(path + "/log"));
+    });
   return show_answer(api.get("/api/v1/workers"), flags, workers_table);
 }
 int views(FarmApi& api, const FarmFlags& flags) {
@@ -386,8 +403,10 @@ void add_farm_commands(CLI::App& app, Action& action) {
       "Examples:\n"
       "  lightshaft jobs --state running,queued\n"
       "  lightshaft jobs --search chapel --sort=-submitted --limit 20");
-  add_option(*jobs_command, "--state", listing->state, "STATE,...",
-             "only jobs in these states: queued, running, paused, done, failed, cancelled");
+  add_option(
+      *jobs_command, "--state", listing->state, "STATE,...",
+      "only jobs in these states: queued, held (queued, and waiting for other jobs), running, paused, done, "
+      "failed, cancelled");
   add_option(*jobs_command, "--search", listing->search, "TEXT",
              "only jobs with this text in their name or id");
   add_option(*jobs_command, "--owner", listing->owner, "USER", "only jobs of this user");
@@ -461,8 +480,11 @@ void add_farm_commands(CLI::App& app, Action& action) {
   add_view(*video_command, filming->view);
   video_command->add_flag("--denoised", filming->denoised, "show the denoised images");
   const auto [workers_command, asking] = add(app, action, "workers", "list the workers of a farm", workers);
-  add_option(*workers_command, "--log", asking->worker, "NAME",
-             "print the latest events of the worker with this name or id instead");
+  CLI::Option* log = add_option(*workers_command, "--log", asking->worker, "NAME",
+                                "print the latest events of the worker with this name or id instead");
+  add_option(*workers_command, "--restart", asking->restarted, "NAME",
+             "let the worker with this name or id finish its units and restart its program (admins only)")
+      ->excludes(log);
   add(app, action, "views", "list the views in which a farm can show colours", views);
 }
 

@@ -91,6 +91,12 @@ FarmApi::Answer<json> as_json(Result<HttpResponse> response) {
   return j;
 }
 
+FarmApi::Answer<void> without_content(Result<HttpResponse> response) {
+  const auto good = checked(std::move(response));
+  if (!good) return tl::unexpected(good.error());
+  return {};
+}
+
 }  // namespace
 
 Rejected problem_of(const HttpResponse& response) {
@@ -157,10 +163,12 @@ FarmApi::Answer<json> FarmApi::post(const std::string& path, const json& body) {
   return as_json(client_.request("POST", path, body.dump()));
 }
 
+FarmApi::Answer<void> FarmApi::ask(const std::string& path, const json& body) {
+  return without_content(client_.request("PATCH", path, body.dump()));
+}
+
 FarmApi::Answer<void> FarmApi::remove(const std::string& path) {
-  const auto response = checked(client_.request("DELETE", path));
-  if (!response) return tl::unexpected(response.error());
-  return {};
+  return without_content(client_.request("DELETE", path));
 }
 
 FarmApi::Answer<std::string> FarmApi::text(const std::string& path) {

@@ -38,6 +38,7 @@ class FarmApi {
   Answer<Json> post(const std::string& path, const Json& body);
   Answer<void> remove(const std::string& path);
   Answer<Json> patch(const std::string& path, const Json& body);
+  Answer<void> ask(const std::string& path, const Json& body);  // a PATCH whose answer has no content
   Answer<std::string> text(const std::string& path);
   Answer<void> download(const std::string& path, const std::filesystem::path& file);
 

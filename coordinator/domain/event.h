@@ -178,10 +178,11 @@ struct WorkerLost {
   WorkerId worker;
   std::uint64_t epoch = 0;
 };
-// The worker wants no more units or, if `withdrawn`, wants units again.
+// The worker wants no more units or, if `withdrawn`, wants units again. `restarts`: after its last unit it
+// restarts its program, which joins as a new worker.
 struct WorkerDrains {
   WorkerId worker;
-  bool withdrawn = false;
+  bool withdrawn = false, restarts = false;
 };
 // The farm names leases "PREFIX-1", "PREFIX-2"... Returns the number in `id`; nullopt if `id` has another
 // prefix, which an earlier start of the coordinator used.

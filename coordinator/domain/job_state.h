@@ -31,11 +31,16 @@ constexpr std::string_view to_string(StopReason reason) {
 }
 
 // A worker is unhealthy if it has failed repeatedly in two jobs (kUnhealthyJobs), or is quarantined. In the
-// HTTP API this state is "sick".
-enum class WorkerState { connected, draining, lost, unhealthy };
+// HTTP API this state is "sick". `restarting`: it drains, and then restarts its program.
+enum class WorkerState { connected, draining, restarting, lost, unhealthy };
 constexpr std::string_view to_string(WorkerState state) {
-  constexpr std::string_view kWords[] = {"connected", "draining", "lost", "sick"};
+  constexpr std::string_view kWords[] = {"connected", "draining", "restarting", "lost", "sick"};
   return kWords[static_cast<std::size_t>(state)];
+}
+
+// True if the worker takes no more units, since it will end or restart.
+constexpr bool is_leaving(WorkerState state) {
+  return state == WorkerState::draining || state == WorkerState::restarting;
 }
 
 // The error of the denoised layers at one level of the stop rule (adaptive_stop.h). A level determines how

@@ -104,6 +104,7 @@ struct Worker {
   bool may_begin = true;     // false: it gets no units of jobs without a numeric class
   bool connected = false;
   bool draining = false;
+  bool restarts = false;  // when it has drained, it restarts its program
   Pause pause = Pause::none;
   std::optional<TimePoint> unhealthy_since;
   TimePoint lost_at{};
@@ -192,7 +193,7 @@ struct Worker {
   }
   WorkerState state() const {
     if (!connected) return WorkerState::lost;
-    if (draining) return WorkerState::draining;
+    if (draining) return restarts ? WorkerState::restarting : WorkerState::draining;
     return unhealthy_since || quarantined ? WorkerState::unhealthy : WorkerState::connected;
   }
 };

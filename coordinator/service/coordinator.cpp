@@ -362,8 +362,8 @@ Result<std::string> Coordinator::worker_log(const WorkerId& id) const {
   return log_text(worker->second.log);
 }
 
-Result<void> Coordinator::drain_worker(const WorkerId& id, bool withdrawn) {
-  return parts_->sessions.drain(id, withdrawn);
+Result<void> Coordinator::drain_worker(const WorkerId& id, DrainNow how) {
+  return parts_->sessions.drain(id, how);
 }
 
 Result<std::unique_ptr<WorkerSession>> Coordinator::connect(const WorkerHello& hello,

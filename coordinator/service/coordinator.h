@@ -144,7 +144,7 @@ class Coordinator {
   std::vector<WorkerView> workers() const;
   // The latest events of a worker since this coordinator knows it, a line each: states, failures, refusals
   Result<std::string> worker_log(const WorkerId& id) const;
-  Result<void> drain_worker(const WorkerId& id, bool withdrawn = false);  // WorkerSessions::drain
+  Result<void> drain_worker(const WorkerId& id, DrainNow how = {});  // WorkerSessions::drain
   // `principal`: who answers for the worker (WorkerJoined::principal)
   Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink,
                                                  const std::string& principal = {});

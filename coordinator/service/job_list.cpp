@@ -19,6 +19,7 @@ struct Row {
   JobId id;
   std::optional<JobView> view;  // set for a sequence, whose state is combined from its frames
   JobState state = JobState::queued;
+  bool held = false;
   std::string name, owner;
   double submitted = 0;
 };
@@ -43,7 +44,8 @@ bool asked_for(const Row& row, const JobsAsked& asked, const std::vector<std::st
   const auto has = [text = lower(row.name + '\n' + row.id.value)](const std::string& word) {
     return text.find(word) != std::string::npos;
   };
-  return (asked.states.empty() || asked.states.contains(row.state)) &&
+  const bool any_state = asked.states.empty() && !asked.held;
+  return (any_state || asked.states.contains(row.state) || (asked.held && row.held)) &&
          (!asked.owner || *asked.owner == row.owner) && row.submitted >= asked.since_unix &&
          (words.empty() || std::ranges::all_of(words, has));
 }
@@ -99,9 +101,14 @@ std::optional<Row> row_of(Core& core, const JobId& id, const JobsAsked& asked, b
   const Sequence* sequence = core.jobs.sequence(id);
   const EntryPtr entry = sequence ? sequence->frames.front() : core.jobs.find(id);
   if (!entry || (asked.visible && !asked.visible(entry->stored.owner))) return std::nullopt;
-  Row row{id, {}, entry->stored.state, entry->stored.name, entry->stored.owner, entry->stored.submitted_unix};
+  const StoredJob& job = entry->stored;
+  Row row{id,       {},        job.state,         is_held(job.state, !job.spec.after.empty()),
+          job.name, job.owner, job.submitted_unix};
   if (sequence || with_view) row.view = view_of(core, id);
-  if (row.view) row.state = row.view->state;
+  if (row.view) {
+    row.state = row.view->state;
+    row.held = is_held(row.state, !row.view->after.empty());
+  }
   return row;
 }
 
@@ -126,6 +133,7 @@ JobsPage list_jobs(Guarded<Core>& core, const JobsAsked& asked) {
     auto row = row_of(locked, all[i], asked, by_view);
     if (!row) return;
     ++page.states[static_cast<std::size_t>(row->state)];
+    page.held += row->held;
     page.owners.insert(row->owner);
     if (asked_for(*row, asked, words)) rows.push_back(std::move(*row));
   });

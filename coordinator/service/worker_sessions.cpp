@@ -191,7 +191,8 @@ void WorkerSessions::handle(Core& core, Connection& from, FromWorker message) {
                    core.driver.run(LeaseCameBack{from.worker, m});
                  },
                  [&](const WorkerDraining& m) {
-                   core.driver.run(WorkerDrains{from.worker, m.withdrawn});
+                   if (!m.refused.empty()) found->second.note("does not restart: " + m.refused);
+                   core.driver.run(WorkerDrains{from.worker, m.withdrawn, m.restarts});
                  }},
       message);
 }
@@ -214,7 +215,7 @@ void WorkerSessions::note_progress(Core& core, Connection& from, WorkerEntry& wo
   core.publisher.worker(from.worker, false);
 }
 
-Result<void> WorkerSessions::drain(const WorkerId& id, bool withdrawn) {
+Result<void> WorkerSessions::drain(const WorkerId& id, DrainNow how) {
   const auto core = core_.lock();
   const auto found = core->workers.find(id);
   if (found == core->workers.end())
@@ -224,10 +225,15 @@ Result<void> WorkerSessions::drain(const WorkerId& id, bool withdrawn) {
     return fail(Errc::failed_precondition,
                 fmt::format("worker {} is not connected: it can't be asked to end", id.value));
   const auto figures = core->driver.farm().worker(id);
-  if (withdrawn && !(figures && figures->state == WorkerState::draining))
+  if (how.withdrawn && !(figures && is_leaving(figures->state)))
     return fail(Errc::failed_precondition,
                 fmt::format("worker {} is not draining: it takes units as before", id.value));
-  connection->sink->send(DrainNow{withdrawn});
+  if (how.restart && !found->second.hello.restarts)
+    return fail(Errc::failed_precondition,
+                fmt::format("worker {} cannot restart itself, since its version is too old: drain it, and "
+                            "start it again on its machine",
+                            id.value));
+  connection->sink->send(how);
   return {};
 }
 

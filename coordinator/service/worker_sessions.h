@@ -32,10 +32,10 @@ class WorkerSessions {
   // `principal`: who answers for the worker (WorkerJoined::principal)
   Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink,
                                                  const std::string& principal = {});
-  // Asks a worker to finish the units that it renders and to end or, if `withdrawn`, to stay after all.
+  // Asks a worker to finish the units that it renders and then to end or to restart, or to stay after all.
   // not_found: there is no such worker. failed_precondition: it is not connected, or is to stay but does not
-  // drain.
-  Result<void> drain(const WorkerId& id, bool withdrawn);
+  // drain, or cannot restart.
+  Result<void> drain(const WorkerId& id, DrainNow how);
   // Reports to the farm the workers whose results wait for memory in the coordinator, so that their leases
   // are renewed.
   void report_held_back(Core& core) const;

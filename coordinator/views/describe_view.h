@@ -322,7 +322,8 @@ void describe(V& v, T& t) {
 
 template <class V, job::Of<WorkerView> T>
 void describe(V& v, T& w) {
-  static constexpr std::array<std::string_view, 5> kStates{"connected", "draining", "lost", "sick", "gone"};
+  static constexpr std::array<std::string_view, 6> kStates{"connected", "draining", "restarting",
+                                                           "lost",      "sick",     "gone"};
   v.field("id", "", w.id.value);
   v.field("name", "", w.name);
   v.field("build", "", w.build);

@@ -79,6 +79,7 @@ std::string jobs_json(const JobsPage& page) {
   json states = json::object();
   for (std::size_t i = 0; i < page.states.size(); ++i)
     states[std::string(to_string(static_cast<JobState>(i)))] = page.states[i];
+  states[std::string(kHeld)] = page.held;
   return dump(json{{"jobs", to_value(page.jobs)},
                    {"total", page.total},
                    {"states", std::move(states)},

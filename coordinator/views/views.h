@@ -239,10 +239,15 @@ enum class JobOrder { order, active, submitted, name, owner, state, progress, re
 inline constexpr std::array<std::string_view, 8> kJobOrders = {"order", "active", "submitted", "name",
                                                                "owner", "state",  "progress",  "relmse"};
 
+// A job is held while it is queued and waits for other jobs (JobSpec::after). This is no state of its own.
+inline constexpr std::string_view kHeld = "held";
+constexpr bool is_held(JobState state, bool waits) { return state == JobState::queued && waits; }
+
 struct JobsAsked {
   // Returns true if the client may see the jobs of this owner; an empty function: it may see all jobs
   std::function<bool(const std::string& owner)> visible;
   std::set<JobState> states;  // states to list; empty: all
+  bool held = false;          // true: lists held jobs, too, or, if `states` is empty, only them (is_held())
   std::optional<std::string> owner;
   std::string search;  // words, each of which the name or id must contain (case is ignored); empty: all jobs
   double since_unix = 0;  // earliest time of submission, in seconds since 1970
@@ -255,6 +260,7 @@ struct JobsPage {
   std::vector<JobView> jobs;
   std::size_t total = 0;                // number of jobs that match the request; `jobs` is one page of them
   std::array<std::size_t, 6> states{};  // number of visible jobs in each JobState, whether or not they match
+  std::size_t held = 0;                 // how many of the queued ones are held
   std::set<std::string> owners;         // owners of all visible jobs
 };
 
@@ -304,7 +310,7 @@ struct WorkerView {
   bool fake = false;     // true for a fake worker (for tests), which invents its pixels instead of rendering
   int threads = 1;
   std::vector<std::string> tags;
-  std::string state;     // "connected", "draining", "lost", "sick"
+  std::string state;     // "connected", "draining", "restarting", "lost", "sick"
   std::string activity;  // what it does now, in its own words, or what is wrong with it
   std::string job;       // id of the job that it works on; empty: none
   std::uint64_t units_done = 0;
@@ -347,7 +353,7 @@ inline tl::unexpected<Rejected> rejected(Error error, std::vector<Diagnostic> di
 // These functions write views as JSON or CSV. In JSON, values that are not set are null.
 std::string time_json(const TimeSplit& time);
 std::string job_json(const JobView& job);
-// Returns {"jobs": [...], "total": number, "states": {STATE: number of jobs}, "owners": [...]}.
+// Returns {"jobs": [...], "total": number, "states": {STATE or "held": number of jobs}, "owners": [...]}.
 std::string jobs_json(const JobsPage& page);
 std::string worker_json(const WorkerView& worker);
 std::string workers_json(const std::vector<WorkerView>& workers);  // returns {"workers": [...]}

@@ -9,7 +9,7 @@ import exr_layers
 import numpy as np
 import pytest
 from cli_kit import FOG, digest, lightshaft as command, write_fog
-from local_farm import SCENE, LocalFarm, bin_dir
+from local_farm import SCENE, LocalFarm, bin_dir, wait_until
 
 import lightshaft
 from lightshaft import submission, transport
@@ -220,6 +220,10 @@ def test_a_job_is_changed_and_removed(farm, local_farm):
     assert " connected: " in farm.worker_log(worker["id"])
     with pytest.raises(lightshaft.NotFound):
         farm.worker_log("w-0-0-nobody")
+    with pytest.raises(lightshaft.NotFound):
+        farm.restart_worker("w-0-0-nobody")
+    farm.restart_worker(worker["id"])
+    wait_until(lambda: any(w["state"] == "connected" and w["id"] != worker["id"] for w in farm.workers()), "it is back")
 
 
 def test_figures_come_as_arrays_and_text(farm):

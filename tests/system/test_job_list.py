@@ -1,9 +1,10 @@
 """The list of jobs in pages, small pictures and the same scene once more, of a real coordinator."""
 
 import json
+import os
 
 import pytest
-from cli_kit import png_size
+from cli_kit import lightshaft, png_size
 from local_farm import SCENE, HttpError
 
 
@@ -21,6 +22,34 @@ def test_pages_of_hundreds_of_jobs_follow_one_another_without_gaps(farm):
     assert times == sorted(times, reverse=True)
     assert farm.get("/api/v1/jobs?state=cancelled")["jobs"][0]["id"] == ids[7]
     assert {job["id"] for job in farm.get("/api/v1/jobs")["jobs"]} == set(ids), "without parameters all, as ever"
+
+
+def test_held_jobs_are_listed_and_counted_on_their_own(farm):
+    first, queued = farm.submit(SCENE, spp=2), farm.submit(SCENE, spp=2)
+    held = farm.submit(SCENE, spp=2, after=first)
+    frames = json.loads(farm.request("POST", f"/api/v1/jobs?spp=2&frames=1-2&after={first}", SCENE.encode(), "application/xml"))["id"]
+    paused = farm.submit(SCENE, spp=2, after=first)
+    farm.request("PATCH", f"/api/v1/jobs/{paused}", b'{"state": "paused"}')
+
+    def ids(query):
+        return [job["id"] for job in farm.get(f"/api/v1/jobs?{query}")["jobs"]]
+
+    assert ids("state=held") == [held, frames]
+    assert ids("state=queued") == [first, queued, held, frames], "held is no state of its own"
+    assert ids("state=paused,held") == [held, frames, paused]
+    assert {farm.job(job)["state"] for job in (held, frames)} == {"queued"}
+    page = farm.get("/api/v1/jobs?state=held&limit=1")
+    assert page["total"] == 2 and len(page["jobs"]) == 1
+    assert page["states"] == {"queued": 4, "held": 2, "running": 0, "paused": 1, "done": 0, "failed": 0, "cancelled": 0}
+    listed = lightshaft("jobs", "--to", farm.url(), "--state", "held", env=dict(os.environ, LIGHTSHAFT_TOKEN=farm.token)).stdout
+    assert held in listed and queued not in listed
+    with pytest.raises(HttpError) as refused:
+        farm.get("/api/v1/jobs?state=holding")
+    assert refused.value.status == 400 and "held" in refused.value.body
+
+    farm.add_worker()
+    farm.wait_for_job(frames)
+    assert ids("state=held") == [] and farm.get("/api/v1/jobs")["states"]["held"] == 0
 
 
 def test_a_scene_is_rendered_again_with_more_samples_also_after_a_restart(farm):

@@ -19,6 +19,10 @@ POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'sel
 TOKEN = "let-there-be-light"
 
 
+def held(job):
+    return job["state"] == "queued" and bool(job.get("after"))
+
+
 def job(id="j-1", name="steam.xml", state="running", **more):
     return {"id": id, "name": name, "state": state, "stopped": "", "progress": 0.25, "spp": 64, "spp_done": 16, "rmse": 0.05, "relmse": 0.01,
             "relmse_ci95": [0.009, 0.011], "target_error": None, "denoise": False, "eta_seconds": 42, "error": "", "warnings": [], "size": [64, 48], "tile": 32,
@@ -235,7 +239,7 @@ def _handler(farm):
             everything = list(farm.jobs.values())
             states = asked["state"].split(",") if "state" in asked else None
             found = [job for job in everything
-                     if (states is None or job["state"] in states) and asked.get("owner", job["owner"]) == job["owner"]
+                     if (states is None or job["state"] in states or ("held" in states and held(job))) and asked.get("owner", job["owner"]) == job["owner"]
                      and job["submitted_unix"] >= float(asked.get("since", 0)) and all(word in f"{job['name']}\n{job['id']}".lower() for word in asked.get("search", "").lower().split())]
             rank = {"running": 0, "paused": 1, "queued": 2}
             keys = {"active": lambda job: (rank.get(job["state"], 3), -job["submitted_unix"]), "name": lambda job: job["name"].lower(),
@@ -245,7 +249,7 @@ def _handler(farm):
             found.sort(key=keys[sort.lstrip("-")], reverse=sort.startswith("-"))
             first = int(asked.get("offset", 0))
             return {"jobs": found[first:first + int(asked.get("limit", len(found)))], "total": len(found), "owners": sorted({job["owner"] for job in everything}),
-                    "states": {state: sum(job["state"] == state for job in everything) for state in {job["state"] for job in everything}}}
+                    "states": {**{state: sum(job["state"] == state for job in everything) for state in {job["state"] for job in everything}}, "held": sum(map(held, everything))}}
 
         def _get_views(self, parts, body):
             if not parts:

@@ -7,7 +7,7 @@ NAMES = """[...document.querySelectorAll("a[href], button, input, select, summar
 }))"""
 
 
-@pytest.mark.parametrize("view", ["jobs", "jobs-page", "job", "job-done", "job-sequence", "viewer", "viewer-compare", "viewer-mix", "workers", "submit-ready"])
+@pytest.mark.parametrize("view", ["jobs", "jobs-page", "job", "job-done", "job-sequence", "job-log", "viewer", "viewer-compare", "viewer-mix", "workers", "submit-ready"])
 def test_every_control_has_a_name_that_holds_its_text(open_page, farm, view):
     page = open_page(f"{farm.url}/demo.html?view={view}")
     page.wait("document.querySelector('main *')")

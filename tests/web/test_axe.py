@@ -38,7 +38,7 @@ def test_axe_finds_nothing_in_a_story(open_page, farm, axe, view, scheme):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("route, there", [("#/jobs", "[data-job]"), ("#/jobs/j-1", ".job-facts"), ("#/view/j-1", "float-view"), ("#/workers", "[data-worker]"), ("#/submit", "#files")])
+@pytest.mark.parametrize("route, there", [("#/jobs", "[data-job]"), ("#/jobs/j-1", ".job-facts"), ("#/jobs/j-1/log", ".log-page pre"), ("#/view/j-1", "float-view"), ("#/workers", "[data-worker]"), ("#/submit", "#files")])
 def test_axe_finds_nothing_on_a_page_of_a_farm(farm, dashboard, axe, route, there, scheme):
     farm.jobs = {"j-1": job(size=farm.size), "j-2": job("j-2", state="done")}
     farm.workers = {"w-1": worker()}

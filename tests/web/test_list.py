@@ -76,6 +76,25 @@ def test_jobs_that_come_go_and_change_are_fetched_in_their_place(farm, dashboard
     shows(page, ["j-0", "j-9", "j-1"])
 
 
+def test_held_jobs_are_selected_and_counted(farm, dashboard):
+    waits = {"state": "queued", "units_done": 0, "after": [{"id": "j-9", "state": "running"}]}
+    farm.jobs = {f"j-{n}": job(f"j-{n}", submitted_unix=1765000000 + n, **more) for n, more in enumerate([waits, waits, {"state": "queued"}, {}])}
+    page = dashboard()
+    shows(page, ["j-3", "j-2", "j-1", "j-0"])
+    assert page.text(".heading .sub") == "4 jobs · 1 rendering · 3 waiting (2 held)"
+    assert page.text("label:has([value=held])") == "held 2"
+
+    page.click("[name=state][value=held]")
+    shows(page, ["j-1", "j-0"])
+    assert page.evaluate("location.hash") == "#/jobs?state=held"
+    farm.change("j-1", after=[])  # what it waited for is done
+    shows(page, ["j-0"])
+    assert page.text("label:has([value=held])") == "held 1"
+
+    page.click("[name=state][value=running]")
+    shows(page, ["j-3", "j-0"])
+
+
 def test_several_jobs_are_cancelled_at_once_after_one_more_question(farm, dashboard):
     farm.jobs = {f"j-{n}": job(f"j-{n}", state="running", submitted_unix=1765000000 + n) for n in range(3)}
     page = dashboard()

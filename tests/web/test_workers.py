@@ -74,6 +74,21 @@ def test_a_worker_is_sent_away_after_one_more_question(some, dashboard):
     assert some.changes[1:] == [("w-3", {"state": "connected"})]
 
 
+def test_a_worker_is_restarted_and_can_be_kept_until_then(some, dashboard):
+    some.workers["w-4"] = {**some.workers["w-4"], "state": "sick", "activity": "failed in 2 jobs"}
+    page = dashboard("#/workers")
+    page.click("[data-worker=w-3] [aria-label='Restart: lab-3']")
+    page.wait("document.querySelector('[data-worker=w-3] .pill')?.innerText === 'restarting'")
+    assert page.text("[data-worker=w-3] .acts") == "Keep after all"
+    page.click("[data-worker=w-3] .acts button")
+    page.wait("!document.querySelector('[data-worker=w-3] .pill')")
+    assert some.changes == [("w-3", {"state": "restarting"}), ("w-3", {"state": "connected"})]
+
+    assert page.text("[data-worker=w-4] .acts") == "Restart" and "failed in 2 jobs" in page.text("[data-worker=w-4] .doing")
+    page.click("[data-worker=w-4] .acts button")
+    page.wait("document.querySelector('[data-worker=w-4] .pill')?.innerText === 'restarting'")
+
+
 @pytest.mark.parametrize("role", ["submit", "read"])
 def test_only_an_admin_sends_workers_away(some, dashboard, role):
     some.role = role

@@ -138,6 +138,7 @@ struct WorkerHello {
   std::optional<std::string> secret = std::nullopt;
   // Size of the BriefMemory (util/protocol/briefs.h) that the worker keeps; 0: every lease needs its brief
   std::uint64_t brief_bytes = 0;
+  bool restarts = false;  // true if it can obey DrainNow::restart
   bool operator==(const WorkerHello&) const = default;
 };
 // This message renews the deadlines of the listed leases. The worker sends it about once a second while it
@@ -157,8 +158,11 @@ struct WorkerProgress {
 };
 // The worker wants no more leases. It still sends the results of finished units, and returns all other units
 // with a LeaseReturned message. `withdrawn`: it wants leases again, after a DrainNow that was withdrawn.
+// `restarts`: afterwards it restarts its program. `refused`: why it does not, although it was asked to; it
+// then goes on as `withdrawn` says.
 struct WorkerDraining {
-  bool withdrawn = false;
+  bool withdrawn = false, restarts = false;
+  std::string refused = {};
   bool operator==(const WorkerDraining&) const = default;
 };
 // The worker returns units of a lease that it has not rendered and will not render, because it takes no more
@@ -221,8 +225,9 @@ struct RecallLease {
 };
 // The worker finishes the units that are being rendered, returns the others, and ends. `withdrawn`: an
 // earlier DrainNow no longer applies; the worker takes leases again unless it has another reason to end.
+// `restart`: instead of ending, the worker restarts its program (WorkerHello::restarts).
 struct DrainNow {
-  bool withdrawn = false;
+  bool withdrawn = false, restart = false;
   bool operator==(const DrainNow&) const = default;
 };
 using ToWorker =

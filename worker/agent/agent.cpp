@@ -22,6 +22,7 @@ constexpr Duration kGoodConnection = std::chrono::seconds(5);
 // a full disk.
 constexpr Duration kFirstPause = std::chrono::milliseconds(100), kFirstTroublePause = std::chrono::seconds(1);
 constexpr Duration kLongestWait = std::chrono::seconds(1);
+constexpr Duration kRefusalShown = std::chrono::minutes(1);  // how long its activity names a refused restart
 constexpr int kProgressWhenIdle = 5;  // an idle worker sends only every fifth progress report
 // Number of cached files that the hello names. The coordinator remembers no more of them (kBlobsRemembered),
 // and takes a longer hello from few workers at a time.
@@ -98,7 +99,7 @@ void Agent::Impl::handle_message(ToWorker& message) {
                    next_progress = up_since;
                    id = welcome.worker;
                    secret = welcome.secret;
-                   if (draining) outgoing.push_front(WorkerDraining{});
+                   if (draining) outgoing.push_front(WorkerDraining{.restarts = restarting});
                    log_info(fmt::format("worker={}", id.value), "joined the coordinator");
                  },
                  [this](Refused& refused) {
@@ -117,7 +118,11 @@ void Agent::Impl::handle_message(ToWorker& message) {
                    outbox.acknowledge(ack.unit);
                    table.acknowledged(ack.unit, ack.refused.has_value());
                  },
-                 [this](CancelJob& c) { cancel(c.job); },
+                 [this](CancelJob& c) {
+                   const std::lock_guard lock(mutex);
+                   drop_work(c.job);
+                   if (const auto it = jobs.find(c.job); it != jobs.end()) it->second.trouble.clear();
+                 },
                  [this](CancelLease& c) {
                    const std::lock_guard lock(mutex);
                    table.drop_lease(c.lease);
@@ -129,7 +134,7 @@ void Agent::Impl::handle_message(ToWorker& message) {
                      outgoing.push_back(std::move(returned));
                    stop_dropped_work();
                  },
-                 [this](DrainNow& d) { coordinator_drains = !d.withdrawn; },
+                 [this](DrainNow& d) { apply_drain(d); },
              },
              message);
   work.notify_all();
@@ -156,6 +161,7 @@ void Agent::Impl::open_connection() {
   hello.platform = backend.platform();
   hello.blobs_held = files.held(kBlobsReported);
   hello.brief_bytes = options.brief_bytes;
+  hello.restarts = options.may_restart != nullptr;
   hello.previous_id = id;
   hello.secret = secret;
   {
@@ -204,12 +210,6 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
   });
 }
 
-void Agent::Impl::cancel(const JobId& job) {
-  const std::lock_guard lock(mutex);
-  drop_work(job);
-  if (const auto it = jobs.find(job); it != jobs.end()) it->second.trouble.clear();
-}
-
 void Agent::Impl::drop_work(const JobId& job) {
   table.drop_job(job);
   outbox.drop_job(job);
@@ -246,19 +246,37 @@ void Agent::Impl::look_at_idleness() {
   drain_requested = true;
 }
 
+void Agent::Impl::apply_drain(const DrainNow& asked) {
+  const auto possible = !asked.restart        ? Result<void>{}
+                        : options.may_restart ? options.may_restart()
+                                              : fail(Errc::failed_precondition, "this worker cannot restart");
+  if (possible) {
+    drain_asked = asked.withdrawn ? std::nullopt : std::optional(asked);
+    return;
+  }
+  log_warn(fmt::format("worker={}", id.value), "does not restart, and works on: " + possible.error().message);
+  const std::lock_guard lock(mutex);
+  outgoing.push_back(WorkerDraining{!draining, restarting, possible.error().message});
+  restart_refused = possible.error().message;
+  restart_refused_until = clock.now() + kRefusalShown;
+}
+
 void Agent::Impl::look_at_drain() {
   const std::lock_guard lock(mutex);
-  const bool wanted = drain_requested || coordinator_drains;
-  if (draining == wanted) return;
+  const bool wanted = drain_requested || drain_asked;
+  const bool anew = !drain_requested && drain_asked && drain_asked->restart;
+  if (draining == wanted && restarting == anew) return;
+  if (draining != wanted) drain_deadline = clock.now() + options.drain_limit;
   draining = wanted;
-  drain_deadline = clock.now() + options.drain_limit;
-  outgoing.push_back(WorkerDraining{.withdrawn = !wanted});
+  restarting = anew;
+  outgoing.push_back(WorkerDraining{.withdrawn = !wanted, .restarts = anew});
   if (draining)
     for (LeaseReturned& returned : table.return_waiting()) outgoing.push_back(std::move(returned));
   work.notify_all();
   log_info(fmt::format("worker={}", id.value),
-           draining ? "draining: finishing the units in hand"
-                    : "the coordinator has withdrawn the drain: taking units again");
+           restarting ? "draining for a restart: finishing the units in hand"
+           : draining ? "draining: finishing the units in hand"
+                      : "the coordinator has withdrawn the drain: taking units again");
 }
 
 std::vector<FromWorker> Agent::Impl::due_messages() {
@@ -279,8 +297,10 @@ std::vector<FromWorker> Agent::Impl::due_messages() {
 WorkerProgress Agent::Impl::progress() const {
   WorkerProgress p;
   p.leases = table.progress();
-  const std::string bad = trouble();
-  p.activity = draining              ? "draining"
+  const std::string bad =
+      clock.now() < restart_refused_until ? "does not restart: " + restart_refused : trouble();
+  p.activity = restarting            ? "draining for a restart"
+               : draining            ? "draining"
                : !bad.empty()        ? bad
                : table.running() > 0 ? "rendering"
                : !loading.empty()    ? "loading " + loading
@@ -299,9 +319,13 @@ std::optional<Result<void>> Agent::Impl::verdict() {
   if (!rendering && outbox.empty() && (outgoing.empty() || connection != Connection::up))
     return broken ? Result<void>(tl::unexpected<Error>(*broken)) : Result<void>{};
   if (clock.now() < drain_deadline) return std::nullopt;
-  return fail(Errc::unavailable, fmt::format("gave up draining after {:.0f} s: {} finished units could not "
-                                             "be delivered; other workers will render them again",
-                                             seconds(options.drain_limit), outbox.size()));
+  const std::string lost = fmt::format(
+      "gave up draining after {:.0f} s: {} finished units could not be delivered; other workers will render "
+      "them again",
+      seconds(options.drain_limit), outbox.size());
+  if (!restarting) return fail(Errc::unavailable, lost);
+  log_warn(fmt::format("worker={}", id.value), lost);
+  return Result<void>{};
 }
 
 void Agent::Impl::record(const char* name, const trace::SpanContext& parent, TimePoint begin, TimePoint end,
@@ -351,6 +375,10 @@ Result<void> Agent::run() { return impl_->run(); }
 void Agent::drain() {
   impl_->drain_requested = true;
   impl_->inbox->nudge();
+}
+
+bool Agent::to_restart() const {
+  return impl_->restarting && !impl_->drain_requested && !impl_->stop_requested;
 }
 
 void Agent::stop() {

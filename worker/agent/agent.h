@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 
 #include "core/base/clock.h"
@@ -26,7 +27,8 @@
 namespace ls::worker {
 
 struct AgentOptions {
-  WorkerHello hello;  // the agent fills in threads, numeric_class, platform, blobs_held and brief_bytes
+  WorkerHello
+      hello;  // the agent fills in threads, numeric_class, platform, blobs_held, brief_bytes, restarts
   int threads = 1;
   std::size_t brief_bytes = kBriefBytes;  // size of its memory for the briefs of jobs (BriefMemory)
   // No further unit is begun while results that are not acknowledged occupy this many bytes or more
@@ -36,7 +38,11 @@ struct AgentOptions {
   // A worker that has held no units for this long drains, or, if it has never joined the coordinator, ends
   // run() with an error. Zero: no limit
   Duration idle_limit = Duration::zero();
-  // Longest time that a draining worker may take; if it is exceeded, run() ends with an error
+  // Tells whether the caller can restart its program after run(); an error says why not. It is called when
+  // the coordinator asks for that, on the control thread, and so delays messages. Empty: never.
+  std::function<Result<void>()> may_restart;
+  // Longest time that a draining worker may take; if it is exceeded, run() ends with an error or, if the
+  // worker is to restart, with a warning
   Duration drain_limit = std::chrono::seconds(60);
   std::shared_ptr<trace::Tracer> tracer;  // records trace spans of units and scenes; null: no tracing
   // Seed of the random pauses between attempts to connect. Each worker of a farm should have a different one.
@@ -60,6 +66,9 @@ class Agent {
   // possible and delivers nothing more.
   void drain();
   void stop();
+  // True if the coordinator has asked for a restart and nothing else has ended run(), drain() and stop()
+  // included. Call it after run().
+  bool to_restart() const;
   // Makes run() check its timers again, after a test has advanced `clock`. For tests only.
   void wake();
 

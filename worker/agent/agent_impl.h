@@ -144,11 +144,11 @@ struct Agent::Impl {
   void connection_ended(const Error& why);
   void open_connection();
   void accept_lease(AssignLease& assign);
-  void cancel(const JobId& job);
   void drop_work(const JobId& job);  // drops the job's units and results; call with the mutex held
   // Sets the stop flag of each running unit that is no longer in `table`, and that of the loader if it loads
   // a job of which `table` has no unit.
   void stop_dropped_work();
+  void apply_drain(const DrainNow& asked);
   void look_at_drain();    // begins a drain, or ends one that the coordinator has withdrawn
   void look_at_backend();  // drains if the backend is broken, so that run() ends with the backend's error
   // If the worker was without work for options.idle_limit: drains, or ends run() if it has never joined.
@@ -241,8 +241,8 @@ struct Agent::Impl {
   TimePoint last_busy{};  // when this worker was last found to hold units or results
   std::optional<Result<void>> ended;
   WorkerId id;
-  std::string secret;               // proves to the coordinator that this worker has the id
-  bool coordinator_drains = false;  // the latest DrainNow was not withdrawn
+  std::string secret;                   // proves to the coordinator that this worker has the id
+  std::optional<DrainNow> drain_asked;  // the latest DrainNow, unless it was withdrawn or refused
 
   std::atomic<bool> drain_requested{false}, stop_requested{false};
   std::atomic<bool> stop_loading{false};  // tells the backend to abandon the world that it builds
@@ -265,7 +265,9 @@ struct Agent::Impl {
   std::deque<FromWorker> outgoing;  // returned units and Draining messages, sent when the connection is up
   std::vector<std::unique_ptr<RenderSlot>> slots;
   Connection connection = Connection::down;
-  bool draining = false;
+  bool draining = false, restarting = false;  // restarting: draining, to restart the program
+  std::string restart_refused;                // why the latest restart was refused, and until when to say so
+  TimePoint restart_refused_until{};
   std::optional<Error> broken;  // the backend's error, which run() will return
   std::uint64_t uses = 0;
   double cpu_seconds = 0;

@@ -44,7 +44,7 @@ void Farm::State::on(const WorkerJoined& event) {
   std::sort(worker.blobs.begin(), worker.blobs.end());
   const auto known = quarantined.find(event.worker);
   worker.quarantined = known != quarantined.end();
-  worker.draining = false;
+  worker.draining = worker.restarts = false;
   worker.pause = Pause::none;
   worker.briefs = BriefMemory<JobSeq>(std::min(event.brief_bytes, kBriefBytesMost));
   worker.warmed_up.clear();
@@ -101,11 +101,16 @@ void Farm::State::lose(Worker& worker, FreedCause why) {
 
 void Farm::State::on(const WorkerDrains& event) {
   Worker* worker = workers.find(event.worker);
-  if (worker == nullptr || !worker->connected || worker->draining == !event.withdrawn) return;
+  if (worker == nullptr || !worker->connected) return;
+  const bool restarts = !event.withdrawn && event.restarts;
+  if (worker->draining == !event.withdrawn && worker->restarts == restarts) return;
   worker->draining = !event.withdrawn;
+  worker->restarts = restarts;
   touch(*worker);
-  effects.emplace_back(
-      WorkerStateChanged{worker->id, worker->state(), event.withdrawn ? "takes units again" : "drains"});
+  effects.emplace_back(WorkerStateChanged{worker->id, worker->state(),
+                                          event.withdrawn ? "takes units again"
+                                          : restarts      ? "drains, and then restarts its program"
+                                                          : "drains"});
   work_appeared = true;
 }
 

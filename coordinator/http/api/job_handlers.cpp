@@ -116,11 +116,15 @@ Result<void> read_number(const Request& request, std::string_view name, T& out) 
 Result<void> read_states(std::string_view text, JobsAsked& asked) {
   while (!text.empty()) {
     const std::string_view word = take_part(text, ',');
+    if (word == coordinator::kHeld) {
+      asked.held = true;
+      continue;
+    }
     const auto found = std::find_if(kStates.begin(), kStates.end(),
                                     [&](coordinator::JobState state) { return to_string(state) == word; });
     if (found == kStates.end())
       return bad_argument(
-          "'state' has an unknown word; possible: queued, running, paused, done, failed, cancelled");
+          "'state' has an unknown word; possible: queued, held, running, paused, done, failed, cancelled");
     asked.states.insert(*found);
   }
   return {};

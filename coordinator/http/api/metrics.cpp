@@ -111,7 +111,8 @@ void write_jobs(std::string& out, std::span<const coordinator::JobView> jobs) {
 }
 
 void write_workers(std::string& out, std::span<const coordinator::WorkerView> workers) {
-  std::map<std::string, std::uint64_t> by_state{{"connected", 0}, {"draining", 0}, {"lost", 0}, {"sick", 0}};
+  std::map<std::string, std::uint64_t> by_state{
+      {"connected", 0}, {"draining", 0}, {"restarting", 0}, {"lost", 0}, {"sick", 0}};
   std::uint64_t threads = 0, fake = 0;
   for (const auto& worker : workers) {
     ++by_state[worker.state];

@@ -119,19 +119,21 @@ Response get_workers(Api& api, const Request& request, const Params&) {
   return json_response(200, answer.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
-// A worker can be asked to end after its units, and, until it has ended, to stay.
+// A worker can be asked to end after its units, or to restart after them; and, until it has, to stay.
 Response patch_worker(Api& api, const Request& request, const Params& params) {
   const auto body = read_object(request.body, {"state"});
   if (!body) return problem(body.error());
   const auto state = body->find("state");
-  const bool stays = state != body->end() && *state == "connected";
-  if (!stays && (state == body->end() || *state != "draining"))
-    return problem(400,
-                   "'state' must be \"draining\" (the worker finishes its units and ends) or \"connected\" "
-                   "(it stays)");
+  const std::string wanted = state != body->end() && state->is_string() ? state->get<std::string>() : "";
+  const DrainNow how{.withdrawn = wanted == "connected", .restart = wanted == "restarting"};
+  if (!how.withdrawn && !how.restart && wanted != "draining")
+    return problem(
+        400,
+        "'state' must be \"draining\" (the worker finishes its units and ends), \"restarting\" (it "
+        "finishes them and restarts its program) or \"connected\" (it stays)");
   const WorkerId id{params.empty() ? std::string() : params[0]};
   if (!plausible_id(id.value)) return problem(404, "there is no such worker");
-  if (const auto done = api.coordinator().drain_worker(id, stays); !done) return problem(done.error());
+  if (const auto done = api.coordinator().drain_worker(id, how); !done) return problem(done.error());
   return {.status = 202};
 }
 

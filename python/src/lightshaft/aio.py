@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import urllib.parse
 import warnings
 from collections.abc import Iterable, Mapping
 from types import TracebackType
@@ -94,7 +93,7 @@ class AsyncFarm:
     ) -> list[AsyncJob]:
         """Lists the jobs of the farm in order of submission; a sequence is one job.
 
-        `state`: only jobs in this state, or in one of these states, such as 'running'. `search`: only jobs with this
+        `state`: only jobs in this state, or in one of these states, such as 'running'; 'held' jobs wait for others. `search`: only jobs with this
         text in their name or id. `owner`: only jobs of this user. `sort`: 'submitted', 'name', 'progress', 'relmse',
         ...; '-submitted' puts the newest first. `limit` and `offset`: return at most `limit` jobs and skip the first
         `offset`.
@@ -119,8 +118,14 @@ class AsyncFarm:
         """Returns the latest events of a worker, a line each: when it came and left, what failed on it. `worker`
         is its id. For tokens with the role admin or read."""
         return await self._transport.run(
-            steps.text_at(f"/api/v1/workers/{urllib.parse.quote(worker, safe='')}/log")
+            steps.text_at(steps.worker_path(worker) + "/log")
         )
+
+    async def restart_worker(self, worker: str) -> None:
+        """Lets a worker finish its units and then restart its program: after an upgrade, or to get memory back.
+        `worker` is its id; it joins again with the same name and another id. For admins. A worker whose program
+        cannot be run continues, and says so in its log."""
+        await self._transport.run(steps.change_worker(worker, "restarting"))
 
     async def views(self) -> list[str]:
         """Lists the views in which the farm can show colours, those of its OpenColorIO configuration."""

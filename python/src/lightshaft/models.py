@@ -557,7 +557,7 @@ class Worker(TypedDict):
     """True for a fake worker (--fake): it invents pixels instead of rendering, for tests of a farm."""
     threads: NotRequired[int]
     tags: NotRequired[list[str]]
-    state: NotRequired[Literal["connected", "draining", "lost", "sick", "gone"]]
+    state: NotRequired[Literal["connected", "draining", "restarting", "lost", "sick", "gone"]]
     activity: NotRequired[str]
     """What the worker does now, or what is wrong with it."""
     job: NotRequired[Union[str, None]]
@@ -830,7 +830,8 @@ class ListJobsAnswer(TypedDict):
     total: int
     """Number of selected jobs on all pages together."""
     states: dict[str, int]
-    """Number of jobs in each state that this token may see, whether selected or not."""
+    """Number of jobs in each state that this token may see, whether selected or not. `held`: how many of
+    the queued ones wait for other jobs."""
     owners: list[str]
     """Owners of all jobs that this token may see."""
 

@@ -13,7 +13,7 @@ import re
 import time
 from collections.abc import Callable, Generator, Mapping
 from typing import Any, TypeAlias, TypeVar
-from urllib.parse import urljoin, urlsplit
+from urllib.parse import quote, urljoin, urlsplit
 
 from . import models
 from .errors import BadAnswer, FarmBusy, FarmUnreachable, LightshaftError, RequestRejected, error_of
@@ -184,6 +184,14 @@ def listed(path: str, key: str, kind: type = dict) -> Steps[list[Any]]:
 def text_at(path: str) -> Steps[str]:
     reply = yield from succeed(Call("GET", path))
     return reply.body.decode("utf-8", "replace")
+
+
+def worker_path(worker: str) -> str:
+    return f"/api/v1/workers/{quote(worker, safe='')}"
+
+
+def change_worker(worker: str, state: str) -> Steps[None]:
+    yield from succeed(Call("PATCH", worker_path(worker), json.dumps({"state": state}).encode()))
 
 
 def get_job(job: str) -> Steps[models.Job]:

@@ -106,6 +106,130 @@ TEST_F(AgentTest, TakesLeasesAgainWhenTheCoordinatorWithdrawsItsDrain) {
   EXPECT_TRUE(coordinator_.returned.empty());
 }
 
+class RestartTest : public AgentTest {
+ protected:
+  // Starts a worker that may restart and has a unit whose result waits for its acknowledgement, so that it
+  // does not drain before the test has looked at it.
+  void start_busy(AgentOptions options = {}) {
+    coordinator_.acknowledge_results(false);
+    options.may_restart = [this] { return may_; };
+    start(std::move(options));
+    coordinator_.tell(assign("l-1", "j-1", {0}));
+    coordinator_.wait_for([](auto& c) { return c.results.size() == 1; });
+  }
+  void tell(DrainNow asked) {
+    const std::size_t before = coordinator_.drains.size();
+    coordinator_.tell(asked);
+    coordinator_.wait_for([&](auto& c) { return c.drains.size() == before + 1; });
+  }
+  void acknowledge() { coordinator_.tell(ResultAck{{JobId{"j-1"}, 0, 0}, {}}); }
+  Result<void> may_;
+};
+
+TEST_F(RestartTest, DeliversItsResultsAndThenRestarts) {
+  start_busy();
+  EXPECT_TRUE(coordinator_.hellos[0].restarts);
+
+  tell({.restart = true});
+  EXPECT_EQ(coordinator_.drains.back(), WorkerDraining{.restarts = true});
+  coordinator_.tell(assign("l-2", "j-1", {1}));
+  coordinator_.wait_for([](auto& c) { return c.returned.size() == 1; });
+  coordinator_.tell(DrainNow{.restart = true});  // a second one changes nothing
+  acknowledge();
+
+  EXPECT_TRUE(join());
+  EXPECT_TRUE(agent_->to_restart());
+  EXPECT_EQ(coordinator_.drains.size(), 1U);
+}
+
+TEST_F(RestartTest, TheLatestRequestApplies) {
+  start_busy();
+
+  tell({});
+  tell({.restart = true});
+  EXPECT_EQ(coordinator_.drains.back(), WorkerDraining{.restarts = true});
+  tell({.withdrawn = true});
+  EXPECT_EQ(coordinator_.drains.back(), WorkerDraining{.withdrawn = true});
+  tell({.restart = true});
+  tell({});
+  EXPECT_EQ(coordinator_.drains.back(), WorkerDraining{});
+  acknowledge();
+
+  EXPECT_TRUE(join());
+  EXPECT_FALSE(agent_->to_restart());
+}
+
+TEST_F(RestartTest, EndsIfASignalAsksForThatToo) {
+  start_busy();
+  tell({.restart = true});
+
+  agent_->drain();
+  coordinator_.wait_for([](auto& c) { return c.drains.size() == 2; });
+  acknowledge();
+
+  EXPECT_TRUE(join());
+  EXPECT_FALSE(agent_->to_restart());
+}
+
+TEST_F(RestartTest, WorksOnAndSaysWhyIfItsProgramCannotBeRun) {
+  start_busy();
+  may_ = fail(Errc::failed_precondition, "/opt/worker is gone");
+
+  tell({.restart = true});
+
+  EXPECT_EQ(coordinator_.drains.back(),
+            (WorkerDraining{.withdrawn = true, .restarts = false, .refused = "/opt/worker is gone"}));
+  coordinator_.tell(assign("l-2", "j-1", {1}));
+  coordinator_.wait_for([](auto& c) { return c.results.size() == 2; });
+  wait_while_time_passes([](auto& c) {
+    return !c.progress.empty() && c.progress.back().activity == "does not restart: /opt/worker is gone";
+  });
+  pass(std::chrono::seconds(60));
+  wait_while_time_passes([](auto& c) { return c.progress.back().activity == "idle"; });
+}
+
+TEST_F(RestartTest, DrainsOnIfARestartIsRefusedMeanwhile) {
+  start_busy();
+  tell({});
+  may_ = fail(Errc::failed_precondition, "gone");
+
+  tell({.restart = true});
+  EXPECT_EQ(coordinator_.drains.back(),
+            (WorkerDraining{.withdrawn = false, .restarts = false, .refused = "gone"}));
+  acknowledge();
+
+  EXPECT_TRUE(join());
+  EXPECT_FALSE(agent_->to_restart());
+}
+
+TEST_F(RestartTest, RestartsAtItsLimitThoughResultsAreLost) {
+  start_busy({.drain_limit = std::chrono::seconds(5)});
+  tell({.restart = true});
+
+  pass(std::chrono::seconds(6));
+
+  EXPECT_TRUE(join());
+  EXPECT_TRUE(agent_->to_restart());
+}
+
+TEST_F(RestartTest, SaysAgainAfterALostConnectionThatItRestarts) {
+  start_busy();
+  tell({.restart = true});
+
+  coordinator_.cut();
+  wait_while_time_passes([](auto& c) { return c.hellos.size() == 2 && c.drains.size() == 2; });
+
+  EXPECT_EQ(coordinator_.drains.back(), WorkerDraining{.restarts = true});
+}
+
+TEST_F(AgentTest, OffersNoRestartIfItsProgramCannotDoIt) {
+  start();
+  EXPECT_FALSE(coordinator_.hellos[0].restarts);
+  coordinator_.tell(DrainNow{.restart = true});
+  coordinator_.wait_for([](auto& c) { return c.drains.size() == 1; });
+  EXPECT_EQ(coordinator_.drains[0].refused, "this worker cannot restart");
+}
+
 TEST_F(AgentTest, EndsForItsOwnReasonsThoughTheCoordinatorWithdrawsADrain) {
   coordinator_.acknowledge_results(false);
   start({.drain_limit = std::chrono::seconds(5)});

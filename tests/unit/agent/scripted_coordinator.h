@@ -74,6 +74,7 @@ class ScriptedCoordinator final : public CoordinatorLink {
   std::vector<LeaseReturned> returned;
   std::vector<WorkerProgress> progress;
   int draining = 0, undrained = 0;
+  std::vector<WorkerDraining> drains;
   int fetches = 0;
 
   // CoordinatorLink.
@@ -105,7 +106,10 @@ class ScriptedCoordinator final : public CoordinatorLink {
       }
       if (auto* m = std::get_if<LeaseReturned>(&message)) returned.push_back(*m);
       if (auto* m = std::get_if<WorkerProgress>(&message)) progress.push_back(*m);
-      if (auto* m = std::get_if<WorkerDraining>(&message)) ++(m->withdrawn ? undrained : draining);
+      if (auto* m = std::get_if<WorkerDraining>(&message)) {
+        ++(m->withdrawn ? undrained : draining);
+        drains.push_back(*m);
+      }
     }
     changed_.notify_all();
     if (acknowledge) tell(ResultAck{*acknowledge, {}});

@@ -197,6 +197,21 @@ TEST(Lease, DrainingWorkerGetsNoMoreUnitsAndOthersGetItsRest) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
+TEST(Lease, WorkerThatRestartsGetsNoMoreUnitsAndIsNewAfterwards) {
+  Rig rig(plan_of("j", 3, 2), {{"a", 1}});
+  rig.send(WorkerDrains{{"a"}});
+  rig.send(WorkerDrains{{"a"}, false, true});
+
+  EXPECT_EQ(rig.worker("a").state, WorkerState::restarting);
+  rig.send(WorkerDrains{{"a"}, false, true});  // again: nothing changes
+  EXPECT_EQ(rig.worker("a").state, WorkerState::restarting);
+  rig.lose("a");
+  rig.join("a", 1);
+  EXPECT_EQ(rig.worker("a").state, WorkerState::connected);
+  rig.render_all();
+  EXPECT_EQ(rig.job().state, JobState::done);
+}
+
 TEST(Lease, WorkerGetsUnitsAgainWhenItsDrainIsWithdrawn) {
   Rig rig(plan_of("j", 3, 2), {{"a", 1}});
   rig.send(WorkerDrains{{"a"}});

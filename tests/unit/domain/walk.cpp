@@ -261,7 +261,7 @@ void Walk::worker_acts() {
   if (what < 8) worker.stalled = !worker.stalled;
   if (what < 10) worker.crashes = chance(20);
   if (what < 12) {
-    send(WorkerDrains{{name}});
+    send(WorkerDrains{{name}, false, what == 11});
     return give_back(name);
   }
   if (what < 13) worker.gives_back = !worker.gives_back;

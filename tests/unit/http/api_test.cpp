@@ -301,6 +301,8 @@ TEST_F(Routes, DrainRefusesUnknownWorkersAndOtherStates) {
 
   EXPECT_EQ(patch("w-1", R"({"state": "draining"})"), 404);
   EXPECT_EQ(patch("w-1", R"({"state": "connected"})"), 404);
+  EXPECT_EQ(patch("w-1", R"({"state": "restarting"})"), 404);
+  EXPECT_EQ(patch("w-1", R"({"state": 1})"), 400);
   EXPECT_EQ(patch("w-1", R"({"state": "lost"})"), 400);
   EXPECT_EQ(patch("w-1", R"({"name": "x"})"), 400);
   EXPECT_EQ(patch("..", R"({"state": "draining"})"), 404);

@@ -75,6 +75,8 @@ const std::vector<FromWorker> kFromWorker = {
     LeaseReturned{LeaseId{"l"}, {{JobId{"j"}, 5, 6}}, "", true},
     WorkerDraining{},
     WorkerDraining{.withdrawn = true},
+    WorkerDraining{.restarts = true},
+    WorkerDraining{.withdrawn = true, .refused = "its program is gone"},
 };
 
 const std::vector<ToWorker> kToWorker = {
@@ -88,6 +90,7 @@ const std::vector<ToWorker> kToWorker = {
     RecallLease{LeaseId{"l"}},
     DrainNow{},
     DrainNow{.withdrawn = true},
+    DrainNow{.restart = true},
 };
 
 template <class Message, class Wire>
@@ -188,6 +191,8 @@ const Damage kDamages[] = {
     {"unit.job", [](pb::FromWorker& m) { m.mutable_result()->clear_unit(); }, 2},
     {"failure.reason", [](pb::FromWorker& m) { m.mutable_failure()->set_reason(std::string(9000, 'x')); }, 4},
     {"returned.lease", [](pb::FromWorker& m) { m.mutable_returned()->set_lease(std::string(65, 'x')); }, 6},
+    {"draining.refused", [](pb::FromWorker& m) { m.mutable_draining()->set_refused(std::string(9000, 'x')); },
+     8},
     {"message", [](pb::FromWorker& m) { m.Clear(); }, 7},
 };
 

@@ -111,3 +111,5 @@ export const diagnostics = [
   { severity: "error", file: "bath.xml", line: 22, column: 5, text: "no medium has the id \"steem\"; defined here: \"steam\" (line 9)", source_line: "    <ref name=\"interior\" id=\"steem\"/>", length: 4 },
   { severity: "warning", file: "bath.xml", line: 31, column: 9, text: "'strict_normals' means nothing here and is ignored", source_line: "", length: 1 },
 ];
+
+export const log = Array.from({ length: 400 }, (_, n) => `2026-11-30 12:${String(Math.floor(n / 60)).padStart(2, "0")}:${String(n % 60).padStart(2, "0")} ${n === 0 ? "submitted" : n % 57 === 0 ? `tile ${n} round 2 failed on w-19ab-3: out of memory while rendering, since the scene needs more than the renderer may use` : `checkpoint ${n}: relMSE ${(0.4 / n).toFixed(5)}`}`).join("\n");

@@ -60,7 +60,7 @@ export const stories = {
   jobs: () => farm(),
   "jobs-confirm": () => withUi(farm(), { confirming: "j-7f3a91c2" }),
   "jobs-page": () => withListed(withList(withWorkers(signedIn(), data.workers), { asked: { ...kWholeList, states: ["running", "done"], page: 2 }, picked: new Set(["j-7f3a91c2", "j-91d2c3f4"]) }),
-    { jobs: data.jobs, total: 3214, states: { running: 12, queued: 80, paused: 1, done: 3080, failed: 30, cancelled: 11 }, owners: ["", "anna", "bert"] }),
+    { jobs: data.jobs, total: 3214, states: { running: 12, queued: 80, held: 9, paused: 1, done: 3080, failed: 30, cancelled: 11 }, owners: ["", "anna", "bert"] }),
   "jobs-lost": () => withUi({ ...farm(), link: "lost" }, { notice: "The coordinator does not answer. Is it still running, and is this machine on its network?" }),
   job: rendering,
   "job-reference": () => withTiles(jobPage("j-7f3a91c2", { report: data.compared }, [data.comparedJob]), data.tiles),
@@ -73,6 +73,10 @@ export const stories = {
   "job-done": () => jobPage("j-91d2c3f4"),
   "job-failed": () => jobPage("j-c6e8b510", { report: null }),
   "job-unhealthy": () => withTiles(jobPage("j-7f3a91c2", { report: data.doubtful }, [data.unhealthy]), data.tiles),
+  "job-log": () => {
+    const state = jobPage("j-7f3a91c2", { log: { text: data.log } });
+    return { ...state, route: { ...state.route, view: "log" } };
+  },
   "job-unknown": () => ({ ...farm({ view: "job", id: "nope" }), open: { ...openJob("nope"), problem: "There is no job \"nope\"." } }),
   viewer: () => viewing({ region: [300, 250, 420, 330] }, {
     probe: { pixel: [233, 120], layer: "rgb", values: [0.7341, 0.5512, 0.3305], error: [0.0184, 0.0138, 0.0083], samples: 512 },

@@ -57,7 +57,7 @@ export const api = {
   report: async (id) => (await call("GET", `${jobPath(id)}/report`)).json(),
   /** {workers, join}: join says how further ones come in. */
   workers: async () => (await call("GET", "/workers")).json(),
-  /** state: "draining", or "connected" for one that drains and is to stay. */
+  /** state: "draining", "restarting", or "connected" for one that is one of these and is to stay. */
   setWorkerState: (id, state) => call("PATCH", `/workers/${encodeURIComponent(id)}`, json({ state })),
   workerLog: async (id) => (await call("GET", `/workers/${encodeURIComponent(id)}/log`)).text(),
   remove: (id) => call("DELETE", jobPath(id)),

@@ -3,6 +3,8 @@
 
 export const kPageSize = 50;
 export const kStates = ["running", "queued", "paused", "done", "failed", "cancelled"];
+/** By what the list is narrowed: a state, or "held": queued, and waiting for other jobs. */
+export const kFilters = ["running", "queued", "held", "paused", "done", "failed", "cancelled"];
 export const kSorts = [["active", "Rendering first"], ["-submitted", "Newest first"], ["submitted", "Oldest first"], ["name", "Name"], ["-name", "Name, last first"], ["owner", "Owner"], ["-owner", "Owner, last first"], ["state", "State"], ["-state", "State, last first"],
   ["-progress", "Most progress"], ["progress", "Least progress"], ["relmse", "Smallest error"], ["-relmse", "Largest error"]];
 export const kAges = [["", "any time"], ["1", "last day"], ["7", "last 7 days"], ["30", "last 30 days"]];
@@ -16,7 +18,7 @@ export function listOf(query) {
   const page = Number(of.get("page") ?? 1);
   return {
     search: (of.get("search") ?? "").slice(0, 200),
-    states: (of.get("state") ?? "").split(",").filter((state) => kStates.includes(state)),
+    states: (of.get("state") ?? "").split(",").filter((state) => kFilters.includes(state)),
     owner: of.get("owner"),
     days: one(kAges, of.get("days"), ""),
     sort: one(kSorts, of.get("sort"), "active"),

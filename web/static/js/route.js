@@ -1,5 +1,8 @@
-// The routes in the address bar: #/jobs, #/jobs/ID, #/jobs/ID/FRAME for a frame of a sequence,
-// #/view/ID?VIEW, #/workers, #/submit, and #token=..., which signs in and is then removed from the address.
+// The routes in the address bar: #/jobs, #/jobs/ID, #/jobs/ID/FRAME for a frame of a sequence, #/jobs/ID/log, #/view/ID?VIEW,
+// #/workers, #/submit, and #token=..., which signs in and is then removed from the address.
+
+/** The views of one job, which the route names. */
+export const kOfJob = new Set(["job", "log", "view"]);
 
 const kNoId = /^\.{1,2}$/; // in an address these lead elsewhere, however they are encoded
 
@@ -8,12 +11,16 @@ export function routeOf(hash) {
   const [view, part, frame] = path.split("/");
   const id = part && !kNoId.test(decoded(part)) ? part : null;
   if (view === "view" && id) return { view: "view", id: decoded(id), frame: null, query };
+  if (view === "jobs" && id && frame === "log") return { view: "log", id: decoded(id), frame: null };
   if (view === "jobs" && id) return { view: "job", id: decoded(id), frame: /^\d{1,7}$/.test(frame) ? Number(frame) : null };
   return { view: ["workers", "submit"].includes(view) ? view : "jobs", id: null, frame: null, query };
 }
 
 /** Of one frame, or (null) of the sequence, whose page then follows what is rendered. */
 export const frameHref = (id, frame) => `#/jobs/${encodeURIComponent(id)}${frame === null ? "" : `/${frame}`}`;
+
+/** The page of a job's log; a frame has one of its own. */
+export const logHref = (id) => `#/jobs/${encodeURIComponent(id)}/log`;
 
 /** The viewer of a job, or of one frame of a sequence, whose id that frame has. */
 export const viewHref = (id, query = "") => `#/view/${encodeURIComponent(id)}${query ? `?${query}` : ""}`;

@@ -53,7 +53,7 @@ export const openJob = (id, shown = id) => ({
   layer: null, // "picture", "denoised", or as a map over the image "error", "samples"; null: the best picture there is
   clock: "seconds", // axis of the plot; or "core_seconds"
   picked: null, // point of the plot under the pointer
-  log: null, // the lines of the job's log while it is open
+  log: null, // of the job that is shown, while its log is open: {text}, null until it is there
   problem: null, // why the job cannot be shown
   film: null, // {id, playing} while frames of a sequence are scrubbed or played: the frame that is seen
   fps: 24, // pictures per second of what is played, and of a video
@@ -180,6 +180,8 @@ export const doneFrames = (job) => (job?.frames?.list ?? []).filter((frame) => f
 
 const kOver = new Set(["done", "failed", "cancelled"]);
 export const isOver = (job) => kOver.has(job.state);
+/** A job that waits for other jobs is held; one that only waits for a worker is not. */
+export const isHeld = (job) => job.state === "queued" && job.after?.length > 0;
 export const colourOf = (state, worker) => state.colours.get(worker) ?? 0;
 
 /** Those of the page that is seen; without a page all: running first, then waiting, then what is over; the newest first within each. */

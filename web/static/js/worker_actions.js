@@ -6,7 +6,11 @@ export function makeWorkerActions({ get, set, attempt, api }) {
   return {
     searchWorkers: (search) => list({ search }),
     chooseTag: (tag) => list({ tag }),
-    sortWorkers: (sort, descending) => list({ sort, descending }),
+    /** largest: the first press puts the largest first; each further one turns the order round. */
+    sortWorkers: (name, largest) => {
+      const { sort, descending } = get().workerList;
+      list({ sort: name, descending: sort === name ? !descending : largest });
+    },
     /** Opens the log of a worker, or closes it if it is the one that is open. */
     showWorkerLog: async (id) => {
       if (get().workerLog?.id === id) return set({ ...get(), workerLog: null });

@@ -13,6 +13,8 @@ import { goOn } from "./go_on.js";
 import { jobFacts } from "./job_facts.js";
 import { causeFirst } from "../failure.js";
 import { framesStrip } from "./frames.js";
+import { logAgain, logLines } from "./log.js";
+import { logHref } from "../route.js";
 import { errorPlot } from "./plot.js";
 import { phrases } from "../phrases.js";
 import { doubtWord, doubtful, timeLeft } from "../verdict.js";
@@ -103,10 +105,10 @@ function failure(job) {
 }
 
 /** What happened to the job, the latest last. While it is open it is fetched again when the job changes. */
-const logOf = (job, { log }, actions) => h("details", { key: `log ${job.id}`, class: "panel job-log", ontoggle: (event) => (event.currentTarget.open ? actions.readLog(job.id) : actions.closeLog()) },
+const logOf = (job, { log }, actions) => h("details", { key: `log ${job.id}`, class: "panel job-log", ontoggle: (event) => (event.currentTarget.open ? actions.openLog(job.id) : actions.closeLog()) },
   h("summary", null, "Log"),
-  log === null ? h("p", { key: "waiting", class: "help" }, "Fetching the log …") : h("pre", { key: "lines", tabindex: 0, "aria-label": "Log" }, log || "Nothing has happened yet."),
-  log === null ? null : h("button", { key: "again", type: "button", class: "small", onclick: () => actions.readLog(job.id) }, "Read it again"));
+  logLines(log),
+  h("p", { class: "log-tools" }, logAgain(job, log, actions), h("a", { key: "page", class: "button small", href: logHref(job.id) }, "Open as a page")));
 
 function downloadLinks(job, state) {
   const { open } = state;

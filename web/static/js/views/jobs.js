@@ -1,7 +1,7 @@
 // The list of all jobs.
 import { h } from "../dom.js";
-import { isNarrowed, kAges, kPageSize, kSorts, kStates } from "../job_list.js";
-import { isOver, jobsInOrder, mayChange, ownerOf, seesOthers } from "../state.js";
+import { isNarrowed, kAges, kFilters, kPageSize, kSorts, kStates } from "../job_list.js";
+import { isHeld, isOver, jobsInOrder, mayChange, ownerOf, seesOthers } from "../state.js";
 import { count, duration, figure, jobName, kAbsent, moment, percent, plural, spp } from "../format.js";
 import { causeFirst } from "../failure.js";
 import { atLeast, doubtWord, doubtful } from "../verdict.js";
@@ -37,9 +37,9 @@ function head(name, first, { asked }, actions) {
 /** How many jobs there are in which states: of all that this token may see. */
 function tally(state, jobs) {
   const counts = state.list.ids ? state.list.states : {};
-  const n = (name) => (state.list.ids ? counts[name] ?? 0 : jobs.filter((job) => job.state === name).length);
+  const n = (name) => (state.list.ids ? counts[name] ?? 0 : jobs.filter((job) => (name === "held" ? isHeld(job) : job.state === name)).length);
   const all = kStates.reduce((sum, name) => sum + n(name), 0);
-  const parts = [["running", "rendering"], ["queued", "waiting"], ["paused", "paused"], ["failed", "failed"]].map(([name, word]) => (n(name) ? `${count(n(name))} ${word}` : null));
+  const parts = [["running", "rendering"], ["queued", "waiting"], ["paused", "paused"], ["failed", "failed"]].map(([name, word]) => (n(name) ? `${count(n(name))} ${word}${name === "queued" && n("held") ? ` (${count(n("held"))} held)` : ""}` : null));
   return [plural(all, "job"), ...parts].filter(Boolean).join(" · ");
 }
 
@@ -49,7 +49,7 @@ function narrowing(state, actions) {
     h("select", { id: `list-${id}`, onchange: (event) => onChoose(event.currentTarget.value) }, options.map(([value, text]) => h("option", { key: value, value, selected: value === chosen, ".selected": value === chosen }, text))));
   return h("search", { key: "narrow", class: "list-tools" },
     h("input", { key: "search", id: "list-search", type: "search", placeholder: "Search: all words in name or id", "aria-label": "Search names and ids; all words must be there", ".value": asked.search, oninput: actions.typeSearch }),
-    h("fieldset", { key: "states", class: "choice many" }, h("legend", { class: "unseen" }, "States"), kStates.map((name) => h("label", { key: name },
+    h("fieldset", { key: "states", class: "choice many" }, h("legend", { class: "unseen" }, "States"), kFilters.map((name) => h("label", { key: name, title: name === "held" ? "They wait for other jobs, and are counted among those that wait, too" : null },
       h("input", { type: "checkbox", name: "state", value: name, ".checked": asked.states.includes(name), onchange: () => actions.toggleState(name) }),
       h("span", null, stateWord({ state: name }), states[name] ? h("i", { class: "of" }, ` ${count(states[name])}`) : null)))),
     seesOthers(state) && (owners.length > 1 || asked.owner !== null) ? select("owner", "Owner", [["*", "everybody"], ...owners.map((owner) => [`=${owner}`, ownerOf({ owner })])], asked.owner === null ? "*" : `=${asked.owner}`, (value) => actions.narrow({ owner: value === "*" ? null : value.slice(1) })) : null,

@@ -1,11 +1,10 @@
 // Small parts that several views share.
 import { h } from "../dom.js";
-import { isOver, mayChange } from "../state.js";
+import { isHeld, isOver, mayChange } from "../state.js";
 import { percent } from "../format.js";
 
-const kStateWords = { queued: "waiting", running: "rendering", paused: "paused", done: "done", failed: "failed", cancelled: "cancelled" };
-/** A job that waits for other jobs is held; one that only waits for a worker is not. */
-export const stateWord = (job) => (job.state === "queued" && job.after?.length > 0 ? "held" : kStateWords[job.state] ?? job.state);
+const kStateWords = { queued: "waiting", held: "held", running: "rendering", paused: "paused", done: "done", failed: "failed", cancelled: "cancelled" };
+export const stateWord = (job) => (isHeld(job) ? kStateWords.held : kStateWords[job.state] ?? job.state);
 
 export const statePill = (job) => h("span", { class: `pill state-${safeClass(job.state)}` }, stateWord(job));
 

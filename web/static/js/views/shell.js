@@ -3,13 +3,15 @@ import { h } from "../dom.js";
 import { signInView } from "./signin.js";
 import { jobsView } from "./jobs.js";
 import { jobView } from "./job.js";
+import { logView } from "./log.js";
 import { workersView } from "./workers.js";
 import { submitView } from "./submit.js";
 import { viewerView } from "./viewer.js";
 import { mark } from "./pieces.js";
+import { kOfJob } from "../route.js";
 import { mayChange } from "../state.js";
 
-const kViews = { jobs: jobsView, job: jobView, workers: workersView, submit: submitView, view: viewerView };
+const kViews = { jobs: jobsView, job: jobView, log: logView, workers: workersView, submit: submitView, view: viewerView };
 const kRoles = { admin: "may do everything", submit: "sees and changes jobs of its own", read: "may look" };
 const kLinkWords = { connecting: "connecting …", live: "live", lost: "connection lost, trying again …" };
 
@@ -42,7 +44,7 @@ function toMain(event) {
 }
 
 function header(state, actions) {
-  const here = ["job", "view"].includes(state.route.view) ? "jobs" : state.route.view;
+  const here = kOfJob.has(state.route.view) ? "jobs" : state.route.view;
   const link = (view, label) => h("a", { key: view, href: `#/${view}`, "aria-current": here === view ? "page" : null }, label);
   return h("header", { key: "header", class: "top" },
     h("a", { class: "brand", href: "#/jobs", "aria-label": "Lightshaft, all jobs" }, mark(), h("span", null, "Lightshaft")),

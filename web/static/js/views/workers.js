@@ -28,7 +28,9 @@ export function workersView(state, actions) {
     mayChange(state) ? h("details", { key: "add", class: "panel add-worker" }, h("summary", null, "Add a worker"), howToJoin(state)) : null);
 }
 
-const alive = (worker) => worker.state === "connected" || worker.state === "draining";
+const leaving = (worker) => worker.state === "draining" || worker.state === "restarting";
+const alive = (worker) => worker.state === "connected" || leaving(worker);
+const present = (worker) => alive(worker) || worker.state === "sick";
 /** Workers serve everybody: only an admin sends them away. */
 const mayDrain = (state) => state.me.role === "admin";
 
@@ -56,7 +58,7 @@ function ordered(workers, { sort, descending }) {
 
 function head([name, , largest = false], { sort, descending }, actions) {
   const way = sort === name ? (descending ? "descending" : "ascending") : null;
-  return h("th", { key: name, scope: "col", "aria-sort": way }, h("button", { type: "button", class: "sort", onclick: () => actions.sortWorkers(name, sort === name ? !descending : largest) }, name, h("i", { "aria-hidden": "true" }, way ? (descending ? " ↓" : " ↑") : "")));
+  return h("th", { key: name, scope: "col", "aria-sort": way }, h("button", { type: "button", class: "sort", onclick: () => actions.sortWorkers(name, largest) }, name, h("i", { "aria-hidden": "true" }, way ? (descending ? " ↓" : " ↑") : "")));
 }
 
 /** A job stays within one numeric class, so it matters to know when there are several. */
@@ -77,7 +79,7 @@ function row(state, worker, actions) {
       h("b", null, workerMark(colourOf(state, worker.name), worker.name)), worker.state === "connected" ? null : h("span", { key: "state", class: "pill" }, worker.state),
       worker.fake === true ? h("span", { key: "fake", class: "pill", title: "It invents pixels instead of rendering, for tests" }, "fake") : null,
       worker.tags?.length ? h("p", { class: "tags" }, worker.tags.map((tag) => h("span", { key: tag, class: "tag" }, tag))) : null),
-    h("td", { class: "doing" }, alive(worker) ? worker.activity || "idle" : "not connected", worker.job ? [" · ", h("a", { key: "job", href: jobHref(worker.job) }, name)] : null,
+    h("td", { class: "doing" }, present(worker) ? worker.activity || "idle" : "not connected", worker.job ? [" · ", h("a", { key: "job", href: jobHref(worker.job) }, name)] : null,
       seesOthers(state) ? h("button", { key: "log", type: "button", class: "small quiet open-log", "aria-label": `Log: ${worker.name}`, "aria-expanded": String(state.workerLog?.id === worker.id), onclick: () => actions.showWorkerLog(worker.id) }, "Log") : null),
     cell("Threads", count(worker.threads)),
     cell("Done", count(worker.units_done)),
@@ -93,13 +95,17 @@ const logRow = ({ workerLog, me }, worker) => (workerLog?.id !== worker.id ? nul
   h("td", { colspan: kColumns.length + (me.role === "admin" ? 1 : 0) },
     workerLog.text === null ? h("p", { key: "waiting", class: "help" }, "Fetching the log …") : h("pre", { key: "lines", tabindex: 0, "aria-label": `Log of ${worker.name}` }, workerLog.text || "Nothing has happened yet."))));
 
-/** Once it has ended it can't be taken back, so it asks once more. */
+/** A drain asks once more: once the worker has ended, it can't be taken back. A worker that restarts comes back by itself. */
 function drain(state, worker, actions) {
-  if (!alive(worker)) return null;
+  if (!present(worker)) return null;
   const busy = state.ui.busy === `worker ${worker.id}`;
   const button = (key, label, onclick, className) => h("button", { key, type: "button", class: `small ${className}`, disabled: busy, "aria-label": `${label}: ${worker.name}`, onclick }, label);
-  if (worker.state === "draining") return button("stay", "Keep after all", () => actions.setWorkerState(worker.id, "connected"), "quiet");
-  if (state.ui.confirming !== `worker ${worker.id}`) return button("drain", "Drain", () => actions.confirm(`worker ${worker.id}`), "quiet");
+  if (leaving(worker)) return button("stay", "Keep after all", () => actions.setWorkerState(worker.id, "connected"), "quiet");
+  if (state.ui.confirming !== `worker ${worker.id}`) {
+    return h("span", { key: "acts", class: "actions" },
+      alive(worker) ? button("drain", "Drain", () => actions.confirm(`worker ${worker.id}`), "quiet") : null,
+      button("restart", "Restart", () => actions.setWorkerState(worker.id, "restarting"), "quiet"));
+  }
   return h("span", { key: "sure", class: "actions" },
     button("yes", "Really finish and end", () => actions.setWorkerState(worker.id, "draining"), "danger"), button("no", "Keep", () => actions.confirm(null), "quiet"));
 }
