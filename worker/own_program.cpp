@@ -22,9 +22,9 @@ namespace ls::worker {
 namespace {
 
 constexpr const char* kRunning = "/proc/self/exe";
-constexpr Duration kCheckLimit =
-    std::chrono::seconds(10);  // longest time for the program to tell its version
-constexpr int kLookMs = 20;    // pause between two looks at it
+// Longest time for the program to tell its version, and the pause between two looks at it
+constexpr Duration kCheckLimit = std::chrono::seconds(10);
+constexpr int kLookMs = 20;
 
 // Returns the absolute path of the program that a shell runs by this name; empty: there is none.
 std::filesystem::path found_as(const std::string& name) {
@@ -104,8 +104,8 @@ Error OwnProgram::restart() const {
   // They are closed by execv() if that succeeds.
   ::close_range(STDERR_FILENO + 1, ~0U, CLOSE_RANGE_CLOEXEC);
   ::execv(path_.c_str(), arguments.data());
-  return {Errc::internal, fmt::format("cannot start {} again: {}; start the worker", path_.string(),
-                                      std::strerror(errno))};
+  return {Errc::internal,
+          fmt::format("cannot start {} again: {}; start the worker", path_.string(), std::strerror(errno))};
 }
 
 }  // namespace ls::worker

@@ -78,7 +78,7 @@ def test_a_steep_table_of_a_phase_function_is_read_and_one_with_a_negative_value
 
 
 def test_a_closed_shutter_stops_a_camera_with_a_warning(tmp_path):
-    moving = '<animation name="to_world"><transform time="0"/><transform time="1"><translate x="1"/></transform></animation>'
+    moving = '<animation name="to_world"><transform time="0"/><transform time="1"><translate x="0.5"/></transform></animation>'
     for close, stops in (("0", True), ("1", False)):
         sensor = f'<float name="shutter_open" value="0"/><float name="shutter_close" value="{close}"/>'
         assert "shutter" not in inspected(tmp_path, 0, sensor=sensor).stderr

@@ -76,6 +76,23 @@ def test_gains_solo_and_mute_are_seen_and_read(lit):
     assert page.evaluate("document.querySelector('[aria-label=\"Solo lamp\"]').getAttribute('aria-pressed')") == "true"
 
 
+@pytest.mark.parametrize("width", [1280, 375])
+def test_nothing_moves_when_the_error_of_a_mix_comes(lit, width):
+    page = lit("", width=width, height=900, phone=width < 500)
+    mute = "document.querySelector('[aria-label=\"Mute lamp\"]')"
+    page.wait(f"{mute} && document.querySelector('.mix-top p')?.innerText === 'as rendered'")
+    place = f"{mute}.getBoundingClientRect().top + scrollY"
+    page.hold_reply("url.includes('/mix?')")
+    change(page, "sun: gain in stops", "1")
+    page.wait("window.held && document.querySelector('.mix-top p').innerText === 'relMSE …'")
+    before = page.evaluate(place)
+
+    page.release_reply()
+    page.wait("document.querySelector('.mix-top p').innerText.includes('95 %')")
+
+    assert page.evaluate(place) == before
+
+
 def test_media_have_gains_of_their_own(lit):
     page = lit("curve=linear")
     page.click("[aria-label='lamp: media apart']")

@@ -27,8 +27,8 @@
 namespace ls::worker {
 
 struct AgentOptions {
-  WorkerHello
-      hello;  // the agent fills in threads, numeric_class, platform, blobs_held, brief_bytes, restarts
+  // The agent fills in threads, numeric_class, platform, blobs_held, brief_bytes and restarts
+  WorkerHello hello;
   int threads = 1;
   std::size_t brief_bytes = kBriefBytes;  // size of its memory for the briefs of jobs (BriefMemory)
   // No further unit is begun while results that are not acknowledged occupy this many bytes or more

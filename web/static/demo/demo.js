@@ -15,7 +15,10 @@ function show(state) {
   const nothing = () => {};
   const live = {
     confirm: (id) => set(withUi(state, { confirming: id })),
-    pick: (picked) => (picked === state.open.picked ? null : set(withOpen(state, { picked }))),
+    pickPoint: (wanted) => {
+      const picked = typeof wanted === "function" ? wanted(state.open.picked) : wanted;
+      if (picked !== state.open.picked) set(withOpen(state, { picked }));
+    },
     onExposure: (event) => set(withOpen(state, { exposure: Number(event.currentTarget.value) })),
     toggleTiles: () => set(withOpen(state, { showTiles: !state.open.showTiles })),
     setLayer: (layer) => set(withOpen(state, { layer })),

@@ -24,9 +24,10 @@ export function makeAgainActions({ get, set, attempt, api }) {
     openDenoise: (job) => set(withUi(get(), { again: { id: job.id, form: { ...kAgain, denoise: true }, problem: null } })),
     openAgain: (job) => set(withUi(get(), { again: { id: job.id, form: { ...kAgain, spp: job.spp_asked === null ? "" : String(2 * job.spp), target_error: job.spp_asked === null && job.target_error ? String(job.target_error / 2) : "" }, problem: null } })),
     closeAgain: () => set(withUi(get(), { again: null })),
-    typeAgain: (name, value) => set(withUi(get(), { again: { ...get().ui.again, form: { ...get().ui.again.form, [name]: value }, problem: null } })),
+    typeAgain: (name, value) => get().ui.again && set(withUi(get(), { again: { ...get().ui.again, form: { ...get().ui.again.form, [name]: value }, problem: null } })),
     submitAgain: async (event) => {
       event.preventDefault();
+      if (!get().ui.again || get().ui.busy === get().ui.again.id) return; // pressed twice before the page was drawn
       const { id, form } = get().ui.again;
       const { changes, problem } = changesOf(form);
       if (problem) {

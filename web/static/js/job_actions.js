@@ -37,6 +37,30 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
     window.location.hash = "#/jobs";
   }
 
+  /** That a job is not there any more is told by its event. */
+  function unlessGone(error) {
+    if (error.status !== 404) throw error;
+  }
+
+  /** Who looks at the end of the log goes on to see its end. */
+  async function readLog(id) {
+    const lines = () => document.querySelector(".job-log pre");
+    let before = null; // where the reader is, if that is the end
+    await snapshot(`log ${id}`, () => attempt(() => api.log(id).catch(unlessGone)), (now, text) => {
+      if (now.open?.shown !== id || now.open.log === null) return now;
+      const seen = lines();
+      const top = seen?.scrollTop ?? 0;
+      if (!seen || seen.scrollHeight - top - seen.clientHeight < kNearEnd) before = top;
+      return withOpen(now, { log: { text } });
+    });
+    if (before === null) return;
+    requestAnimationFrame(() => {
+      const drawn = lines();
+      if (drawn?.scrollTop === before) drawn.scrollTo({ top: drawn.scrollHeight, behavior: "instant" }); // else the reader has moved meanwhile
+      if (get().route.view === "log" && document.activeElement === document.body) drawn?.focus({ preventScroll: true }); // keys scroll it
+    });
+  }
+
   const shownLayer = () => layerOf(get().open, get().jobs?.get(get().open.shown));
 
   const film = (more) => set(withOpen(get(), { film: more }));
@@ -90,7 +114,13 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
     scrubFilm: (id) => film({ id, playing: false }),
     turnFilm: (id) => (get().open?.film?.playing ? film({ id, playing: true }) : null),
     setFps: (fps) => set(withOpen(get(), { fps })),
-    showFrameOf: (id, frame) => turnTo(frameHref(id, frame)),
+    /** Shows the frame before (by: -1) or after the one that is shown by now. */
+    stepFrame: (by) => {
+      const { open, jobs } = get();
+      const list = jobs.get(open?.id)?.frames?.list ?? [];
+      const next = list[Math.max(0, list.findIndex(({ id }) => id === (open.film?.id ?? open.shown))) + by];
+      if (next) turnTo(frameHref(open.id, next.frame));
+    },
     filmPicture: (id, signal) => pictureOf(id, get().open.exposure, signal),
     /** Of a sequence that was opened: there may be a video already, or one is being made. */
     openVideo: (id) => watchVideo(id, api.video(id).catch(() => null)),
@@ -100,21 +130,11 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
       return watchVideo(id, api.makeVideo(id, { exposure, fps, view: displayOf(get()), ...(layer === "denoised" ? { layer } : {}) }));
     },
     setState: change,
-    /** Who looks at the end of the log goes on to see its end. */
-    readLog: async (id) => {
-      const log = await attempt(() => api.log(id));
-      if (log === undefined || get().open?.shown !== id) return;
-      const lines = () => document.querySelector(".job-log pre");
-      const seen = lines();
-      const before = seen?.scrollTop ?? 0;
-      const follows = !seen || seen.scrollHeight - before - seen.clientHeight < kNearEnd;
-      set(withOpen(get(), { log }));
-      if (!follows) return;
-      requestAnimationFrame(() => {
-        const drawn = lines();
-        if (drawn?.scrollTop === before) drawn.scrollTo({ top: drawn.scrollHeight, behavior: "instant" }); // else the reader has moved meanwhile
-      });
+    openLog: (id) => {
+      set(withOpen(get(), { log: { text: null } }));
+      return readLog(id);
     },
+    readLog,
     closeLog: () => set(withOpen(get(), { log: null })),
     renderOn: alter,
     setPriority: (id, priority) => alter(id, { priority }),
@@ -136,6 +156,10 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
     setDisplay: (display) => set(withOpen(get(), { display })),
     resetExposure: () => set(withOpen(get(), { exposure: 0 })),
     toggleTiles: () => set(withOpen(get(), { showTiles: !get().open.showTiles })),
-    pick: (picked) => (get().open && get().open.picked !== picked ? set(withOpen(get(), { picked })) : null),
+    pickPoint: (wanted) => {
+      if (!get().open) return;
+      const picked = typeof wanted === "function" ? wanted(get().open.picked) : wanted;
+      if (get().open.picked !== picked) set(withOpen(get(), { picked }));
+    },
   };
 }

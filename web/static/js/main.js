@@ -5,7 +5,7 @@ import "./viewer/float_view.js";
 import { api } from "./api.js";
 import { patch } from "./dom.js";
 import { openEvents } from "./events.js";
-import { routeOf, takeToken } from "./route.js";
+import { kOfJob, routeOf, takeToken } from "./route.js";
 import { makeAgainActions } from "./again_actions.js";
 import { makeJobActions } from "./job_actions.js";
 import { listOf } from "./job_list.js";
@@ -15,7 +15,7 @@ import { makeWorkerActions } from "./worker_actions.js";
 import { makeViewerActions } from "./viewer_actions.js";
 import { jobName } from "./format.js";
 import { askFirst, opened, tryLink } from "./session.js";
-import { initialState, openJob, shownOf, withEvent, withJob, withList, withListed, withOpen, withTiles, withUi, withWorkers, withoutJob } from "./state.js";
+import { initialState, isHeld, openJob, shownOf, withEvent, withJob, withList, withListed, withOpen, withTiles, withUi, withWorkers, withoutJob } from "./state.js";
 import { page } from "./views/shell.js";
 
 const kReportPauseMs = 2000;
@@ -27,6 +27,7 @@ let state = initialState();
 let drawing = false;
 let closeEvents = null;
 let reportTimer = 0;
+let sessions = 0; // number of the present one: what an earlier one was refused does not end it
 
 function set(next) {
   state = next;
@@ -38,22 +39,27 @@ function set(next) {
 function draw() {
   drawing = false;
   patch(document.getElementById("app"), ...page(state, actions));
-  const job = ["job", "view"].includes(state.route.view) ? state.jobs?.get(state.route.id) : null;
-  document.title = state.session === "out" ? "Lightshaft" : `${job ? jobName(job) : { workers: "Workers", submit: "New job" }[state.route.view] ?? "Jobs"} · Lightshaft`;
+  const job = kOfJob.has(state.route.view) ? state.jobs?.get(state.route.id) : null;
+  document.title = state.session === "out" ? "Lightshaft" : `${job ? `${state.route.view === "log" ? "Log of " : ""}${jobName(job)}` : { workers: "Workers", submit: "New job" }[state.route.view] ?? "Jobs"} · Lightshaft`;
 }
 
 /** Runs a request; a lost session leads to the sign-in view, any other failure to a notice. Returns undefined then. */
 async function attempt(request) {
+  const mine = sessions;
   try {
     return await request();
   } catch (error) {
-    if (error.status === 401) signedOut();
+    if (error.status === 401) refusedIn(mine);
     else set(withUi(state, { notice: error.message }));
     return undefined;
   }
 }
 
 // ---- session ----
+
+function refusedIn(session) {
+  if (session === sessions) signedOut();
+}
 
 async function start() {
   const { token, link, first } = opened;
@@ -111,6 +117,7 @@ async function enter(first) {
     }
     return error;
   }
+  sessions += 1;
   set(withUi({ ...withListed(withList(state, { asked }), page), me, displays, session: "in" }, { signInError: null, notice: null }));
   closeEvents ??= openEvents({ onOpen, onLost, onEvent });
   showRoute();
@@ -160,16 +167,17 @@ async function onOpen() {
 function onLost(closed) {
   set({ ...state, link: "lost" });
   // an event stream cannot say why it failed, so another request finds out
-  if (closed) api.workers().catch((error) => (error.status === 401 ? signedOut() : null));
+  const mine = sessions;
+  if (closed) api.workers().catch((error) => (error.status === 401 ? refusedIn(mine) : null));
 }
 
 function onEvent(type, data) {
   for (const events of recordings) events.push([type, data]);
-  const before = type === "job" ? state.jobs?.get(data.id)?.state : null;
+  const before = type === "job" ? state.jobs?.get(data.id) : null;
   set(withEvent(state, type, data));
   // The coordinator decides which jobs are listed, and in which order; events only change the numbers in the
   // list.
-  if (type === "job" && !data.sequence && before !== data.state) actions.refreshList(kListPauseMs);
+  if (type === "job" && !data.sequence && (before?.state !== data.state || isHeld(before) !== isHeld(data))) actions.refreshList(kListPauseMs);
   actions.viewerEvent(type, data);
   if (type === "job" && data.id === state.open?.id) showFrame();
   if (type === "job" && data.id === state.open?.shown && !reportTimer) {
@@ -180,45 +188,51 @@ function onEvent(type, data) {
 async function refreshReport() {
   reportTimer = 0;
   const id = state.open?.shown;
-  if (!id || state.jobs?.get(id)?.frames) return; // a sequence whose frames are not known yet
-  const report = await api.report(id).catch(() => null); // there is no report before the first checkpoint
-  if (report && state.open?.shown === id) set(withOpen(state, { report }));
-  if (state.open?.shown === id && state.open.log !== null) actions.readLog(id);
+  if (id && state.open.log !== null) actions.readLog(id);
+  if (!id || state.route.view !== "job" || state.jobs?.get(id)?.frames) return; // a sequence whose frames are not known yet
+  // there is no report before the first checkpoint
+  await snapshot(`report ${id}`, () => api.report(id).catch(() => undefined), (now, report) => (now.open?.shown === id ? withOpen(now, { report }) : now));
 }
 
 async function refreshOpen() {
   const id = state.open?.id;
   if (!id) return;
+  const mine = sessions;
   try {
     await snapshot(`job ${id}`, () => api.job(id), (now, job) => (now.open?.id === id ? withJob(now, job) : now));
     if (state.open?.id !== id || !state.jobs.has(id)) return; // the job was removed or closed meanwhile
     set(withOpen(state, { problem: null }));
     if (!showFrame()) await refreshShown();
   } catch (error) {
-    openFailed(error);
+    openFailed(error, mine);
   }
 }
 
-function openFailed(error) {
-  if (error.status === 401) signedOut();
+function openFailed(error, session) {
+  if (error.status === 401) refusedIn(session);
   else if (error.status === 404 && state.jobs?.has(state.open?.id)) set(withoutJob(state, state.open.id));
   // a removed job has its own message
   else if (error.status !== 404 || !state.open?.problem) set(withOpen(state, { problem: error.message }));
 }
 
+/** The log is open from the first on its own page alone. */
+const logAt = (route) => (route.view === "log" ? { text: null } : null);
+
 /** The image, tiles and figures of the frame that the page is to show. True if that is another one than before. */
 function showFrame() {
   const { open, route } = state;
-  const shown = open && shownOf(state, open.id, route.frame);
+  const shown = open && (route.view === "log" ? open.id : shownOf(state, open.id, route.frame));
   if (!open || open.shown === shown) return false;
   const { exposure, display, showTiles, layer, clock, film, fps, video } = open;
-  set({ ...state, open: { ...openJob(open.id, shown), exposure, display, showTiles, layer, clock, film, fps, video } });
-  refreshShown().catch(openFailed);
+  set({ ...state, open: { ...openJob(open.id, shown), exposure, display, showTiles, layer, clock, film, fps, video, log: logAt(route) } });
+  const mine = sessions;
+  refreshShown().catch((error) => openFailed(error, mine));
   return true;
 }
 
 async function refreshShown() {
   const { id, shown } = state.open;
+  if (state.route.view === "log") return refreshReport();
   const job = state.jobs?.get(shown);
   const fetch = () => Promise.all([job && shown === id ? job : api.job(shown), api.tiles(shown)]);
   await snapshot("shown", fetch, (now, [fresh, tiles]) => {
@@ -241,14 +255,16 @@ function showRoute() {
   const route = routeOf(window.location.hash);
   const moved = route.view !== state.route.view || route.id !== state.route.id;
   const turned = !moved && route.frame !== state.route.frame;
-  const open = route.view !== "job" ? null : state.open?.id === route.id ? state.open : openJob(route.id);
+  const opens = route.view === "job" || route.view === "log";
+  const same = opens && state.open?.id === route.id && state.open;
+  const open = !opens ? null : same && !moved ? same : { ...(same || openJob(route.id)), log: logAt(route) };
   const fresh = open && open !== state.open;
   set(withUi({ ...state, route, open }, moved ? { confirming: null, notice: null, again: null, renaming: null } : {}));
   if (moved) window.scrollTo(0, 0);
   if (route.view === "jobs" && state.session === "in") actions.openList(route.query);
   if (route.view !== "view") actions.closeViewer();
   else if (state.session === "in") actions.openViewer(route);
-  if (fresh && state.session === "in") refreshOpen().then(() => (state.jobs?.get(route.id)?.frames ? actions.openVideo(route.id) : null));
+  if (fresh && state.session === "in") refreshOpen().then(() => (route.view === "job" && state.jobs?.get(route.id)?.frames ? actions.openVideo(route.id) : null));
   else if (turned) {
     set(withOpen(state, { film: null }));
     showFrame();

@@ -21,7 +21,7 @@ const next = (list, value, by) => list[(list.indexOf(value) + by + list.length) 
 export function makeViewerActions({ get, set, attempt, api, snapshot }) {
   const sources = { a: null, b: null };
   let mixing = null; // of the first picture, if it has light groups
-  let pointing = 0;
+  const newest = { point: 0, survey: 0, figures: 0 }; // number of the latest question of each kind: its answer alone is shown
   const cubes = new Map(); // tables of views by name
 
   function change(more) {
@@ -87,13 +87,14 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
 
   /** The ends and the histogram of the layer that is shown, if it needs them. */
   async function survey() {
+    const mine = ++newest.survey;
     const { a, view, histogram } = get().viewer ?? {};
     if (!a) return;
     const layer = a.layer(view.layer);
     const kind = kindOf(layer);
     if (kind === "matte" || (kind !== "measure" && !histogram)) return;
     const found = await a.survey(layer.name, kBins).catch(() => null);
-    if (found && get().viewer?.a === a) set(withViewer(get(), { survey: { layer: layer.name, ...found } }));
+    if (found && mine === newest.survey && get().viewer?.a === a) set(withViewer(get(), { survey: { layer: layer.name, ...found } }));
   }
 
   function came(problem) {
@@ -102,6 +103,8 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
 
   async function openJob(which, id) {
     const { viewer: opened } = get();
+    /** Not if the viewer was closed meanwhile, or another picture was chosen to compare with. */
+    const wanted = () => get().viewer?.id === opened.id && (which === "a" || get().viewer.view.other === id);
     let meta;
     let light; // the module
     let plain = opened?.plain;
@@ -111,10 +114,10 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
       if (which === "a") plain = await bestLayer(id, meta);
     } catch (error) {
       if (error.status === 401) await attempt(() => Promise.reject(error));
-      else if (get().viewer?.id === opened?.id) set(withViewer(get(), { problem: error.message }));
+      else if (wanted()) set(withViewer(get(), { problem: error.message }));
       return;
     }
-    if (get().viewer === null || get().viewer.id !== opened.id) return;
+    if (!wanted()) return;
     sources[which]?.close();
     const plainSource = new PixelSource(meta, (layer, level, rect) => api.pixels(id, layer, level, rect), came);
     sources[which] = light ? new light.MixedSource(plainSource) : plainSource;
@@ -168,6 +171,7 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
   }
 
   async function compareFile(file) {
+    const { viewer: opened } = get();
     let source;
     try {
       source = await openFile(file);
@@ -175,6 +179,7 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
       set(withViewer(get(), { refused: `${file.name}: ${error.message}` }));  // not `problem`, which goes when pixels of the job come
       return;
     }
+    if (get().viewer?.id !== opened.id) return;
     sources.b?.close();
     sources.b = source;
     change({ b: source, file: file.name, refused: null, view: { ...get().viewer.view, other: null } });
@@ -183,8 +188,7 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
 
   /** The values under the pointer, and their standard error: of whatever came last, if several are under way. */
   async function point(pixel) {
-    pointing += 1;
-    const mine = pointing;
+    const mine = ++newest.point;
     const { a, b, view } = get().viewer;
     if (!pixel || !a) {
       set(withViewer(get(), { probe: pixel && { pixel } }));
@@ -193,7 +197,7 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
     const of = (source, name) => (source?.layer(name).name === name ? source.pixel(source.layer(name), ...pixel).catch(() => null) : null);
     const errors = { rgb: "stderr", mix: "mix.stderr" };
     const [values, error, samples, second] = await Promise.all([of(a, view.layer), errors[view.layer] ? of(a, errors[view.layer]) : null, of(a, "spp"), of(b, view.layer)]);
-    if (mine === pointing && get().viewer) set(withViewer(get(), { probe: { pixel, layer: view.layer, values, error, samples: samples?.[0], second } }));
+    if (mine === newest.point && get().viewer) set(withViewer(get(), { probe: { pixel, layer: view.layer, values, error, samples: samples?.[0], second } }));
   }
 
   async function pick(pixel) {
@@ -210,10 +214,11 @@ export function makeViewerActions({ get, set, attempt, api, snapshot }) {
 
   /** Of the region that is framed: its mean, error, and how far the second picture is from the first. */
   async function refreshFigures() {
-    const { a, b, view } = get().viewer;
-    if (!view.region || !a) return;
+    const mine = ++newest.figures;
+    const { a, b, view } = get().viewer ?? {};
+    if (!view?.region || !a) return;
     const figures = await regionFigures(a, b, view.region, a.layer(view.layer).name === "mix" ? ["mix", "mix.stderr"] : ["rgb", "stderr"]).catch(() => null);
-    if (get().viewer?.view.region === view.region) set(withViewer(get(), { figures }));
+    if (mine === newest.figures && get().viewer?.view.region === view.region) set(withViewer(get(), { figures }));
   }
 
   function frame(region) {

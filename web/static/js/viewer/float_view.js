@@ -358,7 +358,11 @@ class FloatView extends HTMLElement {
     else if (event.key === "0") this.#viewed({ zoom: null });
     else if (event.key === "z") this.#viewed(zoomed(view, size, frame, 1 / zoomOf(view, size, frame)));
     else if (event.key === "Enter" && this.#pixel(middle)) this.#tell("picked", this.#pixel(middle));
-    else if (event.key === "r") this.#tell("framed", this.#model.region ? null : this.#regionOf([0, 0], [frame.width, frame.height]));
+    else if (event.key === "r") {
+      const region = this.#model.region ? null : this.#regionOf([0, 0], [frame.width, frame.height]);
+      this.#model = { ...this.#model, region }; // a second press may come before the page is drawn
+      this.#tell("framed", region);
+    }
     else if (event.key.length === 1) this.#tell("command", event.key);
     else return false;
     return true;

@@ -17,6 +17,7 @@ const kFreshPauseMs = 2000; // between two questions for the error of a mix of a
 export function makeMixing({ h, layers, get, show, look, settled, job }) {
   const groups = groupsOf(layers);
   let [timer, asked] = [0, 0];
+  let rendering = false;
   const rows = () => rowsOf(get().view.mix, groups);
   const json = () => JSON.stringify(mixOf(rows(), groups));
 
@@ -52,12 +53,15 @@ export function makeMixing({ h, layers, get, show, look, settled, job }) {
     alter: (name, more) => actions.set(withRow(rows(), name, more(rowOf(rows(), name)))),
     reset: () => change([], { layer: get().plain }),
     async render() {
+      if (rendering) return; // pressed twice: one job is enough
+      rendering = true;
       show({ mixRefused: null });
       try {
         await job.again(json());
       } catch (error) {
         show({ mixRefused: error.message });
       }
+      rendering = false;
     },
     async load(file) {
       try {

@@ -20,7 +20,7 @@ export function framesStrip(state, job, actions) {
   const over = isOver(job);
   const some = list.slice(first, first + kMost);
   const shown = list[at];
-  return h("nav", { key: "frames", class: "panel frames", "aria-label": "Frames", onkeydown: (event) => onKey(event, job, list, at, actions) },
+  return h("nav", { key: "frames", class: "panel frames", "aria-label": "Frames", onkeydown: (event) => onKey(event, job, actions) },
     h("p", { class: "frames-head" },
       h("b", null, shown ? `Frame ${shown.frame}` : "Frames"),
       h("span", { class: "dim" }, tally(frames)),
@@ -82,12 +82,12 @@ function player(state, job, list, at, actions) {
 }
 
 /** Space plays, the arrows step; a slider and a list of choices have their own use of arrows. */
-function onKey(event, job, list, at, actions) {
+function onKey(event, job, actions) {
   if (event.ctrlKey || event.metaKey || event.altKey) return;
   const { localName } = event.target;
   const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
   if (event.key === " " && localName !== "button" && localName !== "select" && doneFrames(job).length > 1) actions.playFilm();
-  else if (by && localName !== "input" && localName !== "select" && list[at + by]) actions.showFrameOf(job.id, list[at + by].frame);
+  else if (by && localName !== "input" && localName !== "select") actions.stepFrame(by);
   else return;
   event.preventDefault();
 }

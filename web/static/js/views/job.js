@@ -108,7 +108,7 @@ function failure(job) {
 const logOf = (job, { log }, actions) => h("details", { key: `log ${job.id}`, class: "panel job-log", ontoggle: (event) => (event.currentTarget.open ? actions.openLog(job.id) : actions.closeLog()) },
   h("summary", null, "Log"),
   logLines(log),
-  h("p", { class: "log-tools" }, logAgain(job, log, actions), h("a", { key: "page", class: "button small", href: logHref(job.id) }, "Open as a page")));
+  log === null ? null : h("p", { key: "tools", class: "log-tools" }, logAgain(job, log, actions), h("a", { key: "page", class: "button small", href: logHref(job.id) }, "Open as a page")));
 
 function downloadLinks(job, state) {
   const { open } = state;

@@ -11,7 +11,7 @@ import { boxOf, drawing, frameOf } from "./plot_drawing.js";
 const kClocks = [["seconds", "Wall time"], ["core_seconds", "Core time"]];
 const kSince = { seconds: "after the first ray", core_seconds: "of core time" };
 
-/** open: {clock, picked, report}; actions: pick(index or null), setClock(key). narrow: the page is as wide as a phone. */
+/** open: {clock, picked, report}; actions: pickPoint(index, null, or what gives one from that of before), setClock(key). narrow: the page is as wide as a phone. */
 export function errorPlot(job, { clock, picked, report }, actions, narrow) {
   const points = drawable(report?.convergence, clock);
   const plot = { points, key: clock, target: denoisedTarget(job) ? null : job.target_error ?? report?.target_error ?? null, ahead: aheadOf(job, report, clock), narrow };
@@ -48,8 +48,8 @@ function figureOf(plot, actions) {
     h("svg", {
       viewBox: `0 0 ${frame.box.width} ${frame.box.height}`, "aria-label": summary(plot), tabindex: 0,
       role: "slider", "aria-valuemin": 1, "aria-valuemax": points.length, "aria-valuenow": chosen + 1, "aria-valuetext": spoken(points[chosen], key),
-      onpointermove: (event) => actions.pick(nearest(event, points, key, frame)), onpointerleave: () => actions.pick(null),
-      onkeydown: (event) => actions.pick(stepped(event, chosen, points.length)), onblur: () => actions.pick(null),
+      onpointermove: (event) => actions.pickPoint(nearest(event, points, key, frame)), onpointerleave: () => actions.pickPoint(null),
+      onkeydown: (event) => step(event, points.length, actions), onblur: () => actions.pickPoint(null),
     }, drawing(plot, frame)),
     h("figcaption", { class: "plot-reading" }, reading(points[chosen], plot), forecastText(plot)));
 }
@@ -61,12 +61,12 @@ function nearest(event, points, key, { x, box }) {
   return points.reduce((best, p, i) => (distance(p) < distance(points[best]) ? i : best), 0);
 }
 
-/** The arrow keys walk along the points; Home and End go to the first and the last. */
-function stepped(event, chosen, count) {
-  const to = { ArrowLeft: chosen - 1, ArrowDown: chosen - 1, ArrowRight: chosen + 1, ArrowUp: chosen + 1, Home: 0, End: count - 1 }[event.key];
-  if (to === undefined) return chosen;
+/** The arrow keys walk along the points, from the one that is chosen by now; Home and End go to the first and the last. */
+function step(event, count, actions) {
+  const by = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, Home: -count, End: count }[event.key];
+  if (by === undefined) return;
   event.preventDefault();
-  return Math.min(count - 1, Math.max(0, to));
+  actions.pickPoint((picked) => Math.min(count - 1, Math.max(0, (picked < count && picked !== null ? picked : count - 1) + by)));
 }
 
 const spoken = (point, key) => `relMSE ${figure(point.relmse)} after ${duration(point[key])}`;

@@ -90,7 +90,7 @@ function tools(viewer, layer, displays, actions) {
         oninput: (event) => actions.look({ exposure: Number(event.currentTarget.value) }), ondblclick: () => actions.look({ exposure: 0 }) }),
       h("output", { for: "ev", class: "number" }, exposureText(view.exposure))),
     pick("curve", "View", curvesOf(displays), curveOf(view.curve, displays), (curve) => actions.look({ curve }), !coloured || view.falseColour),
-    h("label", { key: "false", class: "check" }, h("input", { type: "checkbox", id: "false", disabled: !coloured && kindOf(layer) !== "measure", ".checked": view.falseColour, onchange: () => actions.look({ falseColour: !view.falseColour }) }), "False colours"),
+    h("label", { key: "false", class: "check" }, h("input", { type: "checkbox", id: "false", disabled: !coloured && kindOf(layer) !== "measure", ".checked": view.falseColour, onchange: (event) => actions.look({ falseColour: event.currentTarget.checked }) }), "False colours"),
     layer.channels.length > 1 && kindOf(layer) !== "matte" ? pick("channel", "Channels", [["", "all"], ...layer.channels.slice(0, 3).map((name, i) => [String(i), name])], view.channel === null ? "" : String(view.channel), (value) => actions.look({ channel: value === "" ? null : Number(value) })) : null,
     pick("overlay", "Overlay", overlaysOf(layer), view.overlay, (overlay) => actions.look({ overlay })),
     choice("tool", "What dragging does", [["pan", "Move"], ["region", "Region"]], viewer.tool, actions.setTool),
