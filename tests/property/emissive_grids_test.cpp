@@ -78,7 +78,7 @@ TEST(EmissiveGrids, GiveTheSameImageAsPathsThatMeetTheirLight) {
                           {"fire across haze that glows", {}, overlap},
                           {"fire and a ball that reflections do not show", {}, unseen},
                           {"fire torn by noise", {}, torn_emission},
-                          {"fire by absorption torn by noise", {.absorbed = true}, torn_source},
+                          {"fire by absorption torn by noise", {.absorbed = true}, torn_source, "", 64},
                           {"fire in fog that falls with height", {.fog = true}, falling_fog, "height", 96}};
   const double level = tests.level(std::size(rivals) * kQuarters);
   for (const Rival& rival : rivals) {

@@ -62,8 +62,8 @@ class HeightRay {
     if (climb_ == 0) return x * std::exp(level_);
     const double ground = -level_ / climb_, above = depth(ground);
     if (x >= above) return ground + (x - above);
-    // e^(-climb t) - 1 = -climb x e^level. The logarithms are taken before the exponential can overflow or the
-    // product underflow.
+    // e^(-climb t) - 1 = -climb x e^level. The logarithms are taken before the exponential can overflow or
+    // the product underflow.
     const double y = x * std::exp(level_), growth = -climb_ * y;
     if (growth < kTiny) return y;
     if (growth < kHuge) return std::log1p(growth) / -climb_;

@@ -174,7 +174,7 @@ inline float transmittance_ratio(float sigma_c, float sigma_hero, float length) 
 // Sets the weight and the densities of a flight whose end is set. depth() returns the integral of the density
 // along the flight, where the coefficients are those at the density 1.
 template <bool kChromatic, class Depth>
-[[gnu::always_inline]] inline void weigh(Flight& f, const Medium& m, int hero, const Depth& depth) {
+void weigh(Flight& f, const Medium& m, int hero, const Depth& depth) {
   const float s = m.sigma_t[hero];
   if constexpr (kChromatic) {
     const float length = depth();
