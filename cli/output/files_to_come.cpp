@@ -34,7 +34,7 @@ std::optional<FileState> file_state(const std::string& path) {
 }
 
 Result<FilesToCome> FilesToCome::of(const std::vector<std::string>& patterns,
-                                      const std::optional<FrameRange>& frames) {
+                                    const std::optional<FrameRange>& frames) {
   FilesToCome files;
   std::set<std::string> known;
   const auto add = [&](const std::string& path) {
@@ -45,7 +45,8 @@ Result<FilesToCome> FilesToCome::of(const std::vector<std::string>& patterns,
     if (std::filesystem::is_directory(pattern, error))
       return bad_pattern("{}: that is a folder; name the last file that is written to it", pattern);
     const bool numbered_name = has_frame_number(pattern) && !std::filesystem::exists(pattern, error);
-    if (!numbered_name) add(pattern);
+    if (!numbered_name)
+      add(pattern);
     else if (frames)
       for (const std::uint32_t frame : frames->frames()) add(numbered(pattern, frame));
     else
@@ -70,7 +71,7 @@ std::vector<std::string> FilesToCome::look(
 }
 
 Result<void> wait_for_files(const std::vector<std::string>& patterns, const std::optional<FrameRange>& frames,
-                         const std::function<void(const std::string&)>& note) {
+                            const std::function<void(const std::string&)>& note) {
   auto files = FilesToCome::of(patterns, frames);
   if (!files) return tl::unexpected(files.error());
   const SystemClock clock;

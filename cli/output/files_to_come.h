@@ -21,18 +21,20 @@ struct FileState {
 // The size and time of a file; nothing if it is not there or cannot be looked at.
 std::optional<FileState> file_state(const std::string& path);
 
-// A file is complete once it has had content, and neither its size nor its time has changed, for kQuietSeconds. Times are
-// those of any steady clock, in seconds.
+// A file is complete once it has had content, and neither its size nor its time has changed, for
+// kQuietSeconds. Times are those of any steady clock, in seconds.
 class FilesToCome {
  public:
   static constexpr double kQuietSeconds = 5;
 
-  // `patterns`: paths in which # stands for the frame number, as in numbered(), if there are `frames`. Returns
-  // invalid_argument for a folder, and for a pattern without frames whose name has a run of #.
-  static Result<FilesToCome> of(const std::vector<std::string>& patterns, const std::optional<FrameRange>& frames);
+  // `patterns`: paths in which # stands for the frame number, as in numbered(), if there are `frames`.
+  // Returns invalid_argument for a folder, and for a pattern without frames whose name has a run of #.
+  static Result<FilesToCome> of(const std::vector<std::string>& patterns,
+                                const std::optional<FrameRange>& frames);
 
   // Looks at the files that were not complete before. Returns those that still are not, in order.
-  std::vector<std::string> look(double now, const std::function<std::optional<FileState>(const std::string&)>& state);
+  std::vector<std::string> look(double now,
+                                const std::function<std::optional<FileState>(const std::string&)>& state);
 
  private:
   struct Seen {
@@ -45,6 +47,6 @@ class FilesToCome {
 
 // Returns once all these files are complete. Tells `note` what is waited for whenever that changes.
 Result<void> wait_for_files(const std::vector<std::string>& patterns, const std::optional<FrameRange>& frames,
-                         const std::function<void(const std::string&)>& note);
+                            const std::function<void(const std::string&)>& note);
 
 }  // namespace ls::cli

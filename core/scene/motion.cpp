@@ -22,8 +22,9 @@ Quaternion normalized(const Quaternion& q) {
 Vec3 scaled(const Vec3& v, double s) { return {{v[0] * s, v[1] * s, v[2] * s}}; }
 double length(const Vec3& v) { return std::hypot(v[0], v[1], v[2]); }
 
-// The quaternion of the rotation whose matrix has these columns. The largest of the four components is computed first,
-// from its square, so that none is divided by a small one (Shepperd, "Quaternion from rotation matrix", 1978).
+// The quaternion of the rotation whose matrix has these columns. The largest of the four components is
+// computed first, from its square, so that none is divided by a small one (Shepperd, "Quaternion from
+// rotation matrix", 1978).
 Quaternion quaternion(const Vec3& x, const Vec3& y, const Vec3& z) {
   const double trace = x[0] + y[1] + z[2];
   if (trace >= std::max({x[0], y[1], z[2]}))
@@ -94,7 +95,8 @@ Transform Motion::pose_of(const Parts& parts) {
 }
 
 Motion::Parts Motion::between(const Parts& a, const Parts& b, double t) {
-  return {mixed(a.scale, b.scale, t), slerp(a.rotation, b.rotation, t), mixed(a.translation, b.translation, t)};
+  return {mixed(a.scale, b.scale, t), slerp(a.rotation, b.rotation, t),
+          mixed(a.translation, b.translation, t)};
 }
 
 Motion::Motion(std::span<const MotionKey> keys) : keys_(keys.begin(), keys.end()) {
@@ -102,11 +104,12 @@ Motion::Motion(std::span<const MotionKey> keys) : keys_(keys.begin(), keys.end()
 }
 
 Transform Motion::at(double time) const {
-  const auto after =
-      std::upper_bound(keys_.begin(), keys_.end(), time, [](double t, const MotionKey& k) { return t < k.time; });
+  const auto after = std::upper_bound(keys_.begin(), keys_.end(), time,
+                                      [](double t, const MotionKey& k) { return t < k.time; });
   if (after == keys_.begin()) return keys_.front().to_world;
   const MotionKey& before = after[-1];
-  if (after == keys_.end() || before.time == time || before.to_world == after->to_world) return before.to_world;
+  if (after == keys_.end() || before.time == time || before.to_world == after->to_world)
+    return before.to_world;
   const auto i = static_cast<std::size_t>(after - keys_.begin());
   return pose_of(between(parts_[i - 1], parts_[i], (time - before.time) / (after->time - before.time)));
 }
@@ -119,7 +122,8 @@ std::vector<MotionKey> motion_during(const Motion& motion, double open, double c
     if (key.time > open && key.time < close) during.push_back(key);
   during.push_back({close, motion.at(close)});
   const Transform& first = during.front().to_world;
-  if (std::all_of(during.begin(), during.end(), [&](const MotionKey& k) { return k.to_world == first; })) return {};
+  if (std::all_of(during.begin(), during.end(), [&](const MotionKey& k) { return k.to_world == first; }))
+    return {};
   for (MotionKey& key : during) key.time = (key.time - open) / (close - open);
   // Rounding may give neighbours the same time; each then gets the next one, so that a jump stays a jump.
   during.back().time = 1;

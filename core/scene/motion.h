@@ -9,8 +9,8 @@
 
 namespace ls::scene {
 
-// True if the transform only scales along its own axes (and may mirror), turns and moves, and can be inverted. Its axes may
-// be off a right angle by a thousandth of a radian, which is lost where it moves.
+// True if the transform only scales along its own axes (and may mirror), turns and moves, and can be
+// inverted. Its axes may be off a right angle by a thousandth of a radian, which is lost where it moves.
 bool can_move(const Transform& t);
 
 // A motion with its transforms taken apart, for the poses between its keys.
@@ -22,14 +22,15 @@ class Motion {
 
   bool empty() const { return keys_.empty(); }
   std::span<const MotionKey> keys() const { return keys_; }
-  // Returns the pose at this time: at a key its transform, bit for bit. Between two keys, scale and place are interpolated
-  // linearly, and the turn at a constant rate along the shorter way (slerp: Shoemake, "Animating rotation with quaternion
-  // curves", SIGGRAPH 1985), as in Mitsuba 3. Before the first key and after the last one nothing moves. Not if empty().
+  // Returns the pose at this time: at a key its transform, bit for bit. Between two keys, scale and place are
+  // interpolated linearly, and the turn at a constant rate along the shorter way (slerp: Shoemake, "Animating
+  // rotation with quaternion curves", SIGGRAPH 1985), as in Mitsuba 3. Before the first key and after the
+  // last one nothing moves. Not if empty().
   Transform at(double time) const;
 
  private:
   struct Parts {
-    Vec3 scale;  // the first is negative if the transform mirrors
+    Vec3 scale;                      // the first is negative if the transform mirrors
     std::array<double, 4> rotation;  // a unit quaternion x, y, z, w
     Vec3 translation;
   };
@@ -41,8 +42,8 @@ class Motion {
   std::vector<Parts> parts_;  // of each key
 };
 
-// Returns the part of a motion that happens between two times, with the times of the result from 0 to 1. Empty if nothing
-// moves between them.
+// Returns the part of a motion that happens between two times, with the times of the result from 0 to 1.
+// Empty if nothing moves between them.
 std::vector<MotionKey> motion_during(const Motion& motion, double open, double close);
 
 }  // namespace ls::scene

@@ -125,10 +125,10 @@ struct MotionKey {
   Transform to_world;
   bool operator==(const MotionKey&) const = default;
 };
-struct Sensor {  // looks along the +z axis of to_world, with +y up and +x to the LEFT, as in Mitsuba
+struct Sensor {        // looks along the +z axis of to_world, with +y up and +x to the LEFT, as in Mitsuba
   Transform to_world;  // of a camera that moves: in the middle of the exposure
-  // Of a camera that moves during the exposure: in the order of times, the first at 0 and the last at 1, and the shutter
-  // is open from 0 to 1. Otherwise there are no keys, and the shutter opens and closes at 0.
+  // Of a camera that moves during the exposure: in the order of times, the first at 0 and the last at 1, and
+  // the shutter is open from 0 to 1. Otherwise there are no keys, and the shutter opens and closes at 0.
   std::vector<MotionKey> motion;
   double shutter_open = 0, shutter_close = 0;
   double fov = 50;  // in degrees, along fov_axis

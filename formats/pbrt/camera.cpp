@@ -199,8 +199,8 @@ class SettingsTranslator {
   // Mirrors the camera: pbrt's has +x on the right, ours on the left.
   static Transform facing(const Transform& world) { return multiply(world, scaled(Vec3{{-1, 1, 1}}).to); }
 
-  // Places a camera. place_of(m): its to_world, where m is the matrix from camera to world. It is an <animation> if the
-  // camera moves.
+  // Places a camera. place_of(m): its to_world, where m is the matrix from camera to world. It is an
+  // <animation> if the camera moves.
   template <class F>
   void place_camera(Element& out, Params& p, F place_of) {
     const Transform start = place_of(s_.camera_ctm.from);
@@ -217,8 +217,10 @@ class SettingsTranslator {
     add(out, std::move(animation));
     if (const double end = without_scale(s_.camera_end_ctm.from).scale;
         std::abs(end / without_scale(s_.camera_ctm.from).scale - 1) > 1e-6 && p.has("lensradius"))
-      t_.warn_once(p.at(), "the scale of this camera changes while the shutter is open: its lens keeps the size and the "
-                           "focus of the beginning");
+      t_.warn_once(
+          p.at(),
+          "the scale of this camera changes while the shutter is open: its lens keeps the size and the "
+          "focus of the beginning");
     add(out, "shutter_open", p.number("shutteropen", 0), p.at());
     add(out, "shutter_close", p.number("shutterclose", 1), p.at());
   }

@@ -411,15 +411,16 @@ class Loader {
   // Warns of shapes that move. Lights and media are where they are at StartTime in pbrt, too.
   void place_still(const Token& d) {
     if (now_.ctm.to != now_.end_ctm.to)
-      t_.warn_once(d.at, fmt::format("this {} moves in pbrt; it is shown where it is at StartTime: only cameras move",
-                                     d.text));
+      t_.warn_once(
+          d.at, fmt::format("this {} moves in pbrt; it is shown where it is at StartTime: only cameras move",
+                            d.text));
   }
   void transform_times(const Token& d) {
     const auto n = numbers(d, 2);
     if (!n) return;
     if (!((*n)[0] < (*n)[1]))
-      return report_.error(d.at, fmt::format("TransformTimes end at {} and begin at {}: let them end later", (*n)[1],
-                                             (*n)[0]));
+      return report_.error(d.at, fmt::format("TransformTimes end at {} and begin at {}: let them end later",
+                                             (*n)[1], (*n)[0]));
     start_time_ = (*n)[0];
     end_time_ = (*n)[1];
   }

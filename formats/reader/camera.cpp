@@ -83,13 +83,15 @@ std::vector<MotionKey> Reader::read_keys(const Element& animation, Projection pr
   for (const Element& e : animation.children) {
     const auto time = parse_number(e.get("time"));
     if (!time || !(std::abs(*time) <= kMaxTime)) {
-      report_.error(value_place(e, "time"), fmt::format("'time' wants a number of at most {:g} in size, not \"{}\"",
-                                                        kMaxTime, e.get("time")));
+      report_.error(
+          value_place(e, "time"),
+          fmt::format("'time' wants a number of at most {:g} in size, not \"{}\"", kMaxTime, e.get("time")));
       continue;
     }
     if (!keys.empty() && !(*time > keys.back().time))
-      report_.error(value_place(e, "time"), fmt::format("the times of an <animation> must ascend: {} comes after {}",
-                                                        *time, keys.back().time));
+      report_.error(
+          value_place(e, "time"),
+          fmt::format("the times of an <animation> must ascend: {} comes after {}", *time, keys.back().time));
     const Transform to_world = read_transform(e, report_);
     if (!check_place(e, to_world, projection)) continue;
     if (!can_move(to_world)) {
@@ -97,8 +99,10 @@ std::vector<MotionKey> Reader::read_keys(const Element& animation, Projection pr
       continue;
     }
     if (!keys.empty() && (determinant3(to_world) < 0) != (determinant3(keys.front().to_world) < 0))
-      report_.error(e.at, "this transform mirrors and the first one does not, or the other way round: between them the "
-                          "camera would be flat");
+      report_.error(
+          e.at,
+          "this transform mirrors and the first one does not, or the other way round: between them the "
+          "camera would be flat");
     keys.push_back({*time, to_world});
     if (keys.size() > kMaxMotionKeys) {
       report_.error(e.at, fmt::format("an <animation> of more than {} transforms", kMaxMotionKeys));
@@ -117,12 +121,14 @@ void Reader::read_motion(const Element& animation, const Element& e, Sensor& s) 
                                            s.shutter_close, s.shutter_open));
   if (report_.has_errors()) return;
   if (s.shutter_open == s.shutter_close && motion.keys().size() > 1)
-    report_.warning(animation.at, fmt::format("the camera stands where it is at {}, since the shutter opens and closes "
-                                              "then: give shutter_open and shutter_close",
-                                              s.shutter_open));
+    report_.warning(animation.at,
+                    fmt::format("the camera stands where it is at {}, since the shutter opens and closes "
+                                "then: give shutter_open and shutter_close",
+                                s.shutter_open));
   s.motion = motion_during(motion, s.shutter_open, s.shutter_close);
   if (s.motion.size() > kMaxMotionKeys)
-    return report_.error(animation.at, fmt::format("more than {} transforms are within the exposure", kMaxMotionKeys));
+    return report_.error(animation.at,
+                         fmt::format("more than {} transforms are within the exposure", kMaxMotionKeys));
   s.to_world = s.motion.empty() ? motion.at(s.shutter_open) : Motion(s.motion).at(.5);
   s.shutter_open = 0, s.shutter_close = 1;
 }

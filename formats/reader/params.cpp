@@ -152,7 +152,9 @@ std::optional<std::string> Params::take_string(std::string_view name) {
 }
 
 const Element* Params::take_animation(std::string_view name) {
-  const auto of_name = [&](const Child& c) { return c.name == name && !c.taken && c.element->tag == "animation"; };
+  const auto of_name = [&](const Child& c) {
+    return c.name == name && !c.taken && c.element->tag == "animation";
+  };
   return std::any_of(children_.begin(), children_.end(), of_name) ? take(name) : nullptr;
 }
 
@@ -274,7 +276,8 @@ const Element* Params::object_at(const Element& e) {
 void Params::convert(const Field& f, const Element& e, Transform& value) {
   if (e.tag == "animation")
     return reader_.report().error(
-        e.at, fmt::format("'{}' of {} is an <animation>: only cameras can move; give a <transform>", f.name, title()));
+        e.at, fmt::format("'{}' of {} is an <animation>: only cameras can move; give a <transform>", f.name,
+                          title()));
   if (e.tag != "transform") return wrong_type(f.name, e, "a <transform>");
   value = read_transform(e, reader_.report());
 }

@@ -378,8 +378,8 @@ class Writer {
   void property(const Field& f, const std::vector<MotionKey>& keys) {
     line(fmt::format("<animation name=\"{}\">", f.name));
     for (const MotionKey& key : keys)
-      line(fmt::format("  <transform time=\"{}\"><matrix value=\"{}\"/></transform>", shortest_number(key.time),
-                       numbers(key.to_world.m)));
+      line(fmt::format("  <transform time=\"{}\"><matrix value=\"{}\"/></transform>",
+                       shortest_number(key.time), numbers(key.to_world.m)));
     line("</animation>");
   }
   void property(const Field& f, const UvTransform& x) {

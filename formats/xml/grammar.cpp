@@ -99,7 +99,8 @@ class StructureChecker {
     if (kind == TagKind::unknown) return;
     if (kind == TagKind::animation) {
       if (row.kind != TagKind::transform)
-        report_.error(e.at, fmt::format("<{}> can't stand in <animation>: only <transform time=\"...\"> can", e.tag));
+        report_.error(
+            e.at, fmt::format("<{}> can't stand in <animation>: only <transform time=\"...\"> can", e.tag));
       return;
     }
     const bool step = row.kind == TagKind::step;

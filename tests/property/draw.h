@@ -46,6 +46,7 @@ class Draw {
   template <class T>
   void field(const scene::Field& f, T& x) {
     if (f.derived && f.given_as.empty()) return;
+    if (f.name.starts_with("shutter_")) return;                            // drawn with the camera's motion
     if (f.wrong == wrong_link_sets || f.wrong == wrong_link_list) return;  // drawn for the scene as a whole
     // Half of what can be left out is.
     if (!f.required && dice_.chance(.4) && !is_index(x)) return;
@@ -92,6 +93,7 @@ class Draw {
   void draw(const scene::Field&, AssetIndex&) {}  // by whoever knows what the file is for
   void draw(const scene::Field&, GroupIndex&) {}
   void draw(const scene::Field&, MeterIndex&) {}
+  void draw(const scene::Field&, std::vector<MotionKey>&) {}  // by random_scene.cpp, which knows the camera
   template <class T>
   void draw(const scene::Field& f, std::optional<T>& x) {
     draw(f, x.emplace());

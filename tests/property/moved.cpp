@@ -64,10 +64,12 @@ void move(const Mover& m, Sensor& s) {
     // Its near plane is where to_world puts it; from there rays reach far - near.
     s.far_clip = s.near_clip + (s.far_clip - s.near_clip) * m.length();
     m.place(s.to_world);
+    for (MotionKey& key : s.motion) m.place(key.to_world);
   } else {
     s.near_clip *= m.length();
     s.far_clip *= m.length();
     m.place_rigid(s.to_world);
+    for (MotionKey& key : s.motion) m.place_rigid(key.to_world);
   }
 }
 

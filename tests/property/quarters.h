@@ -51,8 +51,8 @@ Quarters quarters_of(int seeds, Image&& image_of) {
   return all;
 }
 inline Quarters quarters_of(const SceneBuilder& builder, std::uint64_t spp, int seeds, std::uint64_t first) {
-  return quarters_of(seeds,
-                     [&](int i) { return quarter_image(builder, spp, first + static_cast<std::uint64_t>(i)); });
+  return quarters_of(
+      seeds, [&](int i) { return quarter_image(builder, spp, first + static_cast<std::uint64_t>(i)); });
 }
 
 // Fails if the means of two ways to render the same image, each over `seeds` images, differ at this level.

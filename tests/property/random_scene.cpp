@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "core/scene/motion.h"
 #include "core/scene/schema/validate.h"
 #include "tests/property/draw.h"
 
@@ -27,6 +28,7 @@ class Composer {
     integrator();
     if (draw_.wild()) scene_.sample_count = static_cast<std::uint64_t>(dice_.extreme({1, 1e6}));
     links();
+    motion();
   }
 
  private:
@@ -168,6 +170,20 @@ class Composer {
     if (s.near_clip >= s.far_clip) s.far_clip = s.near_clip * 2;
     if (s.near_clip >= s.far_clip) s.near_clip = 1e-2, s.far_clip = 1e4;
     if (!dice_.chance(.1)) s.medium.reset();
+  }
+  // Some cameras move: from where they are to elsewhere, by way of a third pose.
+  void motion() {
+    if (!dice_.chance(.1)) return;
+    Sensor& s = scene_.sensor;
+    const double far = dice_.chance(.3) ? 2 : .1;
+    Transform end = s.to_world, middle;
+    end.m[3] += far * dice_.gauss();
+    end.m[7] += far * dice_.gauss();
+    aim(middle);
+    if (dice_.chance(.7)) middle = end;
+    s.motion = {{0, s.to_world}, {dice_.between(.1, .9), middle}, {1, end}};
+    s.shutter_close = 1;
+    s.to_world = scene::Motion(s.motion).at(.5);
   }
   // What each kind of camera knows; the rest as it is when it is not given.
   void draw_sensor(const Sensor& drawn, Sensor& s) {

@@ -197,7 +197,8 @@ class Words {
       return std::move(out_);
     }
     say("thin lens", n_.lens, "the aperture has a radius", "the camera is a pinhole");
-    say("camera motion", n_.camera_motion, "the camera moves while the shutter is open", "the camera stands still");
+    say("camera motion", n_.camera_motion, "the camera moves while the shutter is open",
+        "the camera stands still");
     say("crop of the frame", n_.crop, "part of the frame", "the whole frame");
     say("transparent film", n_.transparent_film, "the camera does not see the environment",
         "the environment is in the picture");

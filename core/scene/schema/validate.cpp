@@ -15,8 +15,8 @@
 #include "core/scene/schema/light_links.h"
 #include "core/scene/schema/phase_tables.h"
 #include "core/scene/schema/traits.h"
-#include "core/scene/transform.h"
 #include "core/scene/schema/volume_rules.h"
+#include "core/scene/transform.h"
 
 namespace ls::scene {
 namespace {
@@ -173,15 +173,17 @@ class ValueChecker {
     else if (count > 0 && s_.film != film_of_meters(count))
       wrong_ = "scene.film is not that of the scene's meters";
   }
-  // Checks that times ascend from 0 to 1, and that the camera can move by its keys and to_world is among its poses.
+  // Checks that times ascend from 0 to 1, and that the camera can move by its keys and to_world is among its
+  // poses.
   void check_motion(const Sensor& sensor) {
     const std::vector<MotionKey>& keys = sensor.motion;
     if (sensor.shutter_open != 0 || sensor.shutter_close != (keys.empty() ? 0 : 1))
       wrong_ = "scene.sensor has a shutter that is not that of its motion";
     if (keys.empty() || !wrong_.empty()) return;
     if (keys.size() < 2 || keys.size() > kMaxMotionKeys || keys.front().time != 0 || keys.back().time != 1) {
-      wrong_ = fmt::format("scene.sensor.motion must have 2 to {} keys, the first at time 0 and the last at 1",
-                           kMaxMotionKeys);
+      wrong_ =
+          fmt::format("scene.sensor.motion must have 2 to {} keys, the first at time 0 and the last at 1",
+                      kMaxMotionKeys);
       return;
     }
     const auto fail = [&](std::size_t i, std::string_view what) {

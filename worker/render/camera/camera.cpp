@@ -51,9 +51,7 @@ Camera::Pose Camera::pose(const Transform& to_world) const {
   return p;
 }
 
-Camera::Pose Camera::pose_at(float time) const {
-  return pose(motion_.at(double{time}));
-}
+Camera::Pose Camera::pose_at(float time) const { return pose(motion_.at(double{time})); }
 
 [[gnu::cold, gnu::noinline]] CameraRay Camera::ray_at(float time, double fx, double fy, V2 lens) const {
   CameraRay r = ray(pose_at(time), fx, fy, lens);
@@ -93,7 +91,8 @@ CameraRay Camera::ray(const Pose& pose, double fx, double fy, V2 lens) const {
   if (projection_ == Projection::spherical) return spherical_ray(pose, fx * per_pixel_x_, fy * per_pixel_y_);
   if (projection_ == Projection::orthographic) return orthographic_ray(pose, x, y);
   if (projection_ == Projection::meters) return meter_ray(fx, fy, lens);
-  return lens_ray(pose, x, y, textures_ ? aperture_at(fx * per_pixel_x_, fy * per_pixel_y_) : aperture_, lens);
+  return lens_ray(pose, x, y, textures_ ? aperture_at(fx * per_pixel_x_, fy * per_pixel_y_) : aperture_,
+                  lens);
 }
 
 // Returns the radius of the aperture for the film position (u, v): the radius that the sensor gives, times

@@ -20,8 +20,8 @@ namespace ls::render {
 using scene::tan_half_fov_x;
 
 struct CameraRay {
-  V3 o, d;      // d has unit length
-  float t_max;  // distance along the ray at which the camera clips it; may be infinite
+  V3 o, d;         // d has unit length
+  float t_max;     // distance along the ray at which the camera clips it; may be infinite
   float time = 0;  // of the exposure, from 0 to 1; set only if the camera moves
   // Set if a meter measures along this ray. If the meter has a plate, o is on the plate, and the ray meets
   // the plate at once: its normal is -d.
@@ -41,8 +41,8 @@ class Camera {
       : projection_(Projection::meters), pinhole_(false), meters_(&meters), world_(&world) {}
 
   // Returns the ray through the position (fx, fy) of the whole frame, in pixels from its top left corner.
-  // `lens`, in [0, 1)^2, chooses the point on the lens; a camera without a lens ignores it. Of a camera that moves it is
-  // the ray in the middle of the exposure.
+  // `lens`, in [0, 1)^2, chooses the point on the lens; a camera without a lens ignores it. Of a camera that
+  // moves it is the ray in the middle of the exposure.
   CameraRay ray(double fx, double fy, V2 lens) const { return ray(pose_, fx, fy, lens); }
   // Returns the ray of a camera that moves at a time of the exposure, from 0 to 1.
   CameraRay ray_at(float time, double fx, double fy, V2 lens) const;
@@ -82,7 +82,7 @@ class Camera {
   float aperture_at(double u, double v) const;
 
   Projection projection_ = Projection::perspective;
-  bool pinhole_ = true;           // true for a perspective camera without a lens
+  bool pinhole_ = true;  // true for a perspective camera without a lens
   V3d center_;
   double scale_ = 1;
   Pose pose_;  // of a camera that moves: in the middle of the exposure

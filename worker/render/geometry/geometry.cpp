@@ -65,7 +65,9 @@ template <class V>
   hit.reach = s.reach > 0 ? s.reach : g.reach_of(i);
   if (!(std::min(1 - b.u - b.v, std::min(b.u, b.v)) > s.edge))
     keep_from_edges(e1, e2, twice_area, hit.reach, b);
-  hit.t = static_cast<float>(b.t);
+  // The BVH computes in float32: to it, a surface just behind the origin may lie before it. A negative
+  // distance would take light away.
+  hit.t = std::max(0.f, static_cast<float>(b.t));
   hit.p = V3(v0 + e1 * b.u + e2 * b.v);
   hit.ng = V3(n * (s.orientation / twice_area));
   const auto u = static_cast<float>(b.u), v = static_cast<float>(b.v), w = 1 - u - v;

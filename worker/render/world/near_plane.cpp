@@ -102,15 +102,18 @@ Result<void> check_way_of_camera(const World& w) {
   for (const Track& track : tracks) {
     const auto begin_at = [&](int step) {
       const auto time = static_cast<float>(step) / kSteps;
-      return hidden_part(w, w.camera.ray_at(time, track.x * w.frame.width, track.y * w.frame.height, track.lens)).start;
+      return hidden_part(w,
+                         w.camera.ray_at(time, track.x * w.frame.width, track.y * w.frame.height, track.lens))
+          .start;
     };
     V3 from = begin_at(0);
     for (int step = 1; step <= kSteps; ++step) {
       const V3 to = begin_at(step);
       if (passes_boundary(w, from, to))
-        return fail(Errc::invalid_argument,
-                    "the camera moves through the boundary of a medium while the shutter is open, but its rays begin "
-                    "in one medium: let its animation end before the boundary, or begin behind it");
+        return fail(
+            Errc::invalid_argument,
+            "the camera moves through the boundary of a medium while the shutter is open, but its rays begin "
+            "in one medium: let its animation end before the boundary, or begin behind it");
       from = to;
     }
   }

@@ -11,9 +11,9 @@ namespace ls::render {
 // nothing else.
 bool near_plane_hides_boundaries(const World& w);
 
-// Returns an error if a camera that moves passes a boundary of a medium: its rays begin in one medium, that of the
-// sensor. Follows the points where rays begin, of the frame's middle, of the corners of an orthographic camera's frame
-// and of the lens's rim, in steps.
+// Returns an error if a camera that moves passes a boundary of a medium: its rays begin in one medium, that
+// of the sensor. Follows the points where rays begin, of the frame's middle, of the corners of an
+// orthographic camera's frame and of the lens's rim, in steps.
 Result<void> check_way_of_camera(const World& w);
 
 // The part of a camera ray before its origin: from a little before the lens, so that a camera that stands on

@@ -158,8 +158,8 @@ CameraCollisions camera_collisions(const World& w) {
       const double x = (i + .5) / kLattice * w.frame.width, y = (j + .5) / kLattice * w.frame.height;
       // Rows and columns take turns at the times of a camera that moves.
       const float time = (static_cast<float>((7 * j + 5 * i) % kLattice) + .5f) / kLattice;
-      const float p = met_by(w, w.camera.moves() ? w.camera.ray_at(time, x, y, {.5f, .5f})
-                                                 : w.camera.ray(x, y, {.5f, .5f}));
+      const float p = met_by(
+          w, w.camera.moves() ? w.camera.ray_at(time, x, y, {.5f, .5f}) : w.camera.ray(x, y, {.5f, .5f}));
       all += p;
       if (!(p > kNothing)) continue;
       met += p;

@@ -9,6 +9,7 @@
 #include "core/scene/motion.h"
 #include "core/scene/transform.h"
 #include "tests/support/render_check.h"
+#include "tests/support/significance.h"
 #include "worker/render/math/random.h"
 #include "worker/render/world/world.h"
 
@@ -124,14 +125,14 @@ Sensor moving(Projection projection = Projection::perspective) {
   s.near_clip = .5;
   Transform end = test::translate({1, 2, 3}) * test::rotate_y(120);
   if (projection == Projection::orthographic) end = end * test::scale(2, 3, .5);
-  s.motion = {{0, {}}, {.25, test::translate({0, 1, 0}) * test::rotate_x(50)},
-              {1, end}};
+  s.motion = {{0, {}}, {.25, test::translate({0, 1, 0}) * test::rotate_x(50)}, {1, end}};
   s.to_world = scene::Motion(s.motion).at(.5);
   return s;
 }
 
 TEST(Camera, OfAnyTimeHasTheRaysOfOneThatStandsThere) {
-  for (const Projection projection : {Projection::perspective, Projection::orthographic, Projection::spherical})
+  for (const Projection projection :
+       {Projection::perspective, Projection::orthographic, Projection::spherical})
     for (const double aperture : {0., .3}) {
       if (aperture > 0 && projection != Projection::perspective) continue;
       Sensor s = moving(projection);
@@ -145,7 +146,8 @@ TEST(Camera, OfAnyTimeHasTheRaysOfOneThatStandsThere) {
         const Camera stands = camera(still);
         EXPECT_FALSE(stands.moves());
         for (const double f : {0., .4, 1.}) {
-          const CameraRay a = moves.ray_at(time, 200 * f, 60 * f, {.3f, .8f}), b = stands.ray(200 * f, 60 * f, {.3f, .8f});
+          const CameraRay a = moves.ray_at(time, 200 * f, 60 * f, {.3f, .8f}),
+                          b = stands.ray(200 * f, 60 * f, {.3f, .8f});
           EXPECT_EQ(a.o, b.o);
           EXPECT_EQ(a.d, b.d);
           EXPECT_EQ(a.t_max, b.t_max);
@@ -153,7 +155,7 @@ TEST(Camera, OfAnyTimeHasTheRaysOfOneThatStandsThere) {
           EXPECT_EQ(moves.near_distance(a), stands.near_distance(b));
         }
       }
-      EXPECT_EQ(moves.ray(50, 50, {}).d, moves.ray_at(.5f, 50, 50, {}).d);
+      EXPECT_EQ(moves.ray(50, 50, {.5f, .5f}).d, moves.ray_at(.5f, 50, 50, {.5f, .5f}).d);
     }
 }
 
@@ -164,14 +166,15 @@ TEST(Camera, IsUsableOnlyIfAllItsKeysAre) {
   EXPECT_FALSE(camera(s).usable());
 }
 
-// What a camera sees of the half plane x > 0, which shines, while it slides along it by half its frame: the share of the
-// exposure and of the pixel's width that falls on it.
+// What a camera sees of the half plane x > 0, which shines, while it slides along it by half its frame: the
+// share of the exposure and of the pixel's width that falls on it.
 TEST(Camera, SlidesPastAnEdgeWithATrapezoid) {
   constexpr int kWidth = 16;
   constexpr std::uint64_t kSamples = 4096;
   test::SceneBuilder b(FrameSize{kWidth, 1});
   b.scene.film.filter = BoxFilter{};
-  b.shape(RectangleShape{}, test::translate({50, 0, 0}) * test::rotate_x(180) * test::scale(50, 50, 1), b.diffuse(0))
+  b.shape(RectangleShape{}, test::translate({50, 0, 0}) * test::rotate_x(180) * test::scale(50, 50, 1),
+          b.diffuse(0))
       .emitter = AreaEmitter{b.texture({1, 1, 1})};
   Sensor& s = b.scene.sensor;
   s.projection = Projection::orthographic;
@@ -191,7 +194,8 @@ TEST(Camera, SlidesPastAnEdgeWithATrapezoid) {
     // P(u w + t > c), by inclusion and exclusion at the corners of the unit square
     const double share = 1 - (above(c) - above(c - 1) - above(c - w) + above(c - w - 1)) / w;
     double got = 0;
-    for (int half = 0; half < 2; ++half) got += double{sums[static_cast<std::size_t>(half * 3 * kWidth + x)]} / kSamples;
+    for (int half = 0; half < 2; ++half)
+      got += double{sums[static_cast<std::size_t>(half * 3 * kWidth + x)]} / kSamples;
     // Samples see the light or do not: the variance is at most that of independent ones.
     const double error = std::sqrt(std::max(share * (1 - share), 1e-12) / kSamples);
     EXPECT_NEAR(got, share, test::kStandardErrors * error + 1e-6) << "pixel " << x;

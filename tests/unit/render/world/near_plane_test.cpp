@@ -124,13 +124,15 @@ TEST(NearPlane, ACameraThatMovesStaysInItsMedium) {
   const auto built = [](const SceneBuilder& b) {
     return build_world(b.scene, test::settings_of(b.scene), b.files, 1);
   };
-  for (const double way : {1., -1., 1e-3}) EXPECT_TRUE(built(passing_by(way > 0 ? 2 * way : 1, way, false))) << way;
+  for (const double way : {1., -1., 1e-3})
+    EXPECT_TRUE(built(passing_by(way > 0 ? 2 * way : 1, way, false))) << way;
   EXPECT_TRUE(built(passing_by(-5, 1, true)));
   for (const double face : {.5, .01, .99}) {
     const auto refused = built(passing_by(face, 1, false));
     ASSERT_FALSE(refused) << face;
     EXPECT_EQ(refused.error().code, Errc::invalid_argument);
-    EXPECT_NE(refused.error().message.find("the camera moves through the boundary of a medium"), std::string::npos);
+    EXPECT_NE(refused.error().message.find("the camera moves through the boundary of a medium"),
+              std::string::npos);
   }
 }
 

@@ -167,7 +167,8 @@ what is refused says what to do instead.
   ReverseOrientation; a mesh by ReverseOrientation alone. If a mirrored sphere, disk or cylinder gives light on one side, that is a
   warning: where pbrt samples lights, it takes the other side. A mirrored `plymesh` that gives light, bounds a medium or lets light
   through is refused, as whether its file has normals decides there.
-- **Motion**: the picture shows everything where it stands at StartTime, with a warning.
+- **Motion**: cameras move between their two transforms while the shutter is open. Everything else is shown where it stands at
+  StartTime: lights and media as in pbrt, shapes and instances with a warning.
 - **Textures**: a `float` and a `spectrum` one may have the same name.
 - **Meshes** without normals are flat, in the text and in files.
 - **Texture coordinates** are those of pbrt: on spheres v is 1 at +z, for which a sphere with a texture is mirrored along its axis; a

@@ -492,7 +492,8 @@ AttributeBegin ActiveTransform EndTime AttributeEnd Translate 7 0 0 Shape "spher
   ASSERT_TRUE(r.scene) << messages(r);
   EXPECT_EQ(origin_of(r.scene->shapes.at(0).to_world), (Vec3{{1, 2, 0}}));
   EXPECT_EQ(origin_of(r.scene->shapes.at(1).to_world), (Vec3{{7, 0, 0}}));
-  EXPECT_THAT(messages(r), HasSubstr("4:67: warning: this Shape moves in pbrt; it is shown where it is at StartTime"));
+  EXPECT_THAT(messages(r),
+              HasSubstr("4:77: warning: this Shape moves in pbrt; it is shown where it is at StartTime"));
   EXPECT_EQ(r.diagnostics.size(), 1u);
   EXPECT_THAT(refusal("ActiveTransform Middle"), HasSubstr("wants one of All, StartTime and EndTime"));
   EXPECT_THAT(refusal("TransformTimes 1 1"), HasSubstr("TransformTimes end at 1 and begin at 1"));
@@ -526,7 +527,8 @@ TEST(Pbrt, CamerasMoveBetweenTheirTwoTransforms) {
 
 TEST(Pbrt, NamedCoordinateSystemsHaveBothTransforms) {
   const ReadResult r = camera_that_moves(
-      "ActiveTransform EndTime Translate 3 0 0 ActiveTransform All CoordinateSystem \"rail\" Identity Translate 9 9 9 "
+      "ActiveTransform EndTime Translate 3 0 0 ActiveTransform All CoordinateSystem \"rail\" Identity "
+      "Translate 9 9 9 "
       "CoordSysTransform \"rail\"",
       R"("perspective")");
   ASSERT_TRUE(r.scene) << messages(r);

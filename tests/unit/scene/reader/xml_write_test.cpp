@@ -139,6 +139,7 @@ TEST(XmlWrite, KeepsEveryBitOfEveryValue) {
     }
     // Some values must be consistent with each other.
     s.sensor.far_clip = s.sensor.near_clip * 2;
+    s.sensor.shutter_open = s.sensor.shutter_close = 0;  // those of a camera that stands still
     for (Emitter& e : s.emitters)
       if (auto* spot = std::get_if<SpotEmitter>(&e)) spot->beam_width = spot->cutoff_angle / 3;
     for (Bsdf& b : s.bsdfs)  // needs equal roughnesses

@@ -99,7 +99,7 @@ bool mitsuba_has(std::string_view plugin, std::string_view parameter) {
       coat{"int_ior", "ext_ior", "nonlinear", "diffuse_reflectance", "specular_reflectance"},
       mapped{"flip_invalid_normals", "use_shadowing_function"},
       mesh{"filename", "face_normals", "flip_tex_coords"},
-      view{"to_world", "fov", "fov_axis", "near_clip", "far_clip"},
+      view{"to_world", "fov", "fov_axis", "near_clip", "far_clip", "shutter_open", "shutter_close"},
       path{"max_depth", "rr_depth", "hide_emitters"}, medium{"sigma_t", "albedo", "scale"};
   static const std::map<std::string_view, std::vector<Names>> all{
       {"sphere", {{"center", "radius"}}},
