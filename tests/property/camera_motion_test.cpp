@@ -50,7 +50,7 @@ SceneBuilder stopped(SceneBuilder b, double time) {
 }
 
 // An image of this many stills, each at a random time of its part of the exposure.
-constexpr int kStills = 16;
+constexpr int kStills = 8;
 QuarterImage of_stills(const SceneBuilder& moving, std::uint64_t spp, std::uint64_t seed) {
   render::RandomStream dice(seed);
   QuarterImage mean{};

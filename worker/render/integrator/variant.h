@@ -38,11 +38,17 @@ struct Variant {
   GroupFn group = nullptr;  // set with Features::reuse, and then used instead of `sample`
 };
 
+[[gnu::cold, gnu::noinline]] inline CameraRay moving_camera_ray(const World& w, const SampleStream& stream,
+                                                                double fx, double fy, V2 lens) {
+  return w.camera.ray_at(stream.group(0, Purpose::time).u(0), fx, fy, lens);
+}
 inline CameraRay camera_ray(const World& w, const SampleStream& stream, int x, int y) {
   const Group g = stream.group(0, Purpose::camera);
   const double fx = x + .5 + w.filter.offset(g.u(0)), fy = y + .5 + w.filter.offset(g.u(1));
-  if (w.camera.moves()) return w.camera.ray_at(stream.group(0, Purpose::time).u(0), fx, fy, {g.u(2), g.u(3)});
-  return w.camera.ray(fx, fy, {g.u(2), g.u(3)});
+  const V2 lens(g.u(2), g.u(3));
+  if (w.camera.moves()) [[unlikely]]
+    return moving_camera_ray(w, stream, fx, fy, lens);
+  return w.camera.ray(fx, fy, lens);
 }
 template <Features F, template <Features> class Light>
 SampleOutcome sample_with(const World& w, int x, int y, std::uint64_t sample, LightSplit* split,
