@@ -38,7 +38,7 @@ Result<FilesToCome> FilesToCome::of(const std::vector<std::string>& patterns,
   FilesToCome files;
   std::set<std::string> known;
   const auto add = [&](const std::string& path) {
-    if (known.insert(path).second) files.waiting_.push_back(path);
+    if (known.insert(path).second) files.files_.push_back(path);
   };
   for (const std::string& pattern : patterns) {
     std::error_code error;
@@ -57,17 +57,19 @@ Result<FilesToCome> FilesToCome::of(const std::vector<std::string>& patterns,
 
 std::vector<std::string> FilesToCome::look(
     double now, const std::function<std::optional<FileState>(const std::string&)>& state) {
-  std::erase_if(waiting_, [&](const std::string& path) {
+  std::vector<std::string> incomplete;
+  for (const std::string& path : files_) {
     const auto found = state(path);
     if (!found || found->bytes == 0) {
       seen_.erase(path);
-      return false;
+      incomplete.push_back(path);
+      continue;
     }
     const auto [seen, fresh] = seen_.try_emplace(path, Seen{*found, now});
     if (!fresh && seen->second.state != *found) seen->second = {*found, now};
-    return now - seen->second.since >= kQuietSeconds;
-  });
-  return waiting_;
+    if (now - seen->second.since < kQuietSeconds) incomplete.push_back(path);
+  }
+  return incomplete;
 }
 
 Result<void> wait_for_files(const std::vector<std::string>& patterns, const std::optional<FrameRange>& frames,

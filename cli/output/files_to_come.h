@@ -32,7 +32,8 @@ class FilesToCome {
   static Result<FilesToCome> of(const std::vector<std::string>& patterns,
                                 const std::optional<FrameRange>& frames);
 
-  // Looks at the files that were not complete before. Returns those that still are not, in order.
+  // Looks at all files, also at those that were complete before, as they may have grown since. Returns those
+  // that are not complete, in order.
   std::vector<std::string> look(double now,
                                 const std::function<std::optional<FileState>(const std::string&)>& state);
 
@@ -41,7 +42,7 @@ class FilesToCome {
     FileState state;
     double since;
   };
-  std::vector<std::string> waiting_;
+  std::vector<std::string> files_;
   std::map<std::string, Seen> seen_;
 };
 

@@ -223,11 +223,19 @@ Result<void> WorkerSessions::drain(const WorkerId& id, DrainNow how) {
   const auto& connection = found->second.connection;
   if (!connection || !connection->open)
     return fail(Errc::failed_precondition,
-                fmt::format("worker {} is not connected: it can't be asked to end", id.value));
+                fmt::format("worker {} is not connected: it can be asked for nothing", id.value));
   const auto figures = core->driver.farm().worker(id);
   if (how.withdrawn && !(figures && is_leaving(figures->state)))
     return fail(Errc::failed_precondition,
                 fmt::format("worker {} is not draining: it takes units as before", id.value));
+  // It would come back under another id, and be trusted as before.
+  if (how.restart && core->driver.farm().quarantined(id))
+    return fail(
+        Errc::failed_precondition,
+        fmt::format(
+            "worker {} is quarantined: drain it, find out why its results differ, and start it again on "
+            "its machine",
+            id.value));
   if (how.restart && !found->second.hello.restarts)
     return fail(Errc::failed_precondition,
                 fmt::format("worker {} cannot restart itself, since its version is too old: drain it, and "

@@ -1,12 +1,10 @@
 // Preloaded into a program, this makes it behave as on another machine. LIGHTSHAFT_TEST_ISA names the
 // instruction set for which Embree is configured, instead of the one that the program names.
-// LIGHTSHAFT_TEST_OFF names a function that gives wrong results: with "expf" they are off by one unit in the
-// last place, with "rtcIntersect1" one triangle is replaced by its neighbour.
+// LIGHTSHAFT_TEST_OFF names a function that gives wrong results: with "rtcIntersect1" one triangle is
+// replaced by its neighbour.
 #include <dlfcn.h>
 
-#include <cmath>
 #include <cstdlib>
-#include <limits>
 #include <string>
 #include <string_view>
 
@@ -22,13 +20,6 @@ std::string_view setting(const char* name) {
 }
 
 }  // namespace
-
-extern "C" float expf(float x) noexcept {
-  static const auto real = library<float(float)>("expf");
-  static const bool off = setting("LIGHTSHAFT_TEST_OFF") == "expf";
-  const float y = real(x);
-  return off ? std::nextafter(y, std::numeric_limits<float>::infinity()) : y;
-}
 
 extern "C" void* rtcNewDevice(const char* config) {
   static const auto real = library<void*(const char*)>("rtcNewDevice");

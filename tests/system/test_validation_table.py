@@ -81,7 +81,7 @@ def test_a_closed_shutter_stops_a_camera_with_a_warning(tmp_path):
     moving = '<animation name="to_world"><transform time="0"/><transform time="1"><translate x="0.5"/></transform></animation>'
     for close, stops in (("0", True), ("1", False)):
         sensor = f'<float name="shutter_open" value="0"/><float name="shutter_close" value="{close}"/>'
-        assert "shutter" not in inspected(tmp_path, 0, sensor=sensor).stderr
+        assert "shutter opens" not in inspected(tmp_path, 0, sensor=sensor).stderr
         said = inspected(tmp_path, 0, sensor=sensor + moving)
         assert ("give shutter_open and shutter_close" in said.stderr) == stops
         assert ("the camera moves while the shutter is open" in said.stdout) == (not stops)

@@ -222,6 +222,24 @@ def test_who_scrolls_up_while_new_lines_of_a_log_come_stays_there(farm, dashboar
     assert page.evaluate(f"{lines}.scrollTop") == 40
 
 
+def test_a_log_that_could_not_be_fetched_is_read_again(farm, dashboard):
+    farm.jobs["j-1"] = job()
+    farm.log = "12:00:01 submitted\n"
+    page = dashboard("#/jobs/j-1")
+    page.evaluate("""void (() => {
+      const real = fetch;
+      window.away = true;
+      window.fetch = (url, options) => (window.away && url.endsWith("/log") ? Promise.reject(new TypeError("away")) : real(url, options));
+    })()""")
+    page.evaluate("location.hash = '#/jobs/j-1/log'")
+    page.wait("document.querySelector('.log-page .help')?.innerText === 'The log could not be fetched.'")
+
+    page.evaluate("window.away = false")
+    page.evaluate("[...document.querySelectorAll('.log-page button')].find((b) => b.innerText === 'Read it again').click()")
+
+    page.wait("document.querySelector('.log-page pre')?.textContent.includes('submitted')")
+
+
 def test_what_has_no_sample_is_not_offered_as_a_picture(farm, dashboard):
     farm.jobs["j-1"] = job(state="failed", units_done=0, error="no")
     page = dashboard("#/jobs/j-1")

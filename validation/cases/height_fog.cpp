@@ -96,7 +96,7 @@ void fog_through(Table& t) {
                  b.look({0, -rise * 2, -4}, {0, 0, 0}, 1e-4, {0, 1, 0});
                  return b;
                },
-               expected, {.slack = kFogSlack, .slow = looked_up});
+               expected, {.slack = kFogSlack, .slow = looked_up || !is_grey(tint) || rise < 0});
       }
     }
   // Out of the fog into the sky: from the level l up at the slope s, the depth is e^-l H / s; from below the
@@ -114,7 +114,7 @@ void fog_through(Table& t) {
              b.look({0, y, 0}, {0, y + 1, 1}, 1e-4, {0, 1, 0});
              return b;
            },
-           grey(std::exp(-fog.sigma * depth)), {.slack = kFogSlack});
+           grey(std::exp(-fog.sigma * depth)), {.slack = kFogSlack, .slow = below > 0});
   }
 }
 

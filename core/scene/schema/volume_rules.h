@@ -14,8 +14,8 @@ ParameterProblem volume_problem(std::span<const Volume> volumes, const Volume& v
 // Returns whether the volume fills a box, so that a medium that has it as its density ends.
 bool has_box(std::span<const Volume> volumes, VolumeIndex i);
 
-// Looks for volumes that a medium or a phase function can't have: such as have no box, except as the density,
-// and with a "heightfog" as the density, such as vary. The volumes must be without problems.
+// Looks for volumes that a medium or a phase function can't have: volumes without a box, other than the
+// density; and volumes that vary, if the density is a "heightfog". The volumes must be without problems.
 ParameterProblem medium_problem(std::span<const Volume> volumes, const HeterogeneousMedium& m);
 ParameterProblem phase_problem(std::span<const Volume> volumes, const BlendPhase& p);
 

@@ -64,6 +64,7 @@ constexpr Blind kBlind[] = {
     {"N46-normal-of-nothing", kTwoPictures, false, true, "N37-furnace"},
     {"N47-lens-of-nothing", kTwoPictures, false, true, "N47-circle-of-confusion"},
     {"N48-crop-filter", kTwoPictures, false, true, "N48-frame"},
+    {"height-fog-as-grid", kTwoPictures, false, true, "height-fog-through"},
     {"N70-first-samples", "the values may be any that are numbers", false, true, "N04-sigma"},
     {"7.6h-order-", "an order adds light, however much", false, true, "7.6h-once"},
 };

@@ -72,9 +72,21 @@ TEST(FilesToCome, EachFrameHasItsFileAndEachIsLookedAtUntilItIsComplete) {
   for (const char* name : {"fog.0008.vdb", "light.json", "fog.0010.vdb"}) disk.files[name] = {9, 9};
   disk.look(files, 1);
   EXPECT_THAT(disk.look(files, kQuiet), ElementsAre("fog.0012.vdb"));
-  disk.files.clear();
   disk.files["fog.0012.vdb"] = {1, 1};
   disk.look(files, 1);
+  EXPECT_THAT(disk.look(files, kQuiet), IsEmpty());
+}
+
+TEST(FilesToCome, AFileThatGrowsAgainWhileOthersAreMissingIsIncomplete) {
+  auto files = of({"fog.vdb", "smoke.vdb"});
+  Disk disk;
+  disk.files["fog.vdb"] = {10, 1};
+  disk.look(files, 0);
+  EXPECT_THAT(disk.look(files, kQuiet), ElementsAre("smoke.vdb"));
+  disk.files["smoke.vdb"] = {20, 2};
+  disk.look(files, 1);
+  disk.files["fog.vdb"] = {15, 3};
+  EXPECT_THAT(disk.look(files, kQuiet), ElementsAre("fog.vdb"));
   EXPECT_THAT(disk.look(files, kQuiet), IsEmpty());
 }
 

@@ -53,6 +53,8 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
       if (!seen || seen.scrollHeight - top - seen.clientHeight < kNearEnd) before = top;
       return withOpen(now, { log: { text } });
     });
+    const { open } = get();
+    if (open?.shown === id && open.log && open.log.text === null) set(withOpen(get(), { log: { text: null, failed: true } }));
     if (before === null) return;
     requestAnimationFrame(() => {
       const drawn = lines();

@@ -98,6 +98,8 @@ V3d cloud_noise_slope(const V3d& p) {
   return slope;
 }
 
+double Cloud::finest() const { return 1 / (std::abs(frequency_) * kSum.back().frequency); }
+
 float Cloud::value(const V3d& p) const {
   if (p.y <= 0) return 1;  // for any noise the sum below is at least 1, and is limited to 1
   V3d q = p * frequency_;

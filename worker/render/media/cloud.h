@@ -24,6 +24,7 @@ class Cloud {
   float value(const V3d& p) const;
   // Bounds the density in the box [lo, hi].
   ValueBounds bounds(const V3d& lo, const V3d& hi) const;
+  double finest() const;  // size of a cell of the last octave, in the cloud's own coordinates
 
  private:
   double noise_at(double height, double sum) const;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/base/overloaded.h"
 #include "worker/render/base/kinds.h"
@@ -25,8 +26,9 @@ double share(const Field::Mapped& m, float value) {
   const double t = std::clamp((value - m.in_low) / (m.in_high - m.in_low), 0., 1.);
   return m.gamma == 1 ? t : std::pow(t, m.gamma);
 }
+// Curves may leave the range from 0 to 1, but no volume has negative values.
 float put_out(const Field::Mapped& m, double t) {
-  return static_cast<float>(m.out_low + (m.out_high - m.out_low) * t);
+  return static_cast<float>(std::max(0., m.out_low + (m.out_high - m.out_low) * t));
 }
 
 }  // namespace
@@ -46,6 +48,28 @@ void Curve::bound(double a, double b, double& least, double& most) const {
   most = std::max(ya, yb);
   for (std::size_t i = 0; i < x_.size(); ++i)
     if (x_[i] > a && x_[i] < b) least = std::min(least, y_[i]), most = std::max(most, y_[i]);
+}
+
+namespace {
+
+// Returns the smallest length that the map makes as long as `own`, or less.
+double before(const Affine& map, double own) {
+  double squares = 0;
+  for (const double a : map.a) squares += a * a;
+  return own / std::sqrt(squares);
+}
+
+}  // namespace
+
+Field::Field(std::vector<Part> parts)
+    : parts_(std::move(parts)), finest_(std::numeric_limits<double>::infinity()) {
+  for (const Part& part : parts_)
+    finest_ = std::min(
+        finest_,
+        with_kind(part, overloaded{[](const Stored& s) { return before(s.to_own, 1); },
+                                   [](const Noisy& n) { return before(n.to_own, n.noise.finest()); },
+                                   [](const Cloudy& c) { return before(c.to_own, c.cloud.finest()); },
+                                   [](const auto&) { return std::numeric_limits<double>::infinity(); }}));
 }
 
 float Field::value_of(const Part& part, const V3d& p) const {

@@ -66,19 +66,22 @@ class Field {
   using Part = std::variant<Constant, Stored, Falling, Noisy, Cloudy, Product, Mapped>;
 
   // The last of the parts is the field.
-  explicit Field(std::vector<Part> parts) : parts_(std::move(parts)) {}
+  explicit Field(std::vector<Part> parts);
 
   // Returns the value, at least 0, at coordinates of the field.
   float value(const V3& p) const { return value_of(parts_.back(), V3d(p)); }
   // Bounds the values in the box [lo, hi].
   ValueBounds bounds(const V3d& lo, const V3d& hi) const { return bounds_of(parts_.back(), lo, hi); }
   std::uint64_t bytes() const;
+  // The size of the finest cell of noise or voxel of a grid in any part; infinite if there are none.
+  double finest() const { return finest_; }
 
  private:
   float value_of(const Part& part, const V3d& p) const;
   ValueBounds bounds_of(const Part& part, const V3d& lo, const V3d& hi) const;
 
   std::vector<Part> parts_;
+  double finest_;
 };
 
 }  // namespace ls::render

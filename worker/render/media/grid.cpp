@@ -136,7 +136,6 @@ MacroCell Grid::bound_field(int x, int y, int z) const {
   const double side = double{1} * cell_size_ / kBoxesPerSide;
   const V3d corner = V3d(lo_) + V3d(x, y, z) * cell_size_;
   float least = std::numeric_limits<float>::infinity(), most = 0;
-  double sum = 0;
   int count = 0;
   for (int k = 0; k < kBoxesPerSide; ++k)
     for (int j = 0; j < kBoxesPerSide; ++j)
@@ -145,15 +144,18 @@ MacroCell Grid::bound_field(int x, int y, int z) const {
         // The last cell along an axis may reach beyond the domain.
         if (count > 0 && (from.x > hi_.x || from.y > hi_.y || from.z > hi_.z)) continue;
         const ValueBounds in = field_->bounds(from - V3d(kMargin), to);
-        least = std::min(least, in.lo);
-        most = std::max(most, in.hi);
-        sum += (double{in.lo} + in.hi) / 2;
+        const bool finite = std::isfinite(in.lo) && std::isfinite(in.hi);
+        least = std::min(least, finite ? in.lo : 0);
+        most = finite ? std::max(most, in.hi) : std::numeric_limits<float>::infinity();
         ++count;
       }
   MacroCell m;
   m.hi = most * kInflate;
-  m.control = least == most ? least : std::clamp(static_cast<float>(sum / count), least, most);
-  m.residual = least == most ? 0 : std::max(m.hi - m.control, m.control - least) * kInflate;
+  // The bounds may be far apart where the values are not, and on either side of them. With the lower bound as
+  // control value, the factors of ratio tracking are from 0 to 1, and their products vary no more than a way
+  // that is open or not.
+  m.control = least;
+  m.residual = least == most ? 0 : m.hi - least;
   return m;
 }
 
@@ -269,12 +271,15 @@ class Quadrature {
 }  // namespace
 
 Passage Grid::pass_field(const V3d& o, const V3d& d, double t0, double t1, double wanted) const {
-  // Intervals of at most half a voxel, with an error of at most this share of the largest density
-  constexpr double kInterval = .5, kTolerance = 1e-7;
+  // Intervals of at most half a voxel, and half of the finest cell of noise, with an error of at most this
+  // share of the largest density. Longer ones could find the same value at all of their few points.
+  constexpr double kInterval = .5, kTolerance = 1e-7, kMostIntervals = 16384;
+  const double interval = kInterval * std::min(1., field_->finest());
   const auto value = [&](double t) { return static_cast<double>(computed(V3(o + d * t))); };
   Quadrature sum(value, wanted, kTolerance * max_value_);
   const double length = t1 - t0;
-  const int count = static_cast<int>(std::clamp(std::ceil(length * d.length() / kInterval), 1., 4096.));
+  const int count =
+      static_cast<int>(std::clamp(std::ceil(length * d.length() / interval), 1., kMostIntervals));
   for (int i = 0; i < count; ++i)
     if (sum.add(t0 + length * i / count, t0 + length * (i + 1) / count))
       return {true, static_cast<float>(sum.end()), wanted};

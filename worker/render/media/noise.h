@@ -122,6 +122,7 @@ class FractalNoise {
     return std::min(1.f, std::max(-1.f, sum));
   }
   ValueBounds bounds(const V3d& lo, const V3d& hi) const;
+  double finest() const { return 1 / octaves_[count_ - 1].frequency; }  // size of a cell of the last octave
 
  private:
   std::array<Octave, scene::kMaxNoiseOctaves> octaves_;

@@ -50,6 +50,8 @@ PhaseMaker::Made PhaseMaker::operator()(const BlendPhase& p) const {
     blend.weight = static_cast<float>(c->value[0]);
     return blend;
   }
+  // Bounds of computed values are a little above them; what is above 1 is taken as 1.
+  constexpr float kMostBound = 1 + 1e-5f;
   constexpr double kToSigma = 1;  // without effect: no ray walks through the grid's cells
   auto loaded = load_volume(weight, files, w.geometry.center, w.geometry.scale, kToSigma);
   if (!loaded) return tl::unexpected(loaded.error());
@@ -59,7 +61,7 @@ PhaseMaker::Made PhaseMaker::operator()(const BlendPhase& p) const {
     wrong = fmt::format("has {} channels, not one", loaded->channels.size());
   else if (loaded->clamped > 0)
     wrong = fmt::format("has {} values below 0; its values are from 0 to 1", loaded->clamped);
-  else if (grid.max_value() > 1)
+  else if (grid.max_value() > (loaded->field ? kMostBound : 1))
     wrong = fmt::format("reaches {}; its values are from 0 to 1", grid.max_value());
   if (!wrong.empty()) {
     const auto* file = std::get_if<GridVolume>(&weight);

@@ -197,5 +197,82 @@ TEST(Field, IsIntegratedAlongRays) {
   }
 }
 
+// Noise that is 0 in most places, and whose bounds do not know it: each sample of the transmittance is from 0
+// to 1, and their mean is that of the integral.
+constexpr Features kFieldFeatures{.media = true, .grids = true};
+
+TEST(Field, LetsLightThroughItsGaps) {
+  NoiseVolume n;
+  n.scale = 9;
+  n.octaves = 3;
+  n.low = -1.5;
+  n.high = 1;
+  SceneBuilder b;
+  const LoadedVolume v = loaded(b, put(b, n));
+  const Grid& g = v.channels[0];
+  for (const float sigma : {20.f, 200.f}) {
+    Medium m;
+    m.grid = true;
+    m.density = &g;
+    m.sigma_t = C3(sigma);
+    const V3 o(0, .3f, .4f), d(1, 0, 0);
+    double depth = 0;
+    constexpr int kSteps = 100000;
+    for (int s = 0; s < kSteps; ++s)
+      depth += sigma * g.value<Lookup::field>(g.to_index(o + d * ((static_cast<float>(s) + .5f) / kSteps))) /
+               kSteps;
+    constexpr int kTries = 20000;
+    double sum = 0, squares = 0;
+    for (int i = 0; i < kTries; ++i) {
+      const double t = transmittance<kFieldFeatures>(m, o, d, 0, 1, RandomStream(mix64(i))).x;
+      ASSERT_GE(t, 0);
+      ASSERT_LE(t, 1 + 1e-5);
+      sum += t / kTries;
+      squares += t * t / kTries;
+    }
+    const double error = std::sqrt((squares - sum * sum) / kTries);
+    EXPECT_NEAR(sum, std::exp(-depth), 5 * error + 1e-6) << sigma;
+    EXPECT_LT(error, .05 * std::exp(-depth) + 1e-4) << sigma;
+  }
+}
+
+TEST(Field, FinerNoiseThanItsCellsIsIntegrated) {
+  NoiseVolume n;
+  n.scale = 400;
+  n.octaves = 2;
+  n.low = -4;
+  n.high = 4;
+  SceneBuilder b;
+  const LoadedVolume v = loaded(b, put(b, n));
+  const Grid& g = v.channels[0];
+  const V3 o = g.to_index(V3(.01f, .3f, .4f)), d = g.to_index(V3(.99f, .35f, .45f)) - o;
+  double sum = 0;
+  constexpr int kSteps = 400'000;
+  for (int s = 0; s < kSteps; ++s)
+    sum += g.value<Lookup::field>(V3(V3d(o) + V3d(d) * ((s + .5) / kSteps))) / double{kSteps};
+  EXPECT_NEAR(g.pass(o, d, 0, 1).integral, sum, 1e-3 * sum);
+}
+
+TEST(Field, IsNeverNegative) {
+  SceneBuilder b;
+  RemapVolume r = curve(noise(b));
+  r.out_low = 1;
+  r.out_high = 0;
+  r.values = {0, 2, .5, 1};
+  const LoadedVolume v = loaded(b, put(b, r));
+  const Grid& g = v.channels[0];
+  std::mt19937_64 rng(3);
+  std::uniform_real_distribution<float> unit(0, 1);
+  float least = 1, most = 0;
+  for (int i = 0; i < 20000; ++i) {
+    V3 p;
+    for (int k = 0; k < 3; ++k) p[k] = g.domain_lo()[k] + unit(rng) * (g.domain_hi()[k] - g.domain_lo()[k]);
+    least = std::min(least, g.value<Lookup::field>(p));
+    most = std::max(most, g.value<Lookup::field>(p));
+  }
+  EXPECT_EQ(least, 0);
+  EXPECT_GT(most, .5f);
+}
+
 }  // namespace
 }  // namespace ls::render

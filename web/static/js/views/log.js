@@ -5,12 +5,12 @@ import { downloads } from "../api.js";
 import { jobHref } from "../route.js";
 import { statePill, wholeNotice } from "./pieces.js";
 
-/** log: of the open job; null or without a text: it is not there yet. */
+/** log: of the open job; null or without a text: it is not there yet, or could not be fetched. */
 export const logLines = (log) => (typeof log?.text !== "string"
-  ? h("p", { key: "waiting", class: "help" }, "Fetching the log …")
+  ? h("p", { key: "waiting", class: "help" }, log?.failed ? "The log could not be fetched." : "Fetching the log …")
   : h("pre", { key: "lines", tabindex: 0, "aria-label": "Log" }, log.text || "Nothing has happened yet."));
 
-export const logAgain = (job, log, actions) => (typeof log?.text !== "string" ? null
+export const logAgain = (job, log, actions) => (typeof log?.text !== "string" && !log?.failed ? null
   : h("button", { key: "again", type: "button", class: "small", onclick: () => actions.readLog(job.id) }, "Read it again"));
 
 export function logView(state, actions) {
