@@ -66,6 +66,11 @@ TEST(Trust, FarmWithAFaultyWorkerMakesTheImageOfHonestWorkers) {
     EXPECT_EQ(worker.state, worker.name == "fake-2" ? "sick" : "connected") << worker.name;
     if (worker.name == "fake-2") {
       EXPECT_THAT(worker.activity, testing::HasSubstr("quarantined: it rendered tile"));
+      // Under the id of another start it would be trusted again.
+      const auto again = coordinator->drain_worker(worker.id, {.restart = true});
+      ASSERT_FALSE(again);
+      EXPECT_EQ(again.error().code, Errc::failed_precondition);
+      EXPECT_THAT(again.error().message, testing::HasSubstr("is quarantined"));
     }
   }
 }
