@@ -10,11 +10,11 @@
 namespace ls::render {
 namespace {
 
-struct Box {
+struct ImageBox {
   V3d lo, hi;
 };
 // Returns the smallest box that contains the image of the box [lo, hi].
-Box image_of(const Affine& map, const V3d& lo, const V3d& hi) {
+ImageBox image_of(const Affine& map, const V3d& lo, const V3d& hi) {
   const V3d middle = map.point((lo + hi) * .5), half = (hi - lo) * .5;
   V3d reach(0);
   for (int k = 0; k < 3; ++k)
@@ -100,7 +100,7 @@ ValueBounds Field::bounds_of(const Part& part, const V3d& lo, const V3d& hi) con
                          return ValueBounds{c.value, c.value};
                        },
                        [&](const Stored& s) {
-                         const Box box = image_of(s.to_own, lo, hi);
+                         const ImageBox box = image_of(s.to_own, lo, hi);
                          return s.grid.bounds(box.lo, box.hi);
                        },
                        [&](const Falling& f) {
@@ -116,13 +116,13 @@ ValueBounds Field::bounds_of(const Part& part, const V3d& lo, const V3d& hi) con
                          return ValueBounds{at(high), at(low)};
                        },
                        [&](const Noisy& n) {
-                         const Box box = image_of(n.to_own, lo, hi);
+                         const ImageBox box = image_of(n.to_own, lo, hi);
                          const ValueBounds noise = n.noise.bounds(box.lo, box.hi);
                          const float a = n.middle + n.span * noise.lo, b = n.middle + n.span * noise.hi;
                          return ValueBounds{std::max(0.f, std::min(a, b)), std::max(0.f, std::max(a, b))};
                        },
                        [&](const Cloudy& c) {
-                         const Box box = image_of(c.to_own, lo, hi);
+                         const ImageBox box = image_of(c.to_own, lo, hi);
                          return c.cloud.bounds(box.lo, box.hi);
                        },
                        [&](const Product& x) {

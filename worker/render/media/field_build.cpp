@@ -14,7 +14,7 @@ namespace ls::render {
 namespace {
 
 // The region in which a field is bounded by macro cells. Its index coordinates are the field's coordinates.
-struct Frame {
+struct VolumeFrame {
   Affine world_to_index;
   V3d lo, hi;
   // Voxels along a side of the smallest macro cell: those of stored values, or of a box as divided below.
@@ -27,7 +27,7 @@ struct Frame {
 constexpr double kMostBoxes = 1 << 18, kUsualOctaves = 16;
 
 // Returns the number of macro cells along each side.
-V3d cells_of(const Frame& f, int cell) {
+V3d cells_of(const VolumeFrame& f, int cell) {
   V3d n;
   for (int k = 0; k < 3; ++k) n[k] = std::max(1., std::ceil((f.hi[k] - f.lo[k]) / cell));
   return n;
@@ -78,7 +78,7 @@ class Builder {
   }
 
   // Divides the box into about cubic macro cells, as many as may be bounded.
-  Frame box(const Transform& to_world, const Vec3& min, const Vec3& max) const {
+  VolumeFrame box(const Transform& to_world, const Vec3& min, const Vec3& max) const {
     const Affine own_to_world = scene_to_world() * Affine(to_world);
     const V3d lo(min[0], min[1], min[2]), size(max[0] - min[0], max[1] - min[1], max[2] - min[2]);
     V3d length;
@@ -96,7 +96,7 @@ class Builder {
       // Of a box whose sides leave the range of numbers nothing is asked here: run() refuses it.
       if (n.x * n.y * n.z <= most || !(side > 0) || !std::isfinite(side)) break;
     }
-    Frame f;
+    VolumeFrame f;
     f.lo = V3d(0);
     f.hi = n * f.least_cell;
     Affine own_to_index;
@@ -107,8 +107,8 @@ class Builder {
   }
 
   // Returns the frame of the first volume, at any depth, that has one.
-  Result<std::optional<Frame>> frame_of(const Volume& v) {
-    using Found = Result<std::optional<Frame>>;
+  Result<std::optional<VolumeFrame>> frame_of(const Volume& v) {
+    using Found = Result<std::optional<VolumeFrame>>;
     return std::visit(
         overloaded{[&](const NoiseVolume& n) -> Found { return box(n.to_world, n.min, n.max); },
                    [&](const CloudVolume& c) -> Found { return box(c.to_world, c.min, c.max); },
@@ -121,7 +121,7 @@ class Builder {
                      auto loaded = load(g);
                      if (!loaded) return tl::unexpected(loaded.error());
                      const Grid& grid = loaded->channels[0];
-                     Frame f{grid.world_to_index(), V3d(grid.domain_lo()), V3d(grid.domain_hi())};
+                     VolumeFrame f{grid.world_to_index(), V3d(grid.domain_lo()), V3d(grid.domain_hi())};
                      // The grid is needed again, as a part.
                      framed_ = std::move(*loaded);
                      framed_volume_ = &g;
@@ -208,7 +208,7 @@ class Builder {
   const V3d center_;
   const double scale_;
   double most_boxes_ = kMostBoxes;
-  Frame frame_;
+  VolumeFrame frame_;
   Result<LoadedVolume> framed_;                // the grid whose frame is that of the field
   const GridVolume* framed_volume_ = nullptr;  // null: none, or it is a part already
   std::vector<Field::Part> parts_;
