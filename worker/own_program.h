@@ -26,7 +26,8 @@ class OwnProgram {
   const std::filesystem::path& path() const { return path_; }
 
  private:
-  // As it was named at the start if possible: a symbolic link is followed again, to what it then leads to
+  // The path by which the program was started, if it can be found, so that restart() follows a symbolic link
+  // to its new target; otherwise the file that runs
   std::filesystem::path path_;
   std::vector<std::string> arguments_;
 };

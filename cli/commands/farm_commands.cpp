@@ -72,8 +72,8 @@ int print_lines(const FarmApi::Answer<std::string>& text) {
   }
   return kOk;
 }
-// Calls act(worker, path in the API) for each worker with this name or id, until it returns an exit code
-// other than kOk. `connected`: only for workers that are connected, if one of them is.
+// Calls act(worker, path in the API) for each worker with this name or id. Returns the first exit code other
+// than kOk, if there is one. `connected`: only for workers that are connected, if one of them is.
 template <class Act>
 int for_workers(FarmApi& api, const std::string& wanted, bool connected, Act act) {
   const auto answer = api.get("/api/v1/workers");
@@ -87,11 +87,12 @@ int for_workers(FarmApi& api, const std::string& wanted, bool connected, Act act
     return print_error(
         {Errc::not_found,
          fmt::format("there is no worker \"{}\"; `lightshaft workers` lists them", plain_text(wanted))});
-  for (const json& worker : found)
-    if (const int code = act(worker, "/api/v1/workers/" + percent_encode(text_field(worker, "id")));
-        code != kOk)
-      return code;
-  return kOk;
+  int first_failure = kOk;
+  for (const json& worker : found) {
+    const int code = act(worker, "/api/v1/workers/" + percent_encode(text_field(worker, "id")));
+    if (first_failure == kOk) first_failure = code;
+  }
+  return first_failure;
 }
 int restart_workers(FarmApi& api, const FarmFlags& flags) {
   return for_workers(api, flags.restarted, true, [&](const json& worker, const std::string& path) -> int {

@@ -223,7 +223,7 @@ Result<void> WorkerSessions::drain(const WorkerId& id, DrainNow how) {
   const auto& connection = found->second.connection;
   if (!connection || !connection->open)
     return fail(Errc::failed_precondition,
-                fmt::format("worker {} is not connected: it can be asked for nothing", id.value));
+                fmt::format("worker {} is not connected, so it receives no requests", id.value));
   const auto figures = core->driver.farm().worker(id);
   if (how.withdrawn && !(figures && is_leaving(figures->state)))
     return fail(Errc::failed_precondition,

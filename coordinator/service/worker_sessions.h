@@ -34,7 +34,7 @@ class WorkerSessions {
                                                  const std::string& principal = {});
   // Asks a worker to finish the units that it renders and then to end or to restart, or to stay after all.
   // not_found: there is no such worker. failed_precondition: it is not connected, or is to stay but does not
-  // drain, or cannot restart.
+  // drain, or is to restart but is quarantined or of a version that cannot.
   Result<void> drain(const WorkerId& id, DrainNow how);
   // Reports to the farm the workers whose results wait for memory in the coordinator, so that their leases
   // are renewed.

@@ -126,9 +126,10 @@ struct MotionKey {
   bool operator==(const MotionKey&) const = default;
 };
 struct Sensor {        // looks along the +z axis of to_world, with +y up and +x to the LEFT, as in Mitsuba
-  Transform to_world;  // of a camera that moves: in the middle of the exposure
-  // Of a camera that moves during the exposure: in the order of times, the first at 0 and the last at 1, and
-  // the shutter is open from 0 to 1. Otherwise there are no keys, and the shutter opens and closes at 0.
+  Transform to_world;  // where the camera is; if it moves: in the middle of the exposure
+  // Where the camera is during the exposure, sorted by time: the first key is at 0 and the last at 1. A
+  // camera with keys has its shutter open from 0 to 1. A camera that does not move has no keys, and its
+  // shutter opens and closes at 0.
   std::vector<MotionKey> motion;
   double shutter_open = 0, shutter_close = 0;
   double fov = 50;  // in degrees, along fov_axis

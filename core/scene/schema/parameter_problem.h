@@ -1,4 +1,4 @@
-// What the checks of an object's parameters return.
+// The result of checking the parameters of an object.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace ls::scene {
 
-// What is wrong with an object: the parameter that it is about, and a predicate ("has no direction"). Both
-// are empty if nothing is.
+// The first problem of an object: the parameter that causes it, and a predicate ("has no direction") that
+// describes it. Both are empty if there is no problem.
 struct ParameterProblem {
   std::string_view parameter;
   std::string what;

@@ -158,7 +158,7 @@ bool complete_disk(const Geometry& g, std::uint32_t i, const V3d& o, const V3d& 
   if (den == 0) return false;
   const double t = s.n.dot(s.center - o) / den;
   if (!std::isfinite(t)) return false;
-  hit.t = static_cast<float>(t);
+  hit.t = std::max(0.f, static_cast<float>(t));  // as in complete_triangle(): the BVH may round
   const V3d q = o + d * t - s.center;
   const double uu = s.u.dot(s.u), vv = s.v.dot(s.v), uv = s.u.dot(s.v), det = uu * vv - uv * uv;
   double a = (q.dot(s.u) * vv - q.dot(s.v) * uv) / det, b = (q.dot(s.v) * uu - q.dot(s.u) * uv) / det;

@@ -135,11 +135,8 @@ Learned learn_batch(const World& w, const Lesson& lesson, std::uint64_t first, s
   for (std::uint64_t i = first; i < end && goes_on(); ++i) {
     const SampleStream stream(kLearningSeed, 0, 0, 2 * i);
     const Group at = stream.group(0, Purpose::guide), lens = stream.group(0, Purpose::camera);
-    const double fx = at.u(0) * w.frame.width, fy = at.u(1) * w.frame.height;
-    const V2 on_lens(lens.u(2), lens.u(3));
-    const CameraRay ray = w.camera.moves()
-                              ? w.camera.ray_at(stream.group(0, Purpose::time).u(0), fx, fy, on_lens)
-                              : w.camera.ray(fx, fy, on_lens);
+    const CameraRay ray = camera_ray_through(w, stream, at.u(0) * w.frame.width, at.u(1) * w.frame.height,
+                                             {lens.u(2), lens.u(3)});
     PathTracer<F, Light> path(w, stream, nullptr, {.learner = &learned.learner});
     const SampleOutcome out = path.trace(ray);
     rays += path.rays();

@@ -42,13 +42,17 @@ struct Variant {
                                                                 double fx, double fy, V2 lens) {
   return w.camera.ray_at(stream.group(0, Purpose::time).u(0), fx, fy, lens);
 }
-inline CameraRay camera_ray(const World& w, const SampleStream& stream, int x, int y) {
-  const Group g = stream.group(0, Purpose::camera);
-  const double fx = x + .5 + w.filter.offset(g.u(0)), fy = y + .5 + w.filter.offset(g.u(1));
-  const V2 lens(g.u(2), g.u(3));
+// Returns the camera ray through a point of the frame, in pixels. A camera that moves gets a random time.
+inline CameraRay camera_ray_through(const World& w, const SampleStream& stream, double fx, double fy,
+                                    V2 lens) {
   if (w.camera.moves()) [[unlikely]]
     return moving_camera_ray(w, stream, fx, fy, lens);
   return w.camera.ray(fx, fy, lens);
+}
+inline CameraRay camera_ray(const World& w, const SampleStream& stream, int x, int y) {
+  const Group g = stream.group(0, Purpose::camera);
+  const double fx = x + .5 + w.filter.offset(g.u(0)), fy = y + .5 + w.filter.offset(g.u(1));
+  return camera_ray_through(w, stream, fx, fy, {g.u(2), g.u(3)});
 }
 template <Features F, template <Features> class Light>
 SampleOutcome sample_with(const World& w, int x, int y, std::uint64_t sample, LightSplit* split,

@@ -93,7 +93,7 @@ class Builder {
     for (double side = std::cbrt(length.x) * std::cbrt(length.y) * std::cbrt(length.z) / std::cbrt(most);;
          side *= 1.1) {
       for (int k = 0; k < 3; ++k) n[k] = std::clamp(std::floor(length[k] / side), 1., kMostPerSide);
-      // Of a box whose sides leave the range of numbers nothing is asked here: run() refuses it.
+      // A box whose sides overflow or underflow would never end this loop. run() refuses it later.
       if (n.x * n.y * n.z <= most || !(side > 0) || !std::isfinite(side)) break;
     }
     VolumeFrame f;

@@ -166,8 +166,8 @@ TEST(Camera, IsUsableOnlyIfAllItsKeysAre) {
   EXPECT_FALSE(camera(s).usable());
 }
 
-// What a camera sees of the half plane x > 0, which shines, while it slides along it by half its frame: the
-// share of the exposure and of the pixel's width that falls on it.
+// A camera slides by half its frame past the edge of a shining half plane, x > 0. The value of each pixel is
+// the share of the exposure time and of the pixel's width in which it sees the half plane.
 TEST(Camera, SlidesPastAnEdgeWithATrapezoid) {
   constexpr int kWidth = 16;
   constexpr std::uint64_t kSamples = 4096;

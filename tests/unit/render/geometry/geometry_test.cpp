@@ -67,22 +67,23 @@ TEST(World, IsCentredAtItsMiddleIfAllMeshesAreWellResolved) {
   EXPECT_EQ(g->center.x, 50);
 }
 
-// As the BVH may report one, in float32, of a surface that lies just behind the ray's origin.
-TEST(TriangleHit, HasNoNegativeDistance) {
+// The BVH, which computes in float32, may report a surface that lies just behind the ray's origin.
+TEST(Hits, HaveNoNegativeDistance) {
   SceneBuilder builder;
   builder.shape(RectangleShape{}, {}, builder.diffuse(.5));
+  builder.shape(DiskShape{}, {}, builder.diffuse(.5));
   const auto g = Geometry::build(builder.scene, AssetLoader{builder.scene, builder.files});
   ASSERT_TRUE(g.has_value());
-  PrimitiveId first;
-  first.kind = PrimitiveId::Kind::triangle;
-  first.index = 0;
-  SurfaceHit hit;
-  for (const float behind : {0.f, 1e-7f, 1e-3f}) {
-    ASSERT_TRUE(g->complete(first, {.1f, -.2f, behind}, {0, 0, 1}, hit));
-    EXPECT_EQ(hit.t, 0) << behind;
+  for (const auto kind : {PrimitiveId::Kind::triangle, PrimitiveId::Kind::disk}) {
+    const PrimitiveId id{kind, 0};
+    SurfaceHit hit;
+    for (const float behind : {0.f, 1e-7f, 1e-3f}) {
+      ASSERT_TRUE(g->complete(id, {.1f, -.2f, behind}, {0, 0, 1}, hit));
+      EXPECT_EQ(hit.t, 0) << behind;
+    }
+    ASSERT_TRUE(g->complete(id, {.1f, -.2f, -.25f}, {0, 0, 1}, hit));
+    EXPECT_EQ(hit.t, .25f);
   }
-  ASSERT_TRUE(g->complete(first, {.1f, -.2f, -.25f}, {0, 0, 1}, hit));
-  EXPECT_EQ(hit.t, .25f);
 }
 
 TEST(DiskIntersection, EndsAtItsRimAndIgnoresParallelRays) {

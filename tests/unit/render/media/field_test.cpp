@@ -165,6 +165,14 @@ TEST(Field, IsTheSameInAWorldOfAnySize) {
   }
 }
 
+// The mean of `g` between two points in index space, by the midpoint rule.
+double mean_value(const Grid& g, const V3& from, const V3& to, int steps = 400'000) {
+  const V3d o(from), d = V3d(to) - o;
+  double sum = 0;
+  for (int s = 0; s < steps; ++s) sum += g.value<Lookup::field>(V3(o + d * ((s + .5) / steps)));
+  return sum / steps;
+}
+
 // Along any ray the integral is that of a fine midpoint rule, whose error is h^2 / 24 times the change of the
 // slope, here at most 1e-5 of the largest value; and where it reaches a part of itself, the integral up to
 // there is that part.
@@ -182,14 +190,11 @@ TEST(Field, IsIntegratedAlongRays) {
         o[k] = g.domain_lo()[k] + unit(rng) * (g.domain_hi()[k] - g.domain_lo()[k]);
         d[k] = (unit(rng) - .5f) * 8;
       }
-      constexpr int kSteps = 20000;
-      double sum = 0;
-      for (int s = 0; s < kSteps; ++s)
-        sum += g.value<Lookup::field>(V3(V3d(o) + V3d(d) * ((s + .5) / kSteps))) / double{kSteps};
+      const double mean = mean_value(g, o, o + d, 20000);
       const Passage whole = g.pass(o, d, 0, 1);
       EXPECT_FALSE(whole.reached);
-      EXPECT_NEAR(whole.integral, sum, 2e-5 * g.max_value());
-      if (!(sum > 1e-3)) continue;
+      EXPECT_NEAR(whole.integral, mean, 2e-5 * g.max_value());
+      if (!(mean > 1e-3)) continue;
       const Passage part = g.pass(o, d, 0, 1, .3 * whole.integral);
       ASSERT_TRUE(part.reached);
       EXPECT_NEAR(g.pass(o, d, 0, part.t).integral, .3 * whole.integral, 2e-5 * g.max_value());
@@ -216,11 +221,7 @@ TEST(Field, LetsLightThroughItsGaps) {
     m.density = &g;
     m.sigma_t = C3(sigma);
     const V3 o(0, .3f, .4f), d(1, 0, 0);
-    double depth = 0;
-    constexpr int kSteps = 100000;
-    for (int s = 0; s < kSteps; ++s)
-      depth += sigma * g.value<Lookup::field>(g.to_index(o + d * ((static_cast<float>(s) + .5f) / kSteps))) /
-               kSteps;
+    const double depth = sigma * mean_value(g, g.to_index(o), g.to_index(o + d));
     constexpr int kTries = 20000;
     double sum = 0, squares = 0;
     for (int i = 0; i < kTries; ++i) {
@@ -245,12 +246,9 @@ TEST(Field, FinerNoiseThanItsCellsIsIntegrated) {
   SceneBuilder b;
   const LoadedVolume v = loaded(b, put(b, n));
   const Grid& g = v.channels[0];
-  const V3 o = g.to_index(V3(.01f, .3f, .4f)), d = g.to_index(V3(.99f, .35f, .45f)) - o;
-  double sum = 0;
-  constexpr int kSteps = 400'000;
-  for (int s = 0; s < kSteps; ++s)
-    sum += g.value<Lookup::field>(V3(V3d(o) + V3d(d) * ((s + .5) / kSteps))) / double{kSteps};
-  EXPECT_NEAR(g.pass(o, d, 0, 1).integral, sum, 1e-3 * sum);
+  const V3 from = g.to_index(V3(.01f, .3f, .4f)), to = g.to_index(V3(.99f, .35f, .45f));
+  const double mean = mean_value(g, from, to);
+  EXPECT_NEAR(g.pass(from, to - from, 0, 1).integral, mean, 1e-3 * mean);
 }
 
 TEST(Field, IsNeverNegative) {

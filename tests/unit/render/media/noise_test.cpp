@@ -20,10 +20,11 @@ V3d random_point(std::mt19937_64& rng, double reach) {
   return p;
 }
 
-// What the header says of noise: it is the mean, with Perlin's weights, of |g . d| at most, which is the sum
-// of the two largest |d_k|. The mean of these sums changes along an axis by at most 1 + 2 w' <= 1 + 2 * 15/8
-// (two means, each at most 2, change places with the weight w), so between points of a lattice of width h it
-// exceeds their largest by at most 3 h / 2 times that. By symmetry an eighth of the cell is enough.
+// Proves the bound of noise() that its header states. The magnitude of noise is at most the mean, with
+// Perlin's weights, of the largest |g . d| at each corner, which is the sum of the two largest |d_k|. The
+// mean of these sums changes along an axis by at most 1 + 2 w' <= 1 + 2 * 15/8 (two means, each at most 2,
+// change places with the weight w), so between points of a lattice of width h it exceeds their largest by at
+// most 3 h / 2 times that. By symmetry an eighth of the cell is enough.
 TEST(Noise, IsWithinItsBound) {
   constexpr int kSteps = 160;
   constexpr double h = .5 / kSteps, kSlope = 1 + 2 * 15. / 8;
