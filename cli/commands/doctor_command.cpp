@@ -20,7 +20,7 @@ using nlohmann::ordered_json;
 
 struct DoctorFlags {
   FarmOptions farm;
-  std::string cache, data;
+  std::string cache, data, join;
 };
 
 void print_findings(const std::vector<Finding>& findings) {
@@ -50,6 +50,11 @@ std::string findings_json(const std::vector<Finding>& findings) {
 int run_doctor(const DoctorFlags& flags) {
   const MachineFacts machine = observe_machine(flags.cache, flags.data);
   std::vector<Finding> findings = judge_machine(machine);
+  if (!flags.join.empty()) {
+    const auto joining = observe_joining(flags.join);
+    if (!joining) return print_error(joining.error());
+    findings.push_back(judge_joining(*joining));
+  }
   const char* variable = std::getenv("LIGHTSHAFT_URL");
   if (flags.farm.url.empty() && (!variable || !*variable)) {
     findings.push_back({"farm",
@@ -79,6 +84,8 @@ void add_doctor(CLI::App& app, Action& action) {
       "check this machine and its access to a farm; exit code 1 if something does not work", run_doctor);
   flags->farm.add_to(*doctor);
   add_option(*doctor, "--farm", flags->farm.url, "URL", "the same as --to")->excludes("--to");
+  add_option(*doctor, "--join", flags->join, "HOST:PORT",
+             "also try this port for joining, as `lightshaft up --lan` names it");
   add_option(*doctor, "--cache", flags->cache, "DIR",
              "cache folder of a worker; default: the one of this user's workers");
   add_option(*doctor, "--data", flags->data, "DIR", "also check this data folder of a coordinator");

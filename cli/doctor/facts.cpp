@@ -272,4 +272,12 @@ Result<std::vector<FarmFacts>> observe_farm(const HttpClient::Options& connectio
   return all;
 }
 
+Result<JoiningFacts> observe_joining(const std::string& address) {
+  const auto peer = parse_host_port(address);
+  if (!peer) return fail(Errc::invalid_argument, "--join " + peer.error().message);
+  JoiningFacts facts{host_port_text(*peer), {}};
+  if (const auto connected = TcpConnection::open(*peer); !connected) facts.trouble = connected.error().message;
+  return facts;
+}
+
 }  // namespace ls::cli

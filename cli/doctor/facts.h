@@ -89,6 +89,14 @@ struct FarmFacts {
   std::string workers_address, workers_trouble;
 };
 
+// The port of `lightshaft up --lan` at which machines join its farm
+struct JoiningFacts {
+  std::string address;  // HOST:PORT
+  std::string trouble;  // why no connection was possible; empty: one was
+};
+// `address`: HOST:PORT. invalid_argument: it is something else.
+Result<JoiningFacts> observe_joining(const std::string& address);
+
 // Returns one result for each address of `connection`. invalid_argument: an address or the CA file cannot be
 // used.
 Result<std::vector<FarmFacts>> observe_farm(const HttpClient::Options& connection);

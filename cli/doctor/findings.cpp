@@ -326,6 +326,18 @@ double clock_lead(double asked_at, double answered_at, std::int64_t date) {
   return least > 0 ? least : most < 0 ? most : 0;
 }
 
+Finding judge_joining(const JoiningFacts& facts) {
+  Finding found{"joining-port", facts.address, Status::ok, "can be reached", {}};
+  if (!facts.trouble.empty()) {
+    found.status = Status::problem;
+    found.what = "cannot be reached: " + facts.trouble;
+    found.advice =
+        "check that `lightshaft up --lan` runs there and names this port for joining, and that its firewall "
+        "lets the port pass";
+  }
+  return found;
+}
+
 std::vector<Finding> judge_farm(const FarmFacts& facts, const std::string& program_version,
                                 const std::string& numeric_class) {
   std::vector<Finding> all{of_reachability(facts)};

@@ -25,6 +25,8 @@ std::vector<Finding> judge_machine(const MachineFacts& facts);
 std::vector<Finding> judge_farm(const FarmFacts& facts, const std::string& program_version,
                                 const std::string& numeric_class);
 
+Finding judge_joining(const JoiningFacts& facts);
+
 Status worst(const std::vector<Finding>& findings);
 
 // Returns by how many seconds, at least, the coordinator's clock is ahead of this machine's; negative if it

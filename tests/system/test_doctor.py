@@ -151,6 +151,18 @@ def test_an_address_that_is_none_is_not_tried(stub, named):
     assert "workers-port" not in doctor("--farm", stub.url, code=0, LIGHTSHAFT_TOKEN=SECRET)
 
 
+def test_the_port_for_joining_is_tried():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        address = f"127.0.0.1:{listener.getsockname()[1]}"
+        (open_port,) = doctor("--join", address, code=0)["joining-port"]
+    (closed,) = doctor("--join", address, code=1)["joining-port"]
+    wrong = lightshaft("doctor", "--join", "127.0.0.1", code=2, env=clean_environment())
+
+    assert open_port["status"] == "ok" and open_port["subject"] == address
+    assert closed["status"] == "problem" and "Connection refused" in closed["what"] and "lightshaft up --lan" in closed["advice"]
+    assert "--join '127.0.0.1' is no HOST:PORT" in wrong.stderr
+
+
 def test_a_python_without_numpy_is_warned_of_where_up_needs_it(tmp_path):
     python = tmp_path / "python3"
     python.write_text('#!/bin/sh\nexec "%s" -S "$@"\n' % sys.executable)  # -S: without the folders of packages

@@ -198,6 +198,17 @@ TEST(Doctor, PortForWorkersOfTheCoordinatorsMachineAloneIsNotTried) {
   EXPECT_THAT(found.what, HasSubstr("its own machine alone"));
 }
 
+TEST(Doctor, TellsWhetherThePortForJoiningIsReached) {
+  const JoiningFacts open{"farm.example:50052", {}}, closed{"farm.example:50052", "Connection refused"};
+
+  EXPECT_EQ(judge_joining(open).status, Status::ok);
+  const Finding found = judge_joining(closed);
+  EXPECT_EQ(found.status, Status::problem);
+  EXPECT_EQ(found.subject, "farm.example:50052");
+  EXPECT_THAT(found.what, HasSubstr("Connection refused"));
+  EXPECT_THAT(found.advice, HasSubstr("firewall"));
+}
+
 TEST(Doctor, RequiresNoTlsForThisMachine) {
   FarmFacts facts = good_farm();
   for (const char* url : {"http://localhost:8080", "http://127.0.0.1:1", "http://[::1]:8080"}) {
