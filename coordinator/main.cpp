@@ -318,6 +318,12 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   ls::http::Api api(**coordinator, **tokens, limits, ls::http::StaticFiles(ls::http::embedded_files()),
                     identity != nullptr);
   if (*webhooks) api.webhooks([&hooks = **webhooks] { return hooks.figures(); });
+  if (!flags.usd_python.empty()) {
+    auto stages =
+        ls::http::StageReader::open({.python = fs::absolute(flags.usd_python), .folder = data / "stages"});
+    if (!stages) return tl::unexpected(stages.error());
+    api.stages(std::move(*stages));
+  }
   api.workers_port([&grpc] { return grpc.trouble(); });
   api.joining({flags.public_grpc.empty() ? with_port(flags.grpc, *grpc_port) : flags.public_grpc,
                grpc_tls.has_value(), (secrets / "join-token").string()});

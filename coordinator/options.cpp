@@ -70,6 +70,10 @@ void add_shares(CLI::App& app, Flags& flags) {
                  "OpenColorIO configuration with the views in which images can be shown; default: the file "
                  "that the environment variable OCIO names, or built-in views of ACES")
       ->type_name("CONFIG.ocio");
+  app.add_option("--usd-python", flags.usd_python,
+                 "Python interpreter in which pip install 'lightshaft[usd]' was run; it reads stages of USD "
+                 "that are submitted, in a sandbox; default: stages are refused")
+      ->type_name("PYTHON");
   app.add_flag("--allow-fake", flags.allow_fake,
                "for tests: let workers join that were started with --fake and invent their pixels");
 }

@@ -34,7 +34,8 @@ struct Flags {
   ShareLimits shares;
   std::uint64_t film_memory = usable_memory_bytes() / 2;  // as Coordinator::Options::film_bytes
   double audit_percent = 1;
-  std::string ocio;  // an OpenColorIO configuration; empty: that of $OCIO, or the built-in views
+  std::string usd_python;  // a Python that reads stages of USD; empty: they are refused
+  std::string ocio;        // an OpenColorIO configuration; empty: that of $OCIO, or the built-in views
   bool allow_fake = false;
 };
 

@@ -276,7 +276,8 @@ Result<JoiningFacts> observe_joining(const std::string& address) {
   const auto peer = parse_host_port(address);
   if (!peer) return fail(Errc::invalid_argument, "--join " + peer.error().message);
   JoiningFacts facts{host_port_text(*peer), {}};
-  if (const auto connected = TcpConnection::open(*peer); !connected) facts.trouble = connected.error().message;
+  if (const auto connected = TcpConnection::open(*peer); !connected)
+    facts.trouble = connected.error().message;
   return facts;
 }
 

@@ -339,6 +339,7 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
   StoredJob& job = admission.job;
   job.name = request.scene_name.substr(0, limits::kMaxShownName);
   job.owner = request.owner;
+  job.warnings = request.warnings;
   for (const auto& d : read->warnings)
     if (job.warnings.size() < limits::kMaxWarnings) job.warnings.push_back(format_diagnostic(d));
   auto settings = settings_of(read->scene, request.spec, frame.value_or(0), job.warnings);

@@ -334,13 +334,14 @@ struct StreamEvent {
 
 struct SubmitRequest {
   std::string scene_name;  // name of the main file, for diagnostics
-  std::string scene_text;  // Mitsuba or Nori XML
+  std::string scene_text;  // in any of the scene languages
   // Digests of the files that the scene may name, by file name; the store must have these files
   std::map<std::string, Digest> assets;
   JobSpec spec;
   std::string owner = {};  // the user who submits it: JobView::owner
   // Header `traceparent` of the user's request (util/trace/span.h); a malformed one is ignored
   std::string traceparent = {};
+  std::vector<std::string> warnings = {};  // of the program that made the scene of another file
 };
 struct Rejected {
   Error error;

@@ -1,10 +1,18 @@
 // lightshaft-scene SECONDS BYTES: reads scene files that strangers have sent, and answers over the inherited
 // socket kHelperFd (exchange.h) until it is closed. The readers may have bugs: so the program shuts itself in
 // first. It is killed after SECONDS for one scene, and may take BYTES of memory.
+//
+// lightshaft-scene SECONDS BYTES OUTPUT FOLDER... -- PROGRAM ARGUMENT...: shuts itself in, and becomes a
+// program that reads scene files of a kind that is read in another language (stages of USD). The program may
+// read what is in the FOLDERs, and write OUTPUT bytes to the inherited file kHelperFd.
 #include <unistd.h>
 
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
 #include <new>
 #include <string>
+#include <string_view>
 
 #include "core/base/digest.h"
 #include "core/base/helper_program.h"
@@ -62,13 +70,27 @@ bool serve(Message request) {
   return ls::reading::send(ls::kHelperFd, done);
 }
 
+// Returns the exit code, and only if the program cannot be started.
+int become(ls::ShutInProgram program, char** word, char** end) {
+  char** const dashes = std::find(word, end, std::string_view("--"));
+  const auto output = word == end ? std::nullopt : ls::parse_number<std::uint64_t>(*word);
+  if (!output || end - dashes < 2) return 2;
+  program.file_bytes = *output;
+  program.readable.assign(word + 1, dashes);
+  program.arguments.assign(dashes + 1, end);
+  const int reason = ls::become_shut_in(std::move(program));
+  std::fprintf(stderr, "%s cannot be started: %s\n", dashes[1], std::strerror(reason));
+  return 2;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3) return ls::answer_person("lightshaft-scene", LIGHTSHAFT_VERSION, argc, argv);
+  if (argc < 3) return ls::answer_person("lightshaft-scene", LIGHTSHAFT_VERSION, argc, argv);
   const auto seconds = ls::parse_number<unsigned>(argv[1]);
   const auto bytes = ls::parse_number<std::uint64_t>(argv[2]);
   if (!seconds || !bytes) return 2;
+  if (argc > 3) return become({.seconds = *seconds, .memory_bytes = *bytes}, argv + 3, argv + argc);
   ls::shut_in_helper(*bytes);
   try {
     while (auto request = ls::reading::receive(ls::kHelperFd)) {

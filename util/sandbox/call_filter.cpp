@@ -280,6 +280,25 @@ Filter filter_of_starts() {
   return filter;
 }
 
+Filter filter_of_children() {
+  Filter filter;
+  load(offsetof(seccomp_data, nr), filter);
+#ifdef __x86_64__
+  compare(BPF_JEQ, SYS_fork, 1, 0, filter);
+  compare(BPF_JEQ, SYS_vfork, 0, 1, filter);
+  answer(kDeny, filter);
+#endif
+  compare(BPF_JEQ, SYS_clone3, 0, 1, filter);
+  answer(kUnknown, filter);  // as in filter_of_calls()
+  compare(BPF_JEQ, SYS_clone, 1, 0, filter);
+  answer(kAllow, filter);
+  load(offsetof(seccomp_data, args), filter);
+  compare(BPF_JSET, CLONE_THREAD, 0, 1, filter);
+  answer(kAllow, filter);
+  answer(kDeny, filter);
+  return filter;
+}
+
 bool install(Filter filter) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   (void)filter;
@@ -296,5 +315,7 @@ bool install(Filter filter) {
 bool limit_calls() { return install(filter_of_calls()); }
 
 bool forbid_processes() { return install(filter_of_starts()); }
+
+bool forbid_children() { return install(filter_of_children()); }
 
 }  // namespace ls

@@ -17,4 +17,8 @@ bool limit_calls();
 // false if the kernel has no filters.
 bool forbid_processes();
 
+// Denies this process starting other processes from now on, besides limit_calls(), but allows threads and
+// becoming another program. Returns false if the kernel has no filters.
+bool forbid_children();
+
 }  // namespace ls

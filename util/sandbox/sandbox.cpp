@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
@@ -55,7 +56,7 @@ struct Ruleset {
 // holds for signals that the kernel sends on its behalf (fcntl with F_SETOWN).
 constexpr std::uint64_t kScopeSignal = 2;
 
-bool bound_files(const std::vector<std::filesystem::path>& readable) {
+bool bound_files(const std::vector<std::filesystem::path>& readable, const std::filesystem::path& program) {
   const long abi = ::syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
   if (abi < 1) return false;
   Ruleset attr;
@@ -81,6 +82,7 @@ bool bound_files(const std::vector<std::filesystem::path>& readable) {
     done &= allow(rules.fd, path, kRead);
   done &= allow(rules.fd, "/dev/null", kRead | LANDLOCK_ACCESS_FS_WRITE_FILE);
   for (const auto& folder : readable) done &= allow(rules.fd, folder, kRead);
+  if (!program.empty()) done &= allow(rules.fd, program, kRun);
   return done && ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
          ::syscall(SYS_landlock_restrict_self, rules.fd, 0) == 0;
 }
@@ -102,22 +104,9 @@ bool drop_capabilities() {
          });
 }
 
-}  // namespace
-
-Sandboxed enter_sandbox(const std::vector<std::filesystem::path>& readable) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  (void)readable;
-  (void)drop_capabilities;
-  (void)bound_files;
-  return {};
-#else
-  const bool files = bound_files(readable);
-  const bool rights = drop_capabilities();
-  return {limit_calls() && rights, files};
-#endif
-}
-
-void shut_in_helper(std::uint64_t memory_bytes) {
+// What all helpers have in common. `readable`, `program`: as in enter_sandbox().
+void shut_in(std::uint64_t memory_bytes, const std::vector<std::filesystem::path>& readable,
+             const std::filesystem::path& program) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
@@ -125,14 +114,53 @@ void shut_in_helper(std::uint64_t memory_bytes) {
   // Sanitizers reserve more memory than any limit allows, and have no sandbox.
   const rlimit memory{memory_bytes, memory_bytes};
   ::setrlimit(RLIMIT_DATA, &memory);
-  const Sandboxed in = enter_sandbox({});
+#else
+  (void)memory_bytes;
+#endif
+  const Sandboxed in = enter_sandbox(readable, program);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   if (!in.calls || !in.files)
     std::fprintf(stderr, "this kernel has no %s: strangers' files are read without it\n",
                  in.calls ? "Landlock" : "seccomp");
 #else
-  (void)memory_bytes;
+  (void)in;
 #endif
+}
+
+}  // namespace
+
+Sandboxed enter_sandbox(const std::vector<std::filesystem::path>& readable,
+                        const std::filesystem::path& program) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  (void)readable;
+  (void)program;
+  (void)drop_capabilities;
+  (void)bound_files;
+  return {};
+#else
+  const bool files = bound_files(readable, program);
+  const bool rights = drop_capabilities();
+  return {limit_calls() && rights, files};
+#endif
+}
+
+void shut_in_helper(std::uint64_t memory_bytes) {
+  shut_in(memory_bytes, {}, {});
   forbid_processes();
+}
+
+int become_shut_in(ShutInProgram program) {
+  std::vector<char*> argv;
+  for (std::string& each : program.arguments) argv.push_back(each.data());
+  argv.push_back(nullptr);
+  const rlimit files{program.file_bytes, program.file_bytes};
+  ::setrlimit(RLIMIT_FSIZE, &files);
+  std::error_code error;
+  shut_in(program.memory_bytes, program.readable, std::filesystem::canonical(argv.front(), error));
+  forbid_children();
+  ::alarm(program.seconds);  // stays set in the new program
+  ::execv(argv.front(), argv.data());
+  return errno;
 }
 
 }  // namespace ls

@@ -16,6 +16,7 @@
 #include "coordinator/http/api/routes.h"
 #include "coordinator/http/api/static_files.h"
 #include "coordinator/http/auth/auth.h"
+#include "coordinator/http/bundle/stage.h"
 #include "coordinator/http/message/limits.h"
 #include "coordinator/http/message/message.h"
 #include "coordinator/service/coordinator.h"
@@ -83,6 +84,9 @@ class Api {
   void webhooks(std::function<coordinator::WebhookFigures()> figures) { webhooks_ = std::move(figures); }
   // Sets the function that says what is wrong with the workers' port (empty: nothing); /readyz asks it
   void workers_port(std::function<std::string()> trouble) { workers_port_ = std::move(trouble); }
+  // Sets what reads stages of USD; without it they are refused. Call this before the first request
+  void stages(std::unique_ptr<StageReader> reader) { stages_ = std::move(reader); }
+  StageReader* stages() const { return stages_.get(); }
   // Sets how workers join, which the dashboard tells those who add one
   void joining(Joining joining) { joining_ = std::move(joining); }
   const Joining& joining() const { return joining_; }
@@ -108,6 +112,7 @@ class Api {
   Limits limits_;
   StaticFiles files_;
   Joining joining_;
+  std::unique_ptr<StageReader> stages_;
   Counters counters_;
   PartialUploads partial_uploads_{coordinator::limits::kMaxUnfinishedUploads / 4};
   coordinator::Gate pictures_;  // callers take turns to have answers about images made

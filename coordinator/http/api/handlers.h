@@ -66,9 +66,11 @@ std::variant<Response, std::unique_ptr<BodySink>> open_bundle(Api&, const Reques
 
 // The steps that all submissions share, whether the body was a scene, JSON or an archive (job_handlers.cpp).
 
-// Returns the text of a scene file from the blob store; a file of more than scene::kMaxTextBytes bytes is an
-// error.
-Result<std::string> read_scene_blob(Api& api, const Digest& digest);
+// Sets the text of the request's scene, whose name, files and settings are set already, from the blob store.
+// A file of more than scene::kMaxTextBytes bytes is an error. If it is a stage of USD, also sets files and
+// warnings, to those of the scene that the Python package makes of it (coordinator/http/bundle/stage.h).
+Result<void> load_scene(Api& api, const Digest& digest, const Caller& caller,
+                        coordinator::SubmitRequest& job);
 
 // Submits the job and answers: 201 {id, url, warnings}, or the error with the scene's diagnostics.
 Response submit_job(Api& api, coordinator::SubmitRequest request, const Caller& caller);

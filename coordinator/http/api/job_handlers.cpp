@@ -8,9 +8,11 @@
 #include "coordinator/base/limits.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
+#include "coordinator/http/bundle/stage.h"
 #include "coordinator/http/message/json_read.h"
 #include "coordinator/views/describe_change.h"
 #include "core/base/parse_number.h"
+#include "core/base/safe_text.h"
 #include "core/job/spec_draft.h"
 #include "core/scene/limits.h"
 
@@ -62,9 +64,7 @@ Result<SubmitRequest> from_json(Api& api, const Request& request) {
     if (!parsed) return tl::unexpected(parsed.error());
     submit.spec = std::move(*parsed);
   }
-  auto text = read_scene_blob(api, *digest);
-  if (!text) return tl::unexpected(text.error());
-  submit.scene_text = std::move(*text);
+  if (auto ok = load_scene(api, *digest, request.caller, submit); !ok) return tl::unexpected(ok.error());
   return submit;
 }
 
@@ -161,6 +161,38 @@ Result<JobsAsked> read_asked(const Request& request) {
   return asked;
 }
 
+Result<std::string> read_text(const coordinator::BlobStore& blobs, const Digest& digest) {
+  const auto size = blobs.size(digest);
+  if (!size) return tl::unexpected(size.error());
+  if (*size > scene::kMaxTextBytes)
+    return fail(Errc::invalid_argument, fmt::format("the scene file has {} bytes; at most {} are accepted",
+                                                    *size, scene::kMaxTextBytes));
+  const auto bytes = blobs.read(digest, 0, *size);
+  if (!bytes) return tl::unexpected(bytes.error());
+  return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+}
+
+Result<void> load_stage(Api& api, const Digest& digest, const Caller& caller, SubmitRequest& job) {
+  if (!api.stages())
+    return bad_argument(fmt::format(
+        "{} is a stage of USD, which this coordinator does not read: its administrator can give it "
+        "--usd-python. The Python package makes a scene of the stage: python3 -m lightshaft.usd FILE -o "
+        "FOLDER",
+        plain_text(job.scene_name)));
+  const BundleLimits limits{api.limits().blob_bytes, api.limits().unpacked_bytes};
+  Stage stage{job.scene_name, digest, std::move(job.assets), job.spec.frames, {}};
+  if (job.spec.size) stage.size = *job.spec.size;
+  auto scene =
+      api.stages()->read(stage, caller.token_id, limits, api.coordinator().blobs(), api.stop_token());
+  if (!scene) return tl::unexpected(scene.error());
+  auto text = read_text(api.coordinator().blobs(), scene->bundle.scene_digest);
+  if (!text) return tl::unexpected(text.error());
+  job.scene_text = std::move(*text);
+  job.assets = std::move(scene->bundle.assets);
+  job.warnings = std::move(scene->warnings);
+  return {};
+}
+
 }  // namespace
 
 Response get_jobs(Api& api, const Request& request, const Params&) {
@@ -215,19 +247,18 @@ Response delete_job(Api& api, const Request&, const JobId& id) {
   return {.status = 204};
 }
 
-Result<std::string> read_scene_blob(Api& api, const Digest& digest) {
+Result<void> load_scene(Api& api, const Digest& digest, const Caller& caller, SubmitRequest& job) {
   auto& blobs = api.coordinator().blobs();
   if (!blobs.has(digest))
     return fail(Errc::failed_precondition,
                 fmt::format("the scene's blob {0} is not here: PUT /api/v1/blobs/{0} first", digest.hex()));
-  const auto size = blobs.size(digest);
-  if (!size) return tl::unexpected(size.error());
-  if (*size > scene::kMaxTextBytes)
-    return fail(Errc::invalid_argument, fmt::format("the scene file has {} bytes; at most {} are accepted",
-                                                    *size, scene::kMaxTextBytes));
-  const auto bytes = blobs.read(digest, 0, *size);
-  if (!bytes) return tl::unexpected(bytes.error());
-  return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  const auto begin = blobs.read(digest, 0, kStageMagic);
+  if (!begin) return tl::unexpected(begin.error());
+  if (is_stage(job.scene_name, *begin)) return load_stage(api, digest, caller, job);
+  auto text = read_text(blobs, digest);
+  if (!text) return tl::unexpected(text.error());
+  job.scene_text = std::move(*text);
+  return {};
 }
 
 std::optional<Response> refuse_priority(const Api& api, const Caller& caller, int priority) {

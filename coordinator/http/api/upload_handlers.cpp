@@ -1,15 +1,9 @@
 // Handlers of blobs and bundles: bodies that are stored while they arrive.
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <stdlib.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstring>
-#include <system_error>
 
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/bundle/bundle.h"
+#include "coordinator/http/bundle/spool.h"
 #include "coordinator/http/message/json_read.h"
 #include "core/base/parse_number.h"
 #include "core/base/spawn.h"
@@ -217,27 +211,6 @@ std::variant<Response, std::unique_ptr<BodySink>> open_part(Api& api, const Requ
   return std::make_unique<PartSink>(api, token, std::move(*upload), digest, *range);
 }
 
-Error no_spool(std::string_view what, int code) {
-  const bool full = code == ENOSPC || code == EDQUOT || code == EFBIG;
-  return {full ? Errc::resource_exhausted : Errc::unavailable,
-          fmt::format("{} for the request's body: {}{}", what, std::strerror(code),
-                      full ? "; free some space on the coordinator's disk and send it again" : "")};
-}
-
-// Creates a file for a request's body in `folder`, which is created if it is missing; an empty path means the
-// system's folder for temporary files. The file has no name, so it disappears with its descriptor.
-Result<std::unique_ptr<const Descriptor>> open_spool(const std::filesystem::path& folder) {
-  std::error_code error;
-  const auto place = folder.empty() ? std::filesystem::temp_directory_path(error) : folder;
-  if (!error) std::filesystem::create_directories(place, error);
-  if (error) return tl::unexpected(no_spool("no folder", error.value()));
-  std::string name = (place / "body-XXXXXX").string();
-  auto file = std::make_unique<const Descriptor>(::mkostemp(name.data(), O_CLOEXEC));
-  if (file->fd < 0) return tl::unexpected(no_spool("no file", errno));
-  ::unlink(name.c_str());
-  return file;
-}
-
 // Receives POST /api/v1/jobs with a zip or tar: the body is spooled to disk, checked, stored file by file,
 // and submitted.
 class BundleSink final : public BodySink {
@@ -253,12 +226,7 @@ class BundleSink final : public BodySink {
   std::optional<Response> append(std::span<const std::byte> bytes) override {
     received_ += bytes.size();
     if (auto refused = over_limit("bundle", received_, api_.limits().bundle_bytes)) return refused;
-    while (!bytes.empty()) {
-      const ssize_t n = ::write(spool_->fd, bytes.data(), bytes.size());
-      if (n < 0 && errno == EINTR) continue;
-      if (n < 0) return problem(no_spool("no room", errno));
-      bytes = bytes.subspan(static_cast<std::size_t>(n));
-    }
+    if (auto done = write_spool(spool_->fd, bytes); !done) return problem(done.error());
     return std::nullopt;
   }
 
@@ -276,13 +244,11 @@ class BundleSink final : public BodySink {
     auto spec = spec_from_query(query_, "name", bundle->spec);
     if (!spec) return problem(spec.error());
     job.spec = std::move(*spec);
-    auto text = read_scene_blob(api_, bundle->scene_digest);
-    if (!text) return problem(text.error());
-    job.scene_text = std::move(*text);
     job.scene_name = bundle->scene;
+    job.assets = bundle->assets;
+    if (auto ok = load_scene(api_, bundle->scene_digest, caller_, job); !ok) return problem(ok.error());
     for (const auto& [key, value] : query_)
       if (key == "name") job.scene_name = value.substr(0, kMaxAssetName);
-    job.assets = bundle->assets;
     job.owner = caller_.user;
     job.traceparent = traceparent_;
     return submit_job(api_, std::move(job), caller_);

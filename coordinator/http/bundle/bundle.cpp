@@ -9,6 +9,7 @@
 #include <set>
 #include <vector>
 
+#include "coordinator/http/bundle/stage.h"
 #include "coordinator/http/message/json_read.h"
 #include "coordinator/http/message/limits.h"
 #include "core/base/safe_text.h"
@@ -220,13 +221,6 @@ std::string top_of(const std::vector<BundleFile>& files) {
   return top;
 }
 
-bool is_xml(std::string_view name) {
-  if (name.size() < 5) return false;
-  std::string end(name.substr(name.size() - 4));
-  std::transform(end.begin(), end.end(), end.begin(), [](unsigned char c) { return std::tolower(c); });
-  return end == ".xml";
-}
-
 std::string listed(const std::vector<std::string>& names) {
   std::string text;
   for (std::size_t i = 0; i < std::min(names.size(), kMostShown); ++i)
@@ -234,20 +228,36 @@ std::string listed(const std::vector<std::string>& names) {
   return names.size() > kMostShown ? text + fmt::format(" and {} more", names.size() - kMostShown) : text;
 }
 
-// Returns the name in the archive of the only .xml file at the top, which is the scene.
-Result<std::string> only_scene(const std::vector<BundleFile>& files, const std::string& top) {
+bool is_xml(std::string_view name) {
+  if (name.size() < 5) return false;
+  std::string end(name.substr(name.size() - 4));
+  std::transform(end.begin(), end.end(), end.begin(), [](unsigned char c) { return std::tolower(c); });
+  return end == ".xml";
+}
+
+// Returns the names in the archive of the files at the top whose name has this ending.
+std::vector<std::string> at_top(const std::vector<BundleFile>& files, const std::string& top,
+                                bool (*has_ending)(std::string_view)) {
   std::vector<std::string> found;
   for (const BundleFile& file : files) {
     const std::string_view name =
         std::string_view(file.name).substr(file.name.starts_with(top) ? top.size() : 0);
-    if (name.find('/') == std::string_view::npos && !is_litter(name) && is_xml(name))
+    if (name.find('/') == std::string_view::npos && !is_litter(name) && has_ending(name))
       found.push_back(file.name);
   }
+  return found;
+}
+
+// Returns the name in the archive of the scene: the only .xml file at the top, or else the only stage of USD.
+Result<std::string> only_scene(const std::vector<BundleFile>& files, const std::string& top) {
+  std::vector<std::string> found = at_top(files, top, is_xml);
+  if (found.empty()) found = at_top(files, top, is_stage_name);
   if (found.size() == 1) return found.front();
   if (found.empty())
     return bad_bundle(
-        "there is no .xml at its top: put the scene there, or name it in a file job.json, {\"scene\": "
-        "\"FILE\"}");
+        "there is no .xml and no stage of USD at its top: put the scene there, or name it in a file "
+        "job.json, "
+        "{\"scene\": \"FILE\"}");
   return bad_bundle(fmt::format(
       "which of {} is the scene? Name it in a file job.json, {{\"scene\": \"FILE\"}}", listed(found)));
 }

@@ -31,8 +31,9 @@ struct Bundle {
 };
 
 // Reads the archive of `archive_bytes` bytes in `fd`. The scene is the file that job.json names ({"scene":
-// FILE, and the keys of the spec}); without a job.json it is the only .xml file at the top. If all files are
-// in one folder, that folder is the top. Names are normalised ("./a//b" is "a/b").
+// FILE, and the keys of the spec}); without a job.json it is the only .xml file at the top or, if there is
+// none, the only stage of USD there. If all files are in one folder, that folder is the top. Names are
+// normalised ("./a//b" is "a/b").
 //
 // An archive is rejected for the following reasons, and the message names the entry: names that are absolute,
 // lead out of the archive by "..", are not UTF-8, or have control characters or backslashes; links and

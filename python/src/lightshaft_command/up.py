@@ -3,11 +3,14 @@
 
 import contextlib
 import http.client
+import importlib.util
 import os
 import pathlib
 import shlex
 import socket
 import ssl
+import subprocess
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -66,14 +69,23 @@ def free_port(host: str, wanted: int, given: int | None) -> int:
     return found
 
 
+def reads_usd() -> bool:
+    """Tells whether the coordinator's sandbox can read stages of USD with this Python."""
+    if importlib.util.find_spec("pxr") is None:
+        return False
+    command = [sys.executable, "-I", "-B", "-c", "import lightshaft.usd"]
+    return subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False).returncode == 0
+
+
 def start_coordinator(children: Children, asked: Options, data: pathlib.Path, names: list[str]) -> dict[str, int]:
     """Starts the coordinator. Returns its ports `http` and `grpc`."""
     host = "0.0.0.0" if asked.lan else "127.0.0.1"
     home = data / "coordinator"
     tls = ["--tls", "--tls-names", ",".join(names)] if asked.lan else []
+    usd = ["--usd-python", sys.executable] if reads_usd() else []
 
     def words(web: int, workers: int) -> list[str]:
-        return [find("lightshaft-coordinator"), "--http", f"{host}:{web}", "--grpc", f"{host}:{workers}", "--data", str(home), *tls]
+        return [find("lightshaft-coordinator"), "--http", f"{host}:{web}", "--grpc", f"{host}:{workers}", "--data", str(home), *tls, *usd]
 
     # Another program may take a port that was free just now.
     for wanted_http, wanted_workers in ((HTTP, WORKERS), (0, 0)):

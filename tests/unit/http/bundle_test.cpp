@@ -134,7 +134,8 @@ TEST_F(Bundles, SceneIsAtTheTopOrInTheOnlyFolder) {
   ASSERT_TRUE(folder) << folder.error().message;
   EXPECT_EQ(folder->scene, "bath/b.xml");
   EXPECT_EQ(folder->assets.at("t/wood.png"), sha256("3"));
-  EXPECT_THAT(refusal(kZip, {{"good", "inside"}, {"x/a.xml", "1"}}), HasSubstr("no .xml at its top"));
+  EXPECT_THAT(refusal(kZip, {{"good", "inside"}, {"x/a.xml", "1"}}),
+              HasSubstr("no .xml and no stage of USD at its top"));
   EXPECT_THAT(refusal(kZip, {{"a.xml", "1"}, {"b.xml", "inside"}}),
               AllOf(HasSubstr("\"a.xml\", \"b.xml\""), HasSubstr("job.json")));
 }

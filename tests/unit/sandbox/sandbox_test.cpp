@@ -348,6 +348,33 @@ TEST_P(Cage, CannotStartProcessesOnceForbidden) {
   EXPECT_EQ(tried([] { return 0; }), 0);
 }
 
+TEST_P(Cage, CannotStartChildrenOnceForbidden) {
+  const auto tried = [&](const std::function<long()>& start) {
+    return try_sandboxed([&] { return forbid_children() && start() < 0 ? 1 : 0; }, &Sandboxed::calls);
+  };
+  const auto clone_with = [](unsigned long flags) {
+    return [flags] {
+      const long made = ::syscall(SYS_clone, flags, 0, 0, 0, 0);
+      if (made == 0) ::_exit(0);
+      return made;
+    };
+  };
+  char name[] = "/bin/true";
+  char* arguments[] = {name, nullptr};
+
+  const int process = tried(clone_with(SIGCHLD));
+  SKIP_UNCAGED(process, &Sandboxed::calls);
+
+  EXPECT_EQ(process, EPERM);
+  EXPECT_EQ(tried(clone_with(CLONE_VM | CLONE_VFORK | SIGCHLD)), EPERM) << "as posix_spawn does";
+#ifdef __x86_64__
+  EXPECT_EQ(tried([] { return ::syscall(SYS_fork); }), EPERM);
+  EXPECT_EQ(tried([] { return ::syscall(SYS_vfork); }), EPERM);
+#endif
+  EXPECT_EQ(tried([] { return std::thread([] {}).join(), 0; }), 0);
+  EXPECT_EQ(tried([&] { return ::execve(name, arguments, nullptr); }), 0) << "it may become another program";
+}
+
 TEST_P(Cage, CannotSignalOtherProcesses) {
   const int agent = try_sandboxed([] { return ::kill(::getppid(), 0); }, &Sandboxed::calls);
   SKIP_UNCAGED(agent, &Sandboxed::calls);

@@ -31,8 +31,9 @@ async function walk(entry) {
 const folderOf = (path) => path.split("/").slice(0, -1);
 const baseOf = (path) => path.split("/").pop();
 
-const kScenes = [/\.xml$/i, /\.gltf$/i, /\.glb$/i, /\.pbrt$/i, /\.zip$/i, /\.(tar|tar\.gz|tgz)$/i]; // the most likely first
-export const kSceneEndings = ".xml, .gltf, .glb, .pbrt, .zip, .tar or .tar.gz";
+const kUsd = /\.usd[acz]?$/i;
+const kScenes = [/\.xml$/i, /\.gltf$/i, /\.glb$/i, /\.pbrt$/i, kUsd, /\.zip$/i, /\.(tar|tar\.gz|tgz)$/i]; // the most likely first
+export const kSceneEndings = ".xml, .gltf, .glb, .pbrt, .usd, .usda, .usdc, .usdz, .zip, .tar or .tar.gz";
 const kArchive = /\.(zip|tar|tgz|tar\.gz)$/i;
 const kindOf = (path) => kScenes.findIndex((ending) => ending.test(path));
 
@@ -47,12 +48,8 @@ export function scenesAmong(files) {
 /** smoke.2 before smoke.10. */
 const byName = (a, b) => a.localeCompare(b, "en", { numeric: true }) || (a < b ? -1 : 1);
 
-/** What to do with files of which none is a scene here. */
-export function noScene(files) {
-  const usd = files.find(({ path }) => /\.usd[acz]?$/i.test(path));
-  if (usd) return `The coordinator reads no USD. The Python package turns it into a scene with its files, to be dropped here: python -m lightshaft.usd ${baseOf(usd.path)} -o shot`;
-  return `There is no scene among these files. Add it: ${kSceneEndings}.`;
-}
+/** What to do with files of which none is a scene. */
+export const kNoScene = `There is no scene among these files. Add it: ${kSceneEndings}.`;
 
 /**
  * {main, assets: [{name, file}], missing: [name], unused: [path], frames, archive, allSent}: `name` is where the coordinator looks for the file
@@ -75,7 +72,7 @@ const everything = (others, main) => ({ assets: others.map(({ path, file }) => (
 
 async function planned(scene, others, main) {
   if (kArchive.test(main)) return { archive: /\.zip$/i.test(main) ? "application/zip" : "application/x-tar", assets: [], missing: [], unused: others.map(({ path }) => path) };
-  if (/\.pbrt$/i.test(main)) return everything(others, main);
+  if (/\.pbrt$/i.test(main) || kUsd.test(main)) return everything(others, main);
   if (/\.gl(tf|b)$/i.test(main)) return planOfGltf(scene, others, main);
   const survey = new Survey(others, main);
   if (!(await survey.read(scene.file, [])) || survey.hasParameters) {

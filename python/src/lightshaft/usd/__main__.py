@@ -1,10 +1,56 @@
 """python -m lightshaft.usd: writes a stage as a scene for `lightshaft render` and `lightshaft submit`."""
 
 import argparse
+import io
+import json
+import os
 import sys
+import tarfile
 
 from ..errors import LightshaftError
-from . import read
+from ..scene_files import Source
+from . import StageScene, read
+from .files import OutsideFolder
+
+_PIECE = 1 << 24  # bytes read from a file at once
+
+
+class _Pieces(io.RawIOBase):
+    """The bytes of a source as a file."""
+
+    def __init__(self, source: Source) -> None:
+        self._source, self._place = source, 0
+
+    def readable(self) -> bool:
+        return True
+
+    def read(self, size: int = -1, /) -> bytes:
+        left = self._source.size - self._place
+        piece = self._source.read(self._place, min(left, _PIECE if size < 0 else size)) if left else b""
+        self._place += len(piece)
+        return piece
+
+
+def write_bundle(scene: StageScene, descriptor: int) -> None:
+    """Writes the scene with its files and warnings as a tar, as the coordinator takes it."""
+    texts = {
+        "job.json": json.dumps({"scene": "scene.xml"}),
+        "scene.xml": scene.main.xml,
+        "warnings.txt": "\n".join(scene.warnings),
+    }
+    files = {**scene.files, **{name: Source.of_bytes(text.encode()) for name, text in texts.items()}}
+    with os.fdopen(descriptor, "wb") as file, tarfile.open(fileobj=file, mode="w|") as bundle:
+        for name, source in files.items():
+            entry = tarfile.TarInfo(name)
+            entry.size = source.size
+            bundle.addfile(entry, _Pieces(source))
+
+
+def reason_of(error: LightshaftError) -> str:
+    """Says why an uploaded stage is refused. Its user cannot choose the folders that are read."""
+    if isinstance(error, OutsideFolder):
+        return f"{error.what}: send this file along, and name it by its path from the stage"
+    return str(error)
 
 
 def main() -> int:
@@ -13,12 +59,16 @@ def main() -> int:
         description="Writes a USD stage as scene.xml, with the meshes and images that it names.",
     )
     parser.add_argument("stage", help="a .usd, .usda, .usdc or .usdz")
-    parser.add_argument("-o", "--output", required=True, metavar="FOLDER")
+    place = parser.add_mutually_exclusive_group(required=True)
+    place.add_argument("-o", "--output", metavar="FOLDER")
+    # For the coordinator, whose sandbox allows no other file to be written: a tar, or why there is no scene
+    place.add_argument("--to-descriptor", type=int, metavar="FD", help=argparse.SUPPRESS)
     parser.add_argument("--camera", metavar="PATH", help="the path of the camera's prim")
     parser.add_argument("--frames", metavar="A-B", help="time codes, as in 1-10 or 1-10x2")
     parser.add_argument(
         "--size", nargs=2, type=int, metavar=("WIDTH", "HEIGHT"), help="size of the image in pixels"
     )
+    parser.add_argument("--folder", help="read no files outside of this folder (default: the stage's)")
     parser.add_argument(
         "--allow", action="append", default=[], metavar="FOLDER", help="also read files from this folder"
     )
@@ -29,10 +79,16 @@ def main() -> int:
             camera=options.camera,
             frames=options.frames,
             size=tuple(options.size) if options.size else None,
+            folder=options.folder,
             allow=options.allow,
         )
+        if options.to_descriptor is not None:
+            write_bundle(scene, options.to_descriptor)
+            return 0
         scene.write(options.output)
     except LightshaftError as error:
+        if options.to_descriptor is not None:
+            os.write(options.to_descriptor, reason_of(error).encode())
         print(error, file=sys.stderr)
         return 2
     for warning in scene.warnings:

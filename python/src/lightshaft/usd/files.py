@@ -20,6 +20,14 @@ from ..scene_files import PathLike, Source, written_otherwise
 from .problems import Problems
 
 
+class OutsideFolder(FileRefused):
+    """A file lies outside of the folders that may be read."""
+
+    def __init__(self, what: str, folder: pathlib.Path) -> None:
+        super().__init__(f"{what}; to send it, allow its folder: allow=[{str(folder)!r}]")
+        self.what = what
+
+
 class Asset:
     """A file of the stage, on disk or in a .usdz."""
 
@@ -89,10 +97,8 @@ class Files:
     def _admit(self, owner: str, named: str, place: str) -> pathlib.Path:
         real = pathlib.Path(os.path.realpath(place))
         if not any(real.is_relative_to(root) for root in self._roots):
-            raise FileRefused(
-                f"{owner} names {named}, which is {real} and lies outside {self._roots[0]}; "
-                f"to send it, allow its folder: allow=[{str(real.parent)!r}]"
-            )
+            what = f"{owner} names {named}, which is {real} and lies outside {self._roots[0]}"
+            raise OutsideFolder(what, real.parent)
         return real
 
     def take(self, asset: Asset) -> str:

@@ -1,7 +1,7 @@
 // The page for a new job: drop a scene with its files, choose settings, send.
 import { h } from "../dom.js";
 import { bytes, plural } from "../format.js";
-import { kSceneEndings, noScene, scenesAmong } from "../bundle.js";
+import { kSceneEndings, kNoScene, scenesAmong } from "../bundle.js";
 import { diagnostics, notice, progressBar, wholeNotice } from "./pieces.js";
 import { mayChange } from "../state.js";
 
@@ -24,7 +24,7 @@ function dropZone(submit, actions, busy) {
     h("div", { class: "choices" },
       chooser("files", submit.files.length ? "Add files" : "Choose files", { multiple: true }, actions, busy),
       chooser("folder", "Choose a folder", { webkitdirectory: true }, actions, busy)),
-    submit.files.length ? null : h("p", { key: "help", class: "help" }, `A scene is ${kSceneEndings}. Only the files that it names are sent (beside a .pbrt all of them, since this page can't read that), and none that the farm has already. Files may be dropped anywhere on any page.`));
+    submit.files.length ? null : h("p", { key: "help", class: "help" }, `A scene is ${kSceneEndings}. Only the files that it names are sent (beside a .pbrt or a stage of USD all of them, since this page can't read those), and none that the farm has already. Files may be dropped anywhere on any page.`));
 }
 
 // A file input on top of its button, but invisible, so that keyboard and screen reader use a real file input.
@@ -40,7 +40,7 @@ function bundle(submit, actions, busy) {
     h("div", { key: "head", class: "bundle-head" },
       h("h2", null, plan ? plan.main.name : submit.main?.split("/").at(-1) ?? "No scene yet"),
       h("button", { type: "button", class: "small quiet", disabled: busy, onclick: actions.clearFiles }, "Start over")),
-    scenes.length === 0 ? h("p", { class: "field-error", role: "alert" }, noScene(submit.files)) : null,
+    scenes.length === 0 ? h("p", { class: "field-error", role: "alert" }, kNoScene) : null,
     scenes.length > 1
       ? h("p", null, h("label", { for: "main-scene" }, "Scene "), h("select", { id: "main-scene", disabled: busy, onchange: actions.onMain }, scenes.map((path) => h("option", { key: path, value: path, ".selected": path === submit.main }, path))))
       : null,
