@@ -49,6 +49,21 @@ int show_answer(const FarmApi::Answer<json>& answer, const FarmFlags& flags,
   return kOk;
 }
 
+// Jobs that wait for files on their users' machines. An older coordinator knows none.
+void print_announced(FarmApi& api) {
+  const auto answer = api.get("/api/v1/announced");
+  if (!answer) return;
+  for (const json& each : objects_field(*answer, "announced")) {
+    const auto files = texts_field(each, "files");
+    const std::string frames = text_field(each, "frames"), machine = text_field(each, "machine");
+    const double more = number_field(each, "count").value_or(1) - 1;
+    print_note(fmt::format("{}{} will be submitted when {}{} complete{}", text_field(each, "name"),
+                           frames.empty() ? "" : ", frames " + frames + ",",
+                           files.empty() ? "" : files.front(),
+                           more > 0 ? fmt::format(" and {:.0f} more are", more) : " is",
+                           machine.empty() ? "" : " on " + machine));
+  }
+}
 int jobs(FarmApi& api, const FarmFlags& flags) {
   const auto answer = api.get("/api/v1/jobs" + query_of({{"state", flags.state},
                                                          {"search", flags.search},
@@ -61,6 +76,7 @@ int jobs(FarmApi& api, const FarmFlags& flags) {
   const std::size_t shown = objects_field(*answer, "jobs").size();
   if (const auto total = number_field(*answer, "total"); total && *total > static_cast<double>(shown))
     print_note(fmt::format("{} of {:.0f} jobs; --limit and --offset select others", shown, *total));
+  print_announced(api);
   return code;
 }
 int print_lines(const FarmApi::Answer<std::string>& text) {

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <optional>
+#include <random>
 
 #include "cli/commands/commands.h"
 #include "cli/farm/farm_api.h"
@@ -14,6 +16,7 @@
 #include "cli/output/reply_fields.h"
 #include "core/base/safe_text.h"
 #include "core/image/reference/reference.h"
+#include "worker/machine.h"
 
 namespace ls::cli {
 namespace {
@@ -104,6 +107,46 @@ FarmApi::Answer<void> send_reference(const SubmitFlags& flags, JobSpec& spec) {
   return {};
 }
 
+// Tells the farm of a job that waits for files, so that the dashboard and `lightshaft jobs` show it.
+class Announcement {
+ public:
+  static constexpr std::size_t kFilesNamed = 5;  // as many as the farm keeps
+  Announcement(const SubmitFlags& flags, const JobSpec& spec) : flags_(flags), spec_(spec) {}
+
+  // A farm that does not answer, or knows no announcements, does not end the wait. One that does not accept
+  // the token does: it would not accept the job either.
+  Result<void> repeat(const std::vector<std::string>& files) {
+    auto api = FarmApi::open(flags_.farm);
+    if (!api) return tl::unexpected(api.error());
+    const auto named = static_cast<std::ptrdiff_t>(std::min(files.size(), kFilesNamed));
+    FarmApi::Json body{
+        {"name", flags_.name.empty() ? std::filesystem::path(flags_.scene).filename().string() : flags_.name},
+        {"machine", worker::host_name()},
+        {"files", std::vector(files.begin(), files.begin() + named)},
+        {"count", files.size()}};
+    if (spec_.frames) body["frames"] = to_string(*spec_.frames);
+    const auto done = api->put(path_, body);
+    announced_ |= done.has_value();
+    if (!done && done.error().error.code == Errc::permission_denied)
+      return tl::unexpected(done.error().error);
+    return {};
+  }
+  void withdraw() {
+    if (!announced_) return;
+    if (auto api = FarmApi::open(flags_.farm)) (void)api->remove(path_);
+  }
+
+ private:
+  static std::string new_path() {
+    std::random_device random;
+    return fmt::format("/api/v1/announced/{:08x}{:08x}", random(), random());
+  }
+  const SubmitFlags& flags_;
+  const JobSpec& spec_;
+  const std::string path_ = new_path();
+  bool announced_ = false;
+};
+
 int run(const SubmitFlags& flags) {
   auto spec = flags.job.parse();
   if (!spec) return print_error(spec.error());
@@ -114,15 +157,20 @@ int run(const SubmitFlags& flags) {
   if (const auto ok = check_view(flags.view, flags.out); !ok) return print_error(ok.error());
   if (!flags.view.empty())
     if (const auto ok = check_view_of_farm(flags); !ok) return print_rejected(ok.error());
-  const auto note = [&](const std::string& line) {
-    if (!flags.quiet) print_note(line);
+  Announcement announcement(flags, *spec);
+  std::string noted;
+  const auto waiting = [&](const std::vector<std::string>& files) {
+    if (std::string text = waits_for(files); text != noted && !flags.quiet)
+      print_note(noted = std::move(text));
+    return announcement.repeat(files);
   };
-  if (const auto there = wait_for_files(flags.after_files, spec->frames, note); !there)
+  if (const auto there = wait_for_files(flags.after_files, spec->frames, waiting); !there)
     return print_error(there.error());
   if (!flags.reference.empty())
     if (const auto sent = send_reference(flags, *spec); !sent) return print_rejected(sent.error());
   const auto type = bundle_type(flags.scene);
   const Job job = type ? submit_bundle(flags, *spec, *type) : submit_scene(flags, *spec);
+  announcement.withdraw();
   if (!job) return print_rejected(job.error());
   const std::string id = text_field(*job, "id");
   if (id.empty()) return print_error({Errc::internal, "the coordinator's answer names no job"});

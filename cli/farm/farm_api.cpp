@@ -167,6 +167,10 @@ FarmApi::Answer<void> FarmApi::ask(const std::string& path, const json& body) {
   return without_content(client_.request("PATCH", path, body.dump()));
 }
 
+FarmApi::Answer<void> FarmApi::put(const std::string& path, const json& body) {
+  return without_content(client_.request("PUT", path, body.dump()));
+}
+
 FarmApi::Answer<void> FarmApi::remove(const std::string& path) {
   return without_content(client_.request("DELETE", path));
 }

@@ -37,6 +37,7 @@ class FarmApi {
   Answer<Json> get(const std::string& path);
   Answer<Json> post(const std::string& path, const Json& body);
   Answer<void> remove(const std::string& path);
+  Answer<void> put(const std::string& path, const Json& body);
   Answer<Json> patch(const std::string& path, const Json& body);
   Answer<void> ask(const std::string& path, const Json& body);  // a PATCH whose answer has no content
   Answer<std::string> text(const std::string& path);

@@ -15,11 +15,6 @@ namespace {
 
 constexpr std::chrono::seconds kPause{1};  // between two looks
 
-std::string waits_for(const std::vector<std::string>& files) {
-  return files.size() == 1 ? fmt::format("waits for {}", files.front())
-                           : fmt::format("waits for {} files, the first is {}", files.size(), files.front());
-}
-
 tl::unexpected<Error> bad_pattern(fmt::format_string<const std::string&> why, const std::string& pattern) {
   return tl::unexpected(Error{Errc::invalid_argument, "--after-file " + fmt::format(why, pattern)});
 }
@@ -72,17 +67,27 @@ std::vector<std::string> FilesToCome::look(
   return incomplete;
 }
 
+std::string waits_for(const std::vector<std::string>& files) {
+  return files.size() == 1 ? fmt::format("waits for {}", files.front())
+                           : fmt::format("waits for {} files, the first is {}", files.size(), files.front());
+}
+
 Result<void> wait_for_files(const std::vector<std::string>& patterns, const std::optional<FrameRange>& frames,
-                            const std::function<void(const std::string&)>& note) {
+                            const std::function<Result<void>(const std::vector<std::string>&)>& waiting) {
   auto files = FilesToCome::of(patterns, frames);
   if (!files) return tl::unexpected(files.error());
   const SystemClock clock;
   const TimePoint begin = clock.now();
-  std::string reported;
+  std::vector<std::string> last;
+  double repeat_at = 0;
   for (;; std::this_thread::sleep_for(kPause)) {
-    const auto waiting = files->look(seconds(clock.now() - begin), file_state);
-    if (waiting.empty()) return {};
-    if (std::string text = waits_for(waiting); text != reported) note(reported = std::move(text));
+    const double now = seconds(clock.now() - begin);
+    auto incomplete = files->look(now, file_state);
+    if (incomplete.empty()) return {};
+    if (incomplete == last && now < repeat_at) continue;
+    last = std::move(incomplete);
+    repeat_at = now + kRepeatSeconds;
+    if (auto ok = waiting(last); !ok) return ok;
   }
 }
 

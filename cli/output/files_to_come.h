@@ -46,8 +46,12 @@ class FilesToCome {
   std::map<std::string, Seen> seen_;
 };
 
-// Returns once all these files are complete. Tells `note` what is waited for whenever that changes.
+// Returns once all these files are complete. Calls `waiting` with the files that are not, in order: whenever
+// they change, and every kRepeatSeconds. Its error ends the wait.
+inline constexpr double kRepeatSeconds = 20;
 Result<void> wait_for_files(const std::vector<std::string>& patterns, const std::optional<FrameRange>& frames,
-                            const std::function<void(const std::string&)>& note);
+                            const std::function<Result<void>(const std::vector<std::string>&)>& waiting);
+// "waits for a.vdb", or "waits for 3 files, the first is a.vdb".
+std::string waits_for(const std::vector<std::string>& files);
 
 }  // namespace ls::cli

@@ -53,6 +53,9 @@ def test_submit_waits_for_files_that_are_still_written(rendering, tmp_path):
     waiting = subprocess.Popen([bin_dir() / "lightshaft", "submit", scene, "--after-file", scene, "--after-file", tmp_path / "done.##", "--frames", "1-2"],
                                env=environment(rendering), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)  # fmt: skip
     assert waiting.stderr.readline() == f"waits for 3 files, the first is {scene}\n"
+    (shown,) = wait_until(lambda: rendering.get("/api/v1/announced")["announced"], "the farm knows of the job")
+    assert (shown["name"], shown["frames"], shown["files"], shown["count"]) == (scene.name, "1-2", [str(scene), *(str(tmp_path / f"done.0{n}") for n in (1, 2))], 3)
+    assert f"{scene.name}, frames 1-2, will be submitted when {scene} and 2 more are complete on {shown['machine']}" in call(rendering, "jobs").stderr
     for name in ("done.01", "done.02"):
         (tmp_path / name).write_text("complete\n")
     scene.write_bytes(whole[: len(whole) // 2])
@@ -65,6 +68,7 @@ def test_submit_waits_for_files_that_are_still_written(rendering, tmp_path):
 
     assert waiting.returncode == 0, notes
     assert call(rendering, "show", out.split()[0]).returncode == 0
+    assert rendering.get("/api/v1/announced")["announced"] == []
     refused = call(rendering, "submit", scene, "--after-file", tmp_path / "done.##", code=2)
     assert "# stands for the frame number, and there are no --frames" in refused.stderr
 

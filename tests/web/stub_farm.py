@@ -78,6 +78,7 @@ class StubFarm:
     def __init__(self):
         self.lock = threading.Lock()
         self.jobs = {}
+        self.announced = []  # jobs that wait for files
         self.workers = {}
         self.worker_logs = {}
         self.tiles = []
@@ -331,6 +332,9 @@ def _handler(farm):
                 farm.submitted.append(request)
             farm.jobs["j-new"] = job("j-new", request["name"], "queued", progress=0, units_done=0)
             return self._send(201, {"id": "j-new", "url": "/api/v1/jobs/j-new"})
+
+        def _get_announced(self, parts, body):
+            return self._send(200, {"announced": farm.announced})
 
         def _get_workers(self, parts, body):
             if parts[1:] == ["log"]:

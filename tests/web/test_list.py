@@ -55,6 +55,23 @@ def test_search_state_owner_age_and_order_narrow_the_list_and_stand_in_the_addre
     page.wait("document.querySelector('main').innerText.includes('No job is like this.')")
 
 
+def test_jobs_that_wait_for_files_are_shown(farm, dashboard):
+    farm.announced = [{"id": "x1", "name": "shot.xml", "owner": "ada", "machine": "render-3", "frames": "1-48", "files": ["/scratch/smoke.0007.vdb"], "count": 12, "since_unix": 1765000000},
+                      {"id": "x2", "name": "<i>still</i>.xml", "owner": "", "machine": "", "frames": None, "files": ["sky.exr"], "count": 1, "since_unix": 1765000000}]
+    page = dashboard()
+    page.wait("document.querySelectorAll('.announced li').length === 2")
+
+    first, second = page.evaluate("[...document.querySelectorAll('.announced li')].map(one => one.innerText)")
+    assert first.startswith("shot.xml · frames 1-48 · ada") and "needs /scratch/smoke.0007.vdb and 11 other files, on render-3 · since " in first
+    assert second.startswith("<i>still</i>.xml") and "needs sky.exr · since " in second
+
+    farm.announced = []
+    page.evaluate("location.hash = '#/workers'")
+    page.wait("!document.querySelector('.announced')")
+    page.evaluate("location.hash = '#/jobs'")
+    page.wait("document.querySelector('main').innerText.includes('Nothing is rendering yet')")
+
+
 def test_a_link_opens_the_same_list(many, dashboard):
     page = dashboard("#/jobs?search=scene-7&state=failed")
     shows(page, ["j-0007"])

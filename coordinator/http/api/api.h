@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "coordinator/base/gate.h"
+#include "coordinator/http/api/announced_jobs.h"
 #include "coordinator/http/api/metrics.h"
 #include "coordinator/http/api/partial_uploads.h"
 #include "coordinator/http/api/routes.h"
@@ -79,6 +80,7 @@ class Api {
   Counters& counters() { return counters_; }
   const Limits& limits() const { return limits_; }
   PartialUploads& partial_uploads() { return partial_uploads_; }
+  AnnouncedJobs& announced() { return announced_; }
   // Sets the function from which /metrics gets the webhook counters; call this before the first request. If
   // it is never called, /metrics has no webhook counters.
   void webhooks(std::function<coordinator::WebhookFigures()> figures) { webhooks_ = std::move(figures); }
@@ -115,6 +117,7 @@ class Api {
   std::unique_ptr<StageReader> stages_;
   Counters counters_;
   PartialUploads partial_uploads_{coordinator::limits::kMaxUnfinishedUploads / 4};
+  AnnouncedJobs announced_;
   coordinator::Gate pictures_;  // callers take turns to have answers about images made
   std::function<coordinator::WebhookFigures()> webhooks_;
   std::function<trace::Figures()> traces_;

@@ -35,6 +35,11 @@ Response get_job(Api&, const Request&, const JobId&);
 Response patch_job(Api&, const Request&, const JobId&);
 Response delete_job(Api&, const Request&, const JobId&);
 
+// Defined in announced_handlers.cpp
+Response get_announced(Api&, const Request&, const Params&);
+Response put_announced(Api&, const Request&, const Params&);
+Response delete_announced(Api&, const Request&, const Params&);
+
 // Defined in output_handlers.cpp
 Response get_image_exr(Api&, const Request&, const JobId&);
 Response get_deep_exr(Api&, const Request&, const JobId&);

@@ -110,6 +110,10 @@ class AsyncFarm:
             AsyncJob(self._transport, view) for view in await self._transport.run(jobs_of.matching(filters))
         ]
 
+    async def announced(self) -> list[models.AnnouncedJob]:
+        """Lists jobs that `lightshaft submit --after-file` will submit once files on its machine are complete."""
+        return await self._transport.run(steps.listed("/api/v1/announced", "announced"))
+
     async def workers(self) -> list[models.Worker]:
         """Lists the workers of the farm and their present work."""
         return await self._transport.run(steps.listed("/api/v1/workers", "workers"))

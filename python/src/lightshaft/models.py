@@ -545,6 +545,25 @@ class TileEvent(TypedDict):
     worker: NotRequired[Union[str, None]]
 
 
+class AnnouncedJob(TypedDict):
+    id: NotRequired[str]
+    """Id of the announcement."""
+    name: NotRequired[str]
+    """Name of the scene's file."""
+    owner: NotRequired[str]
+    """The user whose job it will be; empty for tokens of no user."""
+    machine: NotRequired[str]
+    """Name of the machine that waits for the files; may be empty."""
+    frames: NotRequired[Union[str, None]]
+    """The frames of a sequence, such as 1-10; null for a single image."""
+    files: NotRequired[list[str]]
+    """The first of the files that are not complete."""
+    count: NotRequired[int]
+    """Number of all files that are not complete."""
+    since_unix: NotRequired[float]
+    """When it was announced first, in seconds since 1970."""
+
+
 class Worker(TypedDict):
     id: NotRequired[str]
     name: NotRequired[str]
@@ -889,6 +908,10 @@ class ListWorkersAnswerJoin(TypedDict):
     certificate and key of their own."""
     token_file: NotRequired[str]
     """Path of the file with the join token, on the coordinator's machine. Shown to admins only."""
+
+
+class ListAnnouncedAnswer(TypedDict):
+    announced: list["AnnouncedJob"]
 
 
 class MissingBlobsAnswer(TypedDict):

@@ -51,6 +51,8 @@ export const api = {
   whoIs: async (token) => (await call("GET", "/session", { headers: { Authorization: `Bearer ${token}` } })).json(),
   /** {jobs, total, states, owners} of a page, see job_list.js. */
   list: async (parameters) => (await call("GET", `/jobs?${parameters}`)).json(),
+  /** Jobs that will be submitted once files are complete: [{id, name, owner, machine, frames, files, count, since_unix}]. */
+  announced: async () => (await (await call("GET", "/announced")).json()).announced,
   job: async (id) => (await call("GET", jobPath(id))).json(),
   tiles: async (id) => (await (await call("GET", `${jobPath(id)}/tiles`)).json()).tiles,
   log: async (id) => (await call("GET", `${jobPath(id)}/log`)).text(),

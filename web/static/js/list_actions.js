@@ -4,6 +4,7 @@ import { withList, withListed, withoutJob, withUi } from "./state.js";
 
 const kTypingPauseMs = 250;
 const kRefreshPauseMs = 1000;
+const kAnnouncedPauseMs = 10000;
 const kAtOnce = 4; // requests, of those that change several jobs
 const kMostListed = 1000; // jobs that the coordinator lists at once
 
@@ -28,6 +29,15 @@ export function makeListActions({ get, set, attempt, api, snapshot }) {
     const asked = get().list.asked;
     await snapshot("jobs", () => attempt(() => api.list(parametersOf(asked, Date.now() / 1000))), (now, page) => (now.list.asked === asked ? withListed(now, page) : now));
   }
+
+  /** No event tells of announced jobs, so they are asked for again and again while the list is seen. */
+  async function refreshAnnounced() {
+    if (get().session !== "in" || get().route.view !== "jobs" || document.hidden) return;
+    const announced = await api.announced().catch(() => null); // of an older coordinator: none
+    if (announced !== null && get().session === "in") set({ ...get(), announced });
+  }
+  setInterval(refreshAnnounced, kAnnouncedPauseMs);
+  document.addEventListener("visibilitychange", refreshAnnounced);
 
   /** Each change is a step of the browser's history, so that Back undoes it; a word that is typed is one step. */
   function narrow(more, typed = false) {
@@ -94,12 +104,14 @@ export function makeListActions({ get, set, attempt, api, snapshot }) {
     /** Of the address. */
     openList: (query) => {
       typing = false;
+      refreshAnnounced();
       const asked = listOf(query);
       if (queryOfList(asked) === queryOfList(get().list.asked) && get().list.ids) return;
       set(withList(get(), { asked, picked: new Set() }));
       refreshList();
     },
     refreshList,
+    refreshAnnounced,
     narrow,
     typeSearch: (event) => narrow({ search: event.currentTarget.value }, true),
     sortBy: (first) => narrow({ sort: turned(get().list.asked.sort, first) }),

@@ -159,6 +159,7 @@ async function onOpen() {
   set({ ...state, link: "live" });
   await Promise.all([
     actions.refreshList(),
+    actions.refreshAnnounced(),
     snapshot("workers", () => attempt(api.workers), (now, { workers, join = null }) => ({ ...withWorkers(now, workers), join }))]);
   actions.viewerEvent(null);
   await refreshOpen();

@@ -16,6 +16,7 @@ export function initialState() {
     // a page of the list of jobs; ids: null until it is known; doing: how far what is done to the selected jobs is
     list: { asked: kWholeList, ids: null, total: 0, states: {}, owners: [], picked: new Set(), doing: null },
     jobs: null, // Map id -> job JSON; of frames only the one that is shown; null: not known yet
+    announced: [], // jobs that will be submitted once files are complete, see api.js
     workers: null, // Map id -> worker JSON
     join: null, // how further workers join: {address, tls, token_file}
     workerLog: null, // of the worker whose log is open: {id, text}; text is null until it is there

@@ -12,9 +12,10 @@ export function jobsView(state, actions) {
   const jobs = jobsInOrder(state);
   const { list } = state;
   const none = list.ids ? list.total === 0 && !isNarrowed(list.asked) : jobs.length === 0;
-  if (none && jobs.length === 0) return mayChange(state) ? firstSteps() : h("section", { key: "empty", class: "empty" }, h("h1", null, "Nothing is rendering yet"), h("p", null, "Your token lets you look; jobs are submitted with another one."));
+  if (none && jobs.length === 0 && state.announced.length === 0) return mayChange(state) ? firstSteps() : h("section", { key: "empty", class: "empty" }, h("h1", null, "Nothing is rendering yet"), h("p", null, "Your token lets you look; jobs are submitted with another one."));
   return h("section", { key: "jobs", class: "jobs" },
     h("div", { class: "heading" }, h("h1", null, "Jobs"), h("p", { class: "sub" }, tally(state, jobs)), mayChange(state) ? h("a", { class: "button primary", href: "#/submit" }, "New job") : null),
+    announcedJobs(state),
     narrowing(state, actions),
     mayChange(state) ? picked(state, jobs, actions) : null,
     jobs.length === 0 ? h("p", { key: "nothing", class: "waiting" }, "No job is like this.") : h("table", { key: "list", class: "list" },
@@ -23,6 +24,15 @@ export function jobsView(state, actions) {
         kColumns.filter(([name]) => name !== "Owner" || seesOthers(state)).map(([name, first]) => head(name, first, list, actions)), h("th", { key: "actions", scope: "col" }, h("span", { class: "unseen" }, "Actions")))),
       h("tbody", null, jobs.map((job) => row(state, job, actions)))),
     pager(list, actions));
+}
+
+/** Jobs that `lightshaft submit` will submit once files on its machine are complete. */
+function announcedJobs(state) {
+  if (state.announced.length === 0) return null;
+  return h("section", { key: "announced", class: "panel announced" }, h("h2", null, "Waiting for files"),
+    h("ul", null, state.announced.map((one) => h("li", { key: one.id },
+      h("b", null, one.name), one.frames ? ` · frames ${one.frames}` : null, seesOthers(state) ? ` · ${ownerOf(one)}` : null,
+      h("small", null, `needs ${one.files[0]}${one.count > 1 ? ` and ${plural(one.count - 1, "other file")}` : ""}${one.machine ? `, on ${one.machine}` : ""} · since ${moment(one.since_unix)}`)))));
 }
 
 /** Columns, and the order after the first press on their heads. */
