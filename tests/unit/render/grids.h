@@ -75,7 +75,7 @@ inline double exact_integral(const Grid& g, const V3d& o, const V3d& d, double t
   std::vector<double> cuts{part.t0, part.t1};
   for (int k = 0; k < 3; ++k) {
     if (di[k] == 0) continue;
-    for (int i = 0; i < g.size_[k]; ++i) {
+    for (int i = 0; i < g.voxels_.size()[k]; ++i) {
       const double t = (i + offset - oi[k]) / di[k];
       if (t > part.t0 && t < part.t1) cuts.push_back(t);
     }
@@ -88,16 +88,15 @@ inline double exact_integral(const Grid& g, const V3d& o, const V3d& d, double t
     int c[3];
     double f[3];
     for (int k = 0; k < 3; ++k) {
-      const double x = std::clamp(q[k], 0., static_cast<double>(g.size_[k] - 1));
+      const double x = std::clamp(q[k], 0., static_cast<double>(g.voxels_.size()[k] - 1));
       c[k] = std::min(static_cast<int>(x), g.last_[k]);
       f[k] = x - c[k];
     }
     for (int corner = 0; corner < 8; ++corner) {
       const int i = corner & 1, j = (corner >> 1) & 1, k = corner >> 2;
       const double w = (i ? f[0] : 1 - f[0]) * (j ? f[1] : 1 - f[1]) * (k ? f[2] : 1 - f[2]);
-      const std::size_t at = (static_cast<std::size_t>(c[2]) * g.size_[1] + c[1]) * g.size_[0] + c[0] +
-                             i * g.step_[0] + j * g.step_[1] + k * g.step_[2];
-      v += w * g.values_[at];
+      const auto next = [&](int axis, int by) { return c[axis] + (g.voxels_.size()[axis] > 1 ? by : 0); };
+      v += w * g.voxels_.at(next(0, i), next(1, j), next(2, k));
     }
     return v;
   };

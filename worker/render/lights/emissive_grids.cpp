@@ -10,9 +10,8 @@ namespace {
 
 // The emission of a cell is the mean of that at points this many voxels apart along each axis.
 constexpr int kVoxelsPerPoint = 2;
-// The most points along each axis of a cell whose values are computed, which takes longer than to look them
-// up.
-constexpr int kComputedPoints = 8;
+// The most points along each axis of a cell. Cells of stored values that are not very large have no more.
+constexpr int kMostPoints = 8;
 // A cell that may emit is chosen at least as often as if it gave off this share of the mean of such cells, as
 // its points may miss what emits in it.
 constexpr double kLeastShare = 1. / 64;
@@ -45,8 +44,7 @@ CellBox box_of(const Grid& grid, std::size_t number) {
 }
 
 double mean_emission(const Medium& m, const Grid& grid, const Affine& to_world, const CellBox& box) {
-  const int nodes = grid.cell_size() / kVoxelsPerPoint;
-  const int n = grid.lookup() == Lookup::field ? std::min(nodes, kComputedPoints) : nodes;
+  const int n = std::min(grid.cell_size() / kVoxelsPerPoint, kMostPoints);
   double sum = 0;
   for (int z = 0; z < n; ++z)
     for (int y = 0; y < n; ++y)

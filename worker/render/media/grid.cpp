@@ -13,29 +13,61 @@ namespace {
 // their maximum by a few ulps (docs/measurements/stability.md N09).
 constexpr float kInflate = 1 + 4 * 0x1p-23f;
 
+// A grid has at most kMostCells macro cells, or one for kValuesPerCell values that are stored if those are
+// more: each takes as much memory as three values. No array of values needs larger cells because of it.
+constexpr std::uint64_t kMostCells = 1 << 22, kValuesPerCell = 16;
+
+// Surrounds values by one layer copied from the opposite end. So interpolation needs no special case at the
+// ends, and macro cells also bound the values interpolated there. All index coordinates grow by one.
+std::vector<float> with_repeated_ends(const std::array<int, 3>& n, const std::vector<float>& inner) {
+  std::vector<float> values;
+  values.reserve((static_cast<std::size_t>(n[0]) + 2) * (static_cast<std::size_t>(n[1]) + 2) *
+                 (static_cast<std::size_t>(n[2]) + 2));
+  const auto from = [&](int i, int k) { return static_cast<std::size_t>((i - 1 + n[k]) % n[k]); };
+  for (int z = 0; z < n[2] + 2; ++z)
+    for (int y = 0; y < n[1] + 2; ++y) {
+      const float* row = inner.data() + (from(z, 2) * n[1] + from(y, 1)) * n[0];
+      values.push_back(row[n[0] - 1]);
+      values.insert(values.end(), row, row + n[0]);
+      values.push_back(row[0]);
+    }
+  return values;
+}
+
 }  // namespace
 
 Grid::Grid(std::array<int, 3> size, std::vector<float> values, const Affine& world_to_index, V3d domain_lo,
-           V3d domain_hi, double density_to_sigma, VolumeFilter filter, Wrap wrap)
-    : size_(size),
-      values_(std::move(values)),
+           V3d domain_hi, double density_to_sigma, VolumeFilter filter, Wrap wrap) {
+  // Only grids that are repeated and interpolated need the extra nodes of with_repeated_ends(). A mirrored
+  // grid equals a clamped one within half a voxel of its ends, and without interpolation wrapping has no
+  // effect inside the domain.
+  const bool padded = wrap == Wrap::repeat && filter == VolumeFilter::trilinear;
+  Affine to_index = world_to_index;
+  if (padded) {
+    values = with_repeated_ends(size, values);
+    for (int& n : size) n += 2;
+    to_index.b = to_index.b + V3d(1);
+    domain_lo = V3d(V3(domain_lo) + V3(1));
+    domain_hi = V3d(V3(domain_hi) + V3(1));
+  }
+  *this =
+      Grid(Voxels(size, std::move(values)), to_index, domain_lo, domain_hi, density_to_sigma, filter, wrap);
+  padded_ = padded;
+}
+
+Grid::Grid(Voxels voxels, const Affine& world_to_index, V3d domain_lo, V3d domain_hi, double density_to_sigma,
+           VolumeFilter filter, Wrap wrap)
+    : voxels_(std::move(voxels)),
       lo_(domain_lo),
       hi_(domain_hi),
       exact_(world_to_index),
       lookup_(filter == VolumeFilter::trilinear ? Lookup::trilinear : Lookup::nearest),
-      wrap_(wrap) {
-  // Only grids that are repeated and interpolated need the extra nodes of repeat_ends(). A mirrored grid
-  // equals a clamped one within half a voxel of its ends, and without interpolation wrapping has no effect
-  // inside the domain.
-  if (wrap == Wrap::repeat && filter == VolumeFilter::trilinear) repeat_ends();
-  for (int k = 0; k < 3; ++k) {
-    last_[k] = std::max(0, size_[k] - 2);
-    top_[k] = static_cast<float>(size_[k] - 1);
+      wrap_(wrap),
+      max_value_(voxels_.largest()) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    last_[k] = std::max(0, voxels_.size()[k] - 2);
+    top_[k] = static_cast<float>(voxels_.size()[k] - 1);
   }
-  // On an axis with one node the step is 0, so that a node is its own neighbour.
-  step_ = {size_[0] > 1 ? std::size_t{1} : 0, size_[1] > 1 ? static_cast<std::size_t>(size_[0]) : 0,
-           size_[2] > 1 ? static_cast<std::size_t>(size_[0]) * size_[1] : 0};
-  for (float v : values_) max_value_ = std::max(max_value_, v);
   use_cells(wanted_cell_size(density_to_sigma));
 }
 
@@ -47,27 +79,8 @@ Grid::Grid(const Field& field, const Affine& world_to_index, V3d domain_lo, V3d 
 
 float Grid::computed(const V3& index) const { return field_->value(index); }
 
-// Surrounds the grid by one layer of nodes copied from the opposite end. So interpolation needs no special
-// case at the ends, and macro cells also bound the values interpolated there. All index coordinates grow by
-// one.
-void Grid::repeat_ends() {
-  const std::array<int, 3> n = size_;
-  const std::vector<float> inner = std::move(values_);
-  for (int& s : size_) s += 2;
-  values_.clear();
-  values_.reserve(static_cast<std::size_t>(size_[0]) * size_[1] * size_[2]);
-  const auto from = [&](int i, int k) { return static_cast<std::size_t>((i - 1 + n[k]) % n[k]); };
-  for (int z = 0; z < size_[2]; ++z)
-    for (int y = 0; y < size_[1]; ++y) {
-      const float* row = inner.data() + (from(z, 2) * n[1] + from(y, 1)) * n[0];
-      values_.push_back(row[n[0] - 1]);
-      values_.insert(values_.end(), row, row + n[0]);
-      values_.push_back(row[0]);
-    }
-  exact_.b = exact_.b + V3d(1);
-  lo_ = lo_ + V3(1);
-  hi_ = hi_ + V3(1);
-  padded_ = true;
+float Grid::trilinear_in_bricks(const V3& index) const {
+  return interpolated(index, [&](const int(&c)[3]) { return voxels_.corners_in_bricks(c[0], c[1], c[2]); });
 }
 
 // Maps an index outside the domain to the index inside that has the same value.
@@ -85,23 +98,14 @@ V3 Grid::wrapped(const V3& index) const {
 
 std::uint64_t Grid::count_above(float limit) const {
   const int skip = padded_ ? 1 : 0;
-  std::uint64_t n = 0;
-  for (int z = skip; z < size_[2] - skip; ++z)
-    for (int y = skip; y < size_[1] - skip; ++y) {
-      const float* row = values_.data() + (static_cast<std::size_t>(z) * size_[1] + y) * size_[0];
-      n += static_cast<std::uint64_t>(
-          std::count_if(row + skip, row + size_[0] - skip, [&](float v) { return v > limit; }));
-    }
-  return n;
+  const auto& n = voxels_.size();
+  return voxels_.count_above(limit, {skip, skip, skip}, {n[0] - 1 - skip, n[1] - 1 - skip, n[2] - 1 - skip});
 }
 
 Grid Grid::mean(const Grid& a, const Grid& b, const Grid& c) {
   Grid m = a;
-  m.max_value_ = 0;
-  for (std::size_t i = 0; i < m.values_.size(); ++i) {
-    m.values_[i] = static_cast<float>((double{a.values_[i]} + b.values_[i] + c.values_[i]) / 3);
-    m.max_value_ = std::max(m.max_value_, m.values_[i]);
-  }
+  m.voxels_ = Voxels::mean(a.voxels_, b.voxels_, c.voxels_);
+  m.max_value_ = m.voxels_.largest();
   m.use_cells(a.cell_size_);
   return m;
 }
@@ -113,14 +117,27 @@ int Grid::wanted_cell_size(double density_to_sigma) const {
   const Affine inverse = exact_.inverse();
   const double voxel = inverse.vector({1, 1, 1}).length();
   const double wanted = 1.44 / std::max(1e-30, static_cast<double>(max_value_) * density_to_sigma * voxel);
-  return wanted < 3 ? 4 : wanted < 10 ? 8 : 16;
+  int size = wanted < 3 ? 4 : wanted < 10 ? 8 : 16;
+  const auto count = [&] {
+    const std::array<int, 3> n = cell_counts(size);
+    return static_cast<std::uint64_t>(n[0]) * static_cast<std::uint64_t>(n[1]) *
+           static_cast<std::uint64_t>(n[2]);
+  };
+  while (count() > std::max(kMostCells, voxels_.stored() / kValuesPerCell)) size *= 2;
+  return size;
+}
+
+std::array<int, 3> Grid::cell_counts(int cell_size) const {
+  std::array<int, 3> n;
+  for (int k = 0; k < 3; ++k)
+    n[static_cast<std::size_t>(k)] =
+        std::max(1, static_cast<int>(std::ceil((hi_[k] - lo_[k]) / static_cast<float>(cell_size))));
+  return n;
 }
 
 void Grid::use_cells(int cell_size) {
   cell_size_ = cell_size;
-  for (int k = 0; k < 3; ++k) {
-    cells_[k] = std::max(1, static_cast<int>(std::ceil((hi_[k] - lo_[k]) / static_cast<float>(cell_size_))));
-  }
+  cells_ = cell_counts(cell_size_);
   macro_.resize(static_cast<std::size_t>(cells_[0]) * cells_[1] * cells_[2]);
   std::size_t i = 0;
   for (int z = 0; z < cells_[2]; ++z)
@@ -162,52 +179,41 @@ MacroCell Grid::bound_field(int x, int y, int z) const {
 ValueBounds Grid::bounds(const V3d& lo, const V3d& hi) const {
   if (lookup_ == Lookup::field) return field_->bounds(lo, hi);
   bool outside = false;
-  int a[3], b[3];
+  Position a, b;
   for (int k = 0; k < 3; ++k) {
     outside = outside || lo[k] < lo_[k] || hi[k] > hi_[k];
     if (lo[k] > hi_[k] || hi[k] < lo_[k]) return {0, 0};
-    const auto node = [&](double at) { return std::clamp(static_cast<int>(at), 0, size_[k] - 1); };
+    const auto node = [&](double at) { return std::clamp(static_cast<int>(at), 0, voxels_.size()[k] - 1); };
     a[k] = node(std::floor(std::max(lo[k], double{lo_[k]})));
     b[k] = node(std::ceil(std::min(hi[k], double{hi_[k]})));
   }
-  ValueBounds out{std::numeric_limits<float>::infinity(), 0};
-  for (int k = a[2]; k <= b[2]; ++k)
-    for (int j = a[1]; j <= b[1]; ++j) {
-      const float* row = values_.data() + (static_cast<std::size_t>(k) * size_[1] + j) * size_[0];
-      for (int i = a[0]; i <= b[0]; ++i) out = {std::min(out.lo, row[i]), std::max(out.hi, row[i])};
-    }
-  return {outside ? 0 : out.lo / kInflate, out.hi * kInflate};
+  const ValueSums in = voxels_.sums(a, b);
+  return {outside ? 0 : in.lo / kInflate, in.hi * kInflate};
 }
 
 MacroCell Grid::bound_cell(int x, int y, int z) const {
   // [a, b] is, along each axis, the range of nodes that interpolation inside the cell can use. The cell is
   // enlarged by .01 voxels at each end, because the traversal's positions are rounded.
-  int a[3], b[3];
+  Position a, b;
   const int c[3] = {x, y, z};
+  double count = 1;
   for (int k = 0; k < 3; ++k) {
     const float lo = lo_[k] + static_cast<float>(c[k] * cell_size_), hi = lo + static_cast<float>(cell_size_);
-    a[k] = std::clamp(static_cast<int>(std::floor(lo - .01f)), 0, size_[k] - 1);
-    b[k] = std::clamp(static_cast<int>(std::ceil(hi + .01f)), 0, size_[k] - 1);
+    const int last = voxels_.size()[k] - 1;
+    a[k] = std::clamp(static_cast<int>(std::floor(lo - .01f)), 0, last);
+    b[k] = std::clamp(static_cast<int>(std::ceil(hi + .01f)), 0, last);
+    count *= b[k] - a[k] + 1;
   }
-  float mn = std::numeric_limits<float>::infinity(), mx = 0;
-  double sum = 0;
-  std::uint64_t n = 0;
-  for (int k = a[2]; k <= b[2]; ++k)
-    for (int j = a[1]; j <= b[1]; ++j) {
-      const float* row = values_.data() + (static_cast<std::size_t>(k) * size_[1] + j) * size_[0];
-      for (int i = a[0]; i <= b[0]; ++i) {
-        mn = std::min(mn, row[i]);
-        mx = std::max(mx, row[i]);
-        sum += row[i];
-        ++n;
-      }
-    }
+  const ValueSums in = voxels_.sums(a, b);
   MacroCell m;
-  m.hi = mx * kInflate;
+  m.hi = in.hi * kInflate;
   // Constant cells need no residual: interpolating equal numbers has no rounding error.
-  m.control = mn == mx ? mn : std::clamp(static_cast<float>(sum / static_cast<double>(n)), mn, mx);
-  m.residual = std::max(m.hi - m.control, m.control - mn) * kInflate;
-  if (mn == mx) m.residual = 0;
+  if (in.lo == in.hi) {
+    m.control = in.lo;
+    return m;
+  }
+  m.control = std::clamp(static_cast<float>(in.sum / count), in.lo, in.hi);
+  m.residual = std::max(m.hi - m.control, m.control - in.lo) * kInflate;
   return m;
 }
 

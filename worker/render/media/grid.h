@@ -1,5 +1,6 @@
-// A dense grid of scalar values, with trilinear interpolation or without interpolation, or a field that is
-// computed at each lookup (field.h). Its macro cells, which are blocks of voxels, store bounds of its values.
+// A grid of scalar values (voxels.h), with trilinear interpolation or without interpolation, or a field that
+// is computed at each lookup (field.h). Its macro cells, which are blocks of voxels, store bounds of its
+// values.
 #pragma once
 
 #include <algorithm>
@@ -15,6 +16,7 @@
 #include "worker/render/math/math.h"
 #include "worker/render/math/transform.h"
 #include "worker/render/math/value_bounds.h"
+#include "worker/render/media/voxels.h"
 
 namespace ls::render {
 
@@ -51,6 +53,9 @@ class Grid {
   Grid(std::array<int, 3> size, std::vector<float> values, const Affine& world_to_index, V3d domain_lo,
        V3d domain_hi, double density_to_sigma, VolumeFilter filter = VolumeFilter::trilinear,
        Wrap wrap = Wrap::clamp);
+  // The same for values that are stored already; they are not repeated.
+  Grid(Voxels voxels, const Affine& world_to_index, V3d domain_lo, V3d domain_hi, double density_to_sigma,
+       VolumeFilter filter = VolumeFilter::trilinear, Wrap wrap = Wrap::clamp);
   // A grid with a field in place of values, whose index coordinates are those of the field. `cell_size` is
   // the width of the macro cells [voxels, a power of two]. The field must outlive the grid.
   Grid(const Field& field, const Affine& world_to_index, V3d domain_lo, V3d domain_hi, int cell_size);
@@ -79,30 +84,17 @@ class Grid {
     return lookup_ == Lookup::trilinear ? trilinear(q) : untrilinear(q);
   }
   float trilinear(const V3& index) const {
-    int cell[3];
-    float f[3];
-    const float q[3] = {index.x, index.y, index.z};
-    for (int k = 0; k < 3; ++k) {
-      const float c = std::min(std::max(0.f, q[k]), top_[k]);  // this order maps NaN to 0
-      cell[k] = std::min(static_cast<int>(c), last_[k]);
-      f[k] = c - static_cast<float>(cell[k]);
-    }
-    const float* v =
-        values_.data() + (static_cast<std::size_t>(cell[2]) * size_[1] + cell[1]) * size_[0] + cell[0];
-    const std::size_t dx = step_[0], dy = step_[1], dz = step_[2];
-    const float c00 = v[0] + f[0] * (v[dx] - v[0]), c10 = v[dy] + f[0] * (v[dy + dx] - v[dy]);
-    const float c01 = v[dz] + f[0] * (v[dz + dx] - v[dz]),
-                c11 = v[dz + dy] + f[0] * (v[dz + dy + dx] - v[dz + dy]);
-    const float c0 = c00 + f[1] * (c10 - c00), c1 = c01 + f[1] * (c11 - c01);
-    return std::max(0.f, c0 + f[2] * (c1 - c0));
+    if (!voxels_.dense()) [[unlikely]]
+      return trilinear_in_bricks(index);
+    return interpolated(index, [&](const int(&c)[3]) { return voxels_.corners(c[0], c[1], c[2]); });
   }
   // Returns the value of the node whose cell contains the point. A point on a face between two cells belongs
   // to the cell with the higher index.
   float nearest(const V3& index) const {
-    std::size_t i[3];
+    int i[3];
     const float q[3] = {index.x, index.y, index.z};
-    for (int k = 0; k < 3; ++k) i[k] = static_cast<std::size_t>(std::min(std::max(0.f, q[k]), top_[k]) + .5f);
-    return values_[(i[2] * size_[1] + i[1]) * size_[0] + i[0]];
+    for (int k = 0; k < 3; ++k) i[k] = static_cast<int>(std::min(std::max(0.f, q[k]), top_[k]) + .5f);
+    return voxels_.at(i[0], i[1], i[2]);
   }
   float untrilinear(const V3& index) const {
     return lookup_ == Lookup::nearest ? nearest(index) : computed(index);
@@ -124,18 +116,18 @@ class Grid {
   V3 domain_lo() const { return lo_; }
   V3 domain_hi() const { return hi_; }
   float max_value() const { return max_value_; }
-  std::uint64_t value_count() const { return values_.size(); }
+  const Voxels& voxels() const { return voxels_; }
   std::uint64_t majorant_bytes() const { return macro_.size() * sizeof(MacroCell); }
-  std::uint64_t bytes() const { return values_.size() * sizeof(float) + macro_.size() * sizeof(MacroCell); }
+  std::uint64_t bytes() const { return voxels_.bytes() + majorant_bytes(); }
 
   // Sets the width of the macro cells to `size` voxels along each axis, regardless of the density. Grids that
   // are traversed together need cells of the same size.
   void use_cells(int size);
-  bool same_values(const Grid& other) const { return values_ == other.values_; }
+  bool same_values(const Grid& other) const { return voxels_ == other.voxels_; }
   // Returns the grid whose values are the means of those of a, b and c, which must have the same shape.
   static Grid mean(const Grid& a, const Grid& b, const Grid& c);
 
-  // Returns the number of values above `limit`.
+  // Returns the number of values above `limit`, which is at least 0.
   std::uint64_t count_above(float limit) const;
 
   // Integrates the values along origin + t direction, in index coordinates, over the finite interval [t0,
@@ -149,18 +141,37 @@ class Grid {
   friend class CellWalk;
   // Defined in the tests, which compare integrals along rays with it.
   friend double exact_integral(const Grid&, const V3d& o, const V3d& d, double t0, double t1);
-  void repeat_ends();
+  // Interpolates between the eight nodes around a point. corners_of gives their values for the indices of the
+  // lowest of them.
+  template <class CornersOf>
+  float interpolated(const V3& index, const CornersOf& corners_of) const {
+    int cell[3];
+    float f[3];
+    const float q[3] = {index.x, index.y, index.z};
+    for (int k = 0; k < 3; ++k) {
+      const float c = std::min(std::max(0.f, q[k]), top_[k]);  // this order maps NaN to 0
+      cell[k] = std::min(static_cast<int>(c), last_[k]);
+      f[k] = c - static_cast<float>(cell[k]);
+    }
+    const std::array<float, 8> v = corners_of(cell);
+    const float c00 = v[0] + f[0] * (v[1] - v[0]), c10 = v[2] + f[0] * (v[3] - v[2]);
+    const float c01 = v[4] + f[0] * (v[5] - v[4]), c11 = v[6] + f[0] * (v[7] - v[6]);
+    const float c0 = c00 + f[1] * (c10 - c00), c1 = c01 + f[1] * (c11 - c01);
+    return std::max(0.f, c0 + f[2] * (c1 - c0));
+  }
+  // Not inlined, so that it does not slow down the code for grids that are one array.
+  [[gnu::noinline]] float trilinear_in_bricks(const V3& index) const;
   V3 wrapped(const V3& index) const;
   int wanted_cell_size(double density_to_sigma) const;
+  std::array<int, 3> cell_counts(int cell_size) const;
   float computed(const V3& index) const;
   MacroCell bound_cell(int x, int y, int z) const;
   MacroCell bound_field(int x, int y, int z) const;
   Passage pass_field(const V3d& o, const V3d& d, double t0, double t1, double wanted) const;
 
-  std::array<int, 3> size_{}, last_{};
+  Voxels voxels_;
+  std::array<int, 3> last_{};
   std::array<float, 3> top_{};
-  std::array<std::size_t, 3> step_{};
-  std::vector<float> values_;
   V3 lo_, hi_;
   Affine exact_;  // world to index, not rounded to float32
   Lookup lookup_ = Lookup::trilinear;

@@ -26,17 +26,21 @@ std::string primitives(const Geometry& g) {
 }
 
 std::vector<WorldReport::Structure> structures_of(const World& w) {
-  std::uint64_t values = 0, cells = 0, value_count = 0;
+  std::uint64_t values = 0, cells = 0, value_count = 0, sparse = 0, halves = 0;
   for (const auto& field : w.fields) values += field->bytes();
   for (const Grid& g : w.grids) {
     cells += g.majorant_bytes();
     values += g.bytes() - g.majorant_bytes();
-    value_count += g.value_count();
+    value_count += g.voxels().count();
+    sparse += g.lookup() != Lookup::field && !g.voxels().dense();
+    halves += g.voxels().halves();
   }
   const EnvironmentMap* map = w.lights.map();
   const std::string grids =
       w.grids.empty() ? "no grid"
-                      : fmt::format("{} of {} values", counted(w.grids.size(), "grid"), value_count);
+                      : fmt::format("{} of {} values{}{}", counted(w.grids.size(), "grid"), value_count,
+                                    sparse > 0 ? fmt::format(", {} sparse", sparse) : "",
+                                    halves > 0 ? fmt::format(", {} of half floats", halves) : "");
   return {{"geometry", w.geometry.bytes(), primitives(w.geometry)},
           {"bvh", w.accel.bytes(),
            w.accel.has_boundaries() ? "one for all, one for what blocks light, one for what lets it pass"
