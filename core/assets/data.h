@@ -23,7 +23,8 @@ inline constexpr std::uint32_t kMaxPolygonCorners = 1 << 16;
 inline constexpr std::uint32_t kMaxImageSide = 1 << 15;
 inline constexpr std::uint64_t kMaxImagePixels = std::uint64_t{1} << 28;
 inline constexpr std::uint32_t kMaxGridSide = 1 << 13;
-inline constexpr std::uint64_t kMaxGridValues = std::uint64_t{1} << 31;
+// The most memory that the values of a grid may take in the renderer
+inline constexpr std::uint64_t kMaxGridBytes = std::uint64_t{16} << 30;
 
 // A mesh attribute with one or three numbers per vertex or triangle.
 struct MeshAttribute {

@@ -39,9 +39,12 @@ Result<void> read_box(std::string_view name, ByteReader& r, GridData& g) {
 }
 
 Result<void> check_count(std::string_view name, std::uint64_t count) {
-  if (count <= kMaxGridValues) return {};
-  return fail(Errc::resource_exhausted,
-              fmt::format("'{}': {} values, more than the limit of {}", name, count, kMaxGridValues));
+  if (count <= kMaxGridBytes / sizeof(float)) return {};
+  return fail(
+      Errc::resource_exhausted,
+      fmt::format("'{}': its {} values take {} MiB of memory, more than the limit of {} MiB; "
+                  "make its voxels larger, or convert it to a .vdb, in which empty space takes no memory",
+                  name, count, count * sizeof(float) >> 20, kMaxGridBytes >> 20));
 }
 
 // Returns the error for the value `v`, which is not finite. (x, y, z) is its voxel or node.

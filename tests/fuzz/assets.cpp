@@ -24,7 +24,7 @@ namespace ls::fuzz {
 namespace {
 
 constexpr std::uint64_t kMostPixels = 1 << 20,
-                        kMostValues = 1 << 20;  // what is refused above is quick and costs nothing
+                        kMostGridBytes = 1 << 22;  // what is refused above is quick and costs nothing
 
 template <class T>
 void put(std::string& to, const T& v) {
@@ -41,11 +41,12 @@ void check(const GridData& g) {
     must(std::isfinite(v) && v >= 0, "a grid's values are finite and not negative");
 }
 
-void check(const LsVdbGrid& grid) {
-  must(grid.channels == 1 || grid.channels == 3, "a grid has 1 or 3 channels");
-  const auto nodes = static_cast<std::uint64_t>(grid.size[0]) * grid.size[1] * grid.size[2];
-  for (std::uint64_t i = 0; i < nodes * static_cast<std::uint64_t>(grid.channels); ++i)
-    must(std::isfinite(grid.values[i]) && grid.values[i] >= 0, "a grid's values are finite and not negative");
+// Looks every value up, of grids that are not too large for that.
+void check(const render::Bricks& bricks) {
+  const render::Position n = bricks.size();
+  if (double{1} * n[0] * n[1] * n[2] > double{1 << 16}) return;
+  for (const float v : bricks.dense())
+    must(std::isfinite(v) && v >= 0, "a grid's values are finite and not negative");
 }
 
 std::string jpeg() {
@@ -147,40 +148,54 @@ std::string patched(std::string bytes, Bytes patches) {
 }
 
 void nvdb(std::string_view file, bool whole) {
-  LsVdbGrid grid{};
   const auto bytes = std::as_bytes(std::span(file));
   try {
-    whole ? render::decode_nvdb(bytes, "", kMostValues, grid)
-          : render::expand_nvdb("fuzz", bytes, kMostValues, grid);
-    check(grid);
+    const render::VdbVoxels grid = whole ? render::decode_nvdb(bytes, "", kMostGridBytes)
+                                         : render::read_nvdb_grid("fuzz", bytes, kMostGridBytes);
+    must(grid.shape.channels == 1 || grid.shape.channels == 3, "a grid has 1 or 3 channels");
+    for (int c = 0; c < grid.shape.channels; ++c) {
+      auto bricks = render::make_bricks(grid.tree, c, kMostGridBytes);
+      if (!bricks) return must(!bricks.error().message.empty(), "what is refused is told why");
+      must(render::Bricks::sound(grid.shape.size_of_box(), grid.shape.lead_of_box(), *bricks),
+           "bricks that were made are sound");
+      check({grid.shape.size_of_box(), grid.shape.lead_of_box(), std::move(*bricks)});
+    }
   } catch (const render::Refused& refused) {
     must(!refused.text.empty(), "what is refused is told why");
   }
-  delete[] grid.values;
 }
 
-// What lightshaft-vdb may have replied: what comes before the values, without its padding, and the values.
+// What lightshaft-vdb may have replied: its head, without the padding, and the bricks.
 void vdb_reply(Bytes input) {
   std::vector<std::byte> reply(input.size() <= sizeof(render::VdbReply)
                                    ? input.size()
-                                   : render::kVdbValuesAt + input.size() - sizeof(render::VdbReply));
+                                   : render::kVdbBricksAt + input.size() - sizeof(render::VdbReply));
   const std::size_t head = std::min(input.size(), sizeof(render::VdbReply));
   std::copy_n(bytes_of(input).begin(), head, reply.begin());
-  if (reply.size() >= render::kVdbValuesAt)
-    std::copy(bytes_of(input).begin() + head, bytes_of(input).end(), reply.begin() + render::kVdbValuesAt);
-  const auto grid = render::validated_grid(reply, kMostValues);
-  grid ? check(*grid) : must(!grid.error().message.empty(), "what is refused is told why");
+  if (reply.size() >= render::kVdbBricksAt)
+    std::copy(bytes_of(input).begin() + head, bytes_of(input).end(), reply.begin() + render::kVdbBricksAt);
+  const auto grid = render::validated_grid(reply, kMostGridBytes);
+  if (!grid) return must(!grid.error().message.empty(), "what is refused is told why");
+  for (const render::BrickTables& bricks : grid->channels)
+    check({grid->shape.size_of_box(), grid->shape.lead_of_box(), bricks, nullptr});
 }
 
 std::string vdb_reply_seed() {
   render::VdbReply reply{};
   reply.magic = render::kVdbMagic;
-  for (std::int32_t& n : reply.grid.size) n = 2;
-  reply.grid.channels = 3;
-  for (int i = 0; i < 16; i += 5) reply.grid.index_to_scene[i] = 1;
+  for (std::int32_t& n : reply.shape.size) n = 2;
+  reply.shape.channels = 1;
+  for (int i = 0; i < 16; i += 5) reply.shape.index_to_scene[i] = 1;
+  std::vector<float> values;
+  for (int i = 0; i < 8; ++i) values.push_back(static_cast<float>(i) / 7);
+  const auto bricks = render::make_bricks(render::tree_of({2, 2, 2}, values), 0, kMostGridBytes).value();
+  reply.counts[0] = {bricks.nodes.size() / render::kNodeEntries, bricks.floats.size() / render::kBrickValues,
+                     0};
   std::string bytes;
   put(bytes, reply);
-  for (int i = 0; i < 24; ++i) put(bytes, static_cast<float>(i));
+  for (const std::uint32_t n : bricks.table) put(bytes, n);
+  for (const std::uint32_t n : bricks.nodes) put(bytes, n);
+  for (const float v : bricks.floats) put(bytes, v);
   return bytes;
 }
 

@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "tests/unit/nvdb/bricks_values.h"
 #include "tests/unit/nvdb/nvdb_builder.h"
 
 namespace ls::render {
@@ -15,7 +16,7 @@ using test::NvdbBuilder;
 using testing::HasSubstr;
 
 struct Read {
-  LsVdbGrid grid{};
+  VdbShape grid{};
   std::string error;
   std::vector<float> values;
 
@@ -25,18 +26,18 @@ struct Read {
   }
 };
 
-Read read(const std::string& file, const std::string& wanted = "", std::uint64_t max_values = 1 << 20) {
+Read read(const std::string& file, const std::string& wanted = "", std::uint64_t max_bytes = 1 << 25) {
   Read r;
   try {
-    decode_nvdb(std::as_bytes(std::span(file.data(), file.size())), wanted, max_values, r.grid);
-    const auto n =
-        static_cast<std::size_t>(r.grid.size[0]) * r.grid.size[1] * r.grid.size[2] * r.grid.channels;
-    r.values.assign(r.grid.values, r.grid.values + n);
+    const VdbVoxels voxels =
+        decode_nvdb(std::as_bytes(std::span(file.data(), file.size())), wanted, max_bytes);
+    r.grid = voxels.shape;
+    // A mutation may ask for a box of billions of voxels.
+    if (double{1} * r.grid.size[0] * r.grid.size[1] * r.grid.size[2] < 1 << 20)
+      r.values = test::values_of(test::with_bricks(voxels));
   } catch (const Refused& e) {
     r.error = e.text;
   }
-  delete[] r.grid.values;
-  r.grid.values = nullptr;
   return r;
 }
 
@@ -100,6 +101,25 @@ TEST(Nvdb, ReadsRootTilesAndNegativeCoordinates) {
   EXPECT_EQ(read(builder.file(b)).at(5, 5, 5), 7);
 }
 
+// All 4096^3 voxels of a root's tile, of which only those on its faces need bricks of their own.
+TEST(Nvdb, LargeTilesAreNotExpanded) {
+  NvdbBuilder builder;
+  builder.hi = {4095, 4095, 4095};
+  std::string b = builder.buffer();
+  NvdbBuilder::put(b, builder.upper() - 32 + 8, std::int64_t{0});
+  NvdbBuilder::put(b, builder.upper() - 32 + 20, 7.f);
+  const std::string file = builder.file(b);
+
+  const VdbVoxels voxels = decode_nvdb(std::as_bytes(std::span(file)), "", 1 << 20);
+
+  EXPECT_EQ(voxels.shape.size[0], 4098);
+  EXPECT_TRUE(voxels.tree.leaves.empty());
+  const VdbGrid grid = test::with_bricks(voxels);
+  EXPECT_LT(BrickTables(grid.channels[0]).bytes(), 1u << 20);
+  const Bricks bricks(voxels.shape.size_of_box(), voxels.shape.lead_of_box(), grid.channels[0]);
+  for (const int x : {0, 1, 4096, 4097}) EXPECT_EQ(bricks.at(x, 5, 4096), x > 0 && x < 4097 ? 7 : .25f);
+}
+
 TEST(Nvdb, ChoosesAGridByItsName) {
   NvdbBuilder a, b;
   a.name = "temperature";
@@ -135,15 +155,19 @@ TEST(Nvdb, RefusesGridsThatAreNotDensitiesByName) {
 }
 
 TEST(Nvdb, RefusesTooLargeGridsBeforeAllocating) {
+  // The box is in 2 x 2 x 2 entries of the table, one of which is a node of 16 KiB with two leaves of 2 KiB
+  // for each channel, and there are three constants.
+  constexpr std::uint64_t kNode = 4 * (4096 + 8), kLeaf = 4 * 512, kConstants = 3 * 4;
   NvdbBuilder builder;
-  EXPECT_THAT(read(builder.file(), "", 2599).error, HasSubstr("2600 voxels; the limit is 2599"));
-  EXPECT_EQ(read(builder.file(), "", 2600).error, "");
+  EXPECT_THAT(read(builder.file(), "", kNode + 2 * kLeaf - 1).error,
+              HasSubstr("grid 'density' of 26 x 10 x 10 voxels takes more than 0 MiB of memory"));
+  EXPECT_EQ(read(builder.file(), "", kNode + 2 * kLeaf + kConstants).error, "");
   builder.type = 6;
-  EXPECT_THAT(read(builder.file(), "", 7799).error, HasSubstr("2600 voxels of 3 values; the limit is 2599"));
-  EXPECT_EQ(read(builder.file(), "", 7800).error, "");
+  EXPECT_THAT(read(builder.file(), "", kNode + 6 * kLeaf - 1).error, HasSubstr("takes more than"));
+  EXPECT_EQ(read(builder.file(), "", kNode + 6 * kLeaf + 3 * kConstants).error, "");
   builder.type = 1;
   builder.hi[1] = 20000;
-  EXPECT_THAT(read(builder.file()).error, HasSubstr("along an axis; the limit is 16384"));
+  EXPECT_THAT(read(builder.file()).error, HasSubstr("spans 20003 voxels along an axis; the limit is 16384"));
   builder = {};
   builder.codec = 1;
   std::string f = builder.file();
@@ -198,7 +222,7 @@ TEST(Nvdb, SurvivesTruncationsAndMutations) {
       const std::size_t at = e < 3 ? rng() % head : rng() % m.size();
       m[at] = static_cast<char>(rng());
     }
-    const Read r = read(m, "", 1 << 16);
+    const Read r = read(m, "", 1 << 20);
     for (const float v : r.values) ASSERT_TRUE(v >= 0 && std::isfinite(v));
   }
 }

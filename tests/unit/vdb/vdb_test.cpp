@@ -13,11 +13,13 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "tests/unit/nvdb/bricks_values.h"
 #include "worker/render/media/vdb_reply.h"
 
 // OpenVDB frees not all of what it has read of a file that turns out to be damaged. lightshaft-vdb reads one
@@ -27,6 +29,11 @@ extern "C" const char* __lsan_default_suppressions() { return "leak:libopenvdb";
 
 namespace {
 
+using ls::render::Bricks;
+using ls::render::BrickTables;
+using ls::render::read_vdb;
+using ls::render::VdbGrid;
+using ls::render::VdbShape;
 using testing::HasSubstr;
 
 class Scratch {
@@ -47,7 +54,7 @@ class Scratch {
 
 struct Read {
   std::string error;
-  LsVdbGrid grid{};
+  VdbShape grid{};
   std::vector<float> values;
 
   float at(int x, int y, int z, int channel = 0) const {
@@ -56,16 +63,12 @@ struct Read {
   }
 };
 
-Read read(const std::filesystem::path& path, std::uint64_t max_values = 1 << 20) {
+Read read(const std::filesystem::path& path, std::uint64_t max_bytes = 1 << 25) {
   Read r;
-  char error[512] = {};
-  if (ls_vdb_read(path.c_str(), "", max_values, &r.grid, error, sizeof error) != 0) {
-    r.error = error;
-    return r;
-  }
-  const auto n = static_cast<std::size_t>(r.grid.size[0]) * r.grid.size[1] * r.grid.size[2] * r.grid.channels;
-  r.values.assign(r.grid.values, r.grid.values + n);
-  ls_vdb_free(&r.grid);
+  VdbGrid grid;
+  if (read_vdb(path.string(), "", max_bytes, grid, r.error) != 0) return r;
+  r.grid = grid.shape;
+  r.values = ls::test::values_of(grid);
   return r;
 }
 
@@ -147,11 +150,117 @@ TEST_F(Vdb, NegativesOfEveryChannelAreCounted) {
   EXPECT_EQ(r.at(1, 1, 1, 1), 0);
 }
 
-TEST_F(Vdb, LimitCountsEveryValue) {
+TEST_F(Vdb, LimitIsOfTheBytesInMemory) {
   write(file_.path(), filled<openvdb::Vec3SGrid>(three<float>));
+  VdbGrid grid;
+  std::string error;
+  ASSERT_EQ(read_vdb(file_.path().string(), "", 1 << 25, grid, error), 0);
+  std::uint64_t bytes = 0;
+  for (const BrickTables bricks : grid.channels) bytes += bricks.bytes();
 
-  EXPECT_THAT(read(file_.path(), 3 * 420 - 1).error, HasSubstr("420 voxels of 3 values; the limit is 419"));
-  EXPECT_EQ(read(file_.path(), 3 * 420).error, "");
+  EXPECT_EQ(read(file_.path(), bytes).error, "");
+  EXPECT_THAT(read(file_.path(), bytes - 1).error,
+              HasSubstr("grid 'density' of 12 x 7 x 5 voxels takes more than 0 MiB of memory"));
+  EXPECT_THAT(read(file_.path(), 100).error, HasSubstr("takes more than"));
+}
+
+// At the ends of what coordinates can be, in one leaf and in two, and at no multiple of anything.
+TEST_F(Vdb, ReadsVoxelsAtAnyCoordinates) {
+  constexpr int kLast = std::numeric_limits<int>::max(), kFirst = std::numeric_limits<int>::min();
+  for (const int at : {kFirst, -(1 << 30) - 1, -(1 << 30), -5, 0, 127, (1 << 30) - 1, 1 << 30, kLast - 1}) {
+    SCOPED_TRACE(at);
+    const auto grid = filled<openvdb::FloatGrid>([](int) { return 0.f; });
+    grid->clear();
+    grid->getAccessor().setValue({at, at, at}, 2);
+    grid->getAccessor().setValue({at + 1, at, at}, 3);
+    write(file_.path(), grid);
+
+    const Read r = read(file_.path());
+
+    ASSERT_EQ(r.error, "");
+    EXPECT_EQ(r.grid.size[0], 4);
+    EXPECT_EQ(r.grid.size[2], 3);
+    EXPECT_EQ(r.grid.index_to_scene[3], double{at} - 1);
+    EXPECT_EQ(r.at(0, 1, 1), 0);
+    EXPECT_EQ(r.at(1, 1, 1), 2);
+    EXPECT_EQ(r.at(2, 1, 1), 3);
+    EXPECT_EQ(r.at(3, 1, 1), 0);
+    EXPECT_EQ(r.at(1, 0, 1), 0);
+    EXPECT_EQ(r.at(1, 1, 2), 0);
+  }
+}
+
+TEST_F(Vdb, VoxelsFarApartTakeTheMemoryOfAFew) {
+  const auto grid = filled<openvdb::FloatGrid>([](int) { return 0.f; });
+  grid->clear();
+  grid->getAccessor().setValue({-8000, 3, 8000}, 2);
+  grid->getAccessor().setValue({8000, 8003, -8000}, 3);
+  write(file_.path(), grid);
+
+  VdbGrid read_grid;
+  std::string error;
+  ASSERT_EQ(read_vdb(file_.path().string(), "", 1 << 25, read_grid, error), 0) << error;
+
+  // The table has at most 127 x 64 x 127 entries; each voxel is in at most 8 bricks of as many nodes.
+  EXPECT_LE(BrickTables(read_grid.channels[0]).bytes(),
+            4u * 127 * 64 * 127 + 18 * (4 * ls::render::kBrickValues + 4 * ls::render::kNodeEntries));
+  const Bricks bricks(read_grid.shape.size_of_box(), read_grid.shape.lead_of_box(),
+                      std::move(read_grid.channels[0]));
+  EXPECT_EQ(bricks.at(1, 1, 16001), 2);
+  EXPECT_EQ(bricks.at(16001, 8001, 1), 3);
+  EXPECT_EQ(bricks.at(8000, 4000, 8000), 0);
+
+  grid->getAccessor().setValue({100'000, 0, 0}, 1);
+  write(file_.path(), grid);
+  EXPECT_THAT(read(file_.path()).error, HasSubstr("spans 108003 voxels along an axis; the limit is 16384"));
+}
+
+TEST_F(Vdb, LargeTilesAreNotExpanded) {
+  const auto grid = filled<openvdb::FloatGrid>([](int) { return 0.f; });
+  grid->clear();
+  grid->tree().addTile(3, openvdb::Coord(4096, 0, -4096), 2.f, true);  // a child of the root: 4096^3 voxels
+  write(file_.path(), grid);
+
+  VdbGrid read_grid;
+  std::string error;
+  ASSERT_EQ(read_vdb(file_.path().string(), "", 1 << 20, read_grid, error), 0) << error;
+
+  EXPECT_EQ(read_grid.shape.size[0], 4098);
+  EXPECT_LT(BrickTables(read_grid.channels[0]).bytes(), 1u << 20);
+  const Bricks bricks(read_grid.shape.size_of_box(), read_grid.shape.lead_of_box(),
+                      std::move(read_grid.channels[0]));
+  for (const int x : {0, 1, 4096, 4097}) EXPECT_EQ(bricks.at(x, 5, 4096), x > 0 && x < 4097 ? 2 : 0);
+}
+
+TEST_F(Vdb, HalfFloatsStayHalvesInMemory) {
+  const auto grid = filled<openvdb::FloatGrid>([](int i) { return static_cast<float>(i) / 3; });
+  for (const bool half : {false, true}) {
+    grid->setSaveFloatAsHalf(half);
+    write(file_.path(), grid);
+    VdbGrid read_grid;
+    std::string error;
+    ASSERT_EQ(read_vdb(file_.path().string(), "", 1 << 25, read_grid, error), 0) << error;
+    EXPECT_EQ(read_grid.channels[0].floats.empty(), half);
+    EXPECT_EQ(read_grid.channels[0].halves.empty(), !half);
+  }
+}
+
+// What a leaf holds outside of the box of the active voxels and its layer is none of the grid's.
+TEST_F(Vdb, InactiveVoxelsCountWithinTheBoxOnly) {
+  const auto grid = filled<openvdb::FloatGrid>([](int) { return 0.f; });
+  grid->clear();
+  grid->getAccessor().setValue({2, 2, 2}, 1);
+  grid->getAccessor().setValueOff({1, 2, 2}, 5);
+  grid->getAccessor().setValueOff({6, 2, 2}, std::numeric_limits<float>::quiet_NaN());
+  grid->getAccessor().setValueOff({6, 6, 2}, -1);
+  write(file_.path(), grid, 0);
+
+  const Read r = read(file_.path());
+
+  ASSERT_EQ(r.error, "");
+  EXPECT_EQ(r.grid.negatives, 0u);
+  EXPECT_EQ(r.at(0, 1, 1), 5);
+  EXPECT_EQ(r.at(2, 1, 1), 0);
 }
 
 TEST_F(Vdb, RefusesPointsAndOtherGridsByTheirTypes) {

@@ -18,6 +18,7 @@
 #include <thread>
 
 #include "core/base/spawn.h"
+#include "tests/unit/nvdb/bricks_values.h"
 #include "tests/unit/nvdb/nvdb_builder.h"
 #include "util/sandbox/call_filter.h"
 #include "worker/render/media/vdb_process.h"
@@ -28,6 +29,8 @@ namespace ls::render {
 namespace {
 
 using testing::HasSubstr;
+
+constexpr std::uint64_t kMost = 1 << 25;  // bytes of a grid
 
 class VdbProcess : public testing::Test {
  protected:
@@ -48,14 +51,17 @@ class VdbProcess : public testing::Test {
     return path;
   }
   Result<VdbFile> read_by(const std::string& words) {
-    return VdbFile::read(folder_ / "none.vdb", "", 1 << 20, program(words));
+    return VdbFile::read(folder_ / "none.vdb", "", kMost, program(words));
   }
-  // ... that answers with a reply and values.
-  Result<VdbFile> answered(const VdbReply& reply, const std::vector<float>& values,
+  // ... that answers with a reply and what follows it.
+  Result<VdbFile> answered(const VdbReply& reply, const std::vector<OwnBricks>& channels,
                            const std::string& then = "") {
-    std::string bytes(kVdbValuesAt, '\0');
+    std::string bytes(kVdbBricksAt, '\0');
     std::memcpy(bytes.data(), &reply, sizeof reply);
-    bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
+    const auto append = [&](const auto& array) {
+      bytes.append(reinterpret_cast<const char*>(array.data()), array.size() * sizeof(array[0]));
+    };
+    for (const OwnBricks& b : channels) append(b.table), append(b.nodes), append(b.floats), append(b.halves);
     return read_by("cat '" + file("reply", bytes).string() + "' >&3\n" + then);
   }
   std::filesystem::path fifo(const std::string& name) {
@@ -67,31 +73,36 @@ class VdbProcess : public testing::Test {
   std::filesystem::path folder_;
 };
 
-VdbReply reply_of(int x, int y, int z) {
+// The bricks of a box of 2 x 1 x 1 values. They are of float32 unless all values are halves.
+OwnBricks bricks_of(const std::vector<float>& values) {
+  return make_bricks(tree_of({2, 1, 1}, values), 0, kMost).value();
+}
+VdbReply reply_of(int x, int y, int z, const std::vector<OwnBricks>& channels) {
   VdbReply reply{};
   reply.magic = kVdbMagic;
-  reply.grid.channels = 1;
-  reply.grid.size[0] = x, reply.grid.size[1] = y, reply.grid.size[2] = z;
+  reply.shape.channels = static_cast<int>(channels.size());
+  reply.shape.size[0] = x, reply.shape.size[1] = y, reply.shape.size[2] = z;
+  for (std::size_t c = 0; c < channels.size(); ++c)
+    reply.counts[c] = {channels[c].nodes.size() / kNodeEntries, BrickTables(channels[c]).brick_count(),
+                       channels[c].halves.empty() ? 0u : 1u};
   return reply;
 }
 
 TEST_F(VdbProcess, GridFromTheProcessEqualsOneReadDirectly) {
   const std::string bytes = test::NvdbBuilder().file();
-  LsVdbGrid here{};
-  decode_nvdb(std::as_bytes(std::span(bytes)), "", 1 << 20, here);
+  const VdbGrid here = test::with_bricks(decode_nvdb(std::as_bytes(std::span(bytes)), "", kMost));
 
-  const auto there = VdbFile::read(file("a.nvdb", bytes), "density", 1 << 20);
+  const auto there = VdbFile::read(file("a.nvdb", bytes), "density", kMost);
 
   ASSERT_TRUE(there) << there.error().message;
-  const std::uint64_t count = values_of(here);
-  ASSERT_EQ(values_of(there->grid()), count);
-  EXPECT_TRUE(std::equal(here.values, here.values + count, there->grid().values));
-  EXPECT_TRUE(std::equal(here.index_to_scene, here.index_to_scene + 16, there->grid().index_to_scene));
-  delete[] here.values;
+  EXPECT_TRUE(Bricks(here.shape.size_of_box(), here.shape.lead_of_box(), here.channels[0]) ==
+              there->channel(0));
+  EXPECT_TRUE(
+      std::equal(here.shape.index_to_scene, here.shape.index_to_scene + 16, there->shape().index_to_scene));
 }
 
 TEST_F(VdbProcess, RefusalHasAReason) {
-  const auto garbage = VdbFile::read(file("a.vdb", "no grid at all"), "", 1 << 20);
+  const auto garbage = VdbFile::read(file("a.vdb", "no grid at all"), "", kMost);
   const auto large = VdbFile::read(file("a.nvdb", test::NvdbBuilder().file()), "", 100);
 
   ASSERT_FALSE(garbage);
@@ -99,7 +110,7 @@ TEST_F(VdbProcess, RefusalHasAReason) {
   EXPECT_THAT(garbage.error().message, HasSubstr("not a readable OpenVDB"));
   ASSERT_FALSE(large);
   EXPECT_EQ(large.error().code, Errc::resource_exhausted);
-  EXPECT_THAT(large.error().message, HasSubstr("the limit is 100"));
+  EXPECT_THAT(large.error().message, HasSubstr("of 26 x 10 x 10 voxels takes more than 0 MiB of memory"));
 }
 
 TEST_F(VdbProcess, FileThatCrashesItsReaderIsAnError) {
@@ -118,25 +129,53 @@ TEST_F(VdbProcess, FileThatCrashesItsReaderIsAnError) {
 }
 
 TEST_F(VdbProcess, ReplyIsValidated) {
-  VdbReply sound = reply_of(2, 1, 1), endless = sound, three = reply_of(1, 1, 1), two = three,
-           refused = reply_of(0, 0, 0);
-  endless.grid.index_to_scene[3] = std::numeric_limits<double>::infinity();
-  three.grid.channels = 3, two.grid.channels = 2;
+  const OwnBricks some = bricks_of({.1f, 2}), halves = bricks_of({1, 2});
+  const VdbReply sound = reply_of(2, 1, 1, {some}), three = reply_of(2, 1, 1, {some, some, some});
+  VdbReply endless = sound, two = reply_of(2, 1, 1, {some, some}), shifted = sound, many = sound,
+           none = sound, refused{};
+  endless.shape.index_to_scene[3] = std::numeric_limits<double>::infinity();
+  shifted.shape.lead[1] = 128;
+  many.counts[0].bricks = std::uint64_t{1} << 62;
+  none.counts[0].nodes = 0;
+  refused.magic = kVdbMagic;
   refused.code = 1;
   std::fill(std::begin(refused.error), std::end(refused.error), 'x');  // without an end
+  OwnBricks cut = some, negative = some, nan = some, wild = some;
+  cut.floats.pop_back();
+  negative.floats.back() = -1;
+  nan.floats.back() = std::nanf("");
+  wild.nodes.back() = 7;
 
-  EXPECT_TRUE(answered(sound, {1, 2}));
-  EXPECT_TRUE(answered(three, {1, 2, 3}));
-  EXPECT_FALSE(answered(three, {1, 2}));
-  EXPECT_FALSE(answered(two, {1, 2}));
-  EXPECT_FALSE(answered(sound, {1}));
-  EXPECT_FALSE(answered(sound, {1, -1}));
-  EXPECT_FALSE(answered(sound, {1, std::nanf("")}));
-  EXPECT_FALSE(answered(endless, {1, 2}));
-  EXPECT_FALSE(answered(reply_of(-2, -1, 1), {1, 2}));
-  EXPECT_FALSE(answered(reply_of(0, 1, 1), {1, 2}));
-  EXPECT_FALSE(answered(reply_of(1 << 30, 1 << 30, 1 << 30), {1, 2}));
-  EXPECT_FALSE(answered(VdbReply{}, {1, 2}));
+  const auto good = answered(sound, {some});
+  ASSERT_TRUE(good) << good.error().message;
+  EXPECT_EQ(good->channel(0).at(1, 0, 0), 2);
+  EXPECT_TRUE(answered(three, {some, some, some}));
+  const VdbReply as_halves = reply_of(2, 1, 1, {halves});
+  const auto good_halves = answered(as_halves, {halves});
+  ASSERT_TRUE(good_halves) << good_halves.error().message;
+  EXPECT_EQ(good_halves->channel(0).at(1, 0, 0), 2);
+  EXPECT_FALSE(answered(sound, {halves}));
+  for (const std::uint16_t bad : {0x7c00, 0x7e00, 0x8001, 0xbc00}) {  // infinite, not a number, negative
+    OwnBricks other = halves;
+    other.halves.back() = bad;
+    EXPECT_FALSE(answered(as_halves, {other})) << bad;
+  }
+  EXPECT_FALSE(answered(three, {some, some}));
+  EXPECT_FALSE(answered(two, {some, some}));
+  EXPECT_FALSE(answered(sound, {cut}));
+  EXPECT_FALSE(answered(sound, {negative}));
+  EXPECT_FALSE(answered(sound, {nan}));
+  EXPECT_FALSE(answered(sound, {wild}));
+  EXPECT_FALSE(answered(endless, {some}));
+  EXPECT_FALSE(answered(shifted, {some}));
+  EXPECT_FALSE(answered(many, {some}));
+  EXPECT_FALSE(answered(none, {some}));
+  EXPECT_FALSE(answered(reply_of(-2, -1, 1, {some}), {some}));
+  EXPECT_FALSE(answered(reply_of(0, 1, 1, {some}), {some}));
+  EXPECT_FALSE(answered(reply_of(200, 1, 1, {some}), {some}));  // a table of two nodes
+  EXPECT_FALSE(answered(reply_of(1 << 14, 1 << 14, 1 << 14, {some}), {some}));
+  EXPECT_FALSE(answered(reply_of(1 << 30, 1 << 30, 1 << 30, {some}), {some}));
+  EXPECT_FALSE(answered(VdbReply{}, {some}));
   EXPECT_FALSE(read_by("printf abc >&3"));
   EXPECT_FALSE(read_by("true"));
   refused.error[0] = 0;
@@ -149,7 +188,8 @@ TEST_F(VdbProcess, ReplyIsValidated) {
 
 TEST_F(VdbProcess, LeftoverProcessesCannotChangeTheReply) {
   const auto go = fifo("go"), done = fifo("done");
-  const auto cut = answered(reply_of(2, 1, 1), {1, 2},
+  const OwnBricks some = bricks_of({1, 2});
+  const auto cut = answered(reply_of(2, 1, 1, {some}), {some},
                             "{ read word <'" + go.string() + "'; (: >/proc/self/fd/3); echo cut >'" +
                                 done.string() + "'; } 2>/dev/null &");
   ASSERT_TRUE(cut) << cut.error().message;
@@ -157,7 +197,7 @@ TEST_F(VdbProcess, LeftoverProcessesCannotChangeTheReply) {
   std::string word;
   std::ifstream(done) >> word;
   EXPECT_EQ(word, "cut");  // it has tried
-  EXPECT_EQ(cut->grid().values[1], 2);
+  EXPECT_EQ(cut->channel(0).at(1, 0, 0), 2);
 }
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // whose shadow is larger than any limit
@@ -182,22 +222,52 @@ int with_limit(std::uint64_t more, const std::function<int()>& run) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-// 258^3 values, 66 MiB: read they fit into any of these limits, but the reply takes as much again.
+// A file of 8 nodes that are full of leaves: 64 MiB. No two of these are equal.
+std::string large_file() {
+  const test::NvdbBuilder builder;
+  const std::uint64_t node_bytes = builder.leaf(0) - builder.lower(), upper = builder.upper();
+  const std::string part = builder.buffer();
+  std::string b = part.substr(0, builder.lower());
+  float next = 1;
+  for (int n = 0; n < 8; ++n) {
+    const auto child = static_cast<std::uint32_t>((n & 1) * 32 * 32 + (n >> 1 & 1) * 32 + (n >> 2));
+    b[upper + 4128 + child / 8] = static_cast<char>(b[upper + 4128 + child / 8] | 1 << child % 8);
+    test::NvdbBuilder::put(b, upper + builder.upper_table() + 8 * child, b.size() - upper);
+    std::string node = part.substr(builder.lower(), node_bytes);
+    std::fill_n(node.begin() + 544, 512, '\xff');
+    for (std::uint64_t i = 0; i < 4096; ++i)
+      test::NvdbBuilder::put(node, builder.lower_table() + 8 * i, node_bytes + i * builder.leaf_bytes());
+    b += node;
+    for (int i = 0; i < 4096; ++i) {
+      std::string leaf = part.substr(builder.leaf(0), builder.leaf_bytes());
+      test::NvdbBuilder::put(leaf, builder.leaf_table(), next++);
+      b += leaf;
+    }
+  }
+  test::NvdbBuilder::put(b, 32, std::uint64_t{b.size()});
+  for (std::uint64_t k = 0; k < 3; ++k)
+    test::NvdbBuilder::put(b, test::NvdbBuilder::kRoot + 12 + 4 * k, builder.origin[k] + 255);
+  return builder.file(b);
+}
+
 TEST_F(VdbProcess, GridAndReplyMustFitIntoTheRenderersRemainingMemory) {
-  test::NvdbBuilder builder;
-  builder.hi = {255, 255, 255};
-  const auto path = file("large.nvdb", builder.file());
+  const auto path = file("large.nvdb", large_file());
   const auto read_with = [&](std::uint64_t more) {
     return with_limit(more, [&] {
-      const auto read = VdbFile::read(path, "", 1 << 25);
+      const auto read = VdbFile::read(path, "", std::uint64_t{1} << 30);
       if (!read) return read.error().code == Errc::resource_exhausted ? 1 : 2;
-      return values_of(read->grid()) == 258 * 258 * 258 ? 0 : 3;
+      return read->channel(0).at(1, 1, 1) == 1 ? 0 : 3;
     });
   };
 
-  EXPECT_EQ(read_with(512 * kMiB), 0);
-  EXPECT_EQ(read_with(120 * kMiB), 1);
-  EXPECT_EQ(read_with(60 * kMiB), 1);  // not even read: no fault of the file
+  // The file takes 67 MiB, its leaves 64, its bricks 92, and the reply as much again.
+  EXPECT_EQ(read_with(700 * kMiB), 0);
+  int last = 1;
+  for (std::uint64_t more = 60; more < 700; more += 40) {
+    const int code = read_with(more * kMiB);
+    EXPECT_TRUE(code == last || (last == 1 && code == 0)) << more << " MiB: " << code;
+    last = code;
+  }
 }
 
 TEST_F(VdbProcess, MappedReplyCountsTowardsTheLimit) {
@@ -205,8 +275,8 @@ TEST_F(VdbProcess, MappedReplyCountsTowardsTheLimit) {
   const int failed = with_limit(512 * kMiB, [&] {
     const std::uint64_t before = limit();
     {
-      const auto read = VdbFile::read(path, "", 1 << 20);
-      const std::uint64_t taken = kVdbValuesAt + 4 * values_of(read->grid());
+      const auto read = VdbFile::read(path, "", kMost);
+      const std::uint64_t taken = kVdbBricksAt + read->channel(0).bytes();
       if (limit() != before - taken) return 1;
     }
     return limit() == before ? 0 : 2;
@@ -216,7 +286,7 @@ TEST_F(VdbProcess, MappedReplyCountsTowardsTheLimit) {
 #endif
 
 TEST_F(VdbProcess, MissingProgramIsNotReportedAsABadFile) {
-  const auto missing = VdbFile::read("a.vdb", "", 1 << 20, "/nowhere/lightshaft-vdb");
+  const auto missing = VdbFile::read("a.vdb", "", kMost, "/nowhere/lightshaft-vdb");
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().code, Errc::internal);
   EXPECT_THAT(missing.error().message, HasSubstr("/nowhere/lightshaft-vdb"));

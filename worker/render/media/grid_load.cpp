@@ -108,28 +108,25 @@ Result<LoadedVolume> vdb_file(const GridVolume& v, const AssetLoader& files, V3d
   const std::string& name = files.name(v.file);
   if (v.border) return fail(Errc::invalid_argument, fmt::format("{}: only a `.vol` has a border", name));
   if (auto ok = BuildStop::go_on(); !ok) return tl::unexpected(ok.error());
-  const auto file = VdbFile::read(*path, v.grid_name, kMaxGridValues);
+  const auto file = VdbFile::read(*path, v.grid_name, kMaxGridBytes);
   if (!file) return fail(file.error().code, fmt::format("{}: {}", name, file.error().message));
-  const LsVdbGrid& raw = file->grid();
+  const VdbShape& shape = file->shape();
   Transform t;
-  std::copy(std::begin(raw.index_to_scene), std::end(raw.index_to_scene), t.m.begin());
+  std::copy(std::begin(shape.index_to_scene), std::end(shape.index_to_scene), t.m.begin());
   const Affine nodes_to_scene = Affine(v.to_world) * Affine(t);
   if (!nodes_to_scene.invertible()) {
     return fail(
         Errc::invalid_argument,
         fmt::format("{}: the grid's transform (to_world times the file's own) cannot be inverted", name));
   }
-  const std::array<int, 3> size{raw.size[0], raw.size[1], raw.size[2]};
-  const auto of = static_cast<std::size_t>(raw.channels);
-  const std::span values(raw.values, of * static_cast<std::size_t>(size[0]) * size[1] * size[2]);
   LoadedVolume out;
-  out.clamped = raw.negatives;
+  out.clamped = shape.negatives;
   // Values are at nodes. From the active voxels to the next nodes outwards the values fall to the background
   // value, and there the grid ends, so wrapping has no effect.
-  for (std::size_t c = 0; c < of; ++c)
-    out.channels.emplace_back(size, channel(values, c, of),
-                              from_world(nodes_to_scene.inverse(), center, scale), V3d(0),
-                              V3d(size[0] - 1, size[1] - 1, size[2] - 1), to_sigma, v.filter);
+  for (int c = 0; c < shape.channels; ++c)
+    out.channels.emplace_back(Voxels(file->channel(c)), from_world(nodes_to_scene.inverse(), center, scale),
+                              V3d(0), V3d(shape.size[0] - 1, shape.size[1] - 1, shape.size[2] - 1), to_sigma,
+                              v.filter);
   return out;
 }
 

@@ -84,11 +84,11 @@ std::uint64_t data_left() {
 }
 
 Result<VdbFile> VdbFile::read(const std::filesystem::path& path, const std::string& grid_name,
-                              std::uint64_t max_values, const std::filesystem::path& program) {
+                              std::uint64_t max_bytes, const std::filesystem::path& program) {
   const Descriptor reply(::memfd_create("lightshaft-vdb", MFD_CLOEXEC | MFD_ALLOW_SEALING));
   if (reply.fd < 0) return no_program("memfd_create", errno);
   const auto end =
-      run_helper(program, {path.string(), grid_name, std::to_string(max_values), std::to_string(data_left())},
+      run_helper(program, {path.string(), grid_name, std::to_string(max_bytes), std::to_string(data_left())},
                  reply.fd, BuildStop::flag());
   if (!end) return no_program(end.error().message);
   if (auto ok = BuildStop::go_on(); !ok) return tl::unexpected(ok.error());
@@ -108,7 +108,7 @@ Result<VdbFile> VdbFile::read(const std::filesystem::path& path, const std::stri
                     ::munmap(m, bytes);
                     raise_limit(taken);
                   }};
-  const auto grid = validated_grid({static_cast<const std::byte*>(mapped), bytes}, max_values);
+  const auto grid = validated_grid({static_cast<const std::byte*>(mapped), bytes}, max_bytes);
   if (!grid) return tl::unexpected(grid.error());
   file.grid_ = *grid;
   return file;

@@ -28,19 +28,24 @@ class VdbFile {
  public:
   // Reads the grid `grid_name` of the file `path`. If grid_name is empty, it reads the only grid, or the grid
   // "density" if there are several. Fails with invalid_argument if the file is at fault; with
-  // resource_exhausted if the grid has more than max_values values or another limit (memory, time) is
+  // resource_exhausted if the grid's bricks take more than max_bytes or another limit (memory, time) is
   // exceeded; and with internal if the program could not be started or ended with an error code.
   static Result<VdbFile> read(const std::filesystem::path& path, const std::string& grid_name,
-                              std::uint64_t max_values,
+                              std::uint64_t max_bytes,
                               const std::filesystem::path& program = program_beside_us("lightshaft-vdb"));
-  // The grid, which is valid: its sizes are at least 1, its values are finite and not negative, and its
-  // transform is finite.
-  const LsVdbGrid& grid() const { return grid_; }
+  // The grid's shape, which is valid: its sizes are at least 1, and its transform is finite.
+  const VdbShape& shape() const { return grid_.shape; }
+  // The values of a channel, which are finite and not negative. They remain where the program has written
+  // them, which is memory that is freed with the last of these and this object.
+  Bricks channel(int c) const {
+    return {shape().size_of_box(), shape().lead_of_box(), grid_.channels[static_cast<std::size_t>(c)],
+            mapped_};
+  }
 
  private:
   VdbFile() = default;
 
-  LsVdbGrid grid_{};
+  VdbView grid_;
   std::shared_ptr<const void> mapped_;
 };
 

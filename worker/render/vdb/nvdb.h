@@ -10,42 +10,44 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
-#include <new>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "worker/render/bricks/bricks.h"
 #include "worker/render/media/vdb_reply.h"
 
 namespace ls::render {
 
-// The readers of .vdb and .nvdb files throw this to reject a file; ls_vdb_read catches it.
+// The readers of .vdb and .nvdb files throw this to reject a file; read_vdb catches it.
 struct Refused {
-  int code;  // the return value of ls_vdb_read: 1 if the file is at fault, 2 if a limit is exceeded
+  int code;  // the return value of read_vdb: 1 if the file is at fault, 2 if a limit is exceeded
   std::string text;
 };
 
-// Allocates an array of `values` floats; throws Refused if there is not enough memory. The caller must have
-// checked the number against the limit max_values.
-inline float* room_for(std::uint64_t values) {
-  float* room = new (std::nothrow) float[values];
-  if (!room)
-    throw Refused{2, "the grid of " + std::to_string(values >> 18) +
-                         " MiB needs more memory than the renderer has left of its limit"};
-  return room;
-}
+// The voxels of a grid as a file holds them, and where they are
+struct VdbVoxels {
+  std::string name;  // of the grid, for messages
+  VdbShape shape{};
+  VoxelTree tree;
+};
+// The coordinates of a voxel in a file, and its value: 3 components, of which a grid with one channel uses
+// only the first
+using Coord = std::array<std::int64_t, 3>;
+using Value = std::array<float, 3>;
 
 // Returns the index in `names`, the names of the file's grids, of the grid to read: the one called `wanted`
 // or, if `wanted` is empty, the only one, or "density" if there are several. Throws Refused if there is no
 // such grid.
 std::size_t choose_grid(const std::vector<std::string>& names, const std::string& wanted);
 
-// Sets out.size. Throws Refused if the grid is larger than 2^14 voxels along an axis (the file is at fault),
-// or has more than max_values values; for this, out.channels must be set already. `name` is the grid's name,
-// for messages.
-void set_size(const std::string& name, const std::array<std::int64_t, 3>& size, std::uint64_t max_values,
-              LsVdbGrid& out);
+// Sets the sizes of `out` and its tree for the voxels from `lo` to before `end`. Throws Refused if there are
+// none, or more than kMaxVdbSide along an axis.
+void set_box(const Coord& lo, const Coord& end, VdbVoxels& out);
+
+// The refusal of a grid that takes more than max_bytes.
+Refused too_large(const VdbVoxels& grid, std::uint64_t max_bytes);
 
 // True for an .nvdb file, decided by `head`, its first 8 bytes or more.
 bool is_nvdb(std::string_view head);
@@ -53,14 +55,11 @@ bool is_nvdb(std::string_view head);
 // Returns all bytes of a file. Throws Refused if it has more than 8 GiB or cannot be read.
 std::vector<std::byte> file_bytes(const std::filesystem::path& path);
 
-// decode_nvdb() reads the grid `wanted` of the bytes of an .nvdb file like ls_vdb_read(), but reports failure
-// by throwing Refused or std::bad_alloc. The caller must free out.values even then. It finds the grid,
-// decompresses its buffer and calls expand_nvdb(), which turns the buffer into values. `name` is the grid's
-// name, for messages.
-void decode_nvdb(std::span<const std::byte> file, const std::string& wanted, std::uint64_t max_values,
-                 LsVdbGrid& out);
-void expand_nvdb(const std::string& name, std::span<const std::byte> buffer, std::uint64_t max_values,
-                 LsVdbGrid& out);
+// decode_nvdb() reads the grid `wanted` of the bytes of an .nvdb file like read_vdb(), but reports failure by
+// throwing Refused or std::bad_alloc. It finds the grid, decompresses its buffer and calls read_nvdb_grid(),
+// which reads the buffer. `name` is the grid's name, for messages.
+VdbVoxels decode_nvdb(std::span<const std::byte> file, const std::string& wanted, std::uint64_t max_bytes);
+VdbVoxels read_nvdb_grid(const std::string& name, std::span<const std::byte> buffer, std::uint64_t max_bytes);
 
 static_assert(std::endian::native == std::endian::little);
 

@@ -117,21 +117,23 @@ std::size_t choose_grid(const std::vector<std::string>& names, const std::string
   throw Refused{1, "it has no grid '" + wanted + "'; there are " + all};
 }
 
-void set_size(const std::string& name, const std::array<std::int64_t, 3>& size, std::uint64_t max_values,
-              LsVdbGrid& out) {
-  std::uint64_t count = 1;
-  for (int k = 0; k < 3; ++k) {
-    const std::int64_t n = size[k];
-    if (n <= 0 || n > (1 << 14))
-      throw Refused{
-          1, "grid '" + name + "' spans " + std::to_string(n) + " voxels along an axis; the limit is 16384"};
-    out.size[k] = static_cast<std::int32_t>(n);
-    count *= static_cast<std::uint64_t>(n);
+void set_box(const Coord& lo, const Coord& end, VdbVoxels& out) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::int64_t n = end[k] - lo[k], lead = lo[k] & (kNodeSide - 1);
+    if (n <= 0 || n > kMaxVdbSide)
+      throw Refused{1, "grid '" + out.name + "' spans " + std::to_string(n) +
+                           " voxels along an axis; the limit is " + std::to_string(kMaxVdbSide)};
+    out.shape.size[k] = out.tree.size[k] = static_cast<std::int32_t>(n);
+    out.shape.lead[k] = out.tree.lead[k] = static_cast<std::int32_t>(lead);
   }
-  if (const std::uint64_t most = max_values / static_cast<std::uint64_t>(out.channels); count > most)
-    throw Refused{2, "grid '" + name + "' spans " + std::to_string(count) +
-                         (out.channels > 1 ? " voxels of 3 values" : " voxels") + "; the limit is " +
-                         std::to_string(most)};
+}
+
+Refused too_large(const VdbVoxels& grid, std::uint64_t max_bytes) {
+  std::string size;
+  for (const std::int32_t n : grid.shape.size) size += (size.empty() ? "" : " x ") + std::to_string(n);
+  return {2, "grid '" + grid.name + "' of " + size + " voxels takes more than " +
+                 std::to_string(max_bytes >> 20) +
+                 " MiB of memory, which is the limit; resample it to larger voxels, or cut off a part"};
 }
 
 bool is_nvdb(std::string_view head) { return is_magic(head.substr(0, 8)); }
@@ -148,8 +150,7 @@ std::vector<std::byte> file_bytes(const std::filesystem::path& path) {
   return bytes;
 }
 
-void decode_nvdb(std::span<const std::byte> bytes, const std::string& wanted, std::uint64_t max_values,
-                 LsVdbGrid& out) {
+VdbVoxels decode_nvdb(std::span<const std::byte> bytes, const std::string& wanted, std::uint64_t max_bytes) {
   const NvdbBytes file(bytes, "a file");
   const std::vector<Entry> all = table_of(file);
   std::vector<std::string> names;
@@ -157,7 +158,7 @@ void decode_nvdb(std::span<const std::byte> bytes, const std::string& wanted, st
   const Entry& e = all[choose_grid(names, wanted)];
   if (e.codec == kPlain) {
     if (e.stored != e.bytes) damaged(e);
-    return expand_nvdb(e.name, file.part(e.at, e.bytes), max_values, out);
+    return read_nvdb_grid(e.name, file.part(e.at, e.bytes), max_bytes);
   }
   if (e.stored < 8 || e.bytes / kMaxExpansion > e.stored) damaged(e);
   std::vector<std::byte> buffer(e.bytes);
@@ -165,7 +166,7 @@ void decode_nvdb(std::span<const std::byte> bytes, const std::string& wanted, st
     unzip(e, file, buffer);
   else
     unblosc(e, file, buffer);
-  expand_nvdb(e.name, buffer, max_values, out);
+  return read_nvdb_grid(e.name, buffer, max_bytes);
 }
 
 }  // namespace ls::render

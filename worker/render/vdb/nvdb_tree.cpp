@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
+#include <map>
+#include <optional>
 
 #include "worker/render/vdb/nvdb.h"
+#include "worker/render/vdb/read_tree.h"
 
 namespace ls::render {
 namespace {
-
-using Coord = std::array<std::int64_t, 3>;
 
 // Byte offsets of fields in the grid's header, which has kGrid = 672 bytes, and in the tree that follows it.
 // kMatrix and kOffset are relative to kMap, kRootOffset to the tree's start, and the child masks to their
@@ -18,7 +18,7 @@ using Coord = std::array<std::int64_t, 3>;
 constexpr std::uint64_t kGrid = 672, kGridSize = 32, kMap = 296, kMatrix = 88, kOffset = 232, kClass = 632,
                         kType = 636, kRootOffset = 24;
 constexpr std::uint64_t kUpperChildMask = 4128, kLowerChildMask = 544;
-constexpr int kUpperSide = 4096, kLowerSide = 128, kLeafSide = 8;
+constexpr int kUpperSide = 4096, kUpperChildren = 32;
 
 enum Type : std::uint32_t {
   kFloat = 1,
@@ -42,9 +42,6 @@ Layout layout_of(Type type) {
   if (type == kVec3d) return {32, 192, 24, 64, 8288, 1120, 24, 160};
   return {28, 64, 20, 32, 8256, 1088, 8, 96};
 }
-// The value of a voxel: 3 components, of which a grid with one channel uses only the first.
-using Value = std::array<float, 3>;
-
 std::string type_name(std::uint32_t type) {
   static constexpr const char* kNames[] = {"unknown", "float", "double", "int16",  "int32", "int64", "vec3f",
                                            "vec3d",   "mask",  "half",   "uint32", "bool",  "rgba8", "Fp4",
@@ -54,17 +51,45 @@ std::string type_name(std::uint32_t type) {
 
 class Tree {
  public:
-  Tree(const std::string& name, const NvdbBytes& bytes, std::uint64_t max_values, LsVdbGrid& out)
-      : name_(name), b_(bytes), max_values_(max_values), out_(out) {}
+  Tree(const std::string& name, const NvdbBytes& bytes) : name_(name), b_(bytes) {}
 
-  void expand() {
-    check_header();
+  void read(std::uint64_t max_bytes, VdbVoxels& out) {
+    check_header(out);
     root_ = kGrid + b_.get<std::uint64_t>(kGrid + kRootOffset);
     if (root_ < kGrid) fault("its tree lies before it");
-    place();
-    out_.values = room_for(values_of(out_));
-    fill(lo_, end_, value(root_ + layout_.background));
-    read_root();
+    Coord lo, end;
+    place(lo, end, out);
+    find_tiles();
+    TreeReader(*this, lo, end, max_bytes, out).read();
+  }
+
+  // The functions that TreeReader needs. A node and a leaf are their byte offsets.
+  std::optional<std::uint64_t> node(const Coord& origin, Value& all) const {
+    // The box of the voxels may reach one voxel beyond what coordinates can be.
+    const bool within =
+        std::ranges::all_of(origin, [](std::int64_t c) { return c == static_cast<std::int32_t>(c); });
+    const auto found = within ? tiles_.find(key_of(origin)) : tiles_.end();
+    if (found == tiles_.end()) {
+      all = value(root_ + layout_.background);
+      return std::nullopt;
+    }
+    const std::uint64_t tile = found->second;
+    const auto child = b_.get<std::int64_t>(tile + 8);
+    if (child == 0) {
+      all = value(tile + layout_.tile_value);
+      return std::nullopt;
+    }
+    std::uint32_t n = 0;
+    for (const std::int64_t c : origin)
+      n = n * kUpperChildren + static_cast<std::uint32_t>((c & (kUpperSide - 1)) / kNodeSide);
+    return child_of(at(root_, child), kUpperChildMask, layout_.upper_table, n, all);
+  }
+  std::optional<std::uint64_t> leaf(std::uint64_t node, int x, int y, int z, Value& all) const {
+    return child_of(node, kLowerChildMask, layout_.lower_table,
+                    static_cast<std::uint32_t>((x * kNodeBricks + y) * kNodeBricks + z), all);
+  }
+  Value voxel(std::uint64_t leaf, int x, int y, int z) const {
+    return voxel(leaf, static_cast<std::uint32_t>((x * kBrickSide + y) * kBrickSide + z));
   }
 
  private:
@@ -72,7 +97,7 @@ class Tree {
     throw Refused{1, "not a readable NanoVDB file: grid '" + name_ + "': " + why};
   }
 
-  void check_header() {
+  void check_header(VdbVoxels& out) {
     const auto magic = b_.part(0, 8);
     const std::string m(reinterpret_cast<const char*>(magic.data()), 8);
     if (m != "NanoVDB0" && m != "NanoVDB1") fault("its data begins with something else");
@@ -86,31 +111,30 @@ class Tree {
                         "; a density is float, double, vec3f, vec3d, half or one of Fp4, Fp8, Fp16 and FpN"};
     type_ = static_cast<Type>(type);
     layout_ = layout_of(type_);
-    out_.channels = type_ == kVec3f || type_ == kVec3d ? 3 : 1;
+    channels_ = type_ == kVec3f || type_ == kVec3d ? 3 : 1;
+    out.shape.channels = out.tree.channels = static_cast<int>(channels_);
   }
 
   // Finds the box of voxels to read, which is that of the active voxels enlarged by one voxel on each side,
-  // and the transform from the nodes of the box to the scene (LsVdbGrid::index_to_scene).
-  void place() {
-    std::array<std::int64_t, 3> size;
+  // and the transform from the nodes of the box to the scene (VdbShape::index_to_scene).
+  void place(Coord& lo_voxel, Coord& end, VdbVoxels& out) const {
     for (int k = 0; k < 3; ++k) {
       const std::int64_t lo = b_.get<std::int32_t>(root_ + 4 * k),
                          hi = b_.get<std::int32_t>(root_ + 12 + 4 * k);
       if (hi < lo) throw Refused{1, "grid '" + name_ + "' is empty: it has no active voxel"};
-      lo_[k] = lo - 1;
-      end_[k] = hi + 2;
-      size[k] = end_[k] - lo_[k];
+      lo_voxel[k] = lo - 1;
+      end[k] = hi + 2;
     }
-    set_size(name_, size, max_values_, out_);
+    set_box(lo_voxel, end, out);
     double m[9], v[3];
     for (int i = 0; i < 9; ++i) m[i] = b_.get<double>(kMap + kMatrix + 8 * i);
     for (int i = 0; i < 3; ++i) v[i] = b_.get<double>(kMap + kOffset + 8 * i);
-    double* t = out_.index_to_scene;
+    double* t = out.shape.index_to_scene;
     for (int r = 0; r < 3; ++r) {
       t[4 * r + 3] = v[r];
       for (int c = 0; c < 3; ++c) {
         t[4 * r + c] = m[3 * r + c];
-        t[4 * r + 3] += m[3 * r + c] * static_cast<double>(lo_[c]);
+        t[4 * r + 3] += m[3 * r + c] * static_cast<double>(lo_voxel[c]);
       }
     }
     t[15] = 1;
@@ -118,7 +142,6 @@ class Tree {
       if (!std::isfinite(t[i])) fault("its transform is not finite");
   }
 
-  std::uint64_t channels() const { return static_cast<std::uint64_t>(out_.channels); }
   double number(std::uint64_t at) const {
     if (type_ == kDouble || type_ == kVec3d) return b_.get<double>(at);
     if (type_ != kHalf) return b_.get<float>(at);
@@ -128,7 +151,7 @@ class Tree {
   }
   Value value(std::uint64_t at) const {
     Value v{};
-    for (std::uint64_t c = 0; c < channels(); ++c)
+    for (std::uint64_t c = 0; c < channels_; ++c)
       v[c] = static_cast<float>(number(at + (type_ == kVec3d ? 8 : 4) * c));
     return v;
   }
@@ -138,8 +161,8 @@ class Tree {
   // minimum plus the code times the step.
   Value voxel(std::uint64_t leaf, std::uint32_t n) const {
     const std::uint64_t table = leaf + layout_.leaf_table;
-    if (type_ == kDouble || type_ == kVec3d) return value(table + 8 * channels() * n);
-    if (type_ == kFloat || type_ == kVec3f) return value(table + 4 * channels() * n);
+    if (type_ == kDouble || type_ == kVec3d) return value(table + 8 * channels_ * n);
+    if (type_ == kFloat || type_ == kVec3f) return value(table + 4 * channels_ * n);
     if (type_ == kHalf) return value(table + 2 * n);
     const std::uint32_t log_bits = type_ == kFp4    ? 2
                                    : type_ == kFp8  ? 3
@@ -152,23 +175,19 @@ class Tree {
     return {static_cast<float>(code) * b_.get<float>(table - 12) + b_.get<float>(table - 16)};
   }
 
-  void read_root() {
+  // The key of the root's tile that a voxel is in
+  static std::uint64_t key_of(const Coord& c) {
+    std::uint64_t key = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      key |= std::uint64_t{static_cast<std::uint32_t>(c[k]) >> 12} << 21 * (2 - k);
+    return key;
+  }
+  void find_tiles() {
     const auto tiles = b_.get<std::uint32_t>(root_ + 24);
-    std::set<std::uint64_t> keys;
     for (std::uint32_t i = 0; i < tiles; ++i) {
       const std::uint64_t tile = root_ + layout_.root_size + layout_.root_tile * i;
-      const auto key = b_.get<std::uint64_t>(tile);
-      if (!keys.insert(key).second) fault("two of its tiles are at one place");
-      Coord origin;
-      for (int k = 0; k < 3; ++k)
-        origin[k] =
-            static_cast<std::int32_t>(static_cast<std::uint32_t>(key >> 21 * (2 - k) & 0xfffff) << 12);
-      if (!meets(origin, kUpperSide)) continue;
-      const auto child = b_.get<std::int64_t>(tile + 8);
-      if (child == 0)
-        fill_node(origin, kUpperSide, value(tile + layout_.tile_value));
-      else
-        inner(at(root_, child), origin, kUpperSide);
+      if (!tiles_.emplace(b_.get<std::uint64_t>(tile), tile).second)
+        fault("two of its tiles are at one place");
     }
   }
 
@@ -177,92 +196,33 @@ class Tree {
     return base + static_cast<std::uint64_t>(offset);
   }
 
-  // Reads the node at the byte offset `node`, which spans `side` voxels along each axis: an upper node (32^3
-  // children of 128^3 voxels each) or a lower node (16^3 children of 8^3 voxels each).
-  void inner(std::uint64_t node, const Coord& origin, int side) {
-    const bool upper = side == kUpperSide;
-    const int child_side = upper ? kLowerSide : kLeafSide, per_axis = side / child_side;
-    const std::uint64_t mask = node + (upper ? kUpperChildMask : kLowerChildMask),
-                        table = node + (upper ? layout_.upper_table : layout_.lower_table);
-    std::array<int, 3> first{}, last{};
-    for (int k = 0; k < 3; ++k) {
-      first[k] = static_cast<int>(std::max<std::int64_t>(0, lo_[k] - origin[k]) / child_side);
-      last[k] = static_cast<int>(std::min<std::int64_t>(side, end_[k] - origin[k]) - 1) / child_side;
-    }
-    for (int x = first[0]; x <= last[0]; ++x)
-      for (int y = first[1]; y <= last[1]; ++y)
-        for (int z = first[2]; z <= last[2]; ++z) {
-          const auto n = static_cast<std::uint32_t>((x * per_axis + y) * per_axis + z);
-          const Coord at_child{origin[0] + x * child_side, origin[1] + y * child_side,
-                               origin[2] + z * child_side};
-          if (!b_.bit(mask, n)) {
-            fill_node(at_child, child_side, value(table + layout_.table_step * n));
-            continue;
-          }
-          const std::uint64_t child = at(node, b_.get<std::int64_t>(table + layout_.table_step * n));
-          if (upper)
-            inner(child, at_child, kLowerSide);
-          else
-            leaf(child, at_child);
-        }
-  }
-
-  void leaf(std::uint64_t node, const Coord& origin) {
-    for (int x = 0; x < kLeafSide; ++x)
-      for (int y = 0; y < kLeafSide; ++y)
-        for (int z = 0; z < kLeafSide; ++z) {
-          const Coord c{origin[0] + x, origin[1] + y, origin[2] + z};
-          if (meets(c, 1)) set(c, voxel(node, static_cast<std::uint32_t>((x * 8 + y) * 8 + z)));
-        }
-  }
-
-  bool meets(const Coord& c, int side) const {
-    for (int k = 0; k < 3; ++k)
-      if (c[k] >= end_[k] || c[k] + side <= lo_[k]) return false;
-    return true;
-  }
-  void fill_node(const Coord& c, int side, const Value& value) {
-    Coord a, e;
-    for (int k = 0; k < 3; ++k) {
-      a[k] = std::max(c[k], lo_[k]);
-      e[k] = std::min(c[k] + side, end_[k]);
-    }
-    fill(a, e, value);
-  }
-  void fill(const Coord& a, const Coord& e, const Value& value) {
-    for (std::int64_t z = a[2]; z < e[2]; ++z)
-      for (std::int64_t y = a[1]; y < e[1]; ++y)
-        for (std::int64_t x = a[0]; x < e[0]; ++x) set({x, y, z}, value);
-  }
-  void set(const Coord& c, const Value& value) {
-    if (!std::isfinite(value[0]) || !std::isfinite(value[1]) || !std::isfinite(value[2]))
-      throw Refused{1, "voxel (" + std::to_string(c[0]) + ", " + std::to_string(c[1]) + ", " +
-                           std::to_string(c[2]) + ") of grid '" + name_ + "' is not a finite number"};
-    const auto i = ((c[2] - lo_[2]) * out_.size[1] + (c[1] - lo_[1])) * out_.size[0] + (c[0] - lo_[0]);
-    std::copy_n(value.begin(), channels(), out_.values + static_cast<std::uint64_t>(i) * channels());
+  // Returns the byte offset of child number n of the node at the byte offset `node`, or nullopt if the child
+  // is a constant, and then the constant in `all`.
+  std::optional<std::uint64_t> child_of(std::uint64_t node, std::uint64_t mask, std::uint64_t table,
+                                        std::uint32_t n, Value& all) const {
+    const std::uint64_t entry = node + table + layout_.table_step * n;
+    if (b_.bit(node + mask, n)) return at(node, b_.get<std::int64_t>(entry));
+    all = value(entry);
+    return std::nullopt;
   }
 
   const std::string& name_;
   const NvdbBytes& b_;
-  const std::uint64_t max_values_;
-  LsVdbGrid& out_;
   Type type_ = kFloat;
   Layout layout_{};
-  std::uint64_t root_ = 0;
-  Coord lo_{}, end_{};  // the box of voxels that is read: from lo_ to before end_
+  std::uint64_t root_ = 0, channels_ = 1;
+  std::map<std::uint64_t, std::uint64_t> tiles_;  // byte offsets of the root's tiles, by their keys
 };
 
 }  // namespace
 
-void expand_nvdb(const std::string& name, std::span<const std::byte> buffer, std::uint64_t max_values,
-                 LsVdbGrid& out) {
+VdbVoxels read_nvdb_grid(const std::string& name, std::span<const std::byte> buffer,
+                         std::uint64_t max_bytes) {
   const NvdbBytes bytes(buffer, "its buffer");
-  Tree(name, bytes, max_values, out).expand();
-  for (float& v : std::span(out.values, values_of(out))) {
-    if (!(v < 0)) continue;
-    ++out.negatives;
-    v = 0;
-  }
+  VdbVoxels out;
+  out.name = name;
+  Tree(name, bytes).read(max_bytes, out);
+  return out;
 }
 
 }  // namespace ls::render

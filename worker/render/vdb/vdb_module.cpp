@@ -1,21 +1,22 @@
 #include "worker/render/media/vdb_reply.h"
 
+#include <malloc.h>
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/io.h>
 #include <openvdb/openvdb.h>
 
-#include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <istream>
 #include <iterator>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <new>
+#include <optional>
 #include <streambuf>
 #include <string>
 #include <string_view>
@@ -24,10 +25,15 @@
 
 #include "core/base/file_form.h"
 #include "worker/render/vdb/nvdb.h"
+#include "worker/render/vdb/read_tree.h"
 
 namespace {
 
+using ls::render::Coord;
 using ls::render::Refused;
+using ls::render::Value;
+using ls::render::VdbShape;
+using ls::render::VdbVoxels;
 
 constexpr std::uintmax_t kSmallFile = 16 << 20;
 constexpr char kDamaged[] = "not a readable OpenVDB or NanoVDB file: damaged, or cut short";
@@ -46,41 +52,82 @@ float component(const openvdb::math::Vec3<T>& value, int k) {
   return static_cast<float>(value[k]);
 }
 
+// A grid of OpenVDB, for TreeReader. Each node is taken out of the grid when it is read, and freed after
+// that, so that the voxels are not in memory twice.
 template <class GridType>
-void copy_values(const GridType& grid, const openvdb::CoordBBox& box, LsVdbGrid& out) {
-  auto access = grid.getConstAccessor();
-  const openvdb::Coord lo = box.min();
-  std::size_t i = 0;
-  openvdb::Coord c;
-  for (int z = 0; z < out.size[2]; ++z) {
-    for (int y = 0; y < out.size[1]; ++y) {
-      for (int x = 0; x < out.size[0]; ++x, ++i) {
-        c.reset(lo.x() + x, lo.y() + y, lo.z() + z);
-        const auto value = access.getValue(c);
-        for (int k = 0; k < out.channels; ++k) {
-          const float v = component(value, k);
-          if (!std::isfinite(v)) {
-            throw Refused{1, "voxel (" + std::to_string(c.x()) + ", " + std::to_string(c.y()) + ", " +
-                                 std::to_string(c.z()) + ") of grid '" + grid.getName() +
-                                 "' is not a finite number"};
-          }
-          out.negatives += v < 0;
-          out.values[i * static_cast<std::size_t>(out.channels) + static_cast<std::size_t>(k)] =
-              v < 0 ? 0.f : v;
-        }
-      }
-    }
-  }
-}
+class Source {
+ public:
+  using Tree = typename GridType::TreeType;
+  using Node = typename Tree::RootNodeType::ChildNodeType::ChildNodeType;
+  using Leaf = typename Tree::LeafNodeType;
+  static_assert(Node::DIM == ls::render::kNodeSide && Leaf::DIM == ls::render::kBrickSide);
 
-void place(const openvdb::GridBase& grid, const openvdb::Coord& lo, LsVdbGrid& out) {
+  explicit Source(GridType& grid) : tree_(grid.tree()) {}
+
+  std::optional<const Node*> node(const Coord& origin, Value& all) {
+    free_node();
+    openvdb::Coord c;
+    for (int k = 0; k < 3; ++k) {
+      // The box of the voxels may reach one voxel beyond what coordinates can be.
+      if (origin[static_cast<std::size_t>(k)] !=
+          static_cast<std::int32_t>(origin[static_cast<std::size_t>(k)])) {
+        all = of(tree_.background());
+        return std::nullopt;
+      }
+      c[k] = static_cast<std::int32_t>(origin[static_cast<std::size_t>(k)]);
+    }
+    if (tree_.template probeConstNode<Node>(c)) {
+      node_.reset(tree_.template stealNode<Node>(c, tree_.background(), false));
+      return node_.get();
+    }
+    all = of(tree_.getValue(c));
+    return std::nullopt;
+  }
+  std::optional<const Leaf*> leaf(const Node* node, int x, int y, int z, Value& all) const {
+    const auto n =
+        static_cast<openvdb::Index>((x * ls::render::kNodeBricks + y) * ls::render::kNodeBricks + z);
+    const auto& child = node->getTable()[n];
+    if (node->getChildMask().isOn(n)) return child.getChild();
+    all = of(child.getValue());
+    return std::nullopt;
+  }
+  Value voxel(const Leaf* leaf, int x, int y, int z) const {
+    return of(leaf->getValue(
+        static_cast<openvdb::Index>((x * ls::render::kBrickSide + y) * ls::render::kBrickSide + z)));
+  }
+
+ private:
+  static Value of(const typename GridType::ValueType& value) {
+    Value all{};
+    for (std::size_t k = 0; k < (openvdb::VecTraits<typename GridType::ValueType>::IsVec ? 3 : 1); ++k)
+      all[k] = component(value, static_cast<int>(k));
+    return all;
+  }
+
+  void free_node() {
+    if (!node_) return;
+    freed_ += node_->leafCount();
+    node_.reset();
+    // The allocator keeps what is freed, unless told otherwise.
+    constexpr std::uint64_t kManyLeaves = 16384;
+    if (freed_ < kManyLeaves) return;
+    ::malloc_trim(0);
+    freed_ = 0;
+  }
+
+  Tree& tree_;
+  std::unique_ptr<Node> node_;
+  std::uint64_t freed_ = 0;  // leaves since the last trim
+};
+
+void place(const openvdb::GridBase& grid, const openvdb::Vec3d& lo, VdbShape& out) {
   const auto& map = grid.transform();
   if (!map.isLinear())
     throw Refused{
         1, "grid '" + grid.getName() + "' has a perspective transform; only linear ones can be rendered"};
-  const openvdb::Vec3d o = map.indexToWorld(lo.asVec3d());
+  const openvdb::Vec3d o = map.indexToWorld(lo);
   for (int k = 0; k < 3; ++k) {
-    openvdb::Vec3d e = lo.asVec3d();
+    openvdb::Vec3d e = lo;
     e[k] += 1;
     const openvdb::Vec3d axis = map.indexToWorld(e) - o;
     for (int r = 0; r < 3; ++r) out.index_to_scene[4 * r + k] = axis[r];
@@ -90,18 +137,26 @@ void place(const openvdb::GridBase& grid, const openvdb::Coord& lo, LsVdbGrid& o
 }
 
 template <class GridType>
-void convert(const openvdb::GridBase::Ptr& base, std::uint64_t max_values, LsVdbGrid& out) {
+void convert(const openvdb::GridBase::Ptr& base, std::uint64_t max_bytes, VdbVoxels& out) {
   const auto grid = openvdb::gridPtrCast<GridType>(base);
-  openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
+  const openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
   if (box.empty()) throw Refused{1, "grid '" + grid->getName() + "' is empty: it has no active voxel"};
-  box.expand(1);
-  out.channels = openvdb::VecTraits<typename GridType::ValueType>::IsVec ? 3 : 1;
-  std::array<std::int64_t, 3> size;
-  for (int k = 0; k < 3; ++k) size[k] = static_cast<std::int64_t>(box.max()[k]) - box.min()[k] + 1;
-  ls::render::set_size(grid->getName(), size, max_values, out);
-  place(*grid, box.min(), out);
-  out.values = ls::render::room_for(ls::render::values_of(out));
-  copy_values(*grid, box, out);
+  out.shape.channels = out.tree.channels = openvdb::VecTraits<typename GridType::ValueType>::IsVec ? 3 : 1;
+  Coord lo, end;
+  for (int k = 0; k < 3; ++k) {
+    lo[static_cast<std::size_t>(k)] = std::int64_t{box.min()[k]} - 1;
+    end[static_cast<std::size_t>(k)] = std::int64_t{box.max()[k]} + 2;
+  }
+  out.name = grid->getName();
+  ls::render::set_box(lo, end, out);
+  place(*grid, {static_cast<double>(lo[0]), static_cast<double>(lo[1]), static_cast<double>(lo[2])},
+        out.shape);
+  const std::uint64_t values = std::uint64_t{grid->tree().leafCount()} *
+                               static_cast<std::uint64_t>(out.shape.channels) * ls::render::kLeafValues;
+  if (values > max_bytes / sizeof(float)) throw ls::render::too_large(out, max_bytes);
+  out.tree.leaves.reserve(values);
+  Source source(*grid);
+  ls::render::TreeReader(source, lo, end, max_bytes, out).read();
 }
 
 // Refuses a grid whose values are no densities, by their type, before its voxels are read.
@@ -221,8 +276,8 @@ class MemoryBuffer final : public std::streambuf {
   }
 };
 
-void read(std::istream& in, std::uint64_t bytes, const std::string& wanted, std::uint64_t max_values,
-          LsVdbGrid& out) {
+void read(std::istream& in, std::uint64_t bytes, const std::string& wanted, std::uint64_t max_bytes,
+          VdbVoxels& out) {
   VdbFile file(in, bytes);
   const openvdb::GridBase::Ptr base = file.read_grid(ls::render::choose_grid(file.names(), wanted));
   if (!base) throw Refused{1, "the grid cannot be read"};
@@ -234,15 +289,15 @@ void read(std::istream& in, std::uint64_t bytes, const std::string& wanted, std:
     throw Refused{1, "grid '" + base->getName() +
                          "' is staggered: its values are flows through the faces of voxels, not a density"};
   }
-  if (base->isType<openvdb::FloatGrid>()) return convert<openvdb::FloatGrid>(base, max_values, out);
-  if (base->isType<openvdb::DoubleGrid>()) return convert<openvdb::DoubleGrid>(base, max_values, out);
-  if (base->isType<openvdb::Vec3SGrid>()) return convert<openvdb::Vec3SGrid>(base, max_values, out);
-  convert<openvdb::Vec3DGrid>(base, max_values, out);
+  if (base->isType<openvdb::FloatGrid>()) return convert<openvdb::FloatGrid>(base, max_bytes, out);
+  if (base->isType<openvdb::DoubleGrid>()) return convert<openvdb::DoubleGrid>(base, max_bytes, out);
+  if (base->isType<openvdb::Vec3SGrid>()) return convert<openvdb::Vec3SGrid>(base, max_bytes, out);
+  convert<openvdb::Vec3DGrid>(base, max_bytes, out);
 }
 
 // Reads a .vdb or .nvdb file, which may be packed by gzip.
-void read_file(const std::filesystem::path& path, const std::string& wanted, std::uint64_t max_values,
-               LsVdbGrid& out) {
+void read_file(const std::filesystem::path& path, const std::string& wanted, std::uint64_t max_bytes,
+               VdbVoxels& out) {
   char head[ls::kFormBytes] = {};
   std::ifstream in(path, std::ios::binary);
   in.read(head, sizeof head);
@@ -257,32 +312,49 @@ void read_file(const std::filesystem::path& path, const std::string& wanted, std
         throw Refused{plain.error().code == ls::Errc::resource_exhausted ? 2 : 1, plain.error().message};
       bytes = std::move(*plain);
     }
-    if (ls::render::is_nvdb({reinterpret_cast<const char*>(bytes.data()), bytes.size()}))
-      return ls::render::decode_nvdb(bytes, wanted, max_values, out);
+    if (ls::render::is_nvdb({reinterpret_cast<const char*>(bytes.data()), bytes.size()})) {
+      out = ls::render::decode_nvdb(bytes, wanted, max_bytes);
+      return;
+    }
     MemoryBuffer buffer(bytes);
     std::istream memory(&buffer);
-    return read(memory, bytes.size(), wanted, max_values, out);
+    return read(memory, bytes.size(), wanted, max_bytes, out);
   }
   in.clear();
   in.seekg(0);
-  read(in, std::filesystem::file_size(path), wanted, max_values, out);
+  read(in, std::filesystem::file_size(path), wanted, max_bytes, out);
+}
+
+// Makes the bricks of all channels, which together may take max_bytes.
+void make_all_bricks(VdbVoxels voxels, std::uint64_t max_bytes, ls::render::VdbGrid& out) {
+  out.shape = voxels.shape;
+  std::uint64_t left = max_bytes;
+  for (int c = 0; c < voxels.shape.channels; ++c) {
+    const bool last = c == voxels.shape.channels - 1;
+    auto bricks = last ? ls::render::make_last_bricks(std::move(voxels.tree), c, left)
+                       : ls::render::make_bricks(voxels.tree, c, left);
+    if (!bricks) throw ls::render::too_large(voxels, max_bytes);
+    left -= ls::render::BrickTables(*bricks).bytes();
+    out.channels.push_back(std::move(*bricks));
+  }
 }
 
 }  // namespace
 
-extern "C" {
+namespace ls::render {
 
-int ls_vdb_read(const char* path, const char* grid_name, std::uint64_t max_values, LsVdbGrid* out,
-                char* error, std::uint64_t error_size) {
-  *out = LsVdbGrid{};
-  const auto say = [&](int code, const std::string& text) {
-    std::snprintf(error, error_size, "%s", text.c_str());
-    ls_vdb_free(out);
+int read_vdb(const std::string& path, const std::string& grid_name, std::uint64_t max_bytes, VdbGrid& out,
+             std::string& error) {
+  const auto say = [&](int code, std::string text) {
+    error = std::move(text);
+    out = {};
     return code;
   };
   try {
     initialize_once();
-    read_file(path, grid_name, max_values, *out);
+    VdbVoxels voxels;
+    read_file(path, grid_name, max_bytes, voxels);
+    make_all_bricks(std::move(voxels), max_bytes, out);
     return 0;
   } catch (const Refused& r) {
     return say(r.code, r.text);
@@ -302,8 +374,4 @@ int ls_vdb_read(const char* path, const char* grid_name, std::uint64_t max_value
   }
 }
 
-void ls_vdb_free(LsVdbGrid* grid) {
-  delete[] grid->values;
-  grid->values = nullptr;
-}
-}
+}  // namespace ls::render
