@@ -35,18 +35,11 @@ Quaternion quaternion(const Vec3& x, const Vec3& y, const Vec3& z) {
   return normalized({z[0] + x[2], y[2] + z[1], 1 + z[2] - x[0] - y[1], x[1] - y[0]});
 }
 
-Quaternion slerp(const Quaternion& a, Quaternion b, double t) {
-  if (dot4(a, b) < 0) b = {-b[0], -b[1], -b[2], -b[3]};
+// The angle between two quaternions. Its arc cosine would be inexact for small angles.
+double angle_between(const Quaternion& a, const Quaternion& b) {
   Quaternion less, more;
   for (std::size_t i = 0; i < 4; ++i) less[i] = b[i] - a[i], more[i] = b[i] + a[i];
-  // The angle between them, at most a right one. Its arc cosine would be inexact for small ones.
-  const double angle = 2 * std::atan2(std::sqrt(dot4(less, less)), std::sqrt(dot4(more, more)));
-  const double sine = std::sin(angle);
-  const double of_a = sine > 0 ? std::sin((1 - t) * angle) / sine : 1 - t,
-               of_b = sine > 0 ? std::sin(t * angle) / sine : t;
-  Quaternion q;
-  for (std::size_t i = 0; i < 4; ++i) q[i] = of_a * a[i] + of_b * b[i];
-  return normalized(q);
+  return 2 * std::atan2(std::sqrt(dot4(less, less)), std::sqrt(dot4(more, more)));
 }
 
 double mixed(double a, double b, double t) { return a == b ? a : (1 - t) * a + t * b; }
@@ -94,13 +87,22 @@ Transform Motion::pose_of(const Parts& parts) {
                     parts.translation);
 }
 
-Motion::Parts Motion::between(const Parts& a, const Parts& b, double t) {
-  return {mixed(a.scale, b.scale, t), slerp(a.rotation, b.rotation, t),
-          mixed(a.translation, b.translation, t)};
+Motion::Parts Motion::between(const Parts& a, const Parts& b, const Turn& turn, double t) {
+  const double of_a = turn.sine > 0 ? std::sin((1 - t) * turn.angle) / turn.sine : 1 - t,
+               of_b = turn.sine > 0 ? std::sin(t * turn.angle) / turn.sine : t;
+  Quaternion q;
+  for (std::size_t i = 0; i < 4; ++i) q[i] = of_a * a.rotation[i] + of_b * turn.to[i];
+  return {mixed(a.scale, b.scale, t), normalized(q), mixed(a.translation, b.translation, t)};
 }
 
 Motion::Motion(std::span<const MotionKey> keys) : keys_(keys.begin(), keys.end()) {
   for (const MotionKey& key : keys_) parts_.push_back(parts_of(key.to_world));
+  for (std::size_t i = 1; i < parts_.size(); ++i) {
+    const Quaternion &a = parts_[i - 1].rotation, &b = parts_[i].rotation;
+    const Quaternion to = dot4(a, b) < 0 ? Quaternion{-b[0], -b[1], -b[2], -b[3]} : b;
+    const double angle = angle_between(a, to);
+    turns_.push_back({to, angle, std::sin(angle)});
+  }
 }
 
 Transform Motion::at(double time) const {
@@ -111,7 +113,50 @@ Transform Motion::at(double time) const {
   if (after == keys_.end() || before.time == time || before.to_world == after->to_world)
     return before.to_world;
   const auto i = static_cast<std::size_t>(after - keys_.begin());
-  return pose_of(between(parts_[i - 1], parts_[i], (time - before.time) / (after->time - before.time)));
+  return pose_of(
+      between(parts_[i - 1], parts_[i], turns_[i - 1], (time - before.time) / (after->time - before.time)));
+}
+
+// A point x is at p = T + R S x, where the place T and the scale S change linearly in the time t that goes
+// from 0 to 1 between the two keys, and R turns by the angle w at a constant rate. So the length of p'' is at
+// most w^2 |S x| + 2 w |S' x|, and a curve leaves its chord over the time h by at most h^2 / 8 times that. At
+// a key the pose is the key's matrix, from which the one that is put together again may differ by its
+// rounding and by a small shear.
+double Motion::bend(double from, double to, double reach) const {
+  const auto after = std::upper_bound(keys_.begin(), keys_.end(), from,
+                                      [](double t, const MotionKey& k) { return t < k.time; });
+  if (after == keys_.begin() || after == keys_.end()) return 0;
+  const auto i = static_cast<std::size_t>(after - keys_.begin());
+  const Parts &a = parts_[i - 1], &b = parts_[i];
+  const double turn = 2 * turns_[i - 1].angle;
+  const double h = (to - from) / (after->time - after[-1].time);
+  double scale = 0, change = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    scale = std::max({scale, std::abs(a.scale[k]), std::abs(b.scale[k])});
+    change = std::max(change, std::abs(b.scale[k] - a.scale[k]));
+  }
+  double put_together = 0;
+  for (const std::size_t key : {i - 1, i}) {
+    const Transform &given = keys_[key].to_world, again = pose_of(parts_[key]);
+    double squares = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3 off = minus(column(given, k), column(again, k));
+      squares += dot(off, off);
+    }
+    put_together = std::max(put_together, std::sqrt(squares));
+  }
+  return reach * (h * h / 8 * turn * (turn * scale + 2 * change) + put_together);
+}
+
+bool moves(const Scene& scene) {
+  const auto moving = [](const auto& one) { return !one.motion.empty(); };
+  return moving(scene.sensor) || std::ranges::any_of(scene.shapes, moving) ||
+         std::ranges::any_of(scene.instances, moving);
+}
+
+std::string_view why_still(const Shape& shape) {
+  if (shape.group) return "is in a group";
+  return shape.meter ? "is measured by a meter" : "";
 }
 
 std::vector<MotionKey> motion_during(const Motion& motion, double open, double close) {

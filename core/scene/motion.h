@@ -3,6 +3,7 @@
 
 #include <array>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "core/scene/scene.h"
@@ -27,6 +28,10 @@ class Motion {
   // rotation with quaternion curves", SIGGRAPH 1985), as in Mitsuba 3. Before the first key and after the
   // last one nothing moves. Not if empty().
   Transform at(double time) const;
+  // Between two times at which a point is, it leaves the straight line between its two places by at most
+  // this. `reach` bounds its distance from the origin of the space that moves. No key may be between the two
+  // times.
+  double bend(double from, double to, double reach) const;
 
  private:
   struct Parts {
@@ -36,11 +41,23 @@ class Motion {
   };
   static Parts parts_of(const Transform& t);
   static Transform pose_of(const Parts& parts);
-  static Parts between(const Parts& a, const Parts& b, double t);
+  // The turn from one key to the next one.
+  struct Turn {
+    std::array<double, 4> to;  // the quaternion of the next key, or its negative, which is nearer
+    double angle, sine;  // between the two quaternions: half of the angle of the turn, at most a right one
+  };
+  static Parts between(const Parts& a, const Parts& b, const Turn& turn, double t);
 
   std::vector<MotionKey> keys_;
   std::vector<Parts> parts_;  // of each key
+  std::vector<Turn> turns_;   // from each key but the last one
 };
+
+// True if anything in the scene moves while the shutter is open.
+bool moves(const Scene& scene);
+
+// Returns what about the shape keeps it from moving, as in "is in a group"; empty if it can move.
+std::string_view why_still(const Shape& shape);
 
 // Returns the part of a motion that happens between two times, with the times of the result from 0 to 1.
 // Empty if nothing moves between them.

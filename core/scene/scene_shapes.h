@@ -67,9 +67,20 @@ struct AreaEmitter {
   bool operator==(const AreaEmitter&) const = default;
 };
 
+// Where something that moves is at one time of the exposure, from 0 (the shutter opens) to 1 (it closes).
+// core/scene/motion.h says what is between two keys.
+struct MotionKey {
+  double time = 0;
+  Transform to_world;
+  bool operator==(const MotionKey&) const = default;
+};
+
 struct Shape {
   Geometry geometry;
-  Transform to_world;
+  Transform to_world;  // where the shape is; if it moves: in the middle of the exposure
+  // Where the shape is during the exposure, as Sensor::motion; empty if it does not move. Shapes that are in
+  // a group or have a meter do not move, and those that emit light move without being stretched.
+  std::vector<MotionKey> motion;
   bool flip_normals = false;
   BsdfIndex bsdf;
   std::optional<AreaEmitter> emitter;
@@ -105,7 +116,8 @@ struct ShapeGroup {  // a group of shapes, which refer to it by its index
 };
 struct Instance {  // a copy of a group's shapes, placed in the world
   GroupIndex group;
-  Transform to_world;
+  Transform to_world;             // where it is; if it moves: in the middle of the exposure
+  std::vector<MotionKey> motion;  // as Shape::motion
   bool operator==(const Instance&) const = default;
 };
 
@@ -118,18 +130,11 @@ enum class FovAxis { x, y, diagonal, smaller, larger };
 // meters: there is no camera. The scene has meters, and each block of pixels of the frame measures one number
 // (core/image/frame/meter_blocks.h).
 enum class Projection { perspective, orthographic, spherical, meters };
-// Where something that moves is at one time of the exposure, from 0 (the shutter opens) to 1 (it closes).
-// core/scene/motion.h says what is between two keys.
-struct MotionKey {
-  double time = 0;
-  Transform to_world;
-  bool operator==(const MotionKey&) const = default;
-};
 struct Sensor {        // looks along the +z axis of to_world, with +y up and +x to the LEFT, as in Mitsuba
   Transform to_world;  // where the camera is; if it moves: in the middle of the exposure
   // Where the camera is during the exposure, sorted by time: the first key is at 0 and the last at 1. A
-  // camera with keys has its shutter open from 0 to 1. A camera that does not move has no keys, and its
-  // shutter opens and closes at 0.
+  // camera that does not move has no keys. In a scene in which something moves, the shutter is open from 0
+  // to 1; in others it opens and closes at 0.
   std::vector<MotionKey> motion;
   double shutter_open = 0, shutter_close = 0;
   double fov = 50;  // in degrees, along fov_axis

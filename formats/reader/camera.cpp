@@ -56,11 +56,12 @@ void Reader::read_projection(const Element& e, Params& p, Sensor& s) {
     }
   }
   if (s.near_clip >= s.far_clip) report_.error(e.at, "near_clip is not nearer than far_clip");
+  shutter_open_ = s.shutter_open;
+  shutter_close_ = s.shutter_close;
   if (animation)
-    read_motion(*animation, e, s);
+    read_motion(*animation, s);
   else
     check_place(e, s.to_world, s.projection);
-  if (s.motion.empty()) s.shutter_open = s.shutter_close = 0;
 }
 
 // Reports a transform of a camera of this kind that is not allowed. Returns whether it is.
@@ -77,8 +78,8 @@ bool Reader::check_place(const Element& e, const Transform& to_world, Projection
   return false;
 }
 
-// Returns the keys of an <animation> of this camera. What is wrong is reported.
-std::vector<MotionKey> Reader::read_keys(const Element& animation, Projection projection) {
+std::vector<MotionKey> Reader::read_keys(const Element& animation,
+                                         const std::function<bool(const Element&, const Transform&)>& fits) {
   std::vector<MotionKey> keys;
   for (const Element& e : animation.children) {
     const auto time = parse_number(e.get("time"));
@@ -93,7 +94,7 @@ std::vector<MotionKey> Reader::read_keys(const Element& animation, Projection pr
           value_place(e, "time"),
           fmt::format("the times of an <animation> must ascend: {} comes after {}", *time, keys.back().time));
     const Transform to_world = read_transform(e, report_);
-    if (!check_place(e, to_world, projection)) continue;
+    if (!fits(e, to_world)) continue;
     if (!can_move(to_world)) {
       report_.error(e.at, "this transform shears: an <animation> can only move, turn, mirror and scale");
       continue;
@@ -101,8 +102,8 @@ std::vector<MotionKey> Reader::read_keys(const Element& animation, Projection pr
     if (!keys.empty() && (determinant3(to_world) < 0) != (determinant3(keys.front().to_world) < 0))
       report_.error(
           e.at,
-          "this transform mirrors and the first one does not, or the other way round: between them the "
-          "camera would be flat");
+          "this transform mirrors and the first one does not, or the other way round: between them what "
+          "moves would be flat");
     keys.push_back({*time, to_world});
     if (keys.size() > kMaxMotionKeys) {
       report_.error(e.at, fmt::format("an <animation> of more than {} transforms", kMaxMotionKeys));
@@ -114,23 +115,54 @@ std::vector<MotionKey> Reader::read_keys(const Element& animation, Projection pr
   return keys;
 }
 
-void Reader::read_motion(const Element& animation, const Element& e, Sensor& s) {
-  const Motion motion(read_keys(animation, s.projection));
-  if (s.shutter_close < s.shutter_open)
-    return report_.error(e.at, fmt::format("the shutter closes at {} and opens at {}: let it close later",
-                                           s.shutter_close, s.shutter_open));
-  if (report_.has_errors()) return;
-  if (s.shutter_open == s.shutter_close && motion.keys().size() > 1)
-    report_.warning(animation.at,
-                    fmt::format("the camera stands where it is at {}, since the shutter opens and closes "
-                                "then: give shutter_open and shutter_close",
-                                s.shutter_open));
-  s.motion = motion_during(motion, s.shutter_open, s.shutter_close);
-  if (s.motion.size() > kMaxMotionKeys)
+void Reader::read_motion(const Element& animation, Sensor& s) {
+  const Motion motion(read_keys(animation, [&](const Element& at, const Transform& to_world) {
+    return check_place(at, to_world, s.projection);
+  }));
+  check_shutter(motion.keys().size() > 1 ? &animation : nullptr, "the camera stands");
+  if (!report_.has_errors()) place_in_exposure(animation, motion, s);
+}
+
+void Reader::check_shutter(const Element* animation, std::string_view what) {
+  if (shutter_close_ < shutter_open_)
+    report_.error(sensor_->at, fmt::format("the shutter closes at {} and opens at {}: let it close later",
+                                           shutter_close_, shutter_open_));
+  else if (animation && shutter_open_ == shutter_close_ && !report_.has_errors())
+    report_.warning(animation->at,
+                    fmt::format("{} where it is at {}, since the shutter opens and closes then: give "
+                                "shutter_open and shutter_close",
+                                what, shutter_open_));
+}
+
+template <class T>
+void Reader::place_in_exposure(const Element& animation, const Motion& motion, T& object) {
+  object.motion = motion_during(motion, shutter_open_, shutter_close_);
+  if (object.motion.size() > kMaxMotionKeys)
     return report_.error(animation.at,
                          fmt::format("more than {} transforms are within the exposure", kMaxMotionKeys));
-  s.to_world = s.motion.empty() ? motion.at(s.shutter_open) : Motion(s.motion).at(.5);
-  s.shutter_open = 0, s.shutter_close = 1;
+  object.to_world = object.motion.empty() ? motion.at(shutter_open_) : Motion(object.motion).at(.5);
+}
+
+void Reader::note_motion(const Element& animation, bool instance, std::vector<MotionKey> keys) {
+  const std::size_t count = instance ? scene_.instances.size() : scene_.shapes.size();
+  if (!keys.empty()) motions_.push_back({&animation, instance, count - 1, std::move(keys)});
+}
+
+// A sensor may follow the shapes that it sees, so these get their places when everything has been read.
+void Reader::finish_motions() {
+  if (report_.has_errors()) return;
+  const auto moving = std::ranges::find_if(motions_, [](const Moving& m) { return m.keys.size() > 1; });
+  if (moving != motions_.end()) check_shutter(moving->animation, "what moves stands");
+  if (report_.has_errors()) return;
+  for (const Moving& m : motions_) {
+    if (m.instance)
+      place_in_exposure(*m.animation, Motion(m.keys), scene_.instances[m.index]);
+    else
+      place_in_exposure(*m.animation, Motion(m.keys), scene_.shapes[m.index]);
+  }
+  motions_.clear();
+  scene_.sensor.shutter_open = 0;
+  scene_.sensor.shutter_close = moves(scene_) ? 1 : 0;
 }
 
 // Reads the sensor's medium. The name of this parameter is "medium" or absent; any other name is an error,

@@ -52,7 +52,8 @@ constexpr PluginRow kPlugins[] = {
     {"shape", "sphere", kRead, ""},
     {"shape", "blender", kRefused,
      "it refers to data in Blender's memory; use Lightshaft's add-on for Blender"},
-    {"shape", "deformable", kRefused, "motion is not supported; write one mesh for each frame", kOlder},
+    {"shape", "deformable", kRefused,
+     "meshes that deform while the shutter is open are not rendered; write one mesh for each frame", kOlder},
     {"shape", "hair", kRefused, kCurves, kOlder},
     {"shape", "heightfield", kRefused, kConvertMesh, kOlder},
 

@@ -276,8 +276,9 @@ const Element* Params::object_at(const Element& e) {
 void Params::convert(const Field& f, const Element& e, Transform& value) {
   if (e.tag == "animation")
     return reader_.report().error(
-        e.at, fmt::format("'{}' of {} is an <animation>: only cameras can move; give a <transform>", f.name,
-                          title()));
+        e.at, fmt::format("'{}' of {} is an <animation>: only cameras, shapes and instances can move; give "
+                          "a <transform>",
+                          f.name, title()));
   if (e.tag != "transform") return wrong_type(f.name, e, "a <transform>");
   value = read_transform(e, reader_.report());
 }

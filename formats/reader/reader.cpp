@@ -42,6 +42,7 @@ Scene Reader::read() {
     read_child(child);
   }
   read_idle_parts();
+  finish_motions();
   check_links();
   warn_of_media_around_camera();
   if (!meters_.empty())

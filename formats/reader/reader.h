@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/base/light/link_names.h"
+#include "core/scene/motion.h"
 #include "core/scene/schema/traits.h"
 #include "core/scene/spectrum.h"
 #include "formats/reader/params.h"
@@ -127,9 +128,11 @@ class Reader {
   template <class T>
   void read_geometry(const Element& e, T geometry);
   void read_shape_parts(Params& p, Shape& shape);
+  std::vector<MotionKey> read_shape_keys(const Element& e, const Element& animation, const Shape& shape);
   void check_visibility(Params& p, const Shape& shape);
   std::optional<AreaEmitter> read_area(const Element& e);
-  void check_placement(const Element& e, const Shape& shape);
+  // Reports a to_world that the shape cannot have, at the element `at`. Returns whether it can have it.
+  bool check_placement(const Element& e, const Element& at, const Shape& shape);
   void warn_of_media_around_camera();
   void read_shape_group(const Element& e);
   void read_instance(const Element& e);
@@ -155,8 +158,20 @@ class Reader {
   void read_projection(const Element& e, Params& p, Sensor& sensor);
   void read_sensor_medium(Params& p, std::optional<MediumIndex>& medium_of_sensor);
   bool check_place(const Element& e, const Transform& to_world, Projection projection);
-  std::vector<MotionKey> read_keys(const Element& animation, Projection projection);
-  void read_motion(const Element& animation, const Element& e, Sensor& s);
+  // Returns the keys of an <animation>. What is wrong is reported. `fits`, called with the element and the
+  // transform of a key, reports a transform that the object cannot have, and returns whether it can.
+  std::vector<MotionKey> read_keys(const Element& animation,
+                                   const std::function<bool(const Element&, const Transform&)>& fits);
+  void read_motion(const Element& animation, Sensor& s);
+  // Cuts the motion to the exposure, and sets the place of the object from it.
+  template <class T>
+  void place_in_exposure(const Element& animation, const Motion& motion, T& object);
+  // Keeps the motion of a shape or an instance, the last one of its list, for finish_motions().
+  void note_motion(const Element& animation, bool instance, std::vector<MotionKey> keys);
+  void finish_motions();
+  // Reports a shutter that closes before it opens and, if there is an animation, one that is never open;
+  // `what` begins a sentence.
+  void check_shutter(const Element* animation, std::string_view what);
   void read_fov(Params& p, Sensor& sensor);
   void read_film(const Element& e);
   void check_crop(const Element& e, Params& p, bool has_width, bool has_height);
@@ -174,12 +189,20 @@ class Reader {
   Report& report_;
   Ids ids_;
   Scene scene_;
-  std::vector<const Element*> shape_elements_;  // the elements of the scene's shapes, in the same order
-  const Element* sensor_ = nullptr;             // the camera
-  std::vector<const Element*> meters_;          // the elements of the scene's meters, in the same order
-  bool sampled_ = false;                        // true if the sampler of a meter was read
-  std::size_t meter_points_ = 0;                // number of points of the meters read so far
-  std::size_t meter_file_bytes_ = 0;            // bytes of the files of points read so far
+  std::vector<const Element*> shape_elements_;   // the elements of the scene's shapes, in the same order
+  const Element* sensor_ = nullptr;              // the camera
+  double shutter_open_ = 0, shutter_close_ = 0;  // of the camera, in the times of its file
+  struct Moving {
+    const Element* animation;
+    bool instance;      // false: a shape
+    std::size_t index;  // in the scene's instances or shapes
+    std::vector<MotionKey> keys;
+  };
+  std::vector<Moving> motions_;         // what moves, until finish_motions()
+  std::vector<const Element*> meters_;  // the elements of the scene's meters, in the same order
+  bool sampled_ = false;                // true if the sampler of a meter was read
+  std::size_t meter_points_ = 0;        // number of points of the meters read so far
+  std::size_t meter_file_bytes_ = 0;    // bytes of the files of points read so far
   const Element* integrator_ = nullptr;
   const Element* material_ = nullptr;  // material of the last shape read; nullptr: the default material
   std::unordered_set<std::string> labels_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/scene/motion.h"
 #include "core/scene/schema/mesh_attributes.h"
 #include "formats/reader/mitsuba_plugins.h"
 #include "formats/reader/reader.h"
@@ -94,6 +95,15 @@ void Reader::read_merge(const Element& e) {
 void Reader::read_instance(const Element& e) {
   Params p(*this, e);
   Instance instance;
+  const Element* animation = p.take_animation("to_world");
+  const auto fits = [&](const Element& at, const Transform& to_world) {
+    if (invertible(to_world)) return true;
+    report_.error(at.at,
+                  "to_world flattens this instance or leaves the range of numbers: it can't be inverted");
+    return false;
+  };
+  std::vector<MotionKey> keys;
+  if (animation) keys = read_keys(*animation, fits);
   bind(p, instance);
   const auto nested = p.take_nested("shape");
   p.finish();
@@ -107,14 +117,13 @@ void Reader::read_instance(const Element& e) {
         fmt::format(
             "an instance shows a shapegroup, not a shape \"{}\": put that into a <shape type=\"shapegroup\">",
             object.get("type")));
-  if (!invertible(instance.to_world))
-    report_.error(e.at,
-                  "to_world flattens this instance or leaves the range of numbers: it can't be inverted");
+  fits(e, instance.to_world);
   read_shape_group(object);
   const auto& group = groups_[&object];
   if (!group) return;
   instance.group = *group;
   scene_.instances.push_back(instance);
+  if (animation) note_motion(*animation, true, std::move(keys));
   label_instance(e);
 }
 
@@ -134,16 +143,39 @@ void Reader::read_geometry(const Element& e, T geometry) {
   bind(p, geometry);
   Shape shape;
   shape.group = group_;
+  const Element* animation = p.take_animation("to_world");
   bind(p, shape);
   shape.geometry = geometry;
   read_shape_parts(p, shape);
   check_visibility(p, shape);
   p.finish();
-  check_placement(e, shape);
+  check_placement(e, e, shape);
   check_attributes(e, shape);
+  std::vector<MotionKey> keys;
+  if (animation) keys = read_shape_keys(e, *animation, shape);
   scene_.shapes.push_back(std::move(shape));
+  if (animation) note_motion(*animation, false, std::move(keys));
   label_shape(e);
   shape_elements_.push_back(&e);
+}
+
+std::vector<MotionKey> Reader::read_shape_keys(const Element& e, const Element& animation,
+                                               const Shape& shape) {
+  if (const std::string_view why = why_still(shape); !why.empty()) {
+    report_.error(animation.at,
+                  fmt::format("this {} {}, and such shapes can't move: give it a <transform>{}",
+                              e.get("type"), why, shape.group ? ", or let instances of its group move" : ""));
+    return {};
+  }
+  return read_keys(animation, [&, placed = shape](const Element& at, const Transform& to_world) mutable {
+    placed.to_world = to_world;
+    if (!check_placement(e, at, placed)) return false;
+    if (!shape.emitter || is_similarity(to_world)) return true;
+    report_.error(at.at,
+                  "this transform stretches a shape that emits light and moves: such a shape can only turn, "
+                  "move, mirror and scale alike along all axes");
+    return false;
+  });
 }
 
 // Rays pass a surface without a material anyhow, and the medium behind it stays visible to them.
@@ -288,22 +320,24 @@ void Reader::check_attributes(const Element& e, const Shape& shape) {
                     use.in_light ? "emitter" : "bsdf"));
 }
 
-void Reader::check_placement(const Element& e, const Shape& shape) {
+bool Reader::check_placement(const Element& e, const Element& at, const Shape& shape) {
+  const auto refuse = [&](std::string text) {
+    report_.error(at.at, std::move(text));
+    return false;
+  };
   if (!invertible(shape.to_world))
-    report_.error(
-        e.at, fmt::format("to_world flattens this {} or leaves the range of numbers: it can't be inverted",
-                          e.get("type")));
-  else if (std::holds_alternative<SphereShape>(shape.geometry) && !is_similarity(shape.to_world))
-    report_.error(
-        e.at,
+    return refuse(fmt::format(
+        "to_world flattens this {} or leaves the range of numbers: it can't be inverted", e.get("type")));
+  if (std::holds_alternative<SphereShape>(shape.geometry) && !is_similarity(shape.to_world))
+    return refuse(
         "to_world stretches this sphere: only turning, moving and scaling alike along all axes keeps it one");
   const auto* c = std::get_if<CylinderShape>(&shape.geometry);
-  if (c && c->p0 == c->p1)
-    report_.error(e.at, "p0 and p1 of this cylinder are the same point");
-  else if (c && invertible(shape.to_world) && !stays_cylinder(*c, shape.to_world))
-    report_.error(e.at,
-                  "to_world stretches this cylinder across its axis or shears it: only along the axis it may "
-                  "be scaled by itself");
+  if (c && c->p0 == c->p1) return refuse("p0 and p1 of this cylinder are the same point");
+  if (c && !stays_cylinder(*c, shape.to_world))
+    return refuse(
+        "to_world stretches this cylinder across its axis or shears it: only along the axis it may be "
+        "scaled by itself");
+  return true;
 }
 
 }  // namespace ls::scene

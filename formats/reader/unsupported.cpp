@@ -55,7 +55,7 @@ const std::vector<MeaninglessRow>& meaningless_table() {
         "debug",
         sampling);
     for (const char* meter : {"irradiancemeter", "radiancemeter", "fluxmeter", "fluencemeter"})
-      add("sensor", meter, "shutter_open shutter_close", "only cameras move");
+      add("sensor", meter, "shutter_open shutter_close", "a meter measures at one time");
     add("sensor", "", "srf", "colours are linear RGB");
     add("sensor", "perspective", "focus_distance", "a pinhole has everything in focus");
     add("shape", "", "silhouette_sampling_weight sampling_weight", sampling);

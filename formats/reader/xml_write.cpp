@@ -84,7 +84,12 @@ class Writer {
     pool(scene_.phases, PhaseIndex{});
     pool(scene_.media, MediumIndex{});
     write_shapes();
-    for (const Instance& instance : scene_.instances) object(instance);
+    for (const Instance& instance : scene_.instances) {
+      open(kInfo<Instance>.kind, plugin(instance), "", "");
+      MovingFields fields{*this, instance.motion};
+      describe(fields, instance);
+      close(kInfo<Instance>.kind);
+    }
     for (const Emitter& emitter : scene_.emitters) std::visit([&](const auto& e) { object(e); }, emitter);
     write_sensor();
     return {out_ + "</scene>\n", std::move(ours_)};
@@ -205,6 +210,16 @@ class Writer {
       if (!mesh || mesh->format != MeshFormat::serialized || f.name != "flip_tex_coords") writer.field(f, x);
     }
   };
+  // Writes the fields of an object that may move.
+  struct MovingFields {
+    Writer& writer;
+    const std::vector<MotionKey>& motion;
+    template <class T>
+    void field(const Field& f, const T& x) {
+      if (f.name == "to_world" && !motion.empty()) return writer.property(f, motion);
+      writer.field(f, x);
+    }
+  };
   // Writes the shapes. The shapes of a group, which are contiguous in the scene, are written inside the
   // group's element.
   void write_shapes() {
@@ -229,7 +244,8 @@ class Writer {
           describe(fields, geometry);
         },
         shape.geometry);
-    describe(*this, shape);
+    MovingFields fields{*this, shape.motion};
+    describe(fields, shape);
     nested("", shape.meter);
     close("shape");
   }

@@ -4,10 +4,8 @@
 
 #include <functional>
 
-#include "core/scene/motion.h"
-#include "tests/property/quarters.h"
+#include "tests/property/stills.h"
 #include "tests/support/significance.h"
-#include "worker/render/math/random.h"
 #include "worker/render/world/world.h"
 
 namespace ls::test {
@@ -33,39 +31,10 @@ SceneBuilder room() {
   return b;
 }
 
-void move(Sensor& s, const std::vector<Transform>& poses) {
-  std::vector<MotionKey> keys;
-  for (const Transform& pose : poses) keys.push_back({static_cast<double>(keys.size()), pose});
-  s.motion = scene::motion_during(scene::Motion(keys), 0, static_cast<double>(keys.size() - 1));
-  s.to_world = scene::Motion(s.motion).at(.5);
-  s.shutter_close = 1;
-}
-
-SceneBuilder stopped(SceneBuilder b, double time) {
-  Sensor& s = b.scene.sensor;
-  s.to_world = scene::Motion(s.motion).at(time);
-  s.motion.clear();
-  s.shutter_close = 0;
-  return b;
-}
-
-// An image of this many stills, each at a random time of its part of the exposure.
-constexpr int kStills = 8;
-QuarterImage of_stills(const SceneBuilder& moving, std::uint64_t spp, std::uint64_t seed) {
-  render::RandomStream dice(seed);
-  QuarterImage mean{};
-  for (int k = 0; k < kStills; ++k) {
-    const double time = (k + double{dice.uniform()}) / kStills;
-    const QuarterImage still =
-        quarter_image(stopped(moving, time), spp / kStills, seed * kStills + static_cast<std::uint64_t>(k));
-    for (std::size_t q = 0; q < kQuarters; ++q) mean[q] += still[q] / kStills;
-  }
-  return mean;
-}
-
 TEST(CameraMotion, GivesTheMeanOfStills) {
   constexpr int kSeeds = 24;
   constexpr std::uint64_t kSpp = 64;
+  constexpr int kStills = 8;
   Tests tests("property/camera_motion");
   const auto lens = [](SceneBuilder& b) {
     b.scene.sensor.aperture_radius = .1;
@@ -75,8 +44,9 @@ TEST(CameraMotion, GivesTheMeanOfStills) {
     Sensor& s = b.scene.sensor;
     s.projection = Projection::orthographic;
     s.near_clip = 1e-3;
-    move(s, {look_at({-1.5, .1, 0}, {1, 0, 0}, {0, 1, 0}) * scale(.5, .5, 1),
-             look_at({-1.5, .1, .2}, {1, -.3, 0}, {0, 1, 0}) * scale(.6, .4, 1)});
+    move(b.scene, s,
+         {look_at({-1.5, .1, 0}, {1, 0, 0}, {0, 1, 0}) * scale(.5, .5, 1),
+          look_at({-1.5, .1, .2}, {1, -.3, 0}, {0, 1, 0}) * scale(.6, .4, 1)});
   };
   const auto around = [](SceneBuilder& b) { b.scene.sensor.projection = Projection::spherical; };
   const auto shared = [](SceneBuilder& b) { b.scene.integrator.path_reuse = 8; };
@@ -106,14 +76,16 @@ TEST(CameraMotion, GivesTheMeanOfStills) {
   for (const Shot& shot : shots) {
     SceneBuilder b = room();
     b.scene.sensor.fov = 70;
-    move(b.scene.sensor, {look_at({-1.6, .1, -.5}, {.5, -.2, 0}, {0, 1, 0}),
-                          look_at({-1.5, .3, 0}, {.6, -.2, .3}, {.2, 1, 0}),
-                          look_at({-1.2, .5, .6}, {.6, -.6, .2}, {.3, 1, 0})});
+    move(
+        b.scene, b.scene.sensor,
+        {look_at({-1.6, .1, -.5}, {.5, -.2, 0}, {0, 1, 0}), look_at({-1.5, .3, 0}, {.6, -.2, .3}, {.2, 1, 0}),
+         look_at({-1.2, .5, .6}, {.6, -.6, .2}, {.3, 1, 0})});
     shot.change(b);
     ASSERT_THAT(estimate(b, 2).variant, testing::HasSubstr(shot.variant)) << shot.name;
     expect_same_quarters(
         shot.name, level, quarters_of(b, kSpp, kSeeds, 100),
-        quarters_of(kSeeds, [&](int i) { return of_stills(b, kSpp, 900 + static_cast<std::uint64_t>(i)); }),
+        quarters_of(kSeeds,
+                    [&](int i) { return of_stills(b, kStills, kSpp, 900 + static_cast<std::uint64_t>(i)); }),
         kSeeds);
   }
   tests.close();

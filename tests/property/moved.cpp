@@ -107,9 +107,13 @@ class Permuter {
 
 Scene moved(Scene s, const Move& move_by) {
   const Mover m(move_by);
+  const auto place = [&](auto& object) {
+    m.place(object.to_world);
+    for (MotionKey& key : object.motion) m.place(key.to_world);
+  };
   for (Shape& shape : s.shapes)
-    if (!shape.group) m.place(shape.to_world);
-  for (Instance& i : s.instances) m.place(i.to_world);
+    if (!shape.group) place(shape);
+  for (Instance& i : s.instances) place(i);
   for (Volume& v : s.volumes)
     std::visit(
         [&](auto& one) {

@@ -5,6 +5,7 @@
 
 #include "core/scene/motion.h"
 #include "core/scene/schema/validate.h"
+#include "core/scene/transform.h"
 #include "tests/property/draw.h"
 
 namespace ls::test {
@@ -29,6 +30,7 @@ class Composer {
     if (draw_.wild()) scene_.sample_count = static_cast<std::uint64_t>(dice_.extreme({1, 1e6}));
     links();
     motion();
+    if (dice_.chance(.1)) shape_motion();
   }
 
  private:
@@ -184,6 +186,25 @@ class Composer {
     s.motion = {{0, s.to_world}, {dice_.between(.1, .9), middle}, {1, end}};
     s.shutter_close = 1;
     s.to_world = scene::Motion(s.motion).at(.5);
+  }
+  // Some shapes and instances move: from where they are to elsewhere, and turn.
+  void shape_motion() {
+    for (Shape& s : scene_.shapes)
+      if (!s.group && !s.meter) move(s, !s.emitter);
+    for (Instance& i : scene_.instances) move(i, true);
+  }
+  template <class T>
+  void move(T& object, bool may_stretch) {
+    if (!dice_.chance(.5) || scene_.sensor.projection == Projection::meters) return;
+    const Transform begin = object.to_world;
+    if (!scene::can_move(begin) || !(may_stretch || scene::is_similarity(begin))) return;
+    const double far = dice_.chance(.3) ? 2 : .1;
+    const Vec3 way{far * dice_.gauss(), far * dice_.gauss(), far * dice_.gauss()};
+    const Transform turn = dice_.chance(.5) ? rotate_x(dice_.between(-170, 170)) : Transform{};
+    const Transform end = translate(way) * begin * turn * scale(dice_.chance(.3) ? 1.5 : 1);
+    object.motion = {{0, begin}, {1, end}};
+    object.to_world = scene::Motion(object.motion).at(.5);
+    scene_.sensor.shutter_close = 1;
   }
   // What each kind of camera knows; the rest as it is when it is not given.
   void draw_sensor(const Sensor& drawn, Sensor& s) {

@@ -92,6 +92,7 @@ inline constexpr std::array kShares = {Share{Family::chi_square, "bsdf/sampling"
                                        Share{Family::scenes, "property/light_tree", 12},
                                        Share{Family::scenes, "property/two_sided", 8 * 12},
                                        Share{Family::scenes, "property/camera_motion", 7 * 12},
+                                       Share{Family::scenes, "property/shape_motion", 12 * 12},
                                        Share{Family::scenes, "property/pruned", 720},
                                        Share{Family::scenes, "property/twins", 120},
                                        Share{Family::scenes, "property/shared_faces", 24},

@@ -40,6 +40,9 @@ class Analyst {
     n_.instances = static_cast<std::uint32_t>(s_.instances.size());
     n_.lens = s_.sensor.aperture_radius > 0;
     n_.camera_motion = !s_.sensor.motion.empty();
+    const auto moving = [](const auto& one) { return !one.motion.empty(); };
+    n_.moving_shapes = static_cast<std::uint32_t>(std::ranges::count_if(s_.shapes, moving) +
+                                                  std::ranges::count_if(s_.instances, moving));
     n_.crop = s_.film.has_crop();
     n_.transparent_film = s_.film.transparent;
     n_.meters = static_cast<std::uint32_t>(meter_count(s_));
@@ -218,6 +221,12 @@ class Words {
     say("user geometries in the BVH", count<SphereShape, DiskShape, CylinderShape>(n_.shapes),
         "spheres, disks, cylinders");
     say("instances of groups", n_.instances, "instances");
+    say("motion of shapes", n_.moving_shapes > 0,
+        fmt::format("{} shapes or instances move while the shutter is open; path_reuse, light_vertices, "
+                    "sky_portals and local_lights, which bring together paths of different times, are left "
+                    "out",
+                    n_.moving_shapes),
+        "all shapes stand still");
     say("dielectrics", count<DielectricBsdf, RoughDielectricBsdf>(n_.materials), "materials");
     say("rough surfaces",
         count<RoughConductorBsdf, RoughPlasticBsdf, RoughDielectricBsdf, CoatedConductorBsdf>(n_.materials),
@@ -335,6 +344,7 @@ std::string canonical_json(const Needs& n) {
   if (n.transparent_film) j["transparent_film"] = true;
   if (n.phases) j["phases"] = true;
   if (n.camera_motion) j["camera_motion"] = true;
+  if (n.moving_shapes > 0) j["moving_shapes"] = n.moving_shapes;
   if (n.height) j["height"] = true;
   if (!n.volumes.empty()) j["volumes"] = n.volumes;
   if (n.meters > 0) j["meters"] = n.meters;

@@ -39,7 +39,8 @@ struct Needs {
   // through which a part of the light passes without a change of direction.
   bool boundaries = false, null_transmission = false;
   bool lens = false, crop = false;
-  bool camera_motion = false;  // the camera moves while the shutter is open
+  bool camera_motion = false;       // the camera moves while the shutter is open
+  std::uint32_t moving_shapes = 0;  // number of shapes and instances that move while the shutter is open
   bool transparent_film = false;
   // Number of shapes that the camera does not see, that are held out or that catch shadows
   std::uint32_t flagged_shapes = 0;

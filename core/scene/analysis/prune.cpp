@@ -8,6 +8,7 @@
 
 #include "core/scene/analysis/unreachable.h"
 #include "core/scene/limits.h"
+#include "core/scene/motion.h"
 #include "core/scene/schema/integrators.h"
 #include "core/scene/schema/light_links.h"
 #include "core/scene/schema/traits.h"
@@ -48,6 +49,7 @@ class Pruner {
       note("shape of the lens", "the camera is a pinhole");
     }
     Pruned out{compacted(s_), {}};
+    out.scene.sensor.shutter_close = moves(out.scene) ? 1 : 0;
     note("light linking", "its list has all that there is", drop_idle_links(out.scene));
     files(out.scene.assets);
     out.left_out = std::move(left_out_);

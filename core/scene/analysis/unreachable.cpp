@@ -52,8 +52,8 @@ class Search {
     if (!s_.meters.empty() || !s.interior || s.group || lets_rays_in(s) || !has_interior_behind(s))
       return false;
     const auto box = box_of(s);
-    // Where a camera that moves is at all times is not looked at.
-    if (!s_.sensor.motion.empty()) return false;
+    // Where a camera or a shape that moves is at all times is not looked at.
+    if (!s_.sensor.motion.empty() || !s.motion.empty()) return false;
     const bool clear = box ? camera_is_outside(s_.sensor, *box) : !s_.sensor.medium;
     return clear && (traits_[s.bsdf.value].black_behind || (box && sealed(s, i, *box)));
   }
@@ -70,7 +70,9 @@ class Search {
            (links_.blockers() & ~links_.having(s.link_sets)) != 0;
   }
   bool emits(MediumIndex m) const { return traits_of(s_.media[m.value], s_.volumes).emits; }
-  static std::optional<Box> place_in_scene(const Shape& s) { return s.group ? std::nullopt : box_of(s); }
+  static std::optional<Box> place_in_scene(const Shape& s) {
+    return s.group || !s.motion.empty() ? std::nullopt : box_of(s);
+  }
 
   // True if light may enter through the shape or come from it. A surface that light passes unchanged (bsdf
   // "null") and that bounds no medium does not count, since prune.cpp removes it later.

@@ -55,6 +55,16 @@ void describe(V& v, T& s) {
   v.field(quantity("radius", "radius", "length", kPositive), s.radius);
 }
 
+template <class V, Of<MotionKey> T>
+void describe(V& v, T& k) {
+  v.field({.name = "time", .doc = "", .derived = true}, k.time);
+  v.field({.name = "to_world", .doc = "", .derived = true}, k.to_world);
+}
+
+// Of everything that moves.
+inline constexpr Field kMotionField{
+    .name = "motion", .doc = "keys of the animation", .derived = true, .elided = true};
+
 LS_TYPE(ShapeGroup, "shape", "shapegroup", "",
         "shapes that are seen where an `instance` of the group stands, and kept in memory once; they stand "
         "inside, placed within the group by their own `to_world`. Shapes that emit light, and instances, "
@@ -67,13 +77,21 @@ LS_TYPE(Instance, "shape", "instance", "",
 template <class V, Of<Instance> T>
 void describe(V& v, T& s) {
   v.field(nested_field("group", "the group", "<shapegroup>"), s.group);
-  v.field({.name = "to_world", .doc = "places the group in the world"}, s.to_world);
+  v.field({.name = "to_world",
+           .doc = "places the group in the world; or an `<animation>`, by which it moves while the shutter "
+                  "is open (docs/guide/motion-blur.md)"},
+          s.to_world);
+  v.field(kMotionField, s.motion);
 }
 // Describes the fields that all kinds of shapes have. Geometry, emitter, bsdf and media are nested objects.
 template <class V, Of<Shape> T>
 void describe(V& v, T& s) {
   v.field({.name = "geometry", .doc = "the plugin", .derived = true}, s.geometry);
-  v.field({.name = "to_world", .doc = "places the shape in the world"}, s.to_world);
+  v.field({.name = "to_world",
+           .doc = "places the shape in the world; or an `<animation>`, by which it moves while the shutter "
+                  "is open (docs/guide/motion-blur.md)"},
+          s.to_world);
+  v.field(kMotionField, s.motion);
   v.field({.name = "flip_normals", .doc = "turns the normals, and so inside and outside"}, s.flip_normals);
   v.field(nested_field("bsdf", "`diffuse` if there is none, black if the shape emits light", "<bsdf>"),
           s.bsdf);
@@ -136,12 +154,6 @@ LS_TYPE(GaussianFilter, "rfilter", "gaussian", "", "Gaussian, cut at four standa
 template <class V, Of<GaussianFilter> T>
 void describe(V& v, T& f) {
   v.field(quantity("stddev", "standard deviation", "pixels", {0, 8, true}), f.stddev);
-}
-
-template <class V, Of<MotionKey> T>
-void describe(V& v, T& k) {
-  v.field({.name = "time", .doc = "", .derived = true}, k.time);
-  v.field({.name = "to_world", .doc = "", .derived = true}, k.to_world);
 }
 
 LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens, orthographic, spherical",
@@ -216,7 +228,7 @@ void describe(V& v, T& s) {
   describe_perspective(v, s);
   describe_lens(v, s);
   v.field(nested_field("medium", "what the camera is in; the name may be left out", "medium"), s.medium);
-  v.field({.name = "motion", .doc = "keys of the animation", .derived = true, .elided = true}, s.motion);
+  v.field(kMotionField, s.motion);
 }
 
 LS_TYPE(

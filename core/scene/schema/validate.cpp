@@ -45,7 +45,7 @@ class ValueChecker {
     if (wrong_.empty()) check_crop();
     if (wrong_.empty()) check_labels();
     if (wrong_.empty()) check_meters();
-    if (wrong_.empty()) check_motion(s_.sensor);
+    if (wrong_.empty()) check_motions();
     if (wrong_.empty() && LinkLists(s_).too_many())
       wrong_ = fmt::format("scene: the lights have more than {} different lists of receivers and blockers",
                            kMostLinkLists);
@@ -173,21 +173,38 @@ class ValueChecker {
     else if (count > 0 && s_.film != film_of_meters(count))
       wrong_ = "scene.film is not that of the scene's meters";
   }
-  // Checks that times ascend from 0 to 1, and that the camera can move by its keys and to_world is among its
+  void check_motions() {
+    if (s_.sensor.shutter_open != 0 || s_.sensor.shutter_close != (moves(s_) ? 1 : 0))
+      wrong_ = "scene.sensor has a shutter that is not that of what moves";
+    if (s_.sensor.projection == Projection::meters && moves(s_))
+      wrong_ = "scene has meters and something that moves";
+    check_motion("sensor", s_.sensor);
+    for (std::size_t i = 0; i < s_.shapes.size() && wrong_.empty(); ++i) {
+      const std::string where = fmt::format("shapes[{}]", i);
+      check_motion(where, s_.shapes[i]);
+      const std::string_view why = why_still(s_.shapes[i]);
+      if (!s_.shapes[i].motion.empty() && !why.empty() && wrong_.empty())
+        wrong_ = fmt::format("scene.{} moves, but {}", where, why);
+      for (const MotionKey& key : s_.shapes[i].motion)
+        if (s_.shapes[i].emitter && !is_similarity(key.to_world) && wrong_.empty())
+          wrong_ = fmt::format("scene.{} emits light, and its motion stretches it", where);
+    }
+    for (std::size_t i = 0; i < s_.instances.size() && wrong_.empty(); ++i)
+      check_motion(fmt::format("instances[{}]", i), s_.instances[i]);
+  }
+  // Checks that times ascend from 0 to 1, and that the object can move by its keys and to_world is among its
   // poses.
-  void check_motion(const Sensor& sensor) {
-    const std::vector<MotionKey>& keys = sensor.motion;
-    if (sensor.shutter_open != 0 || sensor.shutter_close != (keys.empty() ? 0 : 1))
-      wrong_ = "scene.sensor has a shutter that is not that of its motion";
+  template <class T>
+  void check_motion(std::string_view where, const T& object) {
+    const std::vector<MotionKey>& keys = object.motion;
     if (keys.empty() || !wrong_.empty()) return;
     if (keys.size() < 2 || keys.size() > kMaxMotionKeys || keys.front().time != 0 || keys.back().time != 1) {
-      wrong_ =
-          fmt::format("scene.sensor.motion must have 2 to {} keys, the first at time 0 and the last at 1",
-                      kMaxMotionKeys);
+      wrong_ = fmt::format("scene.{}.motion must have 2 to {} keys, the first at time 0 and the last at 1",
+                           where, kMaxMotionKeys);
       return;
     }
     const auto fail = [&](std::size_t i, std::string_view what) {
-      if (wrong_.empty()) wrong_ = fmt::format("scene.sensor.motion[{}] {}", i, what);
+      if (wrong_.empty()) wrong_ = fmt::format("scene.{}.motion[{}] {}", where, i, what);
     };
     for (std::size_t i = 0; i < keys.size(); ++i) {
       if (i > 0 && !(keys[i].time > keys[i - 1].time)) fail(i, "is not later than the one before");
@@ -199,8 +216,8 @@ class ValueChecker {
     // Machines may round the pose between two keys otherwise.
     const Transform middle = Motion(keys).at(.5);
     for (std::size_t i = 0; i < 16; ++i)
-      if (!(std::abs(sensor.to_world.m[i] - middle.m[i]) <= 1e-9 * (1 + std::abs(middle.m[i]))))
-        wrong_ = "scene.sensor.to_world is not the pose in the middle of its motion";
+      if (!(std::abs(object.to_world.m[i] - middle.m[i]) <= 1e-9 * (1 + std::abs(middle.m[i]))))
+        wrong_ = fmt::format("scene.{}.to_world is not the pose in the middle of its motion", where);
   }
   static std::string problem_of(const Meter& m, int shapes) {
     const bool on_shape = m.points.empty();

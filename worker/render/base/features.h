@@ -38,6 +38,8 @@ struct Features {
   bool phases = false;
   // The density of some medium falls with height, in closed form (height_fog.h).
   bool height = false;
+  // Some shape moves while the shutter is open: rays have a time of the exposure.
+  bool motion = false;
   bool operator==(const Features&) const = default;
 
   constexpr bool covers(const Features& need) const {
@@ -45,7 +47,7 @@ struct Features {
            (emission || !need.emission) && (overlaps || !need.overlaps) && (passing || !need.passing) &&
            (aimed || !need.aimed) && (connected || !need.connected) && (whitted || !need.whitted) &&
            (reuse || !need.reuse) && (split || !need.split) && (visibility || !need.visibility) &&
-           (phases || !need.phases) && (height || !need.height);
+           (phases || !need.phases) && (height || !need.height) && (motion || !need.motion);
   }
   constexpr Features with(bool Features::*feature) const {
     Features more = *this;
@@ -57,6 +59,7 @@ inline constexpr Features kEveryScene{
     .media = true, .grids = true, .chromatic = true, .emission = true, .overlaps = true, .passing = true};
 // Everything that media may be
 inline constexpr Features kAnyMedia = kEveryScene.with(&Features::phases).with(&Features::height);
-inline constexpr Features kEverything = kAnyMedia.with(&Features::split).with(&Features::visibility);
+inline constexpr Features kAnyMotion = kAnyMedia.with(&Features::motion);
+inline constexpr Features kEverything = kAnyMotion.with(&Features::split).with(&Features::visibility);
 
 }  // namespace ls::render

@@ -54,7 +54,7 @@ Camera::Pose Camera::pose(const Transform& to_world) const {
 Camera::Pose Camera::pose_at(float time) const { return pose(motion_.at(double{time})); }
 
 [[gnu::cold, gnu::noinline]] CameraRay Camera::ray_at(float time, double fx, double fy, V2 lens) const {
-  CameraRay r = ray(pose_at(time), fx, fy, lens);
+  CameraRay r = ray(moves() ? pose_at(time) : pose_, fx, fy, lens);
   r.time = time;
   return r;
 }

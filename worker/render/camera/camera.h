@@ -22,7 +22,7 @@ using scene::tan_half_fov_x;
 struct CameraRay {
   V3 o, d;         // d has unit length
   float t_max;     // distance along the ray at which the camera clips it; may be infinite
-  float time = 0;  // of the exposure, from 0 to 1; set only if the camera moves
+  float time = 0;  // of the exposure, from 0 to 1
   // Set if a meter measures along this ray. If the meter has a plate, o is on the plate, and the ray meets
   // the plate at once: its normal is -d.
   const MeterStart* meter = nullptr;
@@ -44,7 +44,7 @@ class Camera {
   // `lens`, in [0, 1)^2, chooses the point on the lens; a camera without a lens ignores it. Of a camera that
   // moves it is the ray in the middle of the exposure.
   CameraRay ray(double fx, double fy, V2 lens) const { return ray(pose_, fx, fy, lens); }
-  // Returns the ray of a camera that moves at a time of the exposure, from 0 to 1.
+  // Returns the ray at a time of the exposure, from 0 to 1.
   CameraRay ray_at(float time, double fx, double fy, V2 lens) const;
   bool moves() const { return !motion_.empty(); }
   // True if the origins and directions of all rays of this camera are in the range of float32.

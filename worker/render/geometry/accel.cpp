@@ -34,25 +34,6 @@ constexpr char kDeviceConfig[] = "isa=avx2,max_isa=avx2,frequency_level=simd256,
 constexpr char kDeviceConfig[] = "set_affinity=0";  // on ARM Embree has one instruction set, NEON
 #endif
 
-// set_ray() writes the ray in 16-byte words, as Embree reads it. If it wrote smaller words, the processor
-// could not forward them to a load that spans several of them, and the load would wait.
-using F32x4 = float __attribute__((vector_size(16)));
-using U32x4 = std::uint32_t __attribute__((vector_size(16)));
-void set_ray(RTCRay& r, const V3& o, const V3& d, float t_max) {
-  static_assert(offsetof(RTCRay, tnear) == 12 && offsetof(RTCRay, dir_x) == 16 &&
-                offsetof(RTCRay, tfar) == 32 && offsetof(RTCRay, flags) == 44);
-  const F32x4 origin = {o.x, o.y, o.z, 0}, direction = {d.x, d.y, d.z, 0};
-  const U32x4 rest = {std::bit_cast<std::uint32_t>(t_max), ~0u, 0, 0};  // tfar, mask, id, flags
-  std::memcpy(&r.org_x, &origin, sizeof origin);
-  std::memcpy(&r.dir_x, &direction, sizeof direction);
-  std::memcpy(&r.tfar, &rest, sizeof rest);
-}
-
-// True if Embree can trace a ray from o. Embree's behaviour is undefined for NaN, and Debian's build of it
-// aborts for rays whose origin is farther than 1.8e18. For rays transformed into instances, kLargestInverse
-// (geometry_build.cpp) ensures the same.
-bool near_enough(const V3& o) { return dot(o, o) <= 1e18f; }  // within 1e9 times the world's size
-
 // The Embree scenes over one set of primitives: all of them, the opaque ones, and those that let light pass.
 // If no primitive lets light pass, `all` and `opaque` are the same scene.
 struct Scenes {
@@ -79,6 +60,7 @@ struct Accel::State {
   std::optional<Scenes> own;
   std::deque<Scenes> groups;
   std::vector<std::uint32_t> group_of;  // for each instance, the index of its group
+  std::deque<MovingScene> moving;       // a deque, since the BVH points at its elements
   std::atomic<std::int64_t> bytes{0};
   bool coincident = false;
 
@@ -197,23 +179,65 @@ void attach_instance(RTCDevice device, const Affine& to_world, RTCScene of, unsi
   rtcReleaseGeometry(geom);
 }
 
+// Returns a box around the primitives of a group, in its space.
+Box box_of(const Geometry& g, const PrimitiveSet& set) {
+  Box box;
+  for (std::uint32_t i = set.triangles.first; i < set.triangles.last; ++i)
+    for (int k = 0; k < 3; ++k) box.add(V3d(g.vertex(i, k)));
+  for (std::uint32_t i = set.spheres.first; i < set.spheres.last; ++i) box.add(box_of(g.spheres[i]));
+  for (std::uint32_t i = set.disks.first; i < set.disks.last; ++i) box.add(box_of(g.disks[i]));
+  for (std::uint32_t i = set.cylinders.first; i < set.cylinders.last; ++i) box.add(box_of(g.cylinders[i]));
+  return box;
+}
+
+void attach_moving(const Geometry& g, Accel::State& st, std::uint32_t instance, RTCScene group,
+                   std::initializer_list<RTCScene> scenes) {
+  const PlacedInstance& placed = g.instances[instance];
+  const MovingInstance& mover = g.moving[placed.moving];
+  MovingScene& moving = st.moving.emplace_back();
+  moving.instances = g.instances.data();
+  moving.instance = instance;
+  moving.group = group;
+  const Box box = box_of(g, g.groups[placed.group]);
+  const std::size_t parts = mover.parts(box);
+  moving.boxes.resize(parts + 1);
+  for (std::size_t i = 0; i < parts; ++i) {
+    const auto time = [&](std::size_t k) { return static_cast<double>(k) / static_cast<double>(parts); };
+    const Box during = mover.box(box, time(i), time(i + 1));
+    moving.boxes[i].add(during);
+    moving.boxes[i + 1].add(during);
+  }
+  RTCGeometry geom = rtcNewGeometry(st.device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(geom, 1);
+  rtcSetGeometryTimeStepCount(geom, static_cast<unsigned>(moving.boxes.size()));
+  rtcSetGeometryUserData(geom, &moving);
+  rtcSetGeometryBoundsFunction(geom, moving_bounds_callback, nullptr);
+  rtcSetGeometryIntersectFunction(geom, moving_intersect_callback);
+  rtcSetGeometryOccludedFunction(geom, moving_occluded_callback);
+  rtcCommitGeometry(geom);
+  for (RTCScene s : scenes) rtcAttachGeometryByID(s, geom, kFirstInstance + instance);
+  rtcReleaseGeometry(geom);
+}
+
 void attach_instances(const Geometry& g, Accel::State& st) {
   Scenes& own = *st.own;
+  const auto attach = [&](std::uint32_t i, RTCScene group, std::initializer_list<RTCScene> scenes) {
+    if (g.instances[i].moving != kNone) return attach_moving(g, st, i, group, scenes);
+    attach_instance(st.device, g.instances[i].to_world, group, kFirstInstance + i, scenes);
+  };
   for (std::uint32_t i = 0; i < g.instances.size(); ++i) {
     const PlacedInstance& instance = g.instances[i];
     st.group_of.push_back(instance.group);
     if (g.groups[instance.group].count() == 0) continue;
     const Scenes& group = st.groups[instance.group];
-    const unsigned id = kFirstInstance + i;
     if (own.all == own.opaque) {
-      attach_instance(st.device, instance.to_world, group.all, id, {own.opaque});
+      attach(i, group.all, {own.opaque});
     } else if (!group.boundary) {
-      attach_instance(st.device, instance.to_world, group.all, id, {own.opaque, own.all});
+      attach(i, group.all, {own.opaque, own.all});
     } else {
-      attach_instance(st.device, instance.to_world, group.all, id, {own.all});
-      attach_instance(st.device, instance.to_world, group.boundary, id, {own.boundary});
-      if (g.groups[instance.group].any_opaque())
-        attach_instance(st.device, instance.to_world, group.opaque, id, {own.opaque});
+      attach(i, group.all, {own.all});
+      attach(i, group.boundary, {own.boundary});
+      if (g.groups[instance.group].any_opaque()) attach(i, group.opaque, {own.opaque});
     }
   }
 }
@@ -237,14 +261,25 @@ PrimitiveId primitive_in(const Scenes& in, unsigned geometry, unsigned primitive
 }
 
 [[gnu::always_inline]] inline std::optional<PrimitiveId> trace(const Accel::State& st, RTCScene scene,
-                                                               const V3& o, const V3& d, float t_max) {
+                                                               const V3& o, const V3& d, float t_max,
+                                                               const Moment* moment) {
   if (!near_enough(o) || !is_finite(d)) return std::nullopt;
   RTCRayHit rh;
-  set_ray(rh.ray, o, d, t_max);
+  set_ray(rh.ray, o, d, t_max, moment ? moment->time() : 0);
   rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  Tracing tracing(o, d);
+  Tracing tracing(o, d, moment);
   embree_intersect(scene, tracing.context, rh, nullptr);
   return primitive_of(st, rh.hit);
+}
+
+[[gnu::always_inline]] inline bool is_occluded(const Accel::State& st, const V3& o, const V3& d, float t_max,
+                                               const Moment* moment) {
+  if (!near_enough(o) || !is_finite(d)) return !is_finite(o) || !is_finite(d);
+  RTCRay ray;
+  set_ray(ray, o, d, t_max, moment ? moment->time() : 0);
+  Tracing tracing(o, d, moment);
+  embree_occluded(st.own->opaque, tracing.context, ray);
+  return ray.tfar < 0;
 }
 
 // Returns the version of the loaded Embree library, which may differ from that of the headers.
@@ -298,22 +333,30 @@ Result<Accel> Accel::build(const Geometry& g, int threads, bool coincident) {
 }
 
 std::optional<PrimitiveId> Accel::nearest(const V3& o, const V3& d, float t_max) const {
-  return trace(*state_, state_->own->all, o, d, t_max);
+  return trace(*state_, state_->own->all, o, d, t_max, nullptr);
+}
+std::optional<PrimitiveId> Accel::nearest(const V3& o, const V3& d, float t_max, const Moment& moment) const {
+  return trace(*state_, state_->own->all, o, d, t_max, &moment);
 }
 
 std::optional<PrimitiveId> Accel::nearest_boundary(const V3& o, const V3& d, float t_max) const {
   if (!state_->own->boundary) return std::nullopt;
-  return trace(*state_, state_->own->boundary, o, d, t_max);
+  return trace(*state_, state_->own->boundary, o, d, t_max, nullptr);
+}
+std::optional<PrimitiveId> Accel::nearest_boundary(const V3& o, const V3& d, float t_max,
+                                                   const Moment& moment) const {
+  if (!state_->own->boundary) return std::nullopt;
+  return trace(*state_, state_->own->boundary, o, d, t_max, &moment);
 }
 
-CoincidentHits Accel::between(const V3& a, const V3& b) const {
+CoincidentHits Accel::between(const V3& a, const V3& b, const Moment* moment) const {
   CoincidentHits coincident_hits;
   const V3 d = b - a;
   if (!state_->coincident || !near_enough(a) || !near_enough(b)) return coincident_hits;
   RTCRayHit rh;
-  set_ray(rh.ray, a, d, 1);
+  set_ray(rh.ray, a, d, 1, moment ? moment->time() : 0);
   rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  Collecting all(a, d);
+  Collecting all(a, d, moment);
   embree_intersect(state_->own->all, all.context, rh, collect_callback);
   for (std::size_t i = 0; i < all.count; ++i) coincident_hits.ids[i] = *primitive_of(*state_, all.met[i]);
   // A triangle may be reported once for every leaf that contains part of it.
@@ -326,12 +369,10 @@ CoincidentHits Accel::between(const V3& a, const V3& b) const {
 }
 
 bool Accel::occluded(const V3& o, const V3& d, float t_max) const {
-  if (!near_enough(o) || !is_finite(d)) return !is_finite(o) || !is_finite(d);
-  RTCRay ray;
-  set_ray(ray, o, d, t_max);
-  Tracing tracing(o, d);
-  embree_occluded(state_->own->opaque, tracing.context, ray);
-  return ray.tfar < 0;
+  return is_occluded(*state_, o, d, t_max, nullptr);
+}
+bool Accel::occluded(const V3& o, const V3& d, float t_max, const Moment& moment) const {
+  return is_occluded(*state_, o, d, t_max, &moment);
 }
 
 bool Accel::has_boundaries() const { return state_->own->boundary != nullptr; }

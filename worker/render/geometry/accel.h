@@ -33,16 +33,21 @@ class Accel {
   static Result<Accel> build(const Geometry& geometry, int threads, bool coincident = false);
 
   // Returns the nearest primitive that the ray o + t d hits at a t in (0, t_max). Here and below d need not
-  // be of unit length.
+  // be of unit length, and instances that move are where they are at time 0 of the exposure or, with
+  // `moment`, at its time.
   std::optional<PrimitiveId> nearest(const V3& o, const V3& d, float t_max) const;
+  std::optional<PrimitiveId> nearest(const V3& o, const V3& d, float t_max, const Moment& moment) const;
   // Returns the nearest primitive at a t in (0, t_max) that lets light pass straight through, completely or
   // partly.
   std::optional<PrimitiveId> nearest_boundary(const V3& o, const V3& d, float t_max) const;
+  std::optional<PrimitiveId> nearest_boundary(const V3& o, const V3& d, float t_max,
+                                              const Moment& moment) const;
   // Returns the primitives that the straight line from a to b hits, at most CoincidentHits::kMost. Requires
   // that build() was called with `coincident`.
-  CoincidentHits between(const V3& a, const V3& b) const;
+  CoincidentHits between(const V3& a, const V3& b, const Moment* moment = nullptr) const;
   // True if the ray o + t d hits an opaque primitive at a t in (0, t_max).
   bool occluded(const V3& o, const V3& d, float t_max) const;
+  bool occluded(const V3& o, const V3& d, float t_max, const Moment& moment) const;
 
   bool has_boundaries() const;
   std::uint64_t bytes() const;  // memory of the BVH, as Embree reports it

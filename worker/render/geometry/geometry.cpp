@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "worker/render/base/work_counters.h"
+#include "worker/render/geometry/moment.h"
 
 namespace ls::render {
 namespace {
@@ -227,8 +228,22 @@ bool Geometry::complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hi
   return complete_triangle(*this, id.index, o, d, hit);
 }
 
+bool Geometry::complete(PrimitiveId id, const V3& o, const V3& d, const Moment& moment,
+                        SurfaceHit& hit) const {
+  if (id.instance == kNone) return complete(id, o, d, hit);
+  return complete_instanced(moment.placed(id.instance), id, o, d, hit);
+}
+
+PlacedInstance placed_at(const Geometry& geometry, std::uint32_t instance, double time) {
+  PlacedInstance placed = geometry.instances[instance];
+  if (placed.moving == kNone) return placed;
+  placed.to_world = geometry.moving[placed.moving].to_world(time);
+  placed.to_local = placed.to_world.inverse();
+  return placed;
+}
+
 bool Geometry::complete_unusual(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
-  if (id.instance != kNone) return complete_instanced(id, o, d, hit);
+  if (id.instance != kNone) return complete_instanced(instances[id.instance], id, o, d, hit);
   return complete_local(id, V3d(o), V3d(d), hit);
 }
 
@@ -276,9 +291,9 @@ float reach_of(const PlacedInstance& i, const V3& p, const V3& ng, float local) 
 // The ray is transformed to the group's space without normalisation, so distances along it are the same in
 // both spaces. Normals are transformed back by the matrix of cofactors, negated if the map mirrors: a
 // positive multiple of the inverse transpose, so that normals keep their side of the surface.
-bool Geometry::complete_instanced(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
+bool Geometry::complete_instanced(const PlacedInstance& i, PrimitiveId id, const V3& o, const V3& d,
+                                  SurfaceHit& hit) const {
   LS_COUNT(instances);
-  const PlacedInstance& i = instances[id.instance];
   if (!complete_local(id, i.to_local.point(V3d(o)), i.to_local.vector(V3d(d)), hit)) return false;
   const auto normal = [&](const V3& n) {
     return V3(i.to_world.normal(V3d(n)).normalized() * double{i.mirrored});

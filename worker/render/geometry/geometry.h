@@ -14,13 +14,12 @@
 #include "core/scene/scene.h"
 #include "worker/render/base/asset_loader.h"
 #include "worker/render/base/ray_kind.h"
+#include "worker/render/geometry/instances.h"
 #include "worker/render/math/math.h"
 #include "worker/render/math/transform.h"
 #include "worker/render/texture/surface_attributes.h"
 
 namespace ls::render {
-
-inline constexpr std::uint32_t kNone = 0xffffffffu;
 
 // Properties of a surface. Each shape of the scene is one surface.
 struct SurfaceInfo {
@@ -112,11 +111,6 @@ struct PrimitiveSet {
            disks.last > disks.passing || cylinders.last > cylinders.passing;
   }
 };
-struct PlacedInstance {
-  std::uint32_t group = 0;
-  float mirrored = 1;         // -1 if the maps below mirror, else 1
-  Affine to_world, to_local;  // maps between the world's space and the group's
-};
 
 // Identifies a primitive, as the BVH returns it.
 struct PrimitiveId {
@@ -151,6 +145,8 @@ struct SurfaceHit {
   }
 };
 
+class Moment;
+
 class Geometry {
  public:
   // Reads the scene's shapes. Fails on files and transforms from which no surface can be made.
@@ -169,7 +165,12 @@ class Geometry {
   std::vector<Cylinder> cylinders;
   PrimitiveSet own;                  // primitives outside of groups
   std::vector<PrimitiveSet> groups;  // groups, which are visible through instances only
+  // The instances of the scene, followed by those of the shapes that move by themselves, in the order of the
+  // shapes. The groups of these shapes follow those of the scene.
   std::vector<PlacedInstance> instances;
+  std::vector<MovingInstance> moving;  // those of the instances that move
+  // For each surface: the instance of a shape that moves by itself, else kNone
+  std::vector<std::uint32_t> instance_of_shape;
   std::vector<SurfaceInfo> surfaces;
   SurfaceAttributes attributes;  // mesh attributes that textures read
 
@@ -189,15 +190,21 @@ class Geometry {
   V3 vertex(std::uint32_t triangle, int k) const { return positions[indices[3 * triangle + k]]; }
   // Computes the hit of the ray o + t d on the primitive `id` (t, position, normals, uv) from the shape's own
   // data in plain arithmetic. Returns false if the ray misses the primitive according to this computation.
+  // Instances that move are where they are at time 0 of the exposure or, with `moment`, at its time.
   bool complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const;
+  bool complete(PrimitiveId id, const V3& o, const V3& d, const Moment& moment, SurfaceHit& hit) const;
   // Returns the largest absolute coordinate of the triangle's corners.
   float reach_of(std::uint32_t triangle) const;
 
  private:
   [[gnu::noinline]] bool complete_unusual(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const;
   bool complete_local(PrimitiveId id, const V3d& o, const V3d& d, SurfaceHit& hit) const;
-  bool complete_instanced(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const;
+  bool complete_instanced(const PlacedInstance& i, PrimitiveId id, const V3& o, const V3& d,
+                          SurfaceHit& hit) const;
 };
+
+// Returns where an instance is at a time of the exposure, from 0 to 1.
+PlacedInstance placed_at(const Geometry& geometry, std::uint32_t instance, double time);
 
 // The functions intersect() return the first t in (t_min, t_max) at which the ray o + t d hits the shape, or
 // infinity if there is none. The BVH's callbacks for shapes call them, too.

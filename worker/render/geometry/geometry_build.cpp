@@ -232,7 +232,7 @@ bool finite(const Box& b) {
 }
 
 // The shapes of a scene as placed by their to_world, the bounds of the world (including instances), and the
-// bounds of each group.
+// bounds of each group. A shape that moves has a group of its own, behind those of the scene.
 struct Parts {
   std::vector<Placed> shapes;
   Box world;
@@ -240,12 +240,40 @@ struct Parts {
   std::vector<Box> meshes;  // bounds of the world's own triangle meshes
 };
 
+// Returns the group of each shape: that of the scene, or one of its own if the shape moves.
+std::vector<std::optional<std::uint32_t>> groups_of(const Scene& scene) {
+  std::vector<std::optional<std::uint32_t>> groups;
+  auto own = static_cast<std::uint32_t>(scene.groups.size());
+  for (const Shape& s : scene.shapes) {
+    auto& group = groups.emplace_back();
+    if (s.group) group = s.group->value;
+    if (!s.motion.empty()) group = own++;
+  }
+  return groups;
+}
+std::size_t count_groups(const Scene& scene) {
+  return scene.groups.size() + static_cast<std::size_t>(std::ranges::count_if(
+                                   scene.shapes, [](const Shape& s) { return !s.motion.empty(); }));
+}
+
+// `from_group` maps the group's space to the scene's or, for an instance, to the space that the instance
+// places. A shape is in its group where its to_world places it.
+MovingInstance moving(const Shape& shape, const Affine& from_group, const V3d& center = V3d(0),
+                      double scale = 1) {
+  return {scene::Motion(shape.motion), Affine(shape.to_world).inverse() * from_group, center, scale};
+}
+MovingInstance moving(const Instance& instance, const Affine& from_group, const V3d& center = V3d(0),
+                      double scale = 1) {
+  return {scene::Motion(instance.motion), from_group, center, scale};
+}
+
 // The largest number of vertices of a scene. Indices of vertices have 32 bits, also in the BVH.
 constexpr std::uint64_t kMaxVertices = std::uint64_t{1} << 31;
 
 Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
   Parts parts;
-  parts.groups.resize(scene.groups.size());
+  const auto group_of = groups_of(scene);
+  parts.groups.resize(count_groups(scene));
   std::uint64_t vertices = 0;
   const bool attributes = scene::any_attribute(scene);
   for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
@@ -257,9 +285,11 @@ Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
     if (vertices > kMaxVertices)
       return fail(Errc::resource_exhausted,
                   fmt::format("the scene's meshes have more than {} vertices together", kMaxVertices));
-    const auto& group = scene.shapes[i].group;
+    const auto& group = group_of[i];
     const Box own = bounds_of(*p);
-    (group ? parts.groups[group->value] : parts.world).add(own);
+    (group ? parts.groups[*group] : parts.world).add(own);
+    if (!scene.shapes[i].motion.empty() && !own.empty())
+      parts.world.add(moving(scene.shapes[i], Affine()).box(own, 0, 1));
     if (!group && !p->mesh.positions.empty() && (own.hi - own.lo).length() > 0) parts.meshes.push_back(own);
     parts.shapes.push_back(std::move(*p));
   }
@@ -268,7 +298,9 @@ Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
     if (!m.invertible())
       return fail(Errc::invalid_argument, fmt::format("instance {}: its to_world has no inverse", i + 1));
     const Box& b = parts.groups[scene.instances[i].group.value];
-    if (!b.empty()) parts.world.add(b.moved(m));
+    if (b.empty()) continue;
+    const Instance& instance = scene.instances[i];
+    parts.world.add(instance.motion.empty() ? b.moved(m) : moving(instance, Affine()).box(b, 0, 1));
   }
   if (!finite(parts.world) || !std::all_of(parts.groups.begin(), parts.groups.end(), finite))
     return fail(Errc::invalid_argument,
@@ -302,14 +334,8 @@ PrimitiveSet append_all(Geometry& g, const std::vector<std::uint32_t>& shapes, c
   return set;
 }
 
-Result<PlacedInstance> place_instance(const Instance& instance, const Geometry& g, const Space& group) {
-  const Affine m(instance.to_world);
-  PlacedInstance out;
-  out.group = instance.group.value;
-  out.to_world = Affine::scale_translate(g.scale, -g.center * g.scale) * m *
-                 Affine::scale_translate(1 / group.scale, group.center);
-  // The translation is computed again, because digits may cancel in the product of the three maps above
-  out.to_world.b = (m.point(group.center) - g.center) * g.scale;
+// Completes an instance whose map to the world is set, and checks it.
+Result<PlacedInstance> checked(PlacedInstance out) {
   if (!out.to_world.invertible()) return fail(Errc::invalid_argument, "its to_world has no inverse");
   out.to_local = out.to_world.inverse();
   // The largest absolute value allowed in the matrix of to_local. The BVH transforms rays to the group's
@@ -326,10 +352,54 @@ Result<PlacedInstance> place_instance(const Instance& instance, const Geometry& 
   return out;
 }
 
+Result<PlacedInstance> place_instance(const Instance& instance, const Geometry& g, const Space& group) {
+  const Affine m(instance.to_world);
+  PlacedInstance out;
+  out.group = instance.group.value;
+  out.to_world = Affine::scale_translate(g.scale, -g.center * g.scale) * m *
+                 Affine::scale_translate(1 / group.scale, group.center);
+  // The translation is computed again, because digits may cancel in the product of the three maps above
+  out.to_world.b = (m.point(group.center) - g.center) * g.scale;
+  return checked(out);
+}
+
+// Places a shape or an instance that moves. Scales between two keys are between theirs.
+template <class T>
+Result<PlacedInstance> place_moving(const T& object, std::uint32_t group, Geometry& g, const Space& space) {
+  const MovingInstance instance =
+      moving(object, Affine::scale_translate(1 / space.scale, space.center), g.center, g.scale);
+  PlacedInstance out;
+  out.group = group;
+  for (const MotionKey& key : object.motion) {
+    out.to_world = instance.to_world(key.time);
+    if (auto ok = checked(out); !ok) return ok;
+  }
+  out.to_world = instance.to_world(0);
+  out.moving = static_cast<std::uint32_t>(g.moving.size());
+  g.moving.push_back(instance);
+  return checked(out);
+}
+
+template <class T>
+Result<void> add_instance(const T& object, std::uint32_t group, const std::vector<Space>& spaces, Geometry& g,
+                          std::string_view what, std::size_t number) {
+  Result<PlacedInstance> placed = PlacedInstance{};
+  if (!object.motion.empty())
+    placed = place_moving(object, group, g, spaces[group]);
+  else if constexpr (std::is_same_v<T, Instance>)
+    placed = place_instance(object, g, spaces[group]);
+  if (!placed)
+    return fail(placed.error().code, fmt::format("{} {}: {}", what, number, placed.error().message));
+  g.instances.push_back(*placed);
+  return {};
+}
+
 bool names_groups_that_exist(const Scene& scene) {
   const auto there = [&](GroupIndex g) { return g.value < scene.groups.size(); };
   return std::all_of(scene.shapes.begin(), scene.shapes.end(),
-                     [&](const Shape& s) { return !s.group || (there(*s.group) && !s.emitter); }) &&
+                     [&](const Shape& s) {
+                       return !s.group || (there(*s.group) && !s.emitter && s.motion.empty());
+                     }) &&
          std::all_of(scene.instances.begin(), scene.instances.end(),
                      [&](const Instance& i) { return there(i.group); });
 }
@@ -343,7 +413,7 @@ Result<Geometry> Geometry::build(const Scene& scene, const AssetLoader& files) {
   if (!names_groups_that_exist(scene))
     return fail(Errc::invalid_argument,
                 "a shape or instance is of a group that the scene does not have, or "
-                "emits light in a group");
+                "moves by itself or emits light in a group");
   const auto parts = place_all(scene, files);
   if (!parts) return tl::unexpected(parts.error());
   const scene::LinkLists links(scene);
@@ -362,21 +432,25 @@ Result<Geometry> Geometry::build(const Scene& scene, const AssetLoader& files) {
     g.radius = static_cast<float>((half.length() + aside.length()) * g.scale);
   }
   std::vector<std::uint32_t> own;
-  std::vector<std::vector<std::uint32_t>> of_group(scene.groups.size());
-  for (std::uint32_t i = 0; i < scene.shapes.size(); ++i) {
-    const auto& group = scene.shapes[i].group;
-    (group ? of_group[group->value] : own).push_back(i);
-  }
+  const auto group_of = groups_of(scene);
+  std::vector<std::vector<std::uint32_t>> of_group(parts->groups.size());
+  for (std::uint32_t i = 0; i < scene.shapes.size(); ++i)
+    (group_of[i] ? of_group[*group_of[i]] : own).push_back(i);
   g.own = append_all(g, own, *parts, world);
   std::vector<Space> spaces;
   for (std::size_t i = 0; i < of_group.size(); ++i)
     g.groups.push_back(append_all(g, of_group[i], *parts, spaces.emplace_back(unit_space(parts->groups[i]))));
-  g.instances.reserve(scene.instances.size());
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
-    auto placed = place_instance(scene.instances[i], g, spaces[scene.instances[i].group.value]);
-    if (!placed)
-      return fail(placed.error().code, fmt::format("instance {}: {}", i + 1, placed.error().message));
-    g.instances.push_back(*placed);
+    const Instance& instance = scene.instances[i];
+    if (auto ok = add_instance(instance, instance.group.value, spaces, g, "instance", i + 1); !ok)
+      return tl::unexpected(ok.error());
+  }
+  g.instance_of_shape.resize(scene.shapes.size(), kNone);
+  for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
+    if (scene.shapes[i].motion.empty()) continue;
+    g.instance_of_shape[i] = static_cast<std::uint32_t>(g.instances.size());
+    if (auto ok = add_instance(scene.shapes[i], *group_of[i], spaces, g, "shape", i + 1); !ok)
+      return tl::unexpected(ok.error());
   }
   g.attributes.find_means();
   // The BVH loads 16 bytes for a 12-byte vertex, so the allocation must not end directly behind the last

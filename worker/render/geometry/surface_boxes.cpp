@@ -51,7 +51,9 @@ std::optional<std::vector<SurfaceBox>> surface_boxes(const Geometry& g,
     }
     if (boxes.size() + instances[group[i]].size() > kMaxBoxes) return std::nullopt;
     for (const std::uint32_t k : instances[group[i]]) {
-      const Box b = own[i].moved(g.instances[k].to_world);
+      const PlacedInstance& placed = g.instances[k];
+      const Box b =
+          placed.moving == kNone ? own[i].moved(placed.to_world) : g.moving[placed.moving].box(own[i], 0, 1);
       boxes.push_back({i, k, V3(b.lo), V3(b.hi)});
     }
   }

@@ -4,33 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <optional>
 #include <vector>
 
+#include "worker/render/geometry/box.h"
 #include "worker/render/geometry/geometry.h"
 
 namespace ls::render {
 
-struct Box {
-  V3d lo{std::numeric_limits<double>::infinity()}, hi{-std::numeric_limits<double>::infinity()};
-
-  bool empty() const { return !(lo.x <= hi.x); }
-  void add(const V3d& p) { add({p, p}); }
-  void add(const Box& b) {
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], b.lo[k]);
-      hi[k] = std::max(hi[k], b.hi[k]);
-    }
-  }
-  // Returns the box around the image of this box under the map m. This box must not be empty.
-  Box moved(const Affine& m) const {
-    Box r;
-    for (int k = 0; k < 8; ++k)
-      r.add(m.point({k & 1 ? hi.x : lo.x, k & 2 ? hi.y : lo.y, k & 4 ? hi.z : lo.z}));
-    return r;
-  }
-};
 // The boxes of shapes are exact up to rounding in double.
 inline Box box_of(const Sphere& s) { return {s.center - V3d(s.radius), s.center + V3d(s.radius)}; }
 inline V3d reach(const V3d& u, const V3d& v) {  // half extent of the ellipse u cos a + v sin a
@@ -66,8 +47,8 @@ struct SurfaceBox {
   }
 };
 
-// Returns the bounding boxes, in the world, of the surfaces for which `wanted` is true and that have
-// primitives. Returns nullopt if instances make the list longer than 2^23 boxes.
+// Returns the bounding boxes, in the world and over the whole exposure, of the surfaces for which `wanted` is
+// true and that have primitives. Returns nullopt if instances make the list longer than 2^23 boxes.
 std::optional<std::vector<SurfaceBox>> surface_boxes(const Geometry& g,
                                                      const std::function<bool(const SurfaceInfo&)>& wanted);
 

@@ -37,11 +37,11 @@ static_assert((kOfSurface.bits() ^ kOfLight.bits() ^ kOfGuide.bits() ^ kOfOpacit
 
 // Returns the uv of a hit. On spheres it is computed from the position, because SurfaceHit::uv is set there
 // only if the surface's material or light needs it.
-V2 uv_of(const Geometry& g, const SurfaceHit& hit) {
+V2 uv_of(const Geometry& g, const SurfaceHit& hit, float time) {
   if (hit.primitive.kind != PrimitiveId::Kind::sphere) return hit.uv;
   const Sphere& s = g.spheres[hit.primitive.index];
   V3d p(hit.p);
-  if (hit.primitive.instance != kNone) p = g.instances[hit.primitive.instance].to_local.point(p);
+  if (hit.primitive.instance != kNone) p = placed_at(g, hit.primitive.instance, time).to_local.point(p);
   return sphere_uv(s, (p - s.center).normalized());
 }
 
@@ -106,7 +106,7 @@ void AovPixel::end_sample(int x, int y, std::uint64_t sample, bool usable) {
   if (wants_guide_) add_guide(ray, stream, sample & 1);
   if (wants_opacity_) add_opacity(ray, stream, sample & 1);
   if (!wants_surface_) return;
-  const auto first = PathTracer<Features{.passing = true}>(world_, stream).first_surface(ray);
+  const auto first = PathTracer<Features{.passing = true, .motion = true}>(world_, stream).first_surface(ray);
   if (first) add_surface(*first, stream, ray);
 }
 
@@ -147,7 +147,7 @@ void AovPixel::add_surface(const FirstSurface& first, const SampleStream& stream
   add(Aov::normal, V3d(hit.shading.n));
   add(Aov::geo_normal, V3d(hit.ng));
   if (wanted.has(Aov::uv)) {
-    const V2 uv = uv_of(world_.geometry, hit);
+    const V2 uv = uv_of(world_.geometry, hit, ray.time);
     add(Aov::uv, {uv.x, uv.y, 0});
   }
   if (wanted.has(Aov::albedo)) add(Aov::albedo, V3d(albedo_of(world_, first, stream, ray.d)));
@@ -158,14 +158,14 @@ void AovPixel::add_surface(const FirstSurface& first, const SampleStream& stream
 }
 
 void AovPixel::add_guide(const CameraRay& ray, const SampleStream& stream, std::size_t half) {
-  const DenoisingGuide guide = PathTracer<kAnyMedia>(world_, stream).denoising_guide(ray);
+  const DenoisingGuide guide = PathTracer<kAnyMotion>(world_, stream).denoising_guide(ray);
   if (is_finite(guide.albedo)) add(Aov::denoising_albedo, V3d(guide.albedo), half);
   const V3d& n = guide.normal;
   if (std::isfinite(n.x + n.y + n.z)) add(Aov::denoising_normal, n, half);
 }
 
 void AovPixel::add_opacity(const CameraRay& ray, const SampleStream& stream, std::size_t half) {
-  constexpr Features kFeatures = kAnyMedia.with(&Features::visibility);
+  constexpr Features kFeatures = kAnyMotion.with(&Features::visibility);
   const bool deep = slices_.records() > 0;
   const DeepTransmittance slices{edges_.between, edges_.surfaces, through_};
   if (deep) std::ranges::fill(through_, 0.0);

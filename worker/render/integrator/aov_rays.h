@@ -16,8 +16,8 @@ namespace ls::render {
 // that scatters a ray of this kind, if there is one.
 template <Features F, template <Features> class Light>
 bool PathTracer<F, Light>::meet(SurfaceHit& hit, float reach, RayKind kind) const {
-  const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, reach);
-  if (!primitive || !world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit)) return false;
+  const auto primitive = nearest(ray_.origin, ray_.d, reach);
+  if (!primitive || !complete(*primitive, ray_.origin, ray_.d, hit)) return false;
   if (world_.coincident) prefer_scatterer<true>(hit, ray_.origin, ray_.d, kInfinity, kind);
   return true;
 }
@@ -27,7 +27,7 @@ bool PathTracer<F, Light>::meet(SurfaceHit& hit, float reach, RayKind kind) cons
 // use the same random numbers as in trace().
 template <Features F, template <Features> class Light>
 std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay& ray) {
-  ray_ = {ray.o, ray.o, ray.d};
+  begin(ray);
   float t_max = ray.t_max;
   FirstSurface first;
   SurfaceHit& hit = first.hit;
@@ -54,7 +54,7 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
   DenoisingGuide guide;
   double unscattered = 1;
   bool direct = true;  // true before the first mirror or glass
-  ray_ = {ray.o, ray.o, ray.d};
+  begin(ray);
   medium_ = start_medium(ray);
   float reach = ray.t_max;
   for (segment_ = 0; segment_ < kGuideSegments; ++segment_, reach = kInfinity) {
@@ -113,7 +113,7 @@ Opacity PathTracer<F, Light>::opacity(const CameraRay& ray, const DeepTransmitta
   };
   // Transmittances of the media, and of the surfaces that light passes straight through
   C3 media(1), surfaces(1), shadow(0);
-  ray_ = {ray.o, ray.o, ray.d};
+  begin(ray);
   medium_ = start_medium(ray);
   float reach = ray.t_max;
   for (segment_ = 0; segment_ < kMaxSegments; ++segment_, reach = kInfinity) {
@@ -195,7 +195,7 @@ C3 PathTracer<F, Light>::shadow_at(const SurfaceHit& hit) {
   const Group g = stream_.group(0, Purpose::shadow_catcher), sky = stream_.group(1, Purpose::shadow_catcher);
   if (world_.lights.can_sample()) {
     const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, {hit.p, n});
-    const auto light = world_.lights.sample(choice, hit.p);
+    const auto light = sample_light(choice, hit.p);
     if (light && turn_to(choice, hit)) receive(*light, dot(light->direction, n) / light->pdf, 0);
   }
   if (!is_black(world_.lights.constant_environment()) &&
@@ -222,8 +222,8 @@ bool PathTracer<F, Light>::meets_catcher(const V3& p, const LightSample& light) 
   }
   for (int i = 0; i < kMaxShadowSegments; ++i) {
     SurfaceHit hit;
-    const auto primitive = world_.accel.nearest(o, d, left);
-    if (!primitive || !world_.geometry.complete(*primitive, o, d, hit)) return false;
+    const auto primitive = nearest(o, d, left);
+    if (!primitive || !complete(*primitive, o, d, hit)) return false;
     if (world_.coincident) prefer_scatterer<true>(hit, o, d, left, RayKind::shadow);
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     if (surface.catcher && !surface.null && !is_hidden(hit.surface, RayKind::shadow)) return true;
@@ -242,7 +242,7 @@ DeepProbe PathTracer<F, Light>::deep_probe(const CameraRay& ray) {
   DeepProbe probe;
   const float near = world_.camera.near_distance(ray);
   const auto depth_of = [&](const V3& p) { return near + dot(p - ray.o, ray.d); };
-  ray_ = {ray.o, ray.o, ray.d};
+  begin(ray);
   medium_ = start_medium(ray);
   float reach = ray.t_max;
   for (segment_ = 0; segment_ < kProbeSegments; ++segment_, reach = kInfinity) {

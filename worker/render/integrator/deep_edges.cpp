@@ -51,7 +51,7 @@ std::vector<DeepProbe> probes_of(const World& w, int x, int y, std::uint32_t cou
   std::vector<DeepProbe> probes;
   for (std::uint32_t i = 0; i < count; ++i) {
     const SampleStream stream(0, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), i);
-    probes.push_back(PathTracer<kAnyMedia>(w, stream).deep_probe(camera_ray(w, stream, x, y)));
+    probes.push_back(PathTracer<kAnyMotion>(w, stream).deep_probe(camera_ray(w, stream, x, y)));
   }
   return probes;
 }

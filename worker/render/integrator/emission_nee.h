@@ -71,8 +71,8 @@ void PathTracer<F, Light>::add_emission_at(const EmissiveGrids::Point& point, co
   for (int i = 0; i < kMaxShadowSegments; ++i) {
     SurfaceHit hit;
     LS_COUNT(shadow_rays);
-    const auto primitive = world_.accel.nearest(ray.origin, ray.d, left);
-    const bool met = primitive && world_.geometry.complete(*primitive, ray.origin, ray.d, hit);
+    const auto primitive = nearest(ray.origin, ray.d, left);
+    const bool met = primitive && complete(*primitive, ray.origin, ray.d, hit);
     if constexpr (F.overlaps) {
       if (met && world_.coincident) prefer_scatterer(hit, ray.origin, ray.d, left, kind);
     }

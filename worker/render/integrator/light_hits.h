@@ -26,15 +26,14 @@ void PathTracer<F, Light>::add_emission_times(const C3& beta, const SurfaceHit& 
   see_surface(hit.p);
   float weight = 1;
   if (!hits_count_fully(hit)) {
-    const float p_l =
-        world_.lights.pdf(hit, last_.p, ray_.d, last_.place, last_.in_medium.light_chosen_first());
+    const float p_l = light_pdf(hit);
     if constexpr (F.reuse) {
       if (is_leaving_second()) {
         keep_emitted(emitted, p_l, world_.lights.group(hit));
         return;
       }
     }
-    weight = balance_weight(last_.pdf, p_l * last_.in_medium.found_as_light(world_.lights.pivot(hit)));
+    weight = balance_weight(last_.pdf, p_l * last_.in_medium.found_as_light(light_pivot(hit)));
   }
   add(beta * emitted * weight, F.split ? world_.lights.group(hit) : kNoLightGroup);
 }

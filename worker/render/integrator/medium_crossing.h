@@ -225,7 +225,7 @@ void PathTracer<F, Light>::light_vertex(const Medium& medium, const V3& p, const
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::light_vertex_by(const LightChoice& choice, const Medium& medium, const V3& p,
                                            const V3& d) {
-  const auto light = world_.lights.sample(choice, p);
+  const auto light = sample_light(choice, p);
   if (!light || !turn_to(choice, medium)) return;
   const PhaseValue<F> phase = medium.phase_value<F>(p, d, light->direction);
   const float sampled = direction_pdf(p, phase.pdf, light->direction);
@@ -394,7 +394,8 @@ template <Features F, template <Features> class Light>
 CoincidentHits PathTracer<F, Light>::others_at(const SurfaceHit& hit, const V3& from, const V3& w) const {
   const V3 back = offset_point(hit, -w) - hit.p;
   const float share = hit.t * std::abs(dot(from, back)) / dot(back, back);
-  CoincidentHits all = world_.accel.between(hit.p + back * std::min(1.f, share), offset_point(hit, w));
+  CoincidentHits all =
+      world_.accel.between(hit.p + back * std::min(1.f, share), offset_point(hit, w), moment());
   const auto end = std::remove(all.ids.begin(), all.ids.begin() + all.count, hit.primitive);
   all.count = static_cast<int>(end - all.ids.begin());
   return all;
@@ -414,7 +415,7 @@ auto PathTracer<F, Light>::through_all(const SurfaceHit& hit, const V3& w, const
     if ((dot(w, hit.ng) > 0) == outside) stand(own, outside, true, in);
     for (int i = 0; i < others.count; ++i) {
       SurfaceHit other;
-      if (!world_.geometry.complete(others.ids[static_cast<std::size_t>(i)], o, d, other)) continue;
+      if (!complete(others.ids[static_cast<std::size_t>(i)], o, d, other)) continue;
       const SurfaceInfo& s = world_.geometry.surfaces[other.surface];
       if (s.passable && (dot(d, other.ng) > 0) == outside) stand(s, outside, true, in);
     }
@@ -446,7 +447,7 @@ void PathTracer<F, Light>::prefer_scatterer(SurfaceHit& hit, const V3& o, const 
   for (int i = 0; i < others.count; ++i) {
     SurfaceHit other;
     const PrimitiveId id = others.ids[static_cast<std::size_t>(i)];
-    if (!world_.geometry.complete(id, o, d, other)) continue;
+    if (!complete(id, o, d, other)) continue;
     const SurfaceInfo& info = world_.geometry.surfaces[other.surface];
     if ((info.null && !hidden) || is_passed(other.surface) || other.t > t_max) continue;
     hit = other;
@@ -461,8 +462,7 @@ void PathTracer<F, Light>::add_emission_of_others(const SurfaceHit& hit) {
   const CoincidentHits others = others_at(hit, ray_.d, ray_.d);
   for (int i = 0; i < others.count; ++i) {
     SurfaceHit other;
-    if (!world_.geometry.complete(others.ids[static_cast<std::size_t>(i)], ray_.origin, ray_.d, other))
-      continue;
+    if (!complete(others.ids[static_cast<std::size_t>(i)], ray_.origin, ray_.d, other)) continue;
     const SurfaceInfo& s = world_.geometry.surfaces[other.surface];
     if constexpr (F.visibility) {
       if (s.hidden.has(ray_kind()) || (depth_ == 0 && s.holdout)) continue;

@@ -28,6 +28,7 @@
 #include <type_traits>
 
 #include "worker/render/base/features.h"
+#include "worker/render/geometry/moment.h"
 #include "worker/render/integrator/mis.h"
 #include "worker/render/integrator/offset_ray.h"
 #include "worker/render/integrator/path_records.h"
@@ -212,6 +213,62 @@ class PathTracer {
   void add_environment();
   [[gnu::cold, gnu::noinline]] void add_environment_seen();
   bool meet(SurfaceHit& hit, float reach, RayKind kind) const;
+
+  // What rays meet at the time of the path; as the functions of Accel and of Geometry.
+  std::optional<PrimitiveId> nearest(const V3& o, const V3& d, float t_max) const {
+    if constexpr (F.motion)
+      return world_.accel.nearest(o, d, t_max, moment_);
+    else
+      return world_.accel.nearest(o, d, t_max);
+  }
+  std::optional<PrimitiveId> nearest_boundary(const V3& o, const V3& d, float t_max) const {
+    if constexpr (F.motion)
+      return world_.accel.nearest_boundary(o, d, t_max, moment_);
+    else
+      return world_.accel.nearest_boundary(o, d, t_max);
+  }
+  bool occluded(const V3& o, const V3& d, float t_max) const {
+    if constexpr (F.motion)
+      return world_.accel.occluded(o, d, t_max, moment_);
+    else
+      return world_.accel.occluded(o, d, t_max);
+  }
+  bool complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
+    if constexpr (F.motion)
+      return world_.geometry.complete(id, o, d, moment_, hit);
+    else
+      return world_.geometry.complete(id, o, d, hit);
+  }
+  // Lights at the time of the path; as the functions of Lights.
+  std::optional<LightSample> sample_light(const LightChoice& choice, const V3& x) const {
+    if constexpr (F.motion)
+      return world_.lights.sample(choice, x, moment_);
+    else
+      return world_.lights.sample(choice, x);
+  }
+  template <class Of>
+  Pivot light_pivot(const Of& choice_or_hit) const {
+    if constexpr (F.motion)
+      return world_.lights.pivot(choice_or_hit, moment_);
+    else
+      return world_.lights.pivot(choice_or_hit);
+  }
+  float light_pdf(const SurfaceHit& hit) const {
+    const bool first = last_.in_medium.light_chosen_first();
+    if constexpr (F.motion)
+      return world_.lights.pdf(hit, last_.p, ray_.d, last_.place, first, moment_);
+    else
+      return world_.lights.pdf(hit, last_.p, ray_.d, last_.place, first);
+  }
+  const Moment* moment() const {
+    if constexpr (F.motion) return &moment_;
+    return nullptr;
+  }
+  // Places the path at the start of a camera ray, and at its time.
+  void begin(const CameraRay& ray) {
+    ray_ = {ray.o, ray.o, ray.d};
+    if constexpr (F.motion) moment_.begin(world_.geometry, ray.time);
+  }
   // True if a camera ray passes straight through the surface; false if it ends there.
   bool sees_past(const SurfaceHit& hit, const SurfaceInfo& surface) {
     return surface.hidden.has(RayKind::camera) || surface.null ||
@@ -467,6 +524,7 @@ class PathTracer {
     scene::LinkMask receiver = 0;                    // the lists that have what the last vertex is on or in
     scene::LinkIndex blockers = scene::kEverything;  // the list of the light of shadow rays
   };
+  std::conditional_t<F.motion, Moment, Nothing> moment_;
   std::conditional_t<F.visibility, Links, Nothing> links_;
   struct Emissive {
     // The density with which the last vertex found the direction of the current ray by looking for emissive
@@ -481,7 +539,7 @@ class PathTracer {
 template <Features F, template <Features> class Light>
 SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
   if (!world_.depth_allows(0)) return outcome_;
-  ray_ = {ray.o, ray.o, ray.d};
+  begin(ray);
   last_.p = ray.o;
   if constexpr (F.split)
     if (split_->by_depth.wanted) split_->by_depth.begin(ray.o, world_.camera.near_distance(ray));
@@ -548,8 +606,8 @@ void PathTracer<F, Light>::go_on(float t_max) {
       }
     }
     SurfaceHit hit;
-    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, t_max);
-    const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
+    const auto primitive = nearest(ray_.origin, ray_.d, t_max);
+    const bool met = primitive && complete(*primitive, ray_.origin, ray_.d, hit);
     if constexpr (F.overlaps) {
       if (met && world_.coincident)
         prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity, F.visibility ? ray_kind() : RayKind::camera);

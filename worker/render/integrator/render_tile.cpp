@@ -34,6 +34,8 @@ std::span<const Variant> plain_variants() {
       variant<kEveryScene.with(&Features::phases)>("everything, any phase function"),
       variant<Features{.media = true, .passing = true, .height = true}>("grey fog that falls with height"),
       variant<kAnyMedia>("everything, fog that falls with height"),
+      variant<Features{.passing = true, .motion = true}>("surfaces that move"),
+      variant<kAnyMotion>("everything, surfaces that move"),
       kSplitVariant,
   };
   return kVariants;

@@ -214,7 +214,7 @@ class SegmentNee {
   static void propose(Path& path, const Medium& medium, const Segment& segment, const Plan& plan,
                       const LightChoice& choice, bool by_angle, std::uint32_t bits, RandomStream& stream) {
     const OpticalDepthIn<F>& s = plan.depths;
-    const Pivot pivot = choice.has_place ? path.world_.lights.pivot(choice) : Pivot(V3(0));
+    const Pivot pivot = choice.has_place ? path.light_pivot(choice) : Pivot(V3(0));
     DepthPoint at_point;
     V3 p;
     float e_angle = 0;
@@ -234,7 +234,7 @@ class SegmentNee {
     p = path.ray_.moved_off_ends(p, segment, at_point.t);
     const C3 scattering = at_point.rate > 0 ? s.scattering(at_point, p) : C3(0);
     if (is_black(scattering)) return;
-    const auto light = path.world_.lights.sample(choice, p);
+    const auto light = path.sample_light(choice, p);
     if (!light || !path.turn_to(choice, medium)) return;
 
     const Vertex v = vertex_at(path, medium, plan, at_point);

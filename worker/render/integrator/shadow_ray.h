@@ -30,7 +30,7 @@ C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSam
       return light.radiance * through_media(medium, start, d, *t, stream);
   }
   LS_COUNT(shadow_rays);
-  if (world_.accel.occluded(p, d, left)) return {0, 0, 0};
+  if (occluded(p, d, left)) return {0, 0, 0};
   bool walk = F.passing && world_.shadows_walk;
   if constexpr (F.media) walk = walk || medium.any();
   return walk ? through_boundaries(light.radiance, start, p, d, left, medium, stream) : light.radiance;
@@ -48,8 +48,8 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
   for (int i = 0; i < kMaxShadowSegments; ++i) {
     SurfaceHit hit;
     LS_COUNT(boundary_rays);
-    const auto primitive = world_.accel.nearest_boundary(ray.origin, d, left);
-    const bool met = primitive && world_.geometry.complete(*primitive, ray.origin, d, hit);
+    const auto primitive = nearest_boundary(ray.origin, d, left);
+    const bool met = primitive && complete(*primitive, ray.origin, d, hit);
     if constexpr (F.overlaps) {
       if (met && world_.coincident) prefer_scatterer(hit, ray.origin, d, left, RayKind::shadow);
     }

@@ -23,7 +23,7 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::light_surface_by(const LightChoice& choice, const SurfaceHit& hit,
                                             const SurfaceInfo& surface, const V3& wo) {
-  const auto light = world_.lights.sample(choice, hit.p);
+  const auto light = sample_light(choice, hit.p);
   if (!light || !turn_to(choice, hit)) return;
   const V3 wi = hit.shading.to_local(light->direction);
   // A shading normal must not let light through a surface that is opaque by its geometric normal. Sampled

@@ -38,15 +38,15 @@ struct Variant {
   GroupFn group = nullptr;  // set with Features::reuse, and then used instead of `sample`
 };
 
-[[gnu::cold, gnu::noinline]] inline CameraRay moving_camera_ray(const World& w, const SampleStream& stream,
-                                                                double fx, double fy, V2 lens) {
+[[gnu::cold, gnu::noinline]] inline CameraRay camera_ray_in_time(const World& w, const SampleStream& stream,
+                                                                 double fx, double fy, V2 lens) {
   return w.camera.ray_at(stream.group(0, Purpose::time).u(0), fx, fy, lens);
 }
-// Returns the camera ray through a point of the frame, in pixels. A camera that moves gets a random time.
+// Returns the camera ray through a point of the frame, in pixels. If anything moves, the time is random.
 inline CameraRay camera_ray_through(const World& w, const SampleStream& stream, double fx, double fy,
                                     V2 lens) {
-  if (w.camera.moves()) [[unlikely]]
-    return moving_camera_ray(w, stream, fx, fy, lens);
+  if (w.moves) [[unlikely]]
+    return camera_ray_in_time(w, stream, fx, fy, lens);
   return w.camera.ray(fx, fy, lens);
 }
 inline CameraRay camera_ray(const World& w, const SampleStream& stream, int x, int y) {

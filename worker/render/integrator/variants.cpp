@@ -10,9 +10,12 @@ std::span<const Variant> whitted_variants() {
   static constexpr Variant kVariants[] = {
       variant<Features{.passing = true, .whitted = true}>("surfaces, whitted"),
       variant<Features{.overlaps = true, .passing = true, .whitted = true}>("coincident surfaces, whitted"),
-      variant<Features{
-          .overlaps = true, .passing = true, .visibility = true, .split = true, .whitted = true}>(
-          "coincident surfaces, whitted, and light in parts"),
+      variant<Features{.overlaps = true,
+                       .passing = true,
+                       .visibility = true,
+                       .split = true,
+                       .whitted = true,
+                       .motion = true}>("coincident surfaces that move, whitted, and light in parts"),
   };
   return kVariants;
 }

@@ -113,12 +113,12 @@ class VertexNee {
     if (!lights.can_sample()) return;
     const Group g = path.stream_.group(path.depth_, Purpose::light);
     const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]}, path.last_.place);
-    const auto light = lights.sample(choice, p);
+    const auto light = path.sample_light(choice, p);
     if (!light || !path.turn_to(choice, medium)) return;
     const PhaseValue<F> phase = medium.phase_value<F>(p, d, light->direction);
     const auto& v = path.last_.in_medium;
     const float with_equiangular = v.uses_equiangular(choice.is_point) && choice.has_place
-                                       ? 1 + v.equiangular_ratio(lights.pivot(choice))
+                                       ? 1 + v.equiangular_ratio(path.light_pivot(choice))
                                        : 1.f;
     const float weight = light->delta ? 1 / with_equiangular
                                       : light->pdf / (light->pdf * with_equiangular +
@@ -158,12 +158,13 @@ class VertexNee {
     const float length = depths.to() - depths.from();
     if (!(length > 0)) return;
     const V3 o = path.ray_.start + path.ray_.d * depths.from();
-    const EquiAngular::Sample s = EquiAngular(o, path.ray_.d, length, lights.pivot(choice)).sample(g.u(3));
+    const EquiAngular::Sample s =
+        EquiAngular(o, path.ray_.d, length, path.light_pivot(choice)).sample(g.u(3));
     const DepthPoint at_point = depths.at(depths.from() + s.t);
     const V3 p = path.ray_.moved_off_ends(s.p, segment, at_point.t);
     const C3 scattering = at_point.rate > 0 ? depths.scattering(at_point, p) : C3(0);
     if (is_black(scattering)) return;
-    const auto light = lights.sample(choice, p);
+    const auto light = path.sample_light(choice, p);
     if (!light || !(s.pdf > 0) || !path.turn_to(choice, medium)) return;
     const PhaseValue<F> phase = medium.phase_value<F>(p, path.ray_.d, light->direction);
     const float ratio = ratio_to_flight(s.pdf, flight_pdf<F>(medium, path.density_, at_point));

@@ -81,8 +81,8 @@ void PathTracer<F, Light>::add_direct_past(scene::LinkIndex blockers) {
   };
   for (int i = 0; i < kMaxShadowSegments; ++i) {
     SurfaceHit hit;
-    const auto primitive = world_.accel.nearest(ray.origin, ray.d, kInfinity);
-    const bool met = primitive && world_.geometry.complete(*primitive, ray.origin, ray.d, hit);
+    const auto primitive = nearest(ray.origin, ray.d, kInfinity);
+    const bool met = primitive && complete(*primitive, ray.origin, ray.d, hit);
     if constexpr (F.overlaps) {
       if (met && world_.coincident) prefer_scatterer(hit, ray.origin, ray.d, kInfinity, RayKind::shadow);
     }
@@ -103,7 +103,7 @@ void PathTracer<F, Light>::add_direct_past(scene::LinkIndex blockers) {
         for (int k = 0; k < others.count; ++k) {
           SurfaceHit other;
           const PrimitiveId id = others.ids[static_cast<std::size_t>(k)];
-          if (!world_.geometry.complete(id, ray.origin, ray.d, other)) continue;
+          if (!complete(id, ray.origin, ray.d, other)) continue;
           if (world_.geometry.surfaces[other.surface].null || is_hidden(other.surface, RayKind::shadow))
             add_light_of(other);
         }

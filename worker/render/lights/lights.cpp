@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/overloaded.h"
+#include "worker/render/geometry/moment.h"
 
 namespace ls::render {
 namespace {
@@ -14,6 +15,36 @@ constexpr std::ptrdiff_t kTreeFrom = 32;
 // Every kTableShare-th of the random words that choose among the lights of the tree uses the table of all
 // lights instead of the tree. So each of these lights keeps at least 1/16 of its probability in the table.
 constexpr std::uint64_t kTableShare = 16;
+
+// Returns the scale of the map from the group's space to the world, for a map that keeps angles, at time 0.
+double scale_of(const PlacedInstance& placed) { return std::cbrt(std::abs(placed.to_world.determinant())); }
+
+// Returns the reach (SurfaceHit::reach), in the group's space, of points whose errors are those of rays in
+// the world: coordinates of the world are at most 1, but for those of its centre, and the map to the group's
+// space adds four products of such coordinates (geometry.cpp, reach_of()).
+float reach_in_group(const Geometry& g, std::uint32_t instance) {
+  double least = kInfinity;
+  for (const MotionKey& key : g.moving[g.instances[instance].moving].motion().keys())
+    least = std::min(
+        least, std::cbrt(std::abs(g.moving[g.instances[instance].moving].to_world(key.time).determinant())));
+  return static_cast<float>(4 / least);
+}
+
+LightSample moved(LightSample s, const PlacedInstance& placed, const V3& x) {
+  s.direction = normalize(V3(placed.to_world.vector(V3d(s.direction))));
+  s.target = V3(placed.to_world.point(V3d(s.target)));
+  const V3 way = s.target - x;
+  s.distance = std::sqrt(dot(way, way));
+  return s;
+}
+
+// Returns the part of a hit that the lights' densities depend on, in the group's space.
+SurfaceHit hit_in_group(const SurfaceHit& hit, const PlacedInstance& placed) {
+  SurfaceHit local = hit;
+  local.p = V3(placed.to_local.point(V3d(hit.p)));
+  local.ng = normalize(V3(placed.to_local.vector(V3d(hit.ng))));
+  return local;
+}
 
 }  // namespace
 
@@ -32,9 +63,11 @@ void Lights::add(std::variant<Kind...> kind) {
 void Lights::add_area(const Scene& scene, std::uint32_t shape, const SurfacePrimitives& primitives,
                       Geometry& g) {
   const auto lights = static_cast<std::uint32_t>(lights_.size());
+  const std::uint32_t instance = g.instance_of_shape[shape];
   const auto finish = [&](auto& l) {
     const LightBounds box = l.bounds(world());
     l.reach = std::max(largest(box.low), largest(box.high));
+    if (instance != kNone) l.reach = std::max(l.reach, reach_in_group(g, instance));
     // If the light's surface is null or hidden (some light passes straight through it), other surfaces may
     // coincide with it. Shadow rays must then end in front of all of these surfaces.
     if (g.surfaces[shape].passable) l.reach = std::max(l.reach, g.surfaces[shape].coincident_reach);
@@ -42,7 +75,9 @@ void Lights::add_area(const Scene& scene, std::uint32_t shape, const SurfacePrim
   };
   auto light = make_area_light(scene.shapes[shape], shape, primitives, world());
   std::visit(finish, light);
-  if (lights_.size() > lights) g.surfaces[shape].light = lights;
+  if (lights_.size() == lights) return;
+  g.surfaces[shape].light = lights;
+  lights_.back().instance = instance;
 }
 
 Result<void> Lights::add_map(const Scene& scene, const EnvmapEmitter& emitter, const ImageLoader& images) {
@@ -134,7 +169,25 @@ Result<Lights> Lights::build(const Scene& scene, Geometry& geometry, const Textu
 }
 
 double Lights::power(const Light& light) const {
-  return with_kind(light.kind, [&](const auto& l) { return double{l.power(world())}; });
+  const double power = with_kind(light.kind, [&](const auto& l) { return double{l.power(world())}; });
+  return light.instance == kNone ? power : power * sqr(scale_of(geometry_->instances[light.instance]));
+}
+
+LightBounds Lights::bounds(const Light& light) const {
+  LightBounds b = with_kind(light.kind, [&](const auto& l) -> LightBounds {
+    if constexpr (std::decay_t<decltype(l)>::kHasPlace)
+      return l.bounds(world());
+    else
+      __builtin_unreachable();
+  });
+  if (light.instance == kNone) return b;
+  const PlacedInstance& placed = geometry_->instances[light.instance];
+  const Box box = geometry_->moving[placed.moving].box({V3d(b.low), V3d(b.high)}, 0, 1);
+  LightBounds all;  // whose normals have all directions
+  all.low = V3(box.lo), all.high = V3(box.hi);
+  all.cos_reach = b.cos_reach;
+  all.intensity = b.intensity * sqr(scale_of(placed));
+  return all;
 }
 
 std::vector<V3> Lights::points() const {
@@ -185,6 +238,20 @@ std::optional<LightSample> Lights::sample(const LightChoice& c, const V3& x) con
                    [&](const auto& l) { return l.sample(world(), c.numbers, x, c.probability); });
 }
 
+Pivot Lights::pivot(const LightChoice& choice, const Moment& moment) const {
+  const std::uint32_t instance = lights_[choice.light].instance;
+  const Pivot own = pivot(choice);
+  return instance == kNone ? own : Pivot(V3(moment.placed(instance).to_world.point(V3d(own.p))));
+}
+
+std::optional<LightSample> Lights::sample(const LightChoice& c, const V3& x, const Moment& moment) const {
+  const std::uint32_t instance = lights_[c.light].instance;
+  if (instance == kNone) return sample(c, x);
+  const PlacedInstance& placed = moment.placed(instance);
+  const auto own = sample(c, V3(placed.to_local.point(V3d(x))));
+  return own ? std::optional(moved(*own, placed, x)) : std::nullopt;
+}
+
 C3 Lights::emitted(const SurfaceHit& hit, const V3& w) const {
   const std::uint32_t i = geometry_->surfaces[hit.surface].light;
   const float cosine = dot(hit.ng, w);
@@ -205,6 +272,25 @@ float Lights::pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const
 
 Pivot Lights::pivot(const SurfaceHit& hit) const {
   return with_area(hit, [&](const auto& l) { return l.pivot_of(world(), hit); });
+}
+
+float Lights::pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const LightPlace& place,
+                  bool before_point, const Moment& moment) const {
+  const std::uint32_t light = geometry_->surfaces[hit.surface].light, instance = lights_[light].instance;
+  if (instance == kNone) return pdf(hit, x, direction, place, before_point);
+  const float p =
+      before_point && !by_place(place) ? lights_[light].probability : probability_at(light, place);
+  const PlacedInstance& placed = moment.placed(instance);
+  const SurfaceHit own = hit_in_group(hit, placed);
+  const V3 from(placed.to_local.point(V3d(x))), d = normalize(V3(placed.to_local.vector(V3d(direction))));
+  return with_area(hit, [&](const auto& l) { return l.pdf(world(), own, from, d, p); });
+}
+
+Pivot Lights::pivot(const SurfaceHit& hit, const Moment& moment) const {
+  const std::uint32_t instance = lights_[geometry_->surfaces[hit.surface].light].instance;
+  if (instance == kNone) return pivot(hit);
+  const PlacedInstance& placed = moment.placed(instance);
+  return V3(placed.to_world.point(V3d(pivot(hit_in_group(hit, placed)).p)));
 }
 
 bool Lights::is_sky(const LightChoice& choice) const {
@@ -290,12 +376,7 @@ void Lights::build_tree() {
   std::vector<LightBounds> all;
   for (const Light& light : lights_) {
     if (!has_place(light)) break;
-    LightBounds b = with_kind(light.kind, [&](const auto& l) -> LightBounds {
-      if constexpr (std::decay_t<decltype(l)>::kHasPlace)
-        return l.bounds(world());
-      else
-        __builtin_unreachable();
-    });
+    LightBounds b = bounds(light);
     b.intensity = std::isfinite(b.intensity) ? std::clamp(b.intensity, 1e-30, 1e30) : 1e30;
     all.push_back(b);
   }

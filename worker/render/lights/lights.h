@@ -93,9 +93,13 @@ class Lights {
   bool local_in_media() const { return local_ && local_->in_media(); }
   // The pivot of the chosen light, which must have a position.
   Pivot pivot(const LightChoice& choice) const;
+  Pivot pivot(const LightChoice& choice, const Moment& moment) const;
   // Samples the light that arrives at x from the chosen light. Returns nullopt if no light can arrive: if x
   // is behind the light or outside its cone, or if the light has zero solid angle.
   std::optional<LightSample> sample(const LightChoice& choice, const V3& x) const;
+  // This function and the others with a `moment` are for scenes with shapes that move. The others take all
+  // lights for such that stand still.
+  std::optional<LightSample> sample(const LightChoice& choice, const V3& x, const Moment& moment) const;
 
   // The radiance that a surface light emits at `hit` in the direction w, which points from the surface to the
   // viewer.
@@ -105,7 +109,10 @@ class Lights {
   // `direction` points from x to the hit.
   float pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const LightPlace& place = {},
             bool before_point = false) const;
+  float pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const LightPlace& place,
+            bool before_point, const Moment& moment) const;
   Pivot pivot(const SurfaceHit& hit) const;
+  Pivot pivot(const SurfaceHit& hit, const Moment& moment) const;
   // Returns the radiance of the environment for a path that leaves the scene from x in this direction (a unit
   // vector), weighted against next-event estimation at x, which chooses a light by `place`. `pdf` is the
   // density, per steradian, with which the path sampled the direction. If `pdf` is infinite, the full
@@ -208,6 +215,9 @@ class Lights {
     float probability = 0;
     LightGroup group = kNoLightGroup;
     LightReach reach{};
+    // The instance of a light whose shape moves. Such a light is in the space of its group, which keeps the
+    // angles of the world.
+    std::uint32_t instance = kNone;
   };
 
   static bool has_place(const Light& light) {
@@ -240,6 +250,7 @@ class Lights {
   void sort_places_first();
   void build_tree();
   double power(const Light& light) const;
+  LightBounds bounds(const Light& light) const;
   static bool on_surface(const LightPlace& place) { return dot(place.n, place.n) > 0; }
   bool by_place(const LightPlace& place) const { return local_ && (local_->in_media() || on_surface(place)); }
   bool by_tree(const LightPlace& place) const {

@@ -7,6 +7,7 @@
 
 #include "core/image/error/relative_weights.h"
 #include "worker/render/base/in_order.h"
+#include "worker/render/geometry/moment.h"
 #include "worker/render/math/processor.h"
 #include "worker/render/math/random.h"
 #include "worker/render/media/optical_depth.h"
@@ -44,6 +45,7 @@ std::pair<int, int> somewhere(const World& w, RandomStream& places) {
 
 // Returns the probability that media scatter or absorb a camera ray before it hits a surface.
 float met_by(const World& w, const CameraRay& ray) {
+  const Moment moment(w.geometry, ray.time);
   V3 start = ray.o, origin = ray.o;
   std::uint32_t medium = w.camera_medium;
   const auto beyond = [&](const SurfaceHit& hit, const SurfaceInfo& surface) {
@@ -54,8 +56,8 @@ float met_by(const World& w, const CameraRay& ray) {
   constexpr int kMaxBoundaries = 16;
   for (int i = 0; i < kMaxBoundaries; ++i) {
     SurfaceHit hit;
-    const auto primitive = w.accel.nearest(origin, ray.d, left);
-    const bool met = primitive && w.geometry.complete(*primitive, origin, ray.d, hit);
+    const auto primitive = w.accel.nearest(origin, ray.d, left, moment);
+    const bool met = primitive && w.geometry.complete(*primitive, origin, ray.d, moment, hit);
     if (medium != kNone) {
       const Medium& m = w.media[medium];
       const OpticalDepth depths(m, start, ray.d, met ? dot(hit.p - start, ray.d) : left);
@@ -156,10 +158,10 @@ CameraCollisions camera_collisions(const World& w) {
   for (int j = 0; j < kLattice; ++j)
     for (int i = 0; i < kLattice; ++i) {
       const double x = (i + .5) / kLattice * w.frame.width, y = (j + .5) / kLattice * w.frame.height;
-      // Rows and columns take turns at the times of a camera that moves.
+      // Rows and columns take turns at the times of the exposure.
       const float time = (static_cast<float>((7 * j + 5 * i) % kLattice) + .5f) / kLattice;
-      const float p = met_by(
-          w, w.camera.moves() ? w.camera.ray_at(time, x, y, {.5f, .5f}) : w.camera.ray(x, y, {.5f, .5f}));
+      const float p =
+          met_by(w, w.moves ? w.camera.ray_at(time, x, y, {.5f, .5f}) : w.camera.ray(x, y, {.5f, .5f}));
       all += p;
       if (!(p > kNothing)) continue;
       met += p;

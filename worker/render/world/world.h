@@ -62,6 +62,7 @@ class World {
   // True if a null or hidden surface that emits light coincides with another surface
   bool lights_on_others = false;
   Features need;
+  bool moves = false;     // true if the camera or a shape moves: camera rays then have times
   bool use_media = true;  // false for the integrators `path` and `whitted`, which ignore media
   // True if segments of paths in homogeneous media are also sampled equi-angularly about the lights that have
   // a position.

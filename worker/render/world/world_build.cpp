@@ -30,7 +30,8 @@ Features features_of(const scene::Needs& n) {
           .passing = n.boundaries || n.null_transmission,
           .visibility = n.flagged_shapes > 0 || n.ray_flags > 0 || n.linked_lights > 0,
           .phases = n.phases,
-          .height = n.height};
+          .height = n.height,
+          .motion = n.moving_shapes > 0};
 }
 
 // Returns the features that the finished world requires. Except for `overlaps` and `chromatic`, features_of()
@@ -42,6 +43,7 @@ Features found_in(const World& w) {
                           [](const SurfaceInfo& s) { return s.null || s.null_transmission; });
   f.visibility = std::any_of(surfaces.begin(), surfaces.end(),
                              [](const SurfaceInfo& s) { return s.hidden.any() || s.holdout; });
+  f.motion = !w.geometry.moving.empty();
   if (!w.use_media) return f;
   const auto use = [&](std::uint32_t i) {
     if (i == kNone) return;
@@ -97,6 +99,8 @@ void name_surfaces(const Scene& scene, World& w) {
   }
   for (std::size_t i = 0; i < scene.instances.size(); ++i)
     w.instance_ids.push_back(id(scene.instance_labels, i, &Label::name, "instance"));
+  for (std::size_t i = 0; i < scene.shapes.size(); ++i)  // those that move by themselves
+    if (!scene.shapes[i].motion.empty()) w.instance_ids.push_back(w.shape_ids[i]);
 }
 
 // True if a point light is in a grid or beside it, at most a tenth of the grid's size away. Then equi-angular
@@ -310,6 +314,7 @@ Result<std::shared_ptr<World>> make_world(const Scene& given, const RenderSettin
     return fail(Errc::invalid_argument,
                 "the rays of the sensor leave the range of single precision: check its to_world, fov, "
                 "principal_point_offset, clip planes, aperture_radius and focus_distance");
+  w.moves = w.camera.moves() || !w.geometry.moving.empty();
   w.filter = PixelFilter(scene.film.filter);
   w.hidden_boundaries = near_plane_hides_boundaries(w);
   if (auto ok = check_way_of_camera(w); !ok) return tl::unexpected(ok.error());

@@ -124,7 +124,8 @@ WorldReport describe(const World& w) {
   feature(techniques.has(Technique::path_splitting), "paths that split, or end, by what their pixel shows");
   feature(w.camera.has_lens(), "thin lens");
   feature(w.camera.moves(), "camera motion");
-  feature(!w.geometry.instances.empty(), "instances of groups");
+  feature(!w.geometry.moving.empty(), "shapes that move");
+  feature(w.geometry.instances.size() > w.geometry.moving.size(), "instances of groups that stand still");
   feature(w.geometry.primitive_count() > w.geometry.triangle_count(), "user geometries in the BVH");
   feature(w.textures.bytes() > 0, "image textures");
   feature(w.lights.map(), "environment map, sampled by its brightness");

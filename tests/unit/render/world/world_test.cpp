@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include <cmath>
 #include <limits>
 
@@ -191,7 +193,10 @@ TEST(World, EveryVariantThatCoversASceneGivesTheSameBits) {
     const TileResult first = render(*world);
     // Three more variants are the one for all phase functions, the one for fog that falls with height and the
     // one for AOVs of light; for fog that falls with height there is one of its own in place of the first.
-    EXPECT_EQ(names.size(), n.variants + 3) << n.name;
+    // Those for surfaces that move are not counted.
+    const auto of_still_scenes = std::ranges::count_if(
+        names, [](const std::string& name) { return name.find("that move") == name.npos; });
+    EXPECT_EQ(static_cast<std::size_t>(of_still_scenes), n.variants + 3) << n.name;
     EXPECT_EQ(names.front(), describe(*world).variant);
     EXPECT_EQ(first.health.nonfinite + first.health.negative + first.health.majorant_violations, 0u)
         << n.name;

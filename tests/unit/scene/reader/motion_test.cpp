@@ -159,9 +159,8 @@ TEST(CameraAnimation, IsRefusedWithThePlaceOfWhatIsWrong) {
       {camera(shutter("1", "0") + kAside), 2, "the shutter closes at 0 and opens at 1: let it close later"},
       {camera(shutter("0", "nan") + kAside), 3, "shutter_close"},
       {camera("<transform name=\"to_world\"/>\n" + kAside), 4, "is given 'to_world' twice"},
-      {with_sensor("<shape type=\"sphere\">\n" + kAside + "</shape>"), 3,
-       "'to_world' of shape \"sphere\" is an <animation>: only cameras can move"},
-      {with_sensor("<emitter type=\"spot\">\n" + kAside + "</emitter>"), 3, "only cameras can move"},
+      {with_sensor("<emitter type=\"spot\">\n" + kAside + "</emitter>"), 3,
+       "'to_world' of emitter \"spot\" is an <animation>: only cameras, shapes and instances can move"},
       {with_sensor(kAside), 2, "stands in no object"},
       {camera("<animation name=\"elsewhere\"/>"), 3, "elsewhere"},
   };
@@ -212,9 +211,9 @@ TEST(CameraAnimation, HostileJsonIsRefused) {
               HasSubstr("[1] mirrors unlike the first"));
   EXPECT_THAT(refused([](Sensor& s) { s.to_world.m[3] = 7; }), HasSubstr("is not the pose in the middle"));
   EXPECT_THAT(refused([](Sensor& s) { s.shutter_close = 2; }),
-              HasSubstr("a shutter that is not that of its motion"));
+              HasSubstr("a shutter that is not that of what moves"));
   EXPECT_THAT(refused([](Sensor& s) { s.motion.clear(); }),
-              HasSubstr("a shutter that is not that of its motion"));
+              HasSubstr("a shutter that is not that of what moves"));
 }
 
 }  // namespace
