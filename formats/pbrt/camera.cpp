@@ -204,25 +204,19 @@ class SettingsTranslator {
   template <class F>
   void place_camera(Element& out, Params& p, F place_of) {
     const Transform start = place_of(s_.camera_ctm.from);
-    if (s_.camera_end_ctm.to == s_.camera_ctm.to) return place(out, start, p.at());
-    Element animation = made("animation", "", p.at());
-    set(animation, "name", "to_world", p.at());
-    for (const auto& [time, to_world] :
-         {std::pair(s_.start_time, start), std::pair(s_.end_time, place_of(s_.camera_end_ctm.from))}) {
-      Element key = made("transform", "", p.at());
-      set(key, "time", fmt::format("{}", time), p.at());
-      add(key, matrix_step(to_world.m, p.at()));
-      add(animation, std::move(key));
+    const bool stands = s_.camera_end_ctm.to == s_.camera_ctm.to;
+    if (!stands || t_.moves) {
+      add(out, "shutter_open", p.number("shutteropen", 0), p.at());
+      add(out, "shutter_close", p.number("shutterclose", 1), p.at());
     }
-    add(out, std::move(animation));
+    if (stands) return place(out, start, p.at());
+    animate(out, {s_.start_time, start}, {s_.end_time, place_of(s_.camera_end_ctm.from)}, p.at());
     if (const double end = without_scale(s_.camera_end_ctm.from).scale;
         std::abs(end / without_scale(s_.camera_ctm.from).scale - 1) > 1e-6 && p.has("lensradius"))
       t_.warn_once(
           p.at(),
           "the scale of this camera changes while the shutter is open: its lens keeps the size and the "
           "focus of the beginning");
-    add(out, "shutter_open", p.number("shutteropen", 0), p.at());
-    add(out, "shutter_close", p.number("shutterclose", 1), p.at());
   }
 
   Element orthographic(Params& p) {
@@ -303,6 +297,19 @@ class SettingsTranslator {
 };
 
 }  // namespace
+
+void animate(Element& out, const std::pair<double, const Transform&>& start,
+             const std::pair<double, const Transform&>& end, const Span& at) {
+  Element animation = made("animation", "", at);
+  set(animation, "name", "to_world", at);
+  for (const auto& [time, to_world] : {start, end}) {
+    Element key = made("transform", "", at);
+    set(key, "time", fmt::format("{}", time), at);
+    add(key, matrix_step(to_world.m, at));
+    add(animation, std::move(key));
+  }
+  add(out, std::move(animation));
+}
 
 double exposure_of(Settings& s) {
   double factor = 1;

@@ -237,8 +237,8 @@ class Loader {
     expose(d);
     settings_.camera_ctm = now_.ctm;
     settings_.camera_end_ctm = now_.end_ctm;
-    settings_.start_time = start_time_;
-    settings_.end_time = end_time_;
+    settings_.start_time = t_.start_time;
+    settings_.end_time = t_.end_time;
     settings_.camera_medium = now_.outside;
     System world{now_.ctm, now_.end_ctm};
     std::swap(world.start.to, world.start.from);
@@ -408,21 +408,14 @@ class Loader {
     if (now_.at_start) now_.ctm = ctm.start;
     if (now_.at_end) now_.end_ctm = ctm.end;
   }
-  // Warns of shapes that move. Lights and media are where they are at StartTime in pbrt, too.
-  void place_still(const Token& d) {
-    if (now_.ctm.to != now_.end_ctm.to)
-      t_.warn_once(
-          d.at, fmt::format("this {} moves in pbrt; it is shown where it is at StartTime: only cameras move",
-                            d.text));
-  }
   void transform_times(const Token& d) {
     const auto n = numbers(d, 2);
     if (!n) return;
     if (!((*n)[0] < (*n)[1]))
       return report_.error(d.at, fmt::format("TransformTimes end at {} and begin at {}: let them end later",
                                              (*n)[1], (*n)[0]));
-    start_time_ = (*n)[0];
-    end_time_ = (*n)[1];
+    t_.start_time = (*n)[0];
+    t_.end_time = (*n)[1];
   }
   void reverse_orientation(const Token&) { now_.reversed = !now_.reversed; }
   void attribute(const Token& d) {
@@ -503,7 +496,6 @@ class Loader {
   }
   void shape_(const Token& d) {
     need_world(d);
-    place_still(d);
     auto p = object(d);
     if (!p) return;
     Attributes a = now_;
@@ -511,7 +503,7 @@ class Loader {
       t_.warn_once(p->at(), "shapes of an ObjectBegin give no light, in pbrt neither");
       a.light.reset();
     }
-    auto e = shape(t_, *p, a);
+    auto e = shape(t_, *p, a, group_.has_value());
     if (!e) return;
     if (group_) elements_ += size_of(*e);
     add(group_ ? *group_ : t_.scene, std::move(*e));
@@ -537,10 +529,9 @@ class Loader {
     const auto name = quoted(d);
     if (!name) return;
     if (group_) return report_.error(d.at, "an ObjectInstance within an ObjectBegin: put its shapes here");
-    place_still(d);
     Element out = made("shape", "instance", last_);
     refer(out, "", object_id(*name), last_);
-    place(out, now_.ctm.to, last_);
+    place_moving(t_, out, {now_.ctm.to, now_.end_ctm.to}, "", last_);
     add(t_.scene, std::move(out));
   }
 
@@ -592,7 +583,6 @@ class Loader {
   // are still open, such as AttributeBegin; the file cannot end the blocks that began before it.
   std::size_t floor_ = 0;
   std::map<std::string, System> systems_;
-  double start_time_ = 0, end_time_ = 1;  // TransformTimes
   std::optional<Element> group_;
   bool in_world_ = false, lost_ = false;
   Tokens* tokens_ = nullptr;

@@ -79,6 +79,8 @@ struct Translation {
     lit = true;
     return exposure_factor;
   }
+  double start_time = 0, end_time = 1;  // TransformTimes
+  bool moves = false;                   // true once a shape or an instance moves
   // As in pbrt, a texture of numbers and one of colours may have the same name.
   std::map<std::string, Texture> float_textures, colour_textures;
   std::map<std::string, Material> materials;
@@ -134,8 +136,18 @@ AreaLight area_light(Translation& t, Params& p);
 void add_medium(Translation& t, const std::string& name, Params& p, const Placed& ctm);
 std::string medium_id(const std::string& name);
 
-// In shapes.cpp. nullopt: the shape was reported as wrong.
-std::optional<Element> shape(Translation& t, Params& p, const Attributes& attributes);
+// In shapes.cpp. `in_object`: it stands in an ObjectBegin. nullopt: the shape was reported as wrong.
+std::optional<Element> shape(Translation& t, Params& p, const Attributes& attributes, bool in_object);
+
+// In camera.cpp. Adds an <animation> between two transforms.
+void animate(Element& out, const std::pair<double, const Transform&>& start,
+             const std::pair<double, const Transform&>& end, const Span& at);
+// In shapes.cpp. Places a shape or an instance, which moves if its two transforms differ and it can. If it
+// stands still for the reason `why_still`, or as its transforms do not let it move, a warning says so.
+struct Way {
+  Transform start, end;
+};
+void place_moving(Translation& t, Element& out, const Way& way, std::string_view why_still, const Span& at);
 
 // In camera.cpp. The directives before WorldBegin that set up the camera and the rendering. nullopt: the file
 // does not have the directive.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/scene/motion.h"
 #include "formats/pbrt/object_translation.h"
 #include "formats/xml/transform_element.h"
 
@@ -18,12 +19,16 @@ struct Mesh {
 
 class ShapeTranslator {
  public:
-  ShapeTranslator(Translation& t, Params& p, const Attributes& a) : t_(t), p_(p), a_(a) {}
+  ShapeTranslator(Translation& t, Params& p, const Attributes& a, bool in_object)
+      : t_(t), p_(p), a_(a), in_object_(in_object) {}
 
   std::optional<Element> run() {
     auto out = geometry();
     if (out) {
-      place(*out, to_world_.to, p_.at());
+      const bool stands = a_.end_ctm.to == a_.ctm.to;
+      const Way way{to_world_.to,
+                    stands ? to_world_.to : multiply(a_.end_ctm.to, multiply(a_.ctm.from, to_world_.to))};
+      place_moving(t_, *out, way, why_still(way), p_.at());
       orient(*out);
       surface(*out);
     }
@@ -42,6 +47,13 @@ class ShapeTranslator {
     return type == "trianglemesh" ? triangles() : patches();
   }
 
+  std::string_view why_still(const Way& way) const {
+    const std::string_view type = p_.row().type;
+    if (in_object_) return "it is in an ObjectBegin";
+    if (a_.light) return "it gives light";
+    const bool round = type == "sphere" || type == "cylinder";
+    return round && !(is_similarity(way.start) && is_similarity(way.end)) ? "it is stretched" : "";
+  }
   bool needs_uv() const { return a_.material.has_texture || p_.has("alpha"); }
 
   void need_whole() {
@@ -347,6 +359,7 @@ class ShapeTranslator {
   Translation& t_;
   Params& p_;
   const Attributes& a_;
+  const bool in_object_;
   Placed to_world_;
   bool has_normals_ = false;
   std::vector<double> areas_;  // areas of the separate lights (see measure()); empty: unknown
@@ -354,8 +367,22 @@ class ShapeTranslator {
 
 }  // namespace
 
-std::optional<Element> shape(Translation& t, Params& p, const Attributes& attributes) {
-  return ShapeTranslator(t, p, attributes).run();
+std::optional<Element> shape(Translation& t, Params& p, const Attributes& attributes, bool in_object) {
+  return ShapeTranslator(t, p, attributes, in_object).run();
+}
+
+void place_moving(Translation& t, Element& out, const Way& way, std::string_view why_still, const Span& at) {
+  if (way.start == way.end) return place(out, way.start, at);
+  const bool apart = (determinant3(way.start) < 0) != (determinant3(way.end) < 0);
+  if (why_still.empty() && (apart || !can_move(way.start) || !can_move(way.end)))
+    why_still = "its transforms shear, or one of them mirrors";
+  if (!why_still.empty()) {
+    t.warn_once(at,
+                fmt::format("this moves in pbrt; it is shown where it is at StartTime, since {}", why_still));
+    return place(out, way.start, at);
+  }
+  animate(out, {t.start_time, way.start}, {t.end_time, way.end}, at);
+  t.moves = true;
 }
 
 }  // namespace ls::scene::pbrt

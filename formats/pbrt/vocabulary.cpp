@@ -537,9 +537,9 @@ std::span<const Plain> plain_directives() {
        "no effect, with a warning. forcediffuse and disablepixeljitter would change pixels, so they are "
        "refused unless they are false"},
       {"ActiveTransform",
-       "All, StartTime or EndTime. Cameras move. Everything else is where it is at StartTime, with a "
-       "warning for shapes"},
-      {"TransformTimes", "the times of the camera's two transforms"},
+       "All, StartTime or EndTime. Cameras, shapes and instances move. Lights, media, shapes that give light "
+       "and those in an ObjectBegin are where they are at StartTime; for shapes that is a warning"},
+      {"TransformTimes", "the times of the two transforms"},
       {"Attribute", "refused: write the parameter into each object"},
   };
   return kAll;

@@ -167,8 +167,9 @@ what is refused says what to do instead.
   ReverseOrientation; a mesh by ReverseOrientation alone. If a mirrored sphere, disk or cylinder gives light on one side, that is a
   warning: where pbrt samples lights, it takes the other side. A mirrored `plymesh` that gives light, bounds a medium or lets light
   through is refused, as whether its file has normals decides there.
-- **Motion**: cameras move between their two transforms while the shutter is open. Everything else is shown where it stands at
-  StartTime: lights and media as in pbrt, shapes and instances with a warning.
+- **Motion**: cameras, shapes and instances move between their two transforms while the shutter is open. Lights and media are shown
+  where they stand at StartTime, as in pbrt; so are, with a warning, shapes that give light, that stand in an ObjectBegin, or whose
+  transforms shear.
 - **Textures**: a `float` and a `spectrum` one may have the same name.
 - **Meshes** without normals are flat, in the text and in files.
 - **Texture coordinates** are those of pbrt: on spheres v is 1 at +z, for which a sphere with a texture is mirrored along its axis; a

@@ -484,17 +484,44 @@ TEST(Pbrt, OptionsAreANameAndAValue) {
     EXPECT_THAT(messages(with(option)), HasSubstr("the Option 'seed' wants one value")) << option;
 }
 
-TEST(Pbrt, MovingObjectsAreRenderedAtTheOpeningOfTheShutter) {
+TEST(Pbrt, ShapesAndInstancesMoveBetweenTheirTwoTransforms) {
   const ReadResult r = read_pbrt(pbrt_scene(R"(AttributeBegin ActiveTransform StartTime Translate 1 0 0
-ActiveTransform EndTime Translate 5 0 0 ActiveTransform All Translate 0 2 0 Shape "sphere" AttributeEnd
-AttributeBegin ActiveTransform EndTime AttributeEnd Translate 7 0 0 Shape "sphere")"));
+ActiveTransform EndTime Translate 5 0 0 ActiveTransform All Translate 0 2 0 Shape "disk" "float height" 3 AttributeEnd
+AttributeBegin ActiveTransform EndTime AttributeEnd Shape "sphere"
+ObjectBegin "o" Shape "sphere" ObjectEnd
+ActiveTransform EndTime Translate 0 0 4 ObjectInstance "o")"));
 
   ASSERT_TRUE(r.scene) << messages(r);
-  EXPECT_EQ(origin_of(r.scene->shapes.at(0).to_world), (Vec3{{1, 2, 0}}));
-  EXPECT_EQ(origin_of(r.scene->shapes.at(1).to_world), (Vec3{{7, 0, 0}}));
-  EXPECT_THAT(messages(r),
-              HasSubstr("4:77: warning: this Shape moves in pbrt; it is shown where it is at StartTime"));
-  EXPECT_EQ(r.diagnostics.size(), 1u);
+  EXPECT_EQ(messages(r), "");
+  const Shape& disk = r.scene->shapes.at(0);
+  ASSERT_EQ(disk.motion.size(), 2u);
+  EXPECT_EQ(origin_of(disk.motion[0].to_world), (Vec3{{1, 2, 3}}));
+  EXPECT_EQ(origin_of(disk.motion[1].to_world), (Vec3{{5, 2, 3}}));
+  EXPECT_TRUE(r.scene->shapes.at(1).motion.empty());
+  const Instance& instance = r.scene->instances.at(0);
+  ASSERT_EQ(instance.motion.size(), 2u);
+  EXPECT_EQ(origin_of(instance.motion[1].to_world), (Vec3{{0, 0, 4}}));
+  EXPECT_EQ(r.scene->sensor.shutter_close, 1);  // the camera, which stands still, has the shutter
+  EXPECT_TRUE(r.scene->sensor.motion.empty());
+}
+
+TEST(Pbrt, ShapesThatCannotMoveStandWhereTheyAreAtStartTime) {
+  const std::string aside = "ActiveTransform EndTime Translate 5 0 0 ActiveTransform All ";
+  for (const auto& [text, why] :
+       {std::pair{aside + R"(AreaLightSource "diffuse" Shape "sphere")", "since it gives light"},
+        {aside + R"(ObjectBegin "o" Shape "sphere" ObjectEnd ObjectInstance "o")",
+         "since it is in an ObjectBegin"},
+        {R"(ActiveTransform EndTime Scale 1 2 1 Shape "sphere")", "since it is stretched"},
+        {R"(ActiveTransform EndTime Scale -1 1 1 Shape "disk")",
+         "since its transforms shear, or one of them"},
+        {R"(ActiveTransform EndTime ConcatTransform [1 1 0 0 0 1 0 0 0 0 1 0 0 0 0 1] Shape "disk")",
+         "since its transforms shear"}}) {
+    const ReadResult r = read_pbrt(pbrt_scene(text));
+    ASSERT_TRUE(r.scene) << messages(r);
+    EXPECT_TRUE(r.scene->shapes.at(0).motion.empty()) << text;
+    EXPECT_EQ(origin_of(r.scene->shapes.at(0).to_world), (Vec3{{0, 0, 0}})) << text;
+    EXPECT_THAT(messages(r), HasSubstr("it is shown where it is at StartTime, " + std::string(why)));
+  }
   EXPECT_THAT(refusal("ActiveTransform Middle"), HasSubstr("wants one of All, StartTime and EndTime"));
   EXPECT_THAT(refusal("TransformTimes 1 1"), HasSubstr("TransformTimes end at 1 and begin at 1"));
 }
