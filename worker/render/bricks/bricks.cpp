@@ -322,8 +322,6 @@ Bricks::Bricks(const Position& size, const Position& lead, const BrickTables& ta
       owner_(std::move(owner)) {
   const Position n = table_size(size, lead);
   row_ = {static_cast<std::size_t>(n[0]), static_cast<std::size_t>(n[1])};
-  steps_ = {size[0] > 1 ? std::size_t{1} : 0, size[1] > 1 ? std::size_t{kBrickPitch} : 0,
-            size[2] > 1 ? std::size_t{kBrickPitch} * kBrickPitch : 0};
   const auto same = [](auto first, std::size_t count) {
     return std::all_of(first, first + static_cast<std::ptrdiff_t>(count),
                        [&](auto v) { return v == *first; });

@@ -164,15 +164,19 @@ class Bricks {
   }
   // Returns the index of the value at a position among those of all bricks.
   std::size_t place(int x, int y, int z) const {
-    x += lead_[0], y += lead_[1], z += lead_[2];
-    return number(x >> 3, y >> 3, z >> 3) * kBrickValues + in_brick(x & 7, y & 7, z & 7);
+    const auto i = static_cast<unsigned>(x + lead_[0]), j = static_cast<unsigned>(y + lead_[1]),
+               k = static_cast<unsigned>(z + lead_[2]);
+    const std::size_t node = table_[((k >> 7) * row_[1] + (j >> 7)) * row_[0] + (i >> 7)];
+    const std::size_t brick =
+        nodes_[node * kNodeEntries + ((k >> 3 & 15) << 8 | (j >> 3 & 15) << 4 | (i >> 3 & 15))];
+    return brick * kBrickValues + ((k & 7) * kBrickPitch + (j & 7)) * kBrickPitch + (i & 7);
   }
   float value(std::size_t i) const { return halves_ ? as_float(halves_[i]) : floats_[i]; }
   template <class T>
-  std::array<float, 8> corners(const T* v) const {
-    const auto [dx, dy, dz] = steps_;
-    return {as_float(v[0]),  as_float(v[dx]),      as_float(v[dy]),      as_float(v[dy + dx]),
-            as_float(v[dz]), as_float(v[dz + dx]), as_float(v[dz + dy]), as_float(v[dz + dy + dx])};
+  static std::array<float, 8> corners(const T* v) {
+    constexpr std::size_t y = kBrickPitch, z = std::size_t{kBrickPitch} * kBrickPitch;
+    return {as_float(v[0]), as_float(v[1]),     as_float(v[y]),     as_float(v[y + 1]),
+            as_float(v[z]), as_float(v[z + 1]), as_float(v[z + y]), as_float(v[z + y + 1])};
   }
   template <class Visit>
   void visit(const Position& a, const Position& b, const Visit& visit) const;
@@ -181,8 +185,7 @@ class Bricks {
   const std::uint32_t *table_ = nullptr, *nodes_ = nullptr;
   const float* floats_ = nullptr;  // or halves
   const std::uint16_t* halves_ = nullptr;
-  std::array<std::size_t, 2> row_{};    // of the table: its size along x and y
-  std::array<std::size_t, 3> steps_{};  // from a value to those that follow it along each axis
+  std::array<std::size_t, 2> row_{};  // of the table: its size along x and y
   Position lead_{}, size_{};
   std::vector<bool> same_in_brick_, same_in_node_;  // by number: true if all values are the same
   BrickTables tables_;

@@ -29,8 +29,8 @@ class Voxels {
   // True if the values are one array.
   bool dense() const { return array_ != nullptr; }
 
-  // Returns the values of a node and of those that follow it along each axis; x varies fastest. On an axis
-  // with one node it is its own neighbour. The first function is for arrays, the second for bricks.
+  // Returns the values of a node and of those that follow it along each axis; x varies fastest. What follows
+  // the last node is some finite number. The first function is for arrays, the second for bricks.
   std::array<float, 8> corners(int x, int y, int z) const {
     const float* v = node(x, y, z);
     const std::size_t dx = steps_[0], dy = steps_[1], dz = steps_[2];
