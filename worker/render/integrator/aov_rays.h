@@ -27,7 +27,7 @@ bool PathTracer<F, Light>::meet(SurfaceHit& hit, float reach, RayKind kind) cons
 // use the same random numbers as in trace().
 template <Features F, template <Features> class Light>
 std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay& ray) {
-  begin(ray);
+  ray_ = begin(ray);
   float t_max = ray.t_max;
   FirstSurface first;
   SurfaceHit& hit = first.hit;
@@ -54,7 +54,7 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
   DenoisingGuide guide;
   double unscattered = 1;
   bool direct = true;  // true before the first mirror or glass
-  begin(ray);
+  ray_ = begin(ray);
   medium_ = start_medium(ray);
   float reach = ray.t_max;
   for (segment_ = 0; segment_ < kGuideSegments; ++segment_, reach = kInfinity) {
@@ -113,7 +113,7 @@ Opacity PathTracer<F, Light>::opacity(const CameraRay& ray, const DeepTransmitta
   };
   // Transmittances of the media, and of the surfaces that light passes straight through
   C3 media(1), surfaces(1), shadow(0);
-  begin(ray);
+  ray_ = begin(ray);
   medium_ = start_medium(ray);
   float reach = ray.t_max;
   for (segment_ = 0; segment_ < kMaxSegments; ++segment_, reach = kInfinity) {
@@ -242,7 +242,7 @@ DeepProbe PathTracer<F, Light>::deep_probe(const CameraRay& ray) {
   DeepProbe probe;
   const float near = world_.camera.near_distance(ray);
   const auto depth_of = [&](const V3& p) { return near + dot(p - ray.o, ray.d); };
-  begin(ray);
+  ray_ = begin(ray);
   medium_ = start_medium(ray);
   float reach = ray.t_max;
   for (segment_ = 0; segment_ < kProbeSegments; ++segment_, reach = kInfinity) {

@@ -26,7 +26,8 @@ void PathTracer<F, Light>::add_emission_times(const C3& beta, const SurfaceHit& 
   see_surface(hit.p);
   float weight = 1;
   if (!hits_count_fully(hit)) {
-    const float p_l = light_pdf(hit);
+    const float p_l =
+        this->light_pdf(hit, last_.p, ray_.d, last_.place, last_.in_medium.light_chosen_first());
     if constexpr (F.reuse) {
       if (is_leaving_second()) {
         keep_emitted(emitted, p_l, world_.lights.group(hit));

@@ -394,8 +394,7 @@ template <Features F, template <Features> class Light>
 CoincidentHits PathTracer<F, Light>::others_at(const SurfaceHit& hit, const V3& from, const V3& w) const {
   const V3 back = offset_point(hit, -w) - hit.p;
   const float share = hit.t * std::abs(dot(from, back)) / dot(back, back);
-  CoincidentHits all =
-      world_.accel.between(hit.p + back * std::min(1.f, share), offset_point(hit, w), moment());
+  CoincidentHits all = between(hit.p + back * std::min(1.f, share), offset_point(hit, w));
   const auto end = std::remove(all.ids.begin(), all.ids.begin() + all.count, hit.primitive);
   all.count = static_cast<int>(end - all.ids.begin());
   return all;

@@ -28,10 +28,10 @@
 #include <type_traits>
 
 #include "worker/render/base/features.h"
-#include "worker/render/geometry/moment.h"
 #include "worker/render/integrator/mis.h"
 #include "worker/render/integrator/offset_ray.h"
 #include "worker/render/integrator/path_records.h"
+#include "worker/render/integrator/timed_world.h"
 #include "worker/render/integrator/vertex_nee.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/medium_stack.h"
@@ -84,13 +84,13 @@ template <Features F>
 class SegmentNee;
 
 template <Features F, template <Features> class Light = VertexNee>
-class PathTracer {
+class PathTracer : TimedWorld<F.motion> {
  public:
   // The sample's radiance is added to the components in `split`. `split` is required with F.split and ignored
   // otherwise; in the same way F.connected requires `connections`.
   PathTracer(const World& world, const SampleStream& stream, LightSplit* split = nullptr,
              Connections connections = {})
-      : world_(world), stream_(stream), split_(split), connections_(connections) {}
+      : Timed(world), stream_(stream), split_(split), connections_(connections) {}
 
   SampleOutcome trace(const CameraRay& ray);
   // The first surface at which the path would be scattered if there were no media. The AOVs describe this
@@ -118,6 +118,9 @@ class PathTracer {
   std::uint64_t rays() const { return static_cast<std::uint64_t>(segment_) + boundaries_; }
 
  private:
+  using Timed = TimedWorld<F.motion>;
+  using Timed::begin, Timed::complete, Timed::sample_light, Timed::light_pivot;
+  using Timed::world_, Timed::nearest, Timed::nearest_boundary, Timed::between, Timed::occluded;
   friend class Light<F>;
   friend class VertexNee<F>;
   friend class SegmentNee<F>;
@@ -213,62 +216,6 @@ class PathTracer {
   void add_environment();
   [[gnu::cold, gnu::noinline]] void add_environment_seen();
   bool meet(SurfaceHit& hit, float reach, RayKind kind) const;
-
-  // What rays meet at the time of the path; as the functions of Accel and of Geometry.
-  std::optional<PrimitiveId> nearest(const V3& o, const V3& d, float t_max) const {
-    if constexpr (F.motion)
-      return world_.accel.nearest(o, d, t_max, moment_);
-    else
-      return world_.accel.nearest(o, d, t_max);
-  }
-  std::optional<PrimitiveId> nearest_boundary(const V3& o, const V3& d, float t_max) const {
-    if constexpr (F.motion)
-      return world_.accel.nearest_boundary(o, d, t_max, moment_);
-    else
-      return world_.accel.nearest_boundary(o, d, t_max);
-  }
-  bool occluded(const V3& o, const V3& d, float t_max) const {
-    if constexpr (F.motion)
-      return world_.accel.occluded(o, d, t_max, moment_);
-    else
-      return world_.accel.occluded(o, d, t_max);
-  }
-  bool complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
-    if constexpr (F.motion)
-      return world_.geometry.complete(id, o, d, moment_, hit);
-    else
-      return world_.geometry.complete(id, o, d, hit);
-  }
-  // Lights at the time of the path; as the functions of Lights.
-  std::optional<LightSample> sample_light(const LightChoice& choice, const V3& x) const {
-    if constexpr (F.motion)
-      return world_.lights.sample(choice, x, moment_);
-    else
-      return world_.lights.sample(choice, x);
-  }
-  template <class Of>
-  Pivot light_pivot(const Of& choice_or_hit) const {
-    if constexpr (F.motion)
-      return world_.lights.pivot(choice_or_hit, moment_);
-    else
-      return world_.lights.pivot(choice_or_hit);
-  }
-  float light_pdf(const SurfaceHit& hit) const {
-    const bool first = last_.in_medium.light_chosen_first();
-    if constexpr (F.motion)
-      return world_.lights.pdf(hit, last_.p, ray_.d, last_.place, first, moment_);
-    else
-      return world_.lights.pdf(hit, last_.p, ray_.d, last_.place, first);
-  }
-  const Moment* moment() const {
-    if constexpr (F.motion) return &moment_;
-    return nullptr;
-  }
-  // Places the path at the start of a camera ray, and at its time.
-  void begin(const CameraRay& ray) {
-    ray_ = {ray.o, ray.o, ray.d};
-    if constexpr (F.motion) moment_.begin(world_.geometry, ray.time);
-  }
   // True if a camera ray passes straight through the surface; false if it ends there.
   bool sees_past(const SurfaceHit& hit, const SurfaceInfo& surface) {
     return surface.hidden.has(RayKind::camera) || surface.null ||
@@ -484,7 +431,6 @@ class PathTracer {
     if constexpr (F.chromatic) density_ *= f.density;
   }
 
-  const World& world_;
   SampleStream stream_;
   LightSplit* split_;
   OffsetRay ray_;
@@ -524,7 +470,6 @@ class PathTracer {
     scene::LinkMask receiver = 0;                    // the lists that have what the last vertex is on or in
     scene::LinkIndex blockers = scene::kEverything;  // the list of the light of shadow rays
   };
-  std::conditional_t<F.motion, Moment, Nothing> moment_;
   std::conditional_t<F.visibility, Links, Nothing> links_;
   struct Emissive {
     // The density with which the last vertex found the direction of the current ray by looking for emissive
@@ -539,7 +484,7 @@ class PathTracer {
 template <Features F, template <Features> class Light>
 SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
   if (!world_.depth_allows(0)) return outcome_;
-  begin(ray);
+  ray_ = begin(ray);
   last_.p = ray.o;
   if constexpr (F.split)
     if (split_->by_depth.wanted) split_->by_depth.begin(ray.o, world_.camera.near_distance(ray));
