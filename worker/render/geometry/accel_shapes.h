@@ -95,18 +95,24 @@ struct Tracing {
   static Tracing& of(EmbreeContext* context) { return *reinterpret_cast<Tracing*>(context); }
 };
 
+// Not inlined, to keep it out of the code for shapes outside of groups.
 template <class Shape>
-double shape_distance(const void* user, unsigned prim, EmbreeContext* context, const RTCRay& ray) {
+[[gnu::noinline]] double distance_in_group(const ShapeSet<Shape>& set, const Shape& s, EmbreeContext* context,
+                                           const RTCRay& ray) {
+  // This is the same computation as in Geometry::complete_instanced, so that both find the same hits.
+  const Tracing& tracing = Tracing::of(context);
+  const PlacedInstance& i = tracing.placed(set.instances, context->instID[0] - kFirstInstance);
+  return intersect(s, i.to_local.point(V3d(*tracing.o)), i.to_local.vector(V3d(*tracing.d)), ray.tnear,
+                   ray.tfar);
+}
+
+template <class Shape>
+[[gnu::always_inline]] inline double shape_distance(const void* user, unsigned prim, EmbreeContext* context,
+                                                    const RTCRay& ray) {
   LS_COUNT(user_geometry);
   const auto& set = *static_cast<const ShapeSet<Shape>*>(user);
   const Shape& s = set.shapes[prim];
-  if (context->instID[0] != RTC_INVALID_GEOMETRY_ID) {
-    // This is the same computation as in Geometry::complete_instanced, so that both find the same hits.
-    const Tracing& tracing = Tracing::of(context);
-    const PlacedInstance& i = tracing.placed(set.instances, context->instID[0] - kFirstInstance);
-    return intersect(s, i.to_local.point(V3d(*tracing.o)), i.to_local.vector(V3d(*tracing.d)), ray.tnear,
-                     ray.tfar);
-  }
+  if (context->instID[0] != RTC_INVALID_GEOMETRY_ID) return distance_in_group(set, s, context, ray);
   return intersect(s, V3d(ray.org_x, ray.org_y, ray.org_z), V3d(ray.dir_x, ray.dir_y, ray.dir_z), ray.tnear,
                    ray.tfar);
 }

@@ -35,6 +35,8 @@ std::span<const Variant> plain_variants() {
       variant<Features{.media = true, .passing = true, .height = true}>("grey fog that falls with height"),
       variant<kAnyMedia>("everything, fog that falls with height"),
       variant<Features{.passing = true, .motion = true}>("surfaces that move"),
+      variant<Features{.media = true, .passing = true, .motion = true}>(
+          "homogeneous grey media, surfaces that move"),
       variant<kAnyMotion>("everything, surfaces that move"),
       kSplitVariant,
   };
