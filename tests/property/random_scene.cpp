@@ -201,7 +201,7 @@ class Composer {
     const double far = dice_.chance(.3) ? 2 : .1;
     const Vec3 way{far * dice_.gauss(), far * dice_.gauss(), far * dice_.gauss()};
     const Transform turn = dice_.chance(.5) ? rotate_x(dice_.between(-170, 170)) : Transform{};
-    const Transform end = translate(way) * begin * turn * scale(dice_.chance(.3) ? 1.5 : 1);
+    const Transform end = translate(way) * turn * begin * scale(dice_.chance(.3) ? 1.5 : 1);
     object.motion = {{0, begin}, {1, end}};
     object.to_world = scene::Motion(object.motion).at(.5);
     scene_.sensor.shutter_close = 1;
