@@ -1,6 +1,5 @@
 """The render child of a real worker is shut in: asked of the child that runs, not of the function that should be called."""
 
-import ctypes
 import errno
 import os
 import pathlib
@@ -10,20 +9,16 @@ import subprocess
 
 import pytest
 from asked_process import AskedProcess
+from landlock import landlock
 from local_farm import PATIENCE, SCENE, bin_dir, wait_until
 from processes import family
 
 # system calls of x86-64
-WRITE, IOCTL, SOCKET, KILL, FLOCK, FTRUNCATE, CHMOD, OPENAT, FALLOCATE, LANDLOCK_VERSION = 1, 16, 41, 62, 73, 77, 90, 257, 285, 444
+WRITE, IOCTL, SOCKET, KILL, FLOCK, FTRUNCATE, CHMOD, OPENAT, FALLOCATE = 1, 16, 41, 62, 73, 77, 90, 257, 285
 HERE = -100  # AT_FDCWD
 TIOCSTI = 0x5412
 SHARED_MEMORY = 3  # the child's descriptor of it
 ON_A_TERMINAL = ("/usr/bin/python3", "-c", "import pty, sys; pty.spawn(sys.argv[1:])")
-
-
-def landlock():
-    """Which version of Landlock the kernel has; 0: none."""
-    return max(0, ctypes.CDLL(None).syscall(LANDLOCK_VERSION, None, 0, 1))
 
 
 @pytest.fixture

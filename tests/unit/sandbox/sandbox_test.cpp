@@ -325,16 +325,18 @@ TEST_P(Cage, CannotMakeNamespaces) {
   EXPECT_EQ(try_sandboxed([] { return std::thread([] {}).join(), 0; }, &Sandboxed::calls), 0);
 }
 
+// Starts a process that ends at once. Returns its id, or -1.
+std::function<long()> clone_with(unsigned long flags) {
+  return [flags] {
+    const long made = ::syscall(SYS_clone, flags, 0, 0, 0, 0);
+    if (made == 0) ::_exit(0);
+    return made;
+  };
+}
+
 TEST_P(Cage, CannotStartProcessesOnceForbidden) {
   const auto tried = [&](const std::function<long()>& start) {
     return try_sandboxed([&] { return forbid_processes() && start() < 0 ? 1 : 0; }, &Sandboxed::calls);
-  };
-  const auto clone_with = [](unsigned long flags) {
-    return [flags] {
-      const long made = ::syscall(SYS_clone, flags, 0, 0, 0, 0);
-      if (made == 0) ::_exit(0);
-      return made;
-    };
   };
   char name[] = "/bin/true";
   char* arguments[] = {name, nullptr};
@@ -351,13 +353,6 @@ TEST_P(Cage, CannotStartProcessesOnceForbidden) {
 TEST_P(Cage, CannotStartChildrenOnceForbidden) {
   const auto tried = [&](const std::function<long()>& start) {
     return try_sandboxed([&] { return forbid_children() && start() < 0 ? 1 : 0; }, &Sandboxed::calls);
-  };
-  const auto clone_with = [](unsigned long flags) {
-    return [flags] {
-      const long made = ::syscall(SYS_clone, flags, 0, 0, 0, 0);
-      if (made == 0) ::_exit(0);
-      return made;
-    };
   };
   char name[] = "/bin/true";
   char* arguments[] = {name, nullptr};
