@@ -68,7 +68,7 @@ float Voxels::in_bricks(int x, int y, int z) const { return bricks_->at(x, y, z)
 bool Voxels::halves() const { return bricks_ && bricks_->halves(); }
 
 ValueSums Voxels::sums(const Position& a, const Position& b) const {
-  if (!dense()) return bricks_->sums(a, b);
+  if (bricks_) return bricks_->sums(a, b);
   ValueSums s;
   for (int z = a[2]; z <= b[2]; ++z)
     for (int y = a[1]; y <= b[1]; ++y) {
@@ -83,7 +83,7 @@ ValueSums Voxels::sums(const Position& a, const Position& b) const {
 }
 
 std::uint64_t Voxels::count_above(float limit, const Position& a, const Position& b) const {
-  if (!dense()) return bricks_->count_above(limit, a, b);
+  if (bricks_) return bricks_->count_above(limit, a, b);
   std::uint64_t n = 0;
   for (int z = a[2]; z <= b[2]; ++z)
     for (int y = a[1]; y <= b[1]; ++y) {
@@ -95,27 +95,28 @@ std::uint64_t Voxels::count_above(float limit, const Position& a, const Position
 }
 
 float Voxels::largest() const {
-  if (!dense()) return bricks_ ? bricks_->largest() : 0;
+  if (bricks_) return bricks_->largest();
   float largest = 0;
-  for (const float v : *values_) largest = std::max(largest, v);
+  if (values_)
+    for (const float v : *values_) largest = std::max(largest, v);
   return largest;
 }
 
 std::uint64_t Voxels::count() const { return nodes_of(size_); }
 std::uint64_t Voxels::stored() const {
-  return dense() || !bricks_ ? count() : bricks_->brick_count() * kLeafValues;
+  return bricks_ ? bricks_->brick_count() * kLeafValues : count();
 }
 std::uint64_t Voxels::bytes() const {
-  return dense() || !bricks_ ? count() * sizeof(float) : bricks_->bytes();
+  return bricks_ ? bricks_->bytes() : count() * sizeof(float);
 }
 
 bool Voxels::operator==(const Voxels& other) const {
-  if (size_ != other.size_ || dense() != other.dense()) return false;
-  return dense() ? *values_ == *other.values_ : *bricks_ == *other.bricks_;
+  if (size_ != other.size_ || !bricks_ != !other.bricks_ || !values_ != !other.values_) return false;
+  return bricks_ ? *bricks_ == *other.bricks_ : !values_ || *values_ == *other.values_;
 }
 
 Voxels Voxels::mean(const Voxels& a, const Voxels& b, const Voxels& c) {
-  if (!a.dense() && !b.dense() && !c.dense())
+  if (a.bricks_ && b.bricks_ && c.bricks_)
     return as_bricks(Bricks::mean(*a.bricks_, *b.bricks_, *c.bricks_));
   std::vector<float> values;
   values.reserve(a.count());

@@ -17,7 +17,7 @@ using Position = std::array<int, 3>;
 
 class Voxels {
  public:
-  Voxels() = default;
+  Voxels() = default;  // no nodes
   // One value per node, x fastest.
   Voxels(const Position& size, std::vector<float> values);
   explicit Voxels(Bricks bricks);
@@ -40,7 +40,7 @@ class Voxels {
 
   float at(int x, int y, int z) const { return dense() ? *node(x, y, z) : in_bricks(x, y, z); }
 
-  // These two are for the nodes from a to b, both included. `limit` is at least 0.
+  // These two are for the nodes from a to b, both included; no nodes if b is below a. `limit` is at least 0.
   ValueSums sums(const Position& a, const Position& b) const;
   std::uint64_t count_above(float limit, const Position& a, const Position& b) const;
   float largest() const;

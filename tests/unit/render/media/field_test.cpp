@@ -251,6 +251,15 @@ TEST(Field, FinerNoiseThanItsCellsIsIntegrated) {
   EXPECT_NEAR(g.pass(from, to - from, 0, 1).integral, mean, 1e-3 * mean);
 }
 
+TEST(Field, StoresNoValues) {
+  SceneBuilder b;
+  const LoadedVolume first = loaded(b, noise(b)), second = loaded(b, noise(b));
+  const Grid &g = first.channels[0], &other = second.channels[0];
+  EXPECT_EQ(g.count_above(0), 0u) << "as is asked of albedos";
+  EXPECT_EQ(g.voxels().count(), 0u);
+  EXPECT_TRUE(g.same_values(other));
+}
+
 TEST(Field, IsNeverNegative) {
   SceneBuilder b;
   RemapVolume r = curve(noise(b));
