@@ -7,6 +7,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <filesystem>
+#include <fstream>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -102,12 +103,21 @@ void print_report_health(const json& j) {
         cut));
 }
 
+// Returns the peak memory use of this process. The value of getrusage() would include what the program that
+// started this one took before.
+std::uint64_t own_peak_rss_bytes() {
+  std::ifstream status("/proc/self/status");
+  std::uint64_t kibibytes = 0;
+  for (std::string word; status >> word;)
+    if (word == "VmHWM:" && status >> kibibytes) break;
+  return kibibytes << 10;
+}
+
 // Returns the peak memory use of this process or of any child process that has ended, whichever is largest.
 std::uint64_t peak_rss_bytes() {
-  rusage own{}, children{};
-  ::getrusage(RUSAGE_SELF, &own);
+  rusage children{};
   ::getrusage(RUSAGE_CHILDREN, &children);
-  return static_cast<std::uint64_t>(std::max(own.ru_maxrss, children.ru_maxrss)) << 10;
+  return std::max(own_peak_rss_bytes(), static_cast<std::uint64_t>(children.ru_maxrss) << 10);
 }
 
 class LocalRender {

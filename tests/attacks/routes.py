@@ -33,7 +33,7 @@ def requests_of(document, job):
         for method, operation in item.items():
             if method != "parameters":
                 parameters = [resolve(p) for p in shared + operation.get("parameters", [])]
-                concrete = path.replace("{id}", job).replace("{token}", "none").replace("{worker}", "none").replace("{sha256}", "0" * 64)
+                concrete = path.replace("{id}", job).replace("{token}", "none").replace("{worker}", "none").replace("{announcement}", "none").replace("{sha256}", "0" * 64)
                 yield method.upper(), concrete, [p["name"] for p in parameters if p["in"] == "query"], "requestBody" in operation
 
 

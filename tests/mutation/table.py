@@ -37,7 +37,7 @@ ROWS = [
     (10, "worker/render/math/sampler.h", "(std::uint64_t{y} << 32) | x), «sample & 1»), sample >> 1) {}", "std::uint64_t{0}",
      "both halves of a pixel draw the same numbers", RENDER),
     (11, "worker/render/integrator/render_tile.cpp", "if (!usable(out)) «continue;»", ";", "samples that are no numbers are added up", RENDER),
-    (12, "worker/render/integrator/shadow_ray.h", "if (world_.accel.occluded(p, d, «left»)) return {0, 0, 0};", ".5f * left",
+    (12, "worker/render/integrator/shadow_ray.h", "if (occluded(p, d, «left»)) return {0, 0, 0};", ".5f * left",
      "what stands in the farther half of a shadow ray throws no shadow", RENDER),
     # ---- fold
     (13, "core/image/film/film.cpp", "got.s1 > full.s1 || «got.s1 % 2 != 0»)", "false", "a round with unequal halves is folded", FOLD),
@@ -123,7 +123,7 @@ ROWS = [
      "no next-event estimation at vertices in media", TABLE),
     (103, "worker/render/integrator/vertex_nee.h", "if («!choice.has_place || (points_only(medium) && !choice.is_point)») return;", "true",
      "no equi-angular sampling in media", TABLE),
-    (104, "worker/render/integrator/segment_nee.h", "const auto light = path.world_.lights.sample(choice, p);\n    if («!light || !path.turn_to(choice, medium)») return;", "true",
+    (104, "worker/render/integrator/segment_nee.h", "const auto light = path.sample_light(choice, p);\n    if («!light || !path.turn_to(choice, medium)») return;", "true",
      "no next-event estimation in media by volpath_distant_mis", TABLE),
     (105, "worker/render/integrator/medium_crossing.h", "if («medium.emission_kind == EmissionKind::none || (depth_ == 0 && world_.hide_emitters)») return;", "true", "media give off no light", TABLE),
     (106, "worker/render/integrator/light_hits.h", "if («!world_.lights.has_environment()») return;", "true",

@@ -81,6 +81,10 @@ class Interface:
             body = b'{"priority": -3}'  # which also a user may choose
         if "{worker}" in path:
             path, body = path.replace("{worker}", "nobody"), b'{"state": "draining"}'
+        if "{announcement}" in path:
+            path, body = path.replace("{announcement}", f"of-{caller}"), b'{"name": "shot.xml", "files": ["smoke.vdb"]}'
+            if method == "delete":
+                path, body = path + "-none", None
         if operation == "post /api/v1/jobs":
             path, body, kind = path + "?spp=2", SCENE.encode(), "application/xml"
         if operation == "post /api/v1/jobs/{id}/again":

@@ -103,12 +103,8 @@ float Voxels::largest() const {
 }
 
 std::uint64_t Voxels::count() const { return nodes_of(size_); }
-std::uint64_t Voxels::stored() const {
-  return bricks_ ? bricks_->brick_count() * kLeafValues : count();
-}
-std::uint64_t Voxels::bytes() const {
-  return bricks_ ? bricks_->bytes() : count() * sizeof(float);
-}
+std::uint64_t Voxels::stored() const { return bricks_ ? bricks_->brick_count() * kLeafValues : count(); }
+std::uint64_t Voxels::bytes() const { return bricks_ ? bricks_->bytes() : count() * sizeof(float); }
 
 bool Voxels::operator==(const Voxels& other) const {
   if (size_ != other.size_ || !bricks_ != !other.bricks_ || !values_ != !other.values_) return false;
@@ -116,8 +112,7 @@ bool Voxels::operator==(const Voxels& other) const {
 }
 
 Voxels Voxels::mean(const Voxels& a, const Voxels& b, const Voxels& c) {
-  if (a.bricks_ && b.bricks_ && c.bricks_)
-    return as_bricks(Bricks::mean(*a.bricks_, *b.bricks_, *c.bricks_));
+  if (a.bricks_ && b.bricks_ && c.bricks_) return as_bricks(Bricks::mean(*a.bricks_, *b.bricks_, *c.bricks_));
   std::vector<float> values;
   values.reserve(a.count());
   for (int z = 0; z < a.size_[2]; ++z)
