@@ -3,8 +3,8 @@ import pytest
 from local_farm import SCENE, LocalFarm
 
 # The page, its two scripts, its style and the icon; then who is signed in, the session, who is signed in now, the list, the workers,
-# the event stream, the list again when that stream opens, a small picture. Served module by module it would be some 80.
-MOST_REQUESTS = 14
+# the event stream, the list again when that stream opens, a small picture, the announced jobs. Served module by module it would be some 80.
+MOST_REQUESTS = 15
 MOST_BYTES = 100_000  # of which the scripts in gzip are 73,000; without compression they are three times as long
 
 

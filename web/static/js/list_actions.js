@@ -104,7 +104,7 @@ export function makeListActions({ get, set, attempt, api, snapshot }) {
     /** Of the address. */
     openList: (query) => {
       typing = false;
-      refreshAnnounced();
+      if (get().link === "live") refreshAnnounced();
       const asked = listOf(query);
       if (queryOfList(asked) === queryOfList(get().list.asked) && get().list.ids) return;
       set(withList(get(), { asked, picked: new Set() }));

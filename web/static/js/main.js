@@ -159,8 +159,8 @@ async function onOpen() {
   set({ ...state, link: "live" });
   await Promise.all([
     actions.refreshList(),
-    actions.refreshAnnounced(),
     snapshot("workers", () => attempt(api.workers), (now, { workers, join = null }) => ({ ...withWorkers(now, workers), join }))]);
+  actions.refreshAnnounced(); // after what is seen first
   actions.viewerEvent(null);
   await refreshOpen();
 }
