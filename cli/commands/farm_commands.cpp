@@ -51,9 +51,12 @@ int show_answer(const FarmApi::Answer<json>& answer, const FarmFlags& flags,
 
 // Jobs that wait for files on their users' machines. An older coordinator knows none.
 void print_announced(FarmApi& api) {
+  constexpr std::size_t kMost = 10;
   const auto answer = api.get("/api/v1/announced");
   if (!answer) return;
-  for (const json& each : objects_field(*answer, "announced")) {
+  const auto all = objects_field(*answer, "announced");
+  for (std::size_t i = 0; i < std::min(all.size(), kMost); ++i) {
+    const json& each = all[i];
     const auto files = texts_field(each, "files");
     const std::string frames = text_field(each, "frames"), machine = text_field(each, "machine");
     const double more = number_field(each, "count").value_or(1) - 1;
@@ -63,6 +66,7 @@ void print_announced(FarmApi& api) {
                            more > 0 ? fmt::format(" and {:.0f} more are", more) : " is",
                            machine.empty() ? "" : " on " + machine));
   }
+  if (all.size() > kMost) print_note(fmt::format("{} more jobs wait for files", all.size() - kMost));
 }
 int jobs(FarmApi& api, const FarmFlags& flags) {
   const auto answer = api.get("/api/v1/jobs" + query_of({{"state", flags.state},
@@ -76,7 +80,7 @@ int jobs(FarmApi& api, const FarmFlags& flags) {
   const std::size_t shown = objects_field(*answer, "jobs").size();
   if (const auto total = number_field(*answer, "total"); total && *total > static_cast<double>(shown))
     print_note(fmt::format("{} of {:.0f} jobs; --limit and --offset select others", shown, *total));
-  print_announced(api);
+  if (flags.state.empty() && flags.search.empty() && flags.owner.empty()) print_announced(api);
   return code;
 }
 int print_lines(const FarmApi::Answer<std::string>& text) {

@@ -127,9 +127,10 @@ class Announcement {
     if (spec_.frames) body["frames"] = to_string(*spec_.frames);
     const auto done = api->put(path_, body);
     announced_ |= done.has_value();
-    if (!done && done.error().error.code == Errc::permission_denied)
-      return tl::unexpected(done.error().error);
-    return {};
+    if (done) return {};
+    const Error& error = done.error().error;
+    const bool refused = error.code == Errc::permission_denied || error.code == Errc::unauthenticated;
+    return refused ? tl::unexpected(error) : Result<void>();
   }
   void withdraw() {
     if (!announced_) return;

@@ -168,7 +168,9 @@ FarmApi::Answer<void> FarmApi::ask(const std::string& path, const json& body) {
 }
 
 FarmApi::Answer<void> FarmApi::put(const std::string& path, const json& body) {
-  return without_content(client_.request("PUT", path, body.dump()));
+  // Names of files may have any bytes.
+  const std::string text = body.dump(-1, ' ', false, json::error_handler_t::replace);
+  return without_content(client_.request("PUT", path, text));
 }
 
 FarmApi::Answer<void> FarmApi::remove(const std::string& path) {

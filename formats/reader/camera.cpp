@@ -1,8 +1,10 @@
 // Reads sensors, films, filters, samplers and integrators.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "core/base/text/suggest.h"
 #include "core/scene/limits.h"
@@ -14,6 +16,14 @@
 #include "formats/xml/values.h"
 
 namespace ls::scene {
+namespace {
+
+// True if the keys are not all of one transform.
+bool changes(std::span<const MotionKey> keys) {
+  return std::ranges::any_of(keys, [&](const MotionKey& k) { return k.to_world != keys.front().to_world; });
+}
+
+}  // namespace
 
 void Reader::read_sensor(const Element& e) {
   if (!is_read_plugin("sensor", e.get("type"))) return unknown_plugin(e, report_);
@@ -119,7 +129,7 @@ void Reader::read_motion(const Element& animation, Sensor& s) {
   const Motion motion(read_keys(animation, [&](const Element& at, const Transform& to_world) {
     return check_place(at, to_world, s.projection);
   }));
-  check_shutter(motion.keys().size() > 1 ? &animation : nullptr, "the camera stands");
+  check_shutter(changes(motion.keys()) ? &animation : nullptr, "the camera stands");
   if (!report_.has_errors()) place_in_exposure(animation, motion, s);
 }
 
@@ -151,7 +161,7 @@ void Reader::note_motion(const Element& animation, bool instance, std::vector<Mo
 // A sensor may follow the shapes that it sees, so these get their places when everything has been read.
 void Reader::finish_motions() {
   if (report_.has_errors()) return;
-  const auto moving = std::ranges::find_if(motions_, [](const Moving& m) { return m.keys.size() > 1; });
+  const auto moving = std::ranges::find_if(motions_, [](const Moving& m) { return changes(m.keys); });
   if (moving != motions_.end()) check_shutter(moving->animation, "what moves stands");
   if (report_.has_errors()) return;
   for (const Moving& m : motions_) {

@@ -69,6 +69,8 @@ def test_submit_waits_for_files_that_are_still_written(rendering, tmp_path):
     assert waiting.returncode == 0, notes
     assert call(rendering, "show", out.split()[0]).returncode == 0
     assert rendering.get("/api/v1/announced")["announced"] == []
+    unknown = call(rendering, "submit", scene, "--after-file", tmp_path / "never", LIGHTSHAFT_TOKEN="nobody's", code=1)
+    assert "token" in unknown.stderr, "a token that nobody knows is told at once"
     refused = call(rendering, "submit", scene, "--after-file", tmp_path / "done.##", code=2)
     assert "# stands for the frame number, and there are no --frames" in refused.stderr
 

@@ -290,6 +290,8 @@ Filter filter_of_children() {
 #endif
   compare(BPF_JEQ, SYS_clone3, 0, 1, filter);
   answer(kUnknown, filter);  // as in filter_of_calls()
+  // With PR_SET_PDEATHSIG the process would outlive the one that has started it.
+  add({SYS_prctl, 0, Decided::How::none_of, {PR_SET_PDEATHSIG}}, filter);
   compare(BPF_JEQ, SYS_clone, 1, 0, filter);
   answer(kAllow, filter);
   load(offsetof(seccomp_data, args), filter);

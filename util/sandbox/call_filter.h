@@ -18,7 +18,8 @@ bool limit_calls();
 bool forbid_processes();
 
 // Denies this process starting other processes from now on, besides limit_calls(), but allows threads and
-// becoming another program. Returns false if the kernel has no filters.
+// becoming another program. The process can no longer change what signal it gets when its parent ends.
+// Returns false if the kernel has no filters.
 bool forbid_children();
 
 }  // namespace ls

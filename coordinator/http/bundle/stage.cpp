@@ -13,8 +13,10 @@
 #include <atomic>
 #include <cctype>
 #include <cerrno>
+#include <condition_variable>
 #include <set>
 #include <system_error>
+#include <thread>
 
 #include "coordinator/base/limits.h"
 #include "coordinator/http/bundle/spool.h"
@@ -29,11 +31,13 @@ namespace {
 namespace fs = std::filesystem;
 using coordinator::BlobStore;
 
-constexpr std::string_view kUsda = "#usda", kUsdc = "PXR-USDC", kZip = "PK\x03\x04";
+constexpr std::string_view kUsda = "#usda ", kUsdc = "PXR-USDC", kZip = "PK\x03\x04";
 constexpr std::string_view kWarnings = "warnings.txt";    // of the bundle that the Python package writes
 constexpr std::size_t kMaxReason = 16u << 10;             // bytes of a message from there
 constexpr std::uint64_t kPiece = std::uint64_t{4} << 20;  // bytes of a blob in memory
 constexpr std::size_t kMaxUp = 32;                        // "../" at the beginning of a file's name
+constexpr std::size_t kMaxPart = 200, kMaxDepth = 64;     // of a file's name: bytes of a part, and parts
+constexpr int kNoRoom = 3;                                // exit code of the package
 
 bool ends_in(std::string_view name, std::string_view ending) {
   return name.size() > ending.size() &&
@@ -110,6 +114,9 @@ Result<Place> place_of(const std::string& name) {
     else if (++place.up > kMaxUp)
       return bad("is too many folders up");
   }
+  if (parts.size() > kMaxDepth) return bad(fmt::format("is more than {} folders deep", kMaxDepth));
+  for (const std::string_view part : parts)
+    if (part.size() > kMaxPart) return bad(fmt::format("has a name of more than {} bytes", kMaxPart));
   for (const std::string_view part : parts) place.rest.append(place.rest.empty() ? "" : "/").append(part);
   const auto rest = normal_name(place.rest);
   if (!rest) return bad(rest.error().message);
@@ -117,7 +124,6 @@ Result<Place> place_of(const std::string& name) {
   return place;
 }
 
-// Writes the blob to a new file below `folder`.
 Result<void> write_blob(const BlobStore& blobs, const Digest& digest, const fs::path& file,
                         std::uint64_t& left, const std::stop_token& stop) {
   const auto proven = blobs.prove(digest);
@@ -126,7 +132,6 @@ Result<void> write_blob(const BlobStore& blobs, const Digest& digest, const fs::
   if (!size) return tl::unexpected(size.error());
   if (*size > left) return bad_stage("the files of the stage are too large together");
   left -= *size;
-  if (auto made = make_folder(file.parent_path()); !made) return made;
   const Descriptor out(::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0640));
   if (out.fd < 0) return tl::unexpected(spool_error("no file", errno));
   for (std::uint64_t at = 0; at < *size;) {
@@ -140,9 +145,13 @@ Result<void> write_blob(const BlobStore& blobs, const Digest& digest, const fs::
   return {};
 }
 
-// Lays out the files of the stage below `folder` as its names say. Returns the path of the stage's file.
-Result<fs::path> lay_out(const Stage& stage, const fs::path& folder, const BlobStore& blobs,
-                         std::uint64_t most_bytes, const std::stop_token& stop) {
+// The files of a stage by their paths below one folder.
+struct Layout {
+  std::map<std::string, Digest> files;
+  std::string own_folder, main;  // the stage's folder, "" or ending in "/", and the stage's file
+};
+
+Result<Layout> layout_of(const Stage& stage, std::string_view ending) {
   std::vector<std::pair<Place, Digest>> files;
   std::size_t deepest = 0;
   for (const auto& [name, digest] : stage.files) {
@@ -151,53 +160,93 @@ Result<fs::path> lay_out(const Stage& stage, const fs::path& folder, const BlobS
     deepest = std::max(deepest, place->up);
     files.emplace_back(std::move(*place), digest);
   }
-  // Folders of one letter stand for those above the stage's own.
+  // Stands for the folders above the stage's own. No file has this name, as it has a control character.
   const auto above = [&](std::size_t up) {
-    fs::path path = folder;
-    for (std::size_t i = up; i < deepest; ++i) path /= "d";
+    std::string path;
+    for (std::size_t i = up; i < deepest; ++i) path += "\x7f/";
     return path;
   };
-  std::string own = stage.name.substr(stage.name.rfind('/') + 1);
-  auto name = place_of(own);
-  if (!name || name->up) name = Place{0, "stage.usd"};
-  if (!is_stage_name(name->rest)) name->rest += ".usd";
-  files.emplace_back(*name, stage.main);
-  std::set<fs::path> taken;
+  Layout layout{{}, above(0), {}};
+  auto own = place_of(std::string(fs::path(stage.name).stem().string()).append(ending));
+  if (!own || own->up) own = Place{0, std::string("stage").append(ending)};
+  layout.main = layout.own_folder + own->rest;
+  files.emplace_back(*own, stage.main);
   for (const auto& [place, digest] : files)
-    if (!taken.insert(above(place.up) / place.rest).second)
+    if (!layout.files.emplace(above(place.up) + place.rest, digest).second)
       return bad_stage(fmt::format("the file \"{}\" is there twice", plain_text(place.rest)));
-  for (const fs::path& path : taken)
-    for (fs::path above_it = path.parent_path(); above_it != folder; above_it = above_it.parent_path())
-      if (taken.count(above_it))
-        return bad_stage(fmt::format("the file \"{}\" is a folder of another file, too",
-                                     plain_text(above_it.filename().string())));
-  for (const auto& [place, digest] : files)
-    if (auto ok = write_blob(blobs, digest, above(place.up) / place.rest, most_bytes, stop); !ok)
-      return fail(ok.error().code, fmt::format("\"{}\": {}", plain_text(place.rest), ok.error().message));
-  return above(0) / name->rest;
+  for (const auto& [path, digest] : layout.files)
+    if (const auto inner = layout.files.lower_bound(path + "/");
+        inner != layout.files.end() && inner->first.starts_with(path + "/"))
+      return bad_stage(fmt::format("the file \"{}\" is a folder of another file, too", plain_text(path)));
+  return layout;
+}
+
+// Writes the files below `folder`, each blob once: further files of the same content are links to it.
+Result<void> write_files(const Layout& layout, const fs::path& folder, const BlobStore& blobs,
+                         std::uint64_t most_bytes, const std::stop_token& stop) {
+  std::map<Digest, fs::path> written;
+  std::set<fs::path> made;
+  for (const auto& [name, digest] : layout.files) {
+    if (stop.stop_requested()) return fail(Errc::unavailable, "the coordinator is stopping");
+    const fs::path path = folder / name;
+    if (made.insert(path.parent_path()).second)
+      if (auto ok = make_folder(path.parent_path()); !ok) return ok;
+    const auto [before, fresh] = written.emplace(digest, path);
+    if (!fresh && ::link(before->second.c_str(), path.c_str()) == 0) continue;
+    if (auto ok = write_blob(blobs, digest, path, most_bytes, stop); !ok)
+      return fail(ok.error().code, fmt::format("\"{}\": {}", plain_text(name), ok.error().message));
+  }
+  return {};
 }
 
 std::vector<std::string> lines_of(const std::string& text) {
   std::vector<std::string> lines;
-  for (std::size_t at = 0; at < text.size() && lines.size() < coordinator::limits::kMaxWarnings;) {
+  std::size_t left_out = 0;
+  for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
-    if (end > at) lines.push_back(plain_text(text.substr(at, end - at)));
+    if (end > at && lines.size() < coordinator::limits::kMaxWarnings - 1)
+      lines.push_back(plain_text(text.substr(at, end - at)));
+    else
+      left_out += end > at;
     at = end + 1;
   }
+  if (left_out > 0) lines.push_back(fmt::format("and {} more lines", left_out));
   return lines;
-}
-
-// The message of the Python package, line by line.
-std::string reason_in(const std::string& text) {
-  std::string out;
-  for (const std::string& line : lines_of(text)) out += (out.empty() ? "" : "\n") + line;
-  return out;
 }
 
 void replace_all(const std::string& what, std::string_view by, std::string& text) {
   for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size())
     text.replace(at, what.size(), by);
 }
+
+// What the package says, with names of files as the user gave them, and without folders of this machine.
+std::string said(std::string text, const fs::path& folder, const Layout& layout) {
+  replace_all(folder.string() + "/" + layout.own_folder, "", text);
+  replace_all(folder.string() + "/", "", text);
+  replace_all(folder.string(), "the folder of the stage's files", text);
+  replace_all("\x7f/", "", text);
+  std::string out;
+  for (const std::string& line : lines_of(text)) out += (out.empty() ? "" : "\n") + line;
+  return out;
+}
+
+// Sets `flag` at a time, unless it is destroyed before.
+class Deadline {
+ public:
+  Deadline(Duration after, std::atomic<bool>& flag)
+      : thread_([this, after, &flag](const std::stop_token& stop) {
+          std::unique_lock lock(mutex_);
+          if (!ended_.wait_for(lock, stop, after, [] { return false; }) && !stop.stop_requested())
+            flag = true;
+        }) {}
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable_any ended_;
+  std::jthread thread_;
+};
+
+std::string_view ending_of(std::string_view begin) { return begin.starts_with(kZip) ? ".usdz" : ".usd"; }
 
 }  // namespace
 
@@ -208,9 +257,12 @@ bool is_stage_name(std::string_view file_name) {
 }
 
 bool is_stage(std::string_view file_name, std::span<const std::byte> begin) {
-  const std::string_view bytes(reinterpret_cast<const char*>(begin.data()), begin.size());
-  return bytes.starts_with(kUsda) || bytes.starts_with(kUsdc) ||
-         (bytes.starts_with(kZip) && ends_in(file_name, ".usdz"));
+  std::string_view bytes(reinterpret_cast<const char*>(begin.data()), begin.size());
+  if (bytes.starts_with(kUsda) || bytes.starts_with(kUsdc)) return true;
+  // The Python package sends XML under the name of the stage that it was made of.
+  if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);
+  const std::size_t first = bytes.find_first_not_of(" \t\r\n");
+  return is_stage_name(file_name) && first != std::string_view::npos && bytes[first] != '<';
 }
 
 Result<std::unique_ptr<StageReader>> StageReader::open(Options options) {
@@ -220,6 +272,9 @@ Result<std::unique_ptr<StageReader>> StageReader::open(Options options) {
                             "was run",
                             options.python.string(), why));
   };
+  if (auto ok = make_folder(options.folder); !ok) return tl::unexpected(ok.error());
+  std::error_code ignored;
+  options.folder = fs::canonical(options.folder, ignored);
   const auto output = open_spool(options.folder);
   if (!output) return tl::unexpected(output.error());
   const auto end = run_helper(options.python, {"-I", "-B", "-c", kProbe}, (*output)->fd);
@@ -233,60 +288,99 @@ Result<std::unique_ptr<StageReader>> StageReader::open(Options options) {
     folders.push_back(text->substr(at, zero - at));
     at = zero + 1;
   }
-  std::error_code ignored;
-  fs::remove_all(options.folder, ignored);  // what a killed coordinator has left
-  return std::unique_ptr<StageReader>(new StageReader(std::move(options), std::move(folders)));
+  for (const std::string& folder : folders)
+    if (const auto from = options.folder.lexically_relative(folder); !from.empty() && *from.begin() != "..")
+      return fail(Errc::failed_precondition,
+                  fmt::format("--usd-python {}: stages could read the data folder, which lies in {}: put one "
+                              "of the two elsewhere",
+                              options.python.string(), folder));
+  for (const auto& left : fs::directory_iterator(options.folder, ignored))
+    fs::remove_all(left.path(), ignored);  // of a coordinator that was killed
+  auto reader = std::unique_ptr<StageReader>(new StageReader(std::move(options), std::move(folders)));
+  const auto in_sandbox = reader->run({"-c", "import lightshaft.usd"}, {}, (*output)->fd, {});
+  if (!in_sandbox) return tl::unexpected(in_sandbox.error());
+  if (in_sandbox->status != 0) return cannot("in the sandbox: " + in_sandbox->last_line);
+  return reader;
 }
 
-Result<int> StageReader::run(const fs::path& folder, const fs::path& main, const Stage& stage, int output,
-                             const std::stop_token& stop, std::string& last_line) const {
+Result<HelperEnd> StageReader::run(const std::vector<std::string>& arguments, const fs::path& folder,
+                                   int output, const std::stop_token& stop) const {
   std::vector<std::string> words{std::to_string(options_.seconds), std::to_string(options_.memory_bytes),
-                                 std::to_string(options_.output_bytes), folder.string()};
+                                 std::to_string(options_.output_bytes)};
+  if (!folder.empty()) words.push_back(folder.string());
   words.insert(words.end(), readable_.begin(), readable_.end());
-  words.insert(words.end(),
-               {"--", options_.python.string(), "-I", "-B", "-m", "lightshaft.usd", main.string(), "--folder",
-                folder.string(), "--to-descriptor", std::to_string(kHelperFd)});
-  if (stage.frames) words.insert(words.end(), {"--frames", to_string(*stage.frames)});
-  if (stage.size)
-    words.insert(words.end(),
-                 {"--size", std::to_string(stage.size->width), std::to_string(stage.size->height)});
+  words.insert(words.end(), {"--", options_.python.string(), "-I", "-B"});
+  words.insert(words.end(), arguments.begin(), arguments.end());
   std::atomic<bool> stopped{false};
   const std::stop_callback on_stop(stop, [&] { stopped = true; });
-  const auto end = run_helper(options_.sandbox, std::move(words), output, &stopped);
-  if (!end) return tl::unexpected(end.error());
-  last_line = end->last_line;
-  return end->status;
+  // The process ends by itself after options_.seconds, unless a stage has taken it over.
+  const Deadline deadline(std::chrono::seconds(2 * options_.seconds), stopped);
+  return run_helper(options_.sandbox, std::move(words), output, &stopped);
 }
+
+// The turn of one stage, until it is destroyed.
+struct StageReader::Reading {
+  Reading(StageReader& reader, const std::string& caller) : reader(reader), caller(caller) {
+    const std::lock_guard lock(reader.mutex_);
+    begun = reader.callers_.size() < kAtOnce && reader.callers_.insert(caller).second;
+  }
+  ~Reading() {
+    if (!begun) return;
+    const std::lock_guard lock(reader.mutex_);
+    reader.callers_.erase(caller);
+  }
+  Reading(const Reading&) = delete;
+  Reading& operator=(const Reading&) = delete;
+  StageReader& reader;
+  const std::string caller;
+  bool begun;
+};
 
 Result<StageScene> StageReader::read(const Stage& stage, const std::string& caller,
                                      const BundleLimits& limits, BlobStore& blobs,
                                      const std::stop_token& stop) {
-  const coordinator::Gate::Place turn(turns_, caller, 0);
+  const Reading reading(*this, caller);
+  if (!reading.begun)
+    return fail(Errc::unavailable,
+                "a stage of this token, or two of others, are being read: try again in a minute");
+  const auto begin = blobs.read(stage.main, 0, kStageMagic);
+  if (!begin) return tl::unexpected(begin.error());
+  const auto layout =
+      layout_of(stage, ending_of({reinterpret_cast<const char*>(begin->data()), begin->size()}));
+  if (!layout) return tl::unexpected(layout.error());
   const auto folder = ScratchFolder::make(options_.folder);
   if (!folder) return tl::unexpected(folder.error());
   const fs::path files = (*folder)->path / "files";
-  const auto main = lay_out(stage, files, blobs, limits.total_bytes, stop);
-  if (!main) return tl::unexpected(main.error());
+  if (auto ok = write_files(*layout, files, blobs, std::min(limits.total_bytes, options_.output_bytes), stop);
+      !ok)
+    return tl::unexpected(ok.error());
   const auto made = open_spool((*folder)->path);
   if (!made) return tl::unexpected(made.error());
   const int output = (*made)->fd;
-  std::string last_line;
-  const auto status = run(files, *main, stage, output, stop, last_line);
-  if (!status) return tl::unexpected(status.error());
+  std::vector<std::string> arguments{
+      "-m",           "lightshaft.usd",  (files / layout->main).string(), "--folder",
+      files.string(), "--to-descriptor", std::to_string(kHelperFd)};
+  if (stage.frames) arguments.insert(arguments.end(), {"--frames", to_string(*stage.frames)});
+  if (stage.size)
+    arguments.insert(arguments.end(),
+                     {"--size", std::to_string(stage.size->width), std::to_string(stage.size->height)});
+  const auto end = run(arguments, files, output, stop);
+  if (!end) return tl::unexpected(end.error());
   if (stop.stop_requested()) return fail(Errc::unavailable, "the coordinator is stopping");
   const std::string name = plain_text(stage.name);
-  if (WIFSIGNALED(*status) && WTERMSIG(*status) == SIGALRM)
-    return bad_stage(fmt::format("{}: reading this stage took longer than {} s", name, options_.seconds));
-  if (WIFSIGNALED(*status))
+  if (WIFSIGNALED(end->status)) {
+    const int signal = WTERMSIG(end->status);
+    if (signal == SIGALRM || signal == SIGKILL)
+      return bad_stage(fmt::format("{}: reading this stage took longer than {} s", name, options_.seconds));
     return bad_stage(
-        fmt::format("{}: USD crashed while it read this stage (signal {})", name, WTERMSIG(*status)));
-  if (WEXITSTATUS(*status) != 0) {
+        fmt::format("{}: USD crashed while it read this stage (signal {}), or this took more than {} MiB",
+                    name, signal, options_.memory_bytes >> 20));
+  }
+  if (WEXITSTATUS(end->status) == kNoRoom) return tl::unexpected(spool_error("no room", ENOSPC));
+  if (WEXITSTATUS(end->status) != 0) {
     const auto text = content_of(output, kMaxReason);
-    std::string reason = text && WEXITSTATUS(*status) == 2 ? reason_in(*text) : std::string();
-    // A message names files by where they lie here.
-    replace_all(files.string() + "/", "", reason);
-    replace_all(files.string(), "the folder of the stage's files", reason);
-    if (reason.empty()) reason = "this stage cannot be read: " + last_line;
+    std::string reason = text && WEXITSTATUS(end->status) == 2 ? said(*text, files, *layout) : std::string();
+    if (reason.empty()) reason = "this stage cannot be read: " + said(end->last_line, files, *layout);
     return bad_stage(fmt::format("{}: {}", name, reason));
   }
   struct stat info {};
@@ -298,7 +392,8 @@ Result<StageScene> StageReader::read(const Stage& stage, const std::string& call
   if (const auto file = scene.bundle.assets.extract(std::string(kWarnings)); !file.empty()) {
     const auto bytes = blobs.read_whole(file.mapped(), kMaxReason);
     if (!bytes) return tl::unexpected(bytes.error());
-    scene.warnings = lines_of({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+    scene.warnings =
+        lines_of(said({reinterpret_cast<const char*>(bytes->data()), bytes->size()}, files, *layout));
   }
   return scene;
 }

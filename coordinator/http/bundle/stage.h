@@ -8,14 +8,15 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <set>
 #include <span>
 #include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "coordinator/base/gate.h"
 #include "coordinator/http/bundle/bundle.h"
 #include "core/base/frame_range.h"
 #include "core/base/spawn.h"
@@ -26,7 +27,8 @@ namespace ls::http {
 // The length of a file's beginning that is_stage() needs.
 inline constexpr std::size_t kStageMagic = 8;
 
-// True if a file is a stage: it begins as .usda and .usdc files do, or is a zip of the name *.usdz.
+// True if a file is a stage: it begins as .usda and .usdc files do, or has the name of a stage and does not
+// begin as XML does.
 bool is_stage(std::string_view file_name, std::span<const std::byte> begin);
 // True if the name ends as those of stages do.
 bool is_stage_name(std::string_view file_name);
@@ -57,25 +59,31 @@ class StageReader {
     std::uint64_t memory_bytes = std::uint64_t{4} << 30;   // of the process
     std::uint64_t output_bytes = std::uint64_t{16} << 30;  // of the scene and the files that are made
   };
-  // Starts the interpreter once, to learn where its packages are, and empties the folder.
-  // failed_precondition: it cannot be started, or lacks a package; the message says which.
+  // Starts the interpreter, to learn where its packages are and to try them in the sandbox, and empties the
+  // folder. failed_precondition: it cannot be started or lacks a package; the message says which; or what it
+  // must read contains the folder.
   static Result<std::unique_ptr<StageReader>> open(Options options);
 
-  // Makes a scene of the stage. Callers take turns; each has one stage read at a time. invalid_argument: what
-  // is wrong with the stage, in one line or several; or a file's name leads out of the stage's files.
+  // Makes a scene of the stage. unavailable: a stage of this caller, or kAtOnce of others, are being read; it
+  // does not wait, since it is called on a thread that serves other requests, too. invalid_argument: what is
+  // wrong with the stage, in one line or several; or a file's name leads out of the stage's files.
   // resource_exhausted: there is no room on the disk. Other errors: those of the store.
   Result<StageScene> read(const Stage& stage, const std::string& caller, const BundleLimits& limits,
                           coordinator::BlobStore& blobs, const std::stop_token& stop);
+  static constexpr std::size_t kAtOnce = 2;
 
  private:
+  struct Reading;
   StageReader(Options options, std::vector<std::string> readable)
       : options_(std::move(options)), readable_(std::move(readable)) {}
-  Result<int> run(const std::filesystem::path& folder, const std::filesystem::path& main, const Stage& stage,
-                  int output, const std::stop_token& stop, std::string& last_line) const;
+  // Runs the interpreter in the sandbox, with `folder` to read, and `output` as kHelperFd to write.
+  Result<HelperEnd> run(const std::vector<std::string>& arguments, const std::filesystem::path& folder,
+                        int output, const std::stop_token& stop) const;
 
   const Options options_;
   const std::vector<std::string> readable_;  // folders of the interpreter and its packages
-  coordinator::Gate turns_{{.places = 2, .places_each = 1}};
+  std::mutex mutex_;
+  std::set<std::string> callers_;  // whose stages are being read
 };
 
 }  // namespace ls::http

@@ -222,9 +222,9 @@ class Words {
         "spheres, disks, cylinders");
     say("instances of groups", n_.instances, "instances");
     say("motion of shapes", n_.moving_shapes > 0,
-        fmt::format("{} shapes or instances move while the shutter is open; path_reuse, light_vertices, "
-                    "sky_portals and local_lights, which bring together paths of different times, are left "
-                    "out",
+        fmt::format("shapes or instances that move while the shutter is open: {}; path_reuse, "
+                    "light_vertices, sky_portals and local_lights, which bring together paths of different "
+                    "times, are left out",
                     n_.moving_shapes),
         "all shapes stand still");
     say("dielectrics", count<DielectricBsdf, RoughDielectricBsdf>(n_.materials), "materials");

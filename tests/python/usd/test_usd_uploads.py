@@ -10,7 +10,7 @@ import zipfile
 
 import pytest
 from local_farm import HttpError, LocalFarm, bin_dir
-from stage_kit import Gf, UsdGeom, UsdUtils, bind, camera, colours, coordinates, mesh, new_stage, path_of, png, preview, sky, texture
+from stage_kit import Gf, UsdGeom, UsdUtils, bind, camera, colours, coordinates, exr, mesh, new_stage, path_of, png, preview, sky, texture
 
 SQUARE = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]
 SPEC = {"spp": 4, "size": [24, 24]}
@@ -88,6 +88,17 @@ def test_the_pixels_are_those_of_the_package(farm, local_farm, stage, image, nam
     assert local_farm.job(answer["id"])["name"] == name
 
 
+def test_images_that_are_computed_with_are_those_of_the_package(farm, local_farm, stage, tmp_path):
+    light = exr(tmp_path / "light.exr", [[(0.5, 0.25, 2.0)] * 40] * 20)
+    made = square(stage)
+    bind(made, preview(stage, "/look", diffuseColor=texture(stage, "/look/image", "light.exr", scale=(0.5, 0.25, 0.125, 1))))
+    by_package = farm.submit(path_of(stage), spp=4, size=(24, 24)).wait()
+
+    answer = upload(local_farm, "shot.usda", path_of(stage).read_bytes(), {"light.exr": light.read_bytes()})
+
+    assert pixels(local_farm, answer["id"]) == local_farm.report(by_package.id)["pixels_sha256"]
+
+
 def test_files_above_the_stage_and_layers_are_found(local_farm, stage, image, tmp_path):
     colours(square(stage), [(0.2, 0.4, 0.8)], "constant")
     part = path_of(stage).read_bytes()
@@ -159,13 +170,13 @@ def test_a_stage_reads_no_file_that_was_not_sent(local_farm, stage, path):
     layer_refused, told_of_layer = refusal(local_farm, "shot.usda", f"#usda 1.0\n(\n    subLayers = [@{path}@]\n)\n".encode())
 
     assert image_refused == layer_refused == 400
-    assert f"names {path}, which is /etc/passwd and lies outside the folder of the stage's files: send this file along" in told_of_image
+    assert f"the asset @{path}@ is not found" in told_of_image and f"@{path}@ is not found" in refusal(local_farm, "s.usda", path_of(stage).read_bytes().replace(b"passwd", b"nothing"))[1].replace("nothing", "passwd"), "nobody learns what the machine has"
     assert "/etc/passwd@" in told_of_layer and "root:" not in told_of_layer
 
 
 @pytest.mark.parametrize("name, words", [
     ("/etc/passwd", "has an absolute name"), ("a/../../" + "../" * 40 + "x", "is too many folders up"), ("a\\b.png", "backslash"), ("x/..", "is no name"),
-    ("shot.usda", "is there twice"), ("./wood.png", "is there twice"), ("wood.png/inner.png", "is a folder of another file, too")])
+    ("shot.usd", "is there twice"), ("b" * 300 + ".png", "more than 200 bytes"), ("./wood.png", "is there twice"), ("wood.png/inner.png", "is a folder of another file, too")])
 def test_names_of_files_lead_nowhere_else(local_farm, stage, image, name, words):
     square(stage)
 
@@ -183,9 +194,9 @@ def stand_in(folder, script):
     return program
 
 
-# The package has taken over by a stage: what it then does costs this submission only.
+# A stage has taken the package over: what it then does costs this submission only.
 @pytest.mark.parametrize("script, words", [
-    (f"exec {sys.executable} -c 'import ctypes; ctypes.string_at(0)'", "crashed"), ("exit 3", "cannot be read"), ("echo broken >&2; exit 1", "broken"), ("exit 0", "the archive is empty"),
+    (f"exec {sys.executable} -c 'import ctypes; ctypes.string_at(0)'", "crashed"), ("exit 4", "cannot be read"), ("echo broken >&2; exit 1", "broken"), ("exit 0", "the archive is empty"),
     ("echo no tar >&3", "bundle"), ("printf 'first line\\nsecond \\033[2J line' >&3; exit 2", "shot.usda: first line\nsecond")])
 def test_whatever_happens_to_the_package_is_told(tmp_path, script, words):
     with LocalFarm(tmp_path / "farm", flags=["--usd-python", stand_in(tmp_path, script)]) as farm:
@@ -193,6 +204,13 @@ def test_whatever_happens_to_the_package_is_told(tmp_path, script, words):
 
         assert status == 400 and words in told and "\x1b" not in told
         assert json.loads(farm.request("GET", "/api/v1/jobs"))["jobs"] == []
+
+
+def test_a_full_disk_is_no_fault_of_the_stage(tmp_path):
+    with LocalFarm(tmp_path / "farm", flags=["--usd-python", stand_in(tmp_path, "exit 3")]) as farm:
+        status, told = refusal(farm, "shot.usda", b"#usda 1.0\n")
+
+    assert status == 507 and "free some space" in told
 
 
 def test_the_package_writes_and_starts_nothing(tmp_path):

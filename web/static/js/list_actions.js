@@ -32,9 +32,10 @@ export function makeListActions({ get, set, attempt, api, snapshot }) {
 
   /** No event tells of announced jobs, so they are asked for again and again while the list is seen. */
   async function refreshAnnounced() {
-    if (get().session !== "in" || get().route.view !== "jobs" || document.hidden) return;
+    const { me, session, route } = get();
+    if (session !== "in" || route.view !== "jobs" || document.hidden) return;
     const announced = await api.announced().catch(() => null); // of an older coordinator: none
-    if (announced !== null && get().session === "in") set({ ...get(), announced });
+    if (announced !== null && get().session === "in" && get().me === me) set({ ...get(), announced });
   }
   setInterval(refreshAnnounced, kAnnouncedPauseMs);
   document.addEventListener("visibilitychange", refreshAnnounced);

@@ -134,8 +134,8 @@ class Bricks {
   bool halves() const { return halves_ != nullptr; }
 
   float at(int x, int y, int z) const { return value(place(x, y, z)); }
-  // Returns the values at a position and those that follow it along each axis; x varies fastest. On an axis
-  // of one value it follows itself.
+  // Returns the values at a position and those that follow it along each axis; x varies fastest. What follows
+  // the last position is some finite number.
   std::array<float, 8> corners(int x, int y, int z) const {
     const std::size_t i = place(x, y, z);
     return halves_ ? corners(halves_ + i) : corners(floats_ + i);

@@ -1,9 +1,11 @@
 #include "worker/render/media/grid.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
+#include "worker/render/base/build_stop.h"
 #include "worker/render/media/field.h"
 
 namespace ls::render {
@@ -139,8 +141,9 @@ void Grid::use_cells(int cell_size) {
   cell_size_ = cell_size;
   cells_ = cell_counts(cell_size_);
   macro_.resize(static_cast<std::size_t>(cells_[0]) * cells_[1] * cells_[2]);
+  const std::atomic<bool>* stop = BuildStop::flag();
   std::size_t i = 0;
-  for (int z = 0; z < cells_[2]; ++z)
+  for (int z = 0; z < cells_[2] && !(stop && *stop); ++z)
     for (int y = 0; y < cells_[1]; ++y)
       for (int x = 0; x < cells_[0]; ++x)
         macro_[i++] = lookup_ == Lookup::field ? bound_field(x, y, z) : bound_cell(x, y, z);

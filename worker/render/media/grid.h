@@ -121,7 +121,7 @@ class Grid {
   std::uint64_t bytes() const { return voxels_.bytes() + majorant_bytes(); }
 
   // Sets the width of the macro cells to `size` voxels along each axis, regardless of the density. Grids that
-  // are traversed together need cells of the same size.
+  // are traversed together need cells of the same size. If a BuildStop is set, cells may be left empty.
   void use_cells(int size);
   bool same_values(const Grid& other) const { return voxels_ == other.voxels_; }
   // Returns the grid whose values are the means of those of a, b and c, which must have the same shape.

@@ -1,8 +1,8 @@
 // The interface of lightshaft-vdb, the program that reads .vdb and .nvdb files (vdb_process.h): the function
 // that it runs and its reply. It writes the reply to the file that it inherits as kHelperFd: a VdbReply, then
 // from kVdbBricksAt on the bricks of each channel (bricks.h): its table, its nodes, its values, each at a
-// multiple of 4 bytes. Readers must
-// treat the reply as untrusted: a malicious file may have determined its content.
+// multiple of 4 bytes. Readers must treat the reply as untrusted: a malicious file may have determined its
+// content.
 #pragma once
 
 #include <cstddef>

@@ -118,8 +118,11 @@ void place_meters(World& w) {
 
 MediaState camera_media(const World& w) {
   if (w.camera_medium == kNone) return {};
+  // At the time at which accel and geometry show what moves, unless they are given another one. No boundary
+  // that moves passes the camera (check_way_of_camera), so the media are those of all times.
+  const double x = w.origin_x + w.size.width / 2., y = w.origin_y + w.size.height / 2.;
   const CameraRay ray =
-      w.camera.ray(w.origin_x + w.size.width / 2., w.origin_y + w.size.height / 2., {.5f, .5f});
+      w.camera.moves() ? w.camera.ray_at(0, x, y, {.5f, .5f}) : w.camera.ray(x, y, {.5f, .5f});
   const V3 eye = w.hidden_boundaries ? hidden_part(w, ray).start : ray.o;
   const Left left = left_from(w, eye);
   // A camera on the face of a body, or just before it, names the medium in it too: rays enter the body before

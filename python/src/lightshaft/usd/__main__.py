@@ -1,6 +1,7 @@
 """python -m lightshaft.usd: writes a stage as a scene for `lightshaft render` and `lightshaft submit`."""
 
 import argparse
+import errno
 import io
 import json
 import os
@@ -10,8 +11,9 @@ import tarfile
 from ..errors import LightshaftError
 from ..scene_files import Source
 from . import StageScene, read
-from .files import OutsideFolder
+from .files import OutsideFolder, not_found
 
+NO_ROOM = 3  # exit code: there is no room for the file of --to-descriptor
 _PIECE = 1 << 24  # bytes read from a file at once
 
 
@@ -47,10 +49,11 @@ def write_bundle(scene: StageScene, descriptor: int) -> None:
 
 
 def reason_of(error: LightshaftError) -> str:
-    """Says why an uploaded stage is refused. Its user cannot choose the folders that are read."""
+    """Says why an uploaded stage is refused. Its user chooses neither the folders that are read nor a camera, and
+    need not know what this machine has."""
     if isinstance(error, OutsideFolder):
-        return f"{error.what}: send this file along, and name it by its path from the stage"
-    return str(error)
+        return f"{error.owner}: error: {not_found(error.named)}"
+    return str(error).replace("give camera=", "leave one camera in the stage, or submit it by the Python package with camera=")
 
 
 def main() -> int:
@@ -89,8 +92,13 @@ def main() -> int:
     except LightshaftError as error:
         if options.to_descriptor is not None:
             os.write(options.to_descriptor, reason_of(error).encode())
-        print(error, file=sys.stderr)
+        else:
+            print(error, file=sys.stderr)
         return 2
+    except OSError as error:
+        if options.to_descriptor is not None and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+            return NO_ROOM
+        raise
     for warning in scene.warnings:
         print(warning, file=sys.stderr)
     return 0

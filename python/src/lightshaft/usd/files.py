@@ -20,12 +20,19 @@ from ..scene_files import PathLike, Source, written_otherwise
 from .problems import Problems
 
 
+def not_found(path: str) -> str:
+    return f"the asset @{path}@ is not found. Put the file there, or mend the path"
+
+
 class OutsideFolder(FileRefused):
     """A file lies outside of the folders that may be read."""
 
-    def __init__(self, what: str, folder: pathlib.Path) -> None:
-        super().__init__(f"{what}; to send it, allow its folder: allow=[{str(folder)!r}]")
-        self.what = what
+    def __init__(self, owner: str, named: str, real: pathlib.Path, root: pathlib.Path) -> None:
+        super().__init__(
+            f"{owner} names {named}, which is {real} and lies outside {root}; "
+            f"to send it, allow its folder: allow=[{str(real.parent)!r}]"
+        )
+        self.owner, self.named = owner, named
 
 
 class Asset:
@@ -83,7 +90,7 @@ class Files:
         outer, inner = Ar.SplitPackageRelativePathOuter(resolved)
         if not resolved or not os.path.isfile(outer):
             self._problems.error(
-                prim, f"the asset @{value.path}@ is not found. Put the file there, or mend the path"
+                prim, not_found(value.path)
             )
             return None
         real = self._admit(str(prim.GetPath()), value.path, outer)
@@ -97,8 +104,7 @@ class Files:
     def _admit(self, owner: str, named: str, place: str) -> pathlib.Path:
         real = pathlib.Path(os.path.realpath(place))
         if not any(real.is_relative_to(root) for root in self._roots):
-            what = f"{owner} names {named}, which is {real} and lies outside {self._roots[0]}"
-            raise OutsideFolder(what, real.parent)
+            raise OutsideFolder(owner, named, real, self._roots[0])
         return real
 
     def take(self, asset: Asset) -> str:

@@ -12,7 +12,8 @@ export function jobsView(state, actions) {
   const jobs = jobsInOrder(state);
   const { list } = state;
   const none = list.ids ? list.total === 0 && !isNarrowed(list.asked) : jobs.length === 0;
-  if (none && jobs.length === 0 && state.announced.length === 0) return mayChange(state) ? firstSteps() : h("section", { key: "empty", class: "empty" }, h("h1", null, "Nothing is rendering yet"), h("p", null, "Your token lets you look; jobs are submitted with another one."));
+  if (none && jobs.length === 0 && state.announced.length > 0) return h("section", { key: "jobs", class: "jobs" }, h("div", { class: "heading" }, h("h1", null, "Jobs")), announcedJobs(state));
+  if (none && jobs.length === 0) return mayChange(state) ? firstSteps() : h("section", { key: "empty", class: "empty" }, h("h1", null, "Nothing is rendering yet"), h("p", null, "Your token lets you look; jobs are submitted with another one."));
   return h("section", { key: "jobs", class: "jobs" },
     h("div", { class: "heading" }, h("h1", null, "Jobs"), h("p", { class: "sub" }, tally(state, jobs)), mayChange(state) ? h("a", { class: "button primary", href: "#/submit" }, "New job") : null),
     announcedJobs(state),
