@@ -360,7 +360,7 @@ def test_what_has_no_effect_is_told_by_its_prim(stage):
     for start, part in (
         ("/look/surface", "inputs:sheen has no effect"),
         ("/look", "outputs:displacement of a material has no effect"),
-        ("/m", "velocities has no effect: only the camera's motion is blurred"),
+        ("/m", "velocities has no effect: points that move in a mesh are not blurred"),
         ("/whole", "clippingRange (50, 0.1) shows nothing"),
         ("/whole", "exposure:iso has no effect"),
         ("/sun", "inputs:shadow:color of a light has no effect"),

@@ -11,6 +11,7 @@ from pxr import Gf, Usd, UsdGeom
 from ..errors import StageRejected
 from .document import Document
 from .ignored import tell_prim
+from .motion import MOST_POSES, STEPS, Motions, shutter
 from .problems import Problems
 from .shading import plain
 from .transforms import Matrix, column_matrix, is_usable, scale, translation, unscaled
@@ -18,8 +19,6 @@ from .transforms import Matrix, column_matrix, is_usable, scale, translation, un
 TURNED = scale(-1, 1, -1)  # looks along +z with +x to the left
 NEAR, FAR = 1e-4, 1e7  # of the depths that are seen, unless the camera says otherwise
 WIDTH = 960  # pixels of a frame whose size nobody gives
-MOST_POSES = 500
-STEPS = 9  # times of the exposure at which a camera's place is asked for, beside those that the stage has
 FRAMED = 50.0  # degrees of the view of a stage without a camera
 TENTH = 0.1  # apertures and focal lengths are in tenths of a scene unit
 
@@ -76,6 +75,7 @@ def add_camera(
     time: Usd.TimeCode,
     size: tuple[int, int] | None,
     medium: str | None,
+    motions: Motions,
 ) -> None:
     prim = camera.GetPrim()
 
@@ -95,9 +95,8 @@ def add_camera(
     # The frame holds all of the aperture: where its shape differs it shows more.
     wide = width / height >= across / along
     shown = (along * width / height, along) if wide else (across, across * height / width)
-    opens, closes = get("shutter:open", 0.0), get("shutter:close", 0.0)
+    opens, closes = shutter(camera, time)
     if opens < closes and time.IsNumeric():
-        problems.warn(prim, "shutter:open and shutter:close: only the camera's motion is blurred")
         for name in ("focalLength", "focusDistance", "fStop", "horizontalAperture", "verticalAperture"):
             attribute = prim.GetAttribute(name)
             if len({attribute.Get(time.GetValue() + at) for at in (opens, closes)}) > 1:
@@ -108,6 +107,8 @@ def add_camera(
     sensor: dict[str, Any] = {"type": "perspective"}
     if len(poses) > 1:
         sensor["shutter_open"], sensor["shutter_close"] = min(poses), max(poses)
+    elif motions.any and motions.exposure is not None:
+        sensor["shutter_open"], sensor["shutter_close"] = (motions.exposure.times[i] for i in (0, -1))
 
     def place(inner: Matrix) -> None:
         matrices = {at: pose @ inner for at, pose in poses.items()}

@@ -12,10 +12,12 @@ from .document import Document, reference
 from .gprims import capsule_part, cylinder_part, sphere_part
 from .materials import GREY, Materials, Surface, constant_colour
 from .meshes import Corners, Floats, Ints, Part, Polygons, smooth_normals
+from .motion import Motions, Placement
 from .problems import Problems
 from .shading import Primvar
-from .transforms import Matrix, is_similarity, mirrors, scale
+from .transforms import Matrix, mirrors, scale
 
+SIZES = ("radius", "height", "size", "width", "length", "radiusBottom", "radiusTop")
 SHEET = 1e-5  # the back of a sheet that gives off light stands this share of its size behind the front
 Dict = dict[str, Any]
 
@@ -26,21 +28,31 @@ class Leaf:
 
     name: str
     shape: Dict
-    matrix: Matrix
+    matrix: Placement
 
     @property
     def shines(self) -> bool:
         return "emitter" in self.shape
 
+    @property
+    def alone(self) -> bool:
+        """Whether it cannot be in a group of shapes."""
+        return self.shines or self.matrix.moves
+
 
 class Geometry:
     def __init__(
-        self, document: Document, materials: Materials, problems: Problems, time: Usd.TimeCode
+        self,
+        document: Document,
+        materials: Materials,
+        problems: Problems,
+        time: Usd.TimeCode,
+        motions: Motions,
     ) -> None:
-        self._document, self._materials = document, materials
+        self._document, self._materials, self._motions = document, materials, motions
         self._problems, self._time = problems, time
 
-    def leaves(self, prim: Usd.Prim, matrix: Matrix) -> list[Leaf]:
+    def leaves(self, prim: Usd.Prim, matrix: Placement) -> list[Leaf]:
         """Returns the shapes of a prim. Returns none and reports a warning if its type is not supported."""
         kind = str(prim.GetTypeName())
         if kind == "Mesh":
@@ -49,6 +61,7 @@ class Geometry:
         if build is None:
             self._problems.warn(prim, f"a {kind} is not supported: make it a Mesh")
             return []
+        self._motions.deforms(prim, SIZES)
         surface = self._surface(prim)
         if surface.coordinates is not None or surface.colours is not None:
             self._problems.warn(prim, f"a {kind} has no primvars for its material: displayColor is used")
@@ -59,15 +72,16 @@ class Geometry:
         ]
         return shapes
 
-    def placed(self, leaf: Leaf, matrix: Matrix) -> Dict:
+    def placed(self, leaf: Leaf, matrix: Placement) -> Dict:
         """Places the shape of a leaf at `matrix`. A sphere that would be stretched becomes triangles."""
         shape = leaf.shape
-        if shape["type"] == "sphere" and not is_similarity(matrix):
+        if shape["type"] == "sphere" and not matrix.is_similarity():
             kept = {key: value for key, value in shape.items() if key not in ("type", "radius")}
             shape = {**self._ply(sphere_part(shape["radius"])), **kept}
         # Mirrored, spheres and flat triangles are turned inside out: their normals follow their parameters.
-        inside_out = mirrors(matrix) and (shape["type"] == "sphere" or shape.get("face_normals", False))
-        return {**shape, "to_world": matrix, **({"flip_normals": True} if inside_out else {})}
+        inside_out = mirrors(matrix.still) and (shape["type"] == "sphere" or shape.get("face_normals", False))
+        to_world = self._motions.to_world(leaf.name, matrix, rigid=leaf.shines)
+        return {**shape, "to_world": to_world, **({"flip_normals": True} if inside_out else {})}
 
     def _get(self, prim: Usd.Prim, name: str, default: Any = None) -> Any:
         attribute = prim.GetAttribute(name)
@@ -106,10 +120,11 @@ class Geometry:
 
     # Meshes
 
-    def _mesh(self, prim: Usd.Prim, matrix: Matrix) -> list[Leaf]:
+    def _mesh(self, prim: Usd.Prim, matrix: Placement) -> list[Leaf]:
         polygons = self._polygons(prim)
         if polygons is None:
             return []
+        self._motions.deforms(prim, ("points",))
         corners, face = polygons.triangles()
         if str(self._get(prim, "orientation", "rightHanded")) == "leftHanded":
             corners = corners[:, ::-1]
@@ -247,7 +262,7 @@ class Geometry:
             parts.append((subset.GetPrim(), faces))
         return [*parts, (prim, np.flatnonzero(free))]
 
-    def _sides(self, name: str, part: Part, surface: Surface, matrix: Matrix) -> list[Leaf]:
+    def _sides(self, name: str, part: Part, surface: Surface, matrix: Placement) -> list[Leaf]:
         sides = [part]
         if surface.emission is not None and not part.closed:  # a sheet gives off light on both sides
             sides.append(part.back(SHEET))

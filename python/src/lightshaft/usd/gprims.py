@@ -35,6 +35,12 @@ def revolved(heights: Floats, radii: Floats, normals: Floats, axis: str) -> Part
     return Part(names, table.astype("<f4"), kept, closed=True)
 
 
+def rectangle_part() -> Part:
+    """Makes the square from (-1, -1) to (1, 1) that faces +z."""
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], "<f4")
+    return Part(("x", "y", "z"), corners, np.array([[0, 1, 2], [0, 2, 3]]))
+
+
 def sphere_part(radius: float) -> Part:
     polar = np.linspace(-np.pi / 2, np.pi / 2, AROUND // 2 + 1)
     around = np.stack([np.cos(polar), np.sin(polar)], axis=1)

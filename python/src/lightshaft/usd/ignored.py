@@ -12,7 +12,7 @@ SILENT = {
     *("SkelRoot", "Skeleton", "SkelAnimation", "BlendShape", "OpenVDBAsset"),
     *("RenderSettings", "RenderProduct", "RenderVar", "RenderPass", "Backdrop", "Collection"),
 }
-MOTION = "only the camera's motion is blurred"
+MOTION = "points that move in a mesh are not blurred"
 NO_EFFECT = {
     "velocities": MOTION,
     "accelerations": MOTION,
@@ -52,6 +52,8 @@ def tell_prim(prim: Usd.Prim, problems: Problems) -> None:
         problems.warn(prim, f"a {kind} has no effect")
     for attribute in prim.GetAuthoredAttributes():
         name = attribute.GetName()
+        if NO_EFFECT.get(name) is MOTION and prim.IsA(UsdGeom.PointInstancer):
+            continue  # USD moves the instances by them
         if name in NO_EFFECT and _says_something(attribute):
             problems.warn(prim, f"{name} has no effect: {NO_EFFECT[name]}")
     mode = UsdGeom.ModelAPI(prim).GetModelDrawModeAttr()

@@ -9,14 +9,15 @@ import numpy as np
 from pxr import Usd, UsdGeom, UsdLux
 
 from .document import Document, colour
-from .gprims import cylinder_part, sphere_part
+from .gprims import cylinder_part, rectangle_part, sphere_part
 from .ignored import tell_light
 from .images import LEAST_OF_A_MAP, Images, exr, is_tiny, scaled
 from .links import NONE, Links
 from .meshes import Part
+from .motion import Motions, Placement
 from .problems import Problems
 from .shading import plain
-from .transforms import Matrix, is_similarity, mean_scale, mirrors, scale, unscaled
+from .transforms import EXACT, Matrix, is_similarity, mean_scale, mirrors, scale, unscaled
 from .visibility import Visibility
 
 FLIP = scale(1, -1, -1)  # USD's lights shine along -z, those of the scene format along +z
@@ -34,14 +35,16 @@ class Lights:
         time: Usd.TimeCode,
         up_axis: str,
         links: Links,
+        motions: Motions,
     ) -> None:
+        self._motions = motions
         self._document, self._images, self._problems, self._time = document, images, problems, time
         self._up_axis, self._links = up_axis, links
         self._sky: list[tuple[Usd.Prim, list[float], Dict]] = []
         self._maps = 0
         self.count = 0
 
-    def add(self, prim: Usd.Prim, matrix: Matrix) -> None:
+    def add(self, prim: Usd.Prim, placement: Placement) -> None:
         build = BUILD.get(str(prim.GetTypeName()))
         if build is None:
             self._problems.warn(prim, f"a light of type {prim.GetTypeName()} is not read")
@@ -50,7 +53,8 @@ class Lights:
         self._check(prim)
         tell_light(prim, self._problems)
         self._visible = Visibility(prim, self._time, self._problems)
-        build(self, prim, matrix)
+        self._placement = placement
+        build(self, prim, placement.still)
 
     def finish(self) -> None:
         """Combines domes of one colour into one sky, because the scene format has only one."""
@@ -115,6 +119,7 @@ class Lights:
         return {**self._links.of_light(prim), **({} if shades else {"blockers": NONE})}
 
     def distant(self, prim: Usd.Prim, matrix: Matrix) -> None:
+        self._stands(prim)
         luminance = self.luminance(prim, 50000.0)
         half = min(max(self.number(prim, "angle", 0.53) / 2, 0.0), 180.0)
         if half > 90:
@@ -145,6 +150,7 @@ class Lights:
             flags = {**self._visible.of_sky(), **self._linked(prim)}
             self._sky.append((prim, luminance, flags))
             return
+        self._stands(prim)
         kind = str(self.value(prim, "texture:format", "automatic"))
         if kind not in ("automatic", "latlong"):
             self._problems.error(prim, f"a map of format {kind} is not supported. Make it latlong")
@@ -247,8 +253,29 @@ class Lights:
             radiance = {"type": "bitmap", "filename": name, "raw": True, "to_uv": mirror}
             radiance["wrap_mode"] = "clamp"
         emitter = {"type": "area", "radiance": radiance, **self._beam(prim, flat), **self._linked(prim)}
-        placed = {**shape, "to_world": to_world, "bsdf": {"type": "null"}, "emitter": emitter}
+        shape, placement = self._moving(shape, to_world, flat, image=radiance["type"] == "bitmap")
+        where = self._motions.to_world(prim, placement, rigid=True)
+        placed = {**shape, "to_world": where, "bsdf": {"type": "null"}, "emitter": emitter}
         self._document.define(str(prim.GetPath()), {**placed, **self._visible.of_sky()})
+
+    def _moving(self, shape: Dict, to_world: Matrix, flat: bool, image: bool) -> tuple[Dict, Placement]:
+        """Returns the shape of a lamp and its placement. One that moves gets a form that its transforms do not
+        stretch, as the renderer demands."""
+        if not self._placement.moves:
+            return shape, Placement(to_world)
+        motion = self._placement @ np.linalg.inv(self._placement.still)
+        if flat:
+            x, y, z = np.linalg.norm(to_world[:3, :3], axis=0)
+            if abs(x - y) <= EXACT * x:  # a flat shape has no size along z
+                to_world = to_world @ scale(1, 1, x / z)
+            elif shape["type"] == "rectangle" and not image and not mirrors(to_world):
+                part = rectangle_part().moved(to_world)
+                shape = {"type": "ply", "filename": self._document.files.write(part.ply(), ".ply")}
+                to_world = np.eye(4)
+        return shape, Placement(to_world, (motion @ to_world).poses)
+
+    def _stands(self, prim: Usd.Prim) -> None:
+        self._motions.stands(prim, self._placement, "a light without a shape")
 
     def _beam(self, prim: Usd.Prim, flat: bool) -> Dict:
         """Returns cone and focus as the angles of an area light, measured from its normal."""
@@ -279,6 +306,7 @@ class Lights:
 
     def _point(self, prim: Usd.Prim, matrix: Matrix, radius: float, cone: float) -> None:
         """Replaces a tiny sphere by a point that emits the light of its cross-section in each direction."""
+        self._stands(prim)
         luminance = self.luminance(prim)
         flags = {**self._visible.of_light(), **self._linked(prim)}
         if self.value(prim, "normalize", False):

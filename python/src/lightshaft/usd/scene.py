@@ -21,6 +21,7 @@ from .images import Images
 from .lights import Lights
 from .links import Links
 from .materials import Materials
+from .motion import Exposure, Motions
 from .problems import Problems
 from .volumes import Volumes
 from .walk import Walk
@@ -161,11 +162,13 @@ class _Reader:
         problems = self._problems
         up_axis = str(UsdGeom.GetStageUpAxis(self._stage))
         materials = Materials(document, self._images, problems, time)
-        geometry = Geometry(document, materials, problems, time)
+        exposure = Exposure.of(self._camera, time)
+        motions = Motions(problems, exposure)
+        geometry = Geometry(document, materials, problems, time, motions)
         links = Links(self._stage, problems)
-        lights = Lights(document, self._images, problems, time, up_axis, links)
-        volumes = Volumes(document, problems, time, links)
-        Walk(document, problems, time, geometry, lights, volumes, links).run(self._stage)
+        lights = Lights(document, self._images, problems, time, up_axis, links, motions)
+        volumes = Volumes(document, problems, time, links, motions)
+        Walk(document, problems, time, geometry, lights, volumes, links, motions).run(self._stage)
         lights.finish()
         links.finish(document.scene)
         shines = any("emitter" in value or "temperature" in value for value in document.scene.values())
@@ -177,5 +180,5 @@ class _Reader:
         else:
             with problems.reading(self._camera):
                 inside = volumes.around(cameras.eye(self._camera, time))
-                cameras.add_camera(document, problems, self._camera, time, self._size, inside)
+                cameras.add_camera(document, problems, self._camera, time, self._size, inside, motions)
         return scene_of_dict(document.scene)

@@ -9,6 +9,7 @@ from pxr import Usd, UsdGeom, UsdVol
 
 from .document import Document, colour, reference
 from .links import Links
+from .motion import Motions, Placement
 from .problems import Problems
 from .shading import plain
 from .transforms import Matrix, is_usable, scale, translation
@@ -26,7 +27,15 @@ SETTINGS = {
 
 
 class Volumes:
-    def __init__(self, document: Document, problems: Problems, time: Usd.TimeCode, links: Links) -> None:
+    def __init__(
+        self,
+        document: Document,
+        problems: Problems,
+        time: Usd.TimeCode,
+        links: Links,
+        motions: Motions,
+    ) -> None:
+        self._motions = motions
         self._document, self._problems, self._time, self._links = document, problems, time, links
         self._boxes: list[tuple[str, Matrix]] = []
         self._settings = {name: plain(value) for name, value in SETTINGS.items()}
@@ -39,7 +48,9 @@ class Volumes:
                 return medium
         return None
 
-    def add(self, prim: Usd.Prim, matrix: Matrix) -> None:
+    def add(self, prim: Usd.Prim, placement: Placement) -> None:
+        self._motions.stands(prim, placement, "a volume")
+        matrix = placement.still
         density = temperature = None
         for name, target in UsdVol.Volume(prim).GetFieldPaths().items():
             if name == "density":
