@@ -317,3 +317,11 @@ def test_what_stands_elsewhere_while_the_shutter_is_open_is_rendered_there(stage
     stage.GetPrimAtPath("/camera").GetAttribute("shutter:open").Set(1.0)
     text = read(stage).main.xml
     assert "<animation" not in text and '<matrix value="1.0 0.0 0.0 5.0 ' in text
+
+
+@pytest.mark.parametrize("closes", [float("inf"), 2e9])
+def test_times_that_no_scene_has_are_refused(stage, closes):
+    op(cube(stage, "/cube"), "Translate", (0, 0, 0), (1, 0, 0))
+    stage.GetPrimAtPath("/camera").GetAttribute("shutter:close").Set(closes)
+    with pytest.raises(lightshaft.StageRejected, match="at most 1e.09 in size"):
+        read(stage)

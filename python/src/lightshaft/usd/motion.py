@@ -14,6 +14,7 @@ from .transforms import Matrix, column_matrix, is_similarity, is_usable, mirrors
 
 STEPS = 9  # times of the exposure at which places are asked for, beside those that the stage has
 MOST_POSES = 500
+LATEST = 1e9  # as in the scene format
 MOST_KEYS = 50_000  # of all prims together, each two elements of the 500 000 that a scene can have
 ALIKE = 1e-12  # share of their size by which the numbers of two poses differ that count as one
 ON_THE_WAY = 1e-7  # the same for a pose that the renderer's own steps between two others give
@@ -60,11 +61,13 @@ class Exposure:
     times: tuple[float, ...]
 
     @classmethod
-    def of(cls, camera: UsdGeom.Camera | None, time: Usd.TimeCode) -> Exposure | None:
+    def of(cls, camera: UsdGeom.Camera, time: Usd.TimeCode) -> Exposure | None:
         """Returns None if the shutter is closed, or the stage has no times."""
         opens, closes = shutter(camera, time)
-        if camera is None or not (opens < closes and time.IsNumeric()):
+        if not (opens < closes and time.IsNumeric()):
             return None
+        if max(abs(opens), abs(closes)) > LATEST:
+            raise ValueError(f"shutter:open and shutter:close are times of at most {LATEST:g} in size")
         frame = time.GetValue()
         evenly = [float(step) for step in np.linspace(opens, closes, STEPS)]
         during = Gf.Interval(frame + opens, frame + closes)
@@ -96,10 +99,8 @@ class Exposure:
         return found
 
 
-def shutter(camera: UsdGeom.Camera | None, time: Usd.TimeCode) -> tuple[float, float]:
+def shutter(camera: UsdGeom.Camera, time: Usd.TimeCode) -> tuple[float, float]:
     """Returns when the shutter opens and closes, in frames from the one that is rendered."""
-    if camera is None:
-        return 0.0, 0.0
     values = (camera.GetPrim().GetAttribute(f"shutter:{name}").Get(time) for name in ("open", "close"))
     opens, closes = (0.0 if value is None else float(value) for value in values)
     return opens, closes

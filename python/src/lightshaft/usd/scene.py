@@ -162,7 +162,10 @@ class _Reader:
         problems = self._problems
         up_axis = str(UsdGeom.GetStageUpAxis(self._stage))
         materials = Materials(document, self._images, problems, time)
-        exposure = Exposure.of(self._camera, time)
+        exposure = None
+        if self._camera is not None:
+            with problems.reading(self._camera):
+                exposure = Exposure.of(self._camera, time)
         motions = Motions(problems, exposure)
         geometry = Geometry(document, materials, problems, time, motions)
         links = Links(self._stage, problems)
