@@ -8,9 +8,9 @@ from .problems import ExportError
 TURNED = ((-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1))  # looks along +z with +x to the left
 
 
-def add_camera(document, problems, camera, scene, size, medium, matrix_class, poses):
+def add_camera(document, problems, camera, scene, size, medium, matrix_class, exposure):
     """Adds the camera. `medium`: the id of the medium around the camera, or None. `matrix_class`: Blender's
-    Matrix. `poses`: its matrices by times; empty if it does not move."""
+    Matrix. `exposure`: its Exposure, in which other objects may move."""
     data, name = camera.data, camera.name
     render = scene.render
     if abs(render.pixel_aspect_x - render.pixel_aspect_y) > 1e-6:
@@ -35,7 +35,7 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class, po
             "Render Properties > Light Paths: Fast GI Approximation has no effect: all light is traced"
         )
     width, height = size
-    poses = poses or {0: camera.matrix_world}
+    poses = exposure.camera or {0: camera.matrix_world}
     if any(abs(pose.determinant()) < 1e-30 for pose in poses.values()):
         raise ExportError(f"camera '{name}': its scale is 0. Set it to 1")
     inner = matrix_class(TURNED)
@@ -70,12 +70,10 @@ def add_camera(document, problems, camera, scene, size, medium, matrix_class, po
         values["shutter_open"], values["shutter_close"] = float(min(to_world)), float(max(to_world))
     else:
         to_world = to_world.popitem()[1]
-    if render.use_motion_blur:
-        problems.warning(
-            "Render Properties > Motion Blur applies to the camera only; everything else is rendered where it is at the frame"
-        )
-        if scene.cycles.rolling_shutter_type != "NONE":
-            problems.unsupported("Render Properties > Motion Blur: Rolling Shutter. Set it to None")
+        if document.root.find(".//animation") is not None:
+            values["shutter_open"], values["shutter_close"] = float(exposure.opens), float(exposure.closes)
+    if render.use_motion_blur and scene.cycles.rolling_shutter_type != "NONE":
+        problems.unsupported("Render Properties > Motion Blur: Rolling Shutter. Set it to None")
     transparent = True if render.film_transparent else None
     film = element(
         "film",

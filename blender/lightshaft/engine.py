@@ -13,7 +13,7 @@ from .export import export
 from .farm import Farm
 from .light_groups import known_name
 from .local import LocalJob, find_program
-from .motion import poses_of_camera
+from .motion import exposure_of
 from .problems import ExportError
 from .settings import preferences
 
@@ -76,7 +76,7 @@ class LightshaftEngine(bpy.types.RenderEngine):
         self.passes = wanted_passes(scene, depsgraph.view_layer)
         self.update_stats("", "Lightshaft: exports the scene")
         size = (self.resolution_x, self.resolution_y)
-        path, document, warnings = export(depsgraph, folder, size, poses_of_camera(self, depsgraph))
+        path, document, warnings = export(depsgraph, folder, size, exposure_of(self, depsgraph))
         # Blender 5.0 crashes where it saves a render that was cancelled before it had a result.
         self.end_result(self.begin_result(0, 0, *size))
         job, more = self.start(scene, path, document)

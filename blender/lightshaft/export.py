@@ -11,6 +11,7 @@ from .light_groups import LightGroups
 from .lights import add_light
 from .linking import Linking, drop_empty_sets
 from .materials import Materials, Owner
+from .motion import Exposure
 from .problems import Problems
 from .textures import Textures
 from .visibility import visibility_of
@@ -32,15 +33,15 @@ class Shape:
         self.tree = None
 
 
-def export(depsgraph, folder, size, poses):
-    """Returns (path of scene.xml, its Document, warnings). Raises ExportError, which lists all errors. `poses`: see
-    poses_of_camera()."""
-    return Exporter(depsgraph, folder, size, poses).run()
+def export(depsgraph, folder, size, exposure=None):
+    """Returns (path of scene.xml, its Document, warnings). Raises ExportError, which lists all errors. `exposure`:
+    see exposure_of(); without it nothing moves."""
+    return Exporter(depsgraph, folder, size, exposure or Exposure()).run()
 
 
 class Exporter:
-    def __init__(self, depsgraph, folder, size, poses):
-        self.poses = poses
+    def __init__(self, depsgraph, folder, size, exposure):
+        self.exposure = exposure
         self.depsgraph, self.size, self.scene = depsgraph, size, depsgraph.scene_eval
         self.problems = Problems(self.scene.lightshaft.unsupported == "LEAVE_OUT")
         self.document = Document(folder)
@@ -63,7 +64,7 @@ class Exporter:
         for instance in self.depsgraph.object_instances:
             if instance.show_self:
                 parent = instance.parent if instance.is_instance else None
-                self.add(instance.object, parent, instance.matrix_world.copy())
+                self.add(instance.object, parent, instance)
         for name in self.dim if self.catchers else ():
             self.problems.unsupported(
                 f"light '{name}': Shadow Catcher off. All lights light shadow catchers: switch it on in Object properties > Visibility"
@@ -74,23 +75,27 @@ class Exporter:
         camera = camera.evaluated_get(self.depsgraph)
         eye = camera.matrix_world.translation
         around = next((medium for medium, contains in self.bodies if contains(eye)), None)
-        add_camera(self.document, self.problems, camera, self.scene, self.size, around, Matrix, self.poses)
+        add_camera(self.document, self.problems, camera, self.scene, self.size, around, Matrix, self.exposure)
         self.problems.raise_errors()
         drop_empty_sets(self.document.root)
         return self.document.save(), self.document, self.problems.warnings
 
-    def add(self, item, parent, matrix):
+    def add(self, item, parent, instance):
         name = item.name
         if item.type in UNSEEN:
             return
+        placement = self.exposure.placement(self.problems, instance)
         visible = visibility_of(self.problems, item, parent, self.depsgraph.view_layer)
         self.check_visibility(item, visible)
         links, owner = self.links.of_light(item), self.links.owner_of(item, parent)
         if item.type == "LIGHT":
             marks = {"light_group": self.groups.of(item), **links}
-            add_light(self.document, self.problems, item, matrix, Matrix, self.may_see, marks, visible)
+            add_light(
+                self.document, self.problems, item, placement, Matrix, self.may_see, marks, visible
+            )
         elif item.type == "VOLUME":
-            self.add_grid(item, matrix, self.links.sets_of(owner))
+            placement.stands(self.problems, "a volume")
+            self.add_grid(item, placement.still, self.links.sets_of(owner))
             self.warn_of_shade(name, owner)
         elif item.type in MESHES:
             if any(
@@ -120,7 +125,7 @@ class Exporter:
             )
             if key not in self.known:
                 self.known[key] = self.shapes_of(item, visible, links, sets)
-            self.places.setdefault(key, []).append((name, matrix))
+            self.places.setdefault(key, []).append((name, placement))
             if any(shape.medium for shape in self.known[key]):
                 self.warn_of_shade(name, owner)
         else:
@@ -129,7 +134,7 @@ class Exporter:
             )
 
     def may_see(self, centre, radius):
-        if self.poses:
+        if self.exposure.camera:
             return True  # what a camera that moves passes is not looked at
         camera = self.scene.camera.evaluated_get(self.depsgraph)
         return may_see(camera, self.scene, self.size, centre, radius, Matrix)
@@ -226,19 +231,22 @@ class Exporter:
                     *(self.placed(shape, shape.filenames[0], None) for shape in plain),
                 )
                 identifier = self.document.define(places[0][0], group)
-                for _, matrix in places:
+                for _, placement in places:
+                    to_world = placement.to_world(self.problems)
                     self.document.add(
-                        element("shape", "instance", None, reference(identifier), to_world=matrix)
+                        element("shape", "instance", None, reference(identifier), to_world=to_world)
                     )
                 shapes = [shape for shape in shapes if shape not in plain]
             for shape in shapes:
-                for name, matrix in places:
+                for name, placement in places:
+                    to_world = placement.to_world(self.problems, shape.emission is not None)
                     for filename in shape.filenames:
-                        self.document.define(name, self.placed(shape, filename, matrix))
+                        self.document.define(name, self.placed(shape, filename, to_world))
                     if shape.medium:
-                        self.bodies.append((shape.medium, inside_mesh(shape.tree, matrix.inverted_safe())))
+                        to_local = placement.still.inverted_safe()
+                        self.bodies.append((shape.medium, inside_mesh(shape.tree, to_local)))
 
-    def placed(self, shape, filename, matrix):
+    def placed(self, shape, filename, to_world):
         inside_medium = reference(shape.medium, "interior") if shape.medium else None
         emitter = None
         if shape.emission is not None:
@@ -251,7 +259,7 @@ class Exporter:
             inside_medium,
             emitter,
             filename=filename,
-            to_world=matrix,
+            to_world=to_world,
             **shape.flags,
         )
 

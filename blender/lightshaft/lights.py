@@ -4,18 +4,19 @@ import math
 
 import numpy as np
 
-from . import exr
+from . import exr, meshes
 from .document import element
+from .motion import Placement
 
 FLIP = ((1, 0, 0, 0), (0, -1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1))  # Blender's lights look along -z
 PROFILE = 512  # pixels of the image that a spot light throws
 
 
-def add_light(document, problems, item, matrix, matrix_class, may_see, marks, visible):
-    """Adds a light object at `matrix`. Its power is in W, as in the Light properties. `may_see`: a function of a centre and
+def add_light(document, problems, item, placement, matrix_class, may_see, marks, visible):
+    """Adds a light object at its Placement. Its power is in W, as in the Light properties. `may_see`: a function of a centre and
     a radius, False if the camera does not see the ball. `marks`: the light group and the links of its emitter. `visible`:
     its Visibility."""
-    data, name = item.data, item.name
+    data, name, matrix = item.data, item.name, placement.still
     colour = light_colour(data)
     if (
         data.use_nodes
@@ -37,6 +38,8 @@ def add_light(document, problems, item, matrix, matrix_class, may_see, marks, vi
         problems.warning(
             f"light '{name}': Max Bounces has no effect: its light is traced like that of others"
         )
+    if data.type in ("SUN", "SPOT") or (data.type == "POINT" and not data.shadow_soft_size > 0):
+        placement.stands(problems, "a light without a shape")
     rigid = matrix.normalized()
     if data.type == "SUN":
         direction = -rigid.col[2].xyz
@@ -57,6 +60,13 @@ def add_light(document, problems, item, matrix, matrix_class, may_see, marks, vi
         if radius > 0:
             ball = matrix_class.Translation(matrix.translation) @ matrix_class.Scale(radius, 4)
             radiance = [c / (4 * math.pi**2 * radius**2) for c in colour]
+            if placement.poses:  # a ball of this size at each time, whatever the object's scale
+                radii = matrix_class.Scale(radius, 4)
+                places = {
+                    time: matrix_class.Translation(pose.translation) @ radii
+                    for time, pose in placement.poses.items()
+                }
+                ball = Placement(item, ball, places).to_world(problems, emits=True)
             document.add(lamp("sphere", ball, radiance, visible, may_see, marks))
         else:
             intensity = [c / (4 * math.pi) for c in colour]
@@ -68,7 +78,7 @@ def add_light(document, problems, item, matrix, matrix_class, may_see, marks, vi
     elif data.type == "SPOT":
         add_spot(document, problems, item, colour, rigid @ matrix_class(FLIP), marks, visible)
     else:
-        placed = matrix @ matrix_class(FLIP)
+        placed = placement @ matrix_class(FLIP)
         add_area(document, problems, item, colour, placed, matrix_class, may_see, marks, visible)
 
 
@@ -87,11 +97,13 @@ def vector(name, values, kind="vector"):
     )
 
 
-def lamp(shape, to_world, radiance, visible, may_see, marks):
+def lamp(shape, to_world, radiance, visible, may_see, marks, **values):
     """Makes a shape that emits light and lets the light of others pass, like Blender's lamps. They are hidden from the
     camera by default; a lamp that is out of sight anyway is not marked, because marked shapes cost render time."""
-    radius = to_world.col[0].xyz.length + to_world.col[1].xyz.length
-    hidden = visible.camera if may_see(to_world.translation, radius) else None
+    hidden = visible.camera
+    if not isinstance(to_world, dict):  # what moves is not looked at
+        radius = to_world.col[0].xyz.length + to_world.col[1].xyz.length
+        hidden = hidden if may_see(to_world.translation, radius) else None
     emitter = element("emitter", "area", None, radiance=radiance, **marks)
     return element(
         "shape",
@@ -101,6 +113,7 @@ def lamp(shape, to_world, radiance, visible, may_see, marks):
         emitter,
         to_world=to_world,
         visible_camera=hidden,
+        **values,
         **visible.receivers,
     )
 
@@ -152,7 +165,7 @@ def spot_profile(half, blend):
     return step * step * (3 - 2 * step)
 
 
-def add_area(document, problems, item, colour, to_world, matrix_class, may_see, marks, visible):
+def add_area(document, problems, item, colour, placement, matrix_class, may_see, marks, visible):
     data, name = item.data, item.name
     if data.spread < math.pi - 1e-4:
         problems.unsupported(
@@ -161,11 +174,26 @@ def add_area(document, problems, item, colour, to_world, matrix_class, may_see, 
     long = data.size
     short = data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size
     round_one = data.shape in ("DISK", "ELLIPSE")
-    placed = to_world @ matrix_class.Diagonal((long / 2, short / 2, 1, 1))
+    placed = placement.still @ matrix_class.Diagonal((long / 2, short / 2, 1, 1))
     across, up = placed.col[0].xyz, placed.col[1].xyz
     area = across.cross(up).length * (math.pi if round_one else 4)
     if area <= 0:
         problems.error(f"light '{name}': its size is 0. Give it a size, or make it a point light")
         return
     radiance = [c / (math.pi * area) for c in colour]
-    document.add(lamp("disk" if round_one else "rectangle", placed, radiance, visible, may_see, marks))
+    shape, values = "disk" if round_one else "rectangle", {}
+    if placement.poses:  # the renderer moves no lamp that is stretched: a flat one has no size along z
+        own = placement @ matrix_class.Diagonal((long / 2, short / 2, long / 2, 1))
+        mirrored = placement.still.determinant() < 0
+        if abs(long - short) > 1e-6 * long and not round_one and not mirrored:
+            shape, own = "ply", placement
+            values["filename"] = document.write(rectangle(long / 2, short / 2), ".ply")
+        placed = own.to_world(problems, emits=True)
+    document.add(lamp(shape, placed, radiance, visible, may_see, marks, **values))
+
+
+def rectangle(x, y):
+    """Makes a PLY of the rectangle of these half sizes that faces +z."""
+    corners = [(-x, -y), (x, -y), (x, y), (-x, y)]
+    table = np.array([(*corner, 0, 0, 0, 1) for corner in corners], "<f4")
+    return meshes.ply(table, np.array([[0, 1, 2], [0, 2, 3]]))
