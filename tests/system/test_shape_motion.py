@@ -3,7 +3,7 @@
 import numpy
 import pytest
 from cli_kit import lightshaft
-from exr_layers import read_layers
+from exr_layers import read
 
 ALONG = ('<animation name="to_world"><transform time="0">{0}</transform><transform time="1">{0}<translate x="10"/></transform></animation>', '<transform name="to_world">{0}</transform>')
 
@@ -32,7 +32,7 @@ def test_a_camera_in_fog_keeps_its_media_while_all_moves(tmp_path, cloud):
         scene = tmp_path / f"{kind}.xml"
         scene.write_text(SCENE.format(camera=ALONG[kind].format(""), room=ALONG[kind].format(""), cloud=CLOUDS[cloud][kind]))
         lightshaft("render", scene, "-o", tmp_path / f"{kind}.exr", "--spp", 16, "--float")
-        images.append(numpy.stack([read_layers(tmp_path / f"{kind}.exr")[c] for c in "RGB"]))
+        images.append(numpy.array([read(tmp_path / f"{kind}.exr")[0][c] for c in "RGB"]))
 
     # The media absorb only, so a ray's value is its transmittance: the same but for the rounding of places near 10.
     numpy.testing.assert_allclose(images[0], images[1], rtol=1e-3)

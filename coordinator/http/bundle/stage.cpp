@@ -220,7 +220,7 @@ void replace_all(const std::string& what, std::string_view by, std::string& text
 }
 
 // What the package says, with names of files as the user gave them, and without folders of this machine.
-std::string said(std::string text, const fs::path& folder, const Layout& layout) {
+std::string shown_text(std::string text, const fs::path& folder, const Layout& layout) {
   replace_all(folder.string() + "/" + layout.own_folder, "", text);
   replace_all(folder.string() + "/", "", text);
   replace_all(folder.string(), "the folder of the stage's files", text);
@@ -379,8 +379,9 @@ Result<StageScene> StageReader::read(const Stage& stage, const std::string& call
   if (WEXITSTATUS(end->status) == kNoRoom) return tl::unexpected(spool_error("no room", ENOSPC));
   if (WEXITSTATUS(end->status) != 0) {
     const auto text = content_of(output, kMaxReason);
-    std::string reason = text && WEXITSTATUS(end->status) == 2 ? said(*text, files, *layout) : std::string();
-    if (reason.empty()) reason = "this stage cannot be read: " + said(end->last_line, files, *layout);
+    std::string reason =
+        text && WEXITSTATUS(end->status) == 2 ? shown_text(*text, files, *layout) : std::string();
+    if (reason.empty()) reason = "this stage cannot be read: " + shown_text(end->last_line, files, *layout);
     return bad_stage(fmt::format("{}: {}", name, reason));
   }
   struct stat info {};
@@ -393,7 +394,7 @@ Result<StageScene> StageReader::read(const Stage& stage, const std::string& call
     const auto bytes = blobs.read_whole(file.mapped(), kMaxReason);
     if (!bytes) return tl::unexpected(bytes.error());
     scene.warnings =
-        lines_of(said({reinterpret_cast<const char*>(bytes->data()), bytes->size()}, files, *layout));
+        lines_of(shown_text({reinterpret_cast<const char*>(bytes->data()), bytes->size()}, files, *layout));
   }
   return scene;
 }

@@ -52,20 +52,23 @@ TEST_F(Stages, EndEvenIfTheyIgnoreTheirTime) {
   auto stages = reader("trap '' ALRM\nwhile :; do :; done\n", 1);
   ASSERT_TRUE(stages) << stages.error().message;
 
-  EXPECT_THAT(refusal(**stages, {"shot.usda", add("#usda 1.0\n"), {}, {}, {}}), HasSubstr("took longer than 1 s"));
+  EXPECT_THAT(refusal(**stages, {"shot.usda", add("#usda 1.0\n"), {}, {}, {}}),
+              HasSubstr("took longer than 1 s"));
   EXPECT_TRUE(fs::is_empty(folder / "stages"));
 }
 
 TEST_F(Stages, AreLaidOutByTheNamesOfTheirFiles) {
-  auto stages = reader("d=\"${5%/*}\"; for f in \"$d\"/* \"$d\"/../* \"$d\"/../../x/*; do echo \"$f\" >&3; done; exit 2\n");
+  auto stages = reader(
+      "d=\"${5%/*}\"; for f in \"$d\"/* \"$d\"/../* \"$d\"/../../x/*; do echo \"$f\" >&3; done; exit 2\n");
   ASSERT_TRUE(stages) << stages.error().message;
   const Digest same = add("content");
 
-  const std::string said = refusal(
-      **stages, {"show/shot.usdz", add("#usda 1.0\n"), {{"a", same}, {"../b", same}, {"../../x/c", same}}, {}, {}});
+  const std::string refused = refusal(
+      **stages,
+      {"show/shot.usdz", add("#usda 1.0\n"), {{"a", same}, {"../b", same}, {"../../x/c", same}}, {}, {}});
 
-  EXPECT_THAT(said, AllOf(HasSubstr("a\nshot.usd\n"), HasSubstr("\n../b\n"), HasSubstr("\n../../x/c")));
-  EXPECT_THAT(said, Not(HasSubstr(folder.string())));
+  EXPECT_THAT(refused, AllOf(HasSubstr("a\nshot.usd\n"), HasSubstr("\n../b\n"), HasSubstr("\n../../x/c")));
+  EXPECT_THAT(refused, Not(HasSubstr(folder.string())));
 }
 
 TEST_F(Stages, NamesThatCannotBeLaidOutAreRefused) {
@@ -76,12 +79,13 @@ TEST_F(Stages, NamesThatCannotBeLaidOutAreRefused) {
   for (int i = 0; i < 65; ++i) deep += "a/";
   for (int i = 0; i < 33; ++i) climbing += "../";
 
-  for (const auto& [name, why] : std::vector<std::pair<std::string, std::string>>{{deep + "f", "folders deep"},
-                                                                                  {climbing + "f", "too many folders up"},
-                                                                                  {std::string(201, 'b'), "more than 200 bytes"},
-                                                                                  {"/etc/f", "absolute"},
-                                                                                  {"shot.usd", "twice"},
-                                                                                  {"\x7f/f", "control"}})
+  for (const auto& [name, why] :
+       std::vector<std::pair<std::string, std::string>>{{deep + "f", "folders deep"},
+                                                        {climbing + "f", "too many folders up"},
+                                                        {std::string(201, 'b'), "more than 200 bytes"},
+                                                        {"/etc/f", "absolute"},
+                                                        {"shot.usd", "twice"},
+                                                        {"\x7f/f", "control"}})
     EXPECT_THAT(refusal(**stages, {"shot.usda", main, {{name, file}}, {}, {}}), HasSubstr(why));
   EXPECT_THAT(refusal(**stages, {"shot.usda", main, {{"a", file}, {"a/b", file}}, {}, {}}),
               HasSubstr("a folder of another file"));
