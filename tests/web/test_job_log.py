@@ -16,6 +16,7 @@ def logged(farm):
 def test_the_log_opens_as_a_page_and_back_leads_to_the_job(logged, dashboard):
     page = dashboard("#/jobs/j-1")
     page.click(".job-log summary")
+    page.wait("document.querySelector('.job-log pre')")  # which moves the link
     page.click(".job-log a")
     page.wait(AT_END)
     assert page.evaluate("location.hash") == "#/jobs/j-1/log"
@@ -116,6 +117,7 @@ def test_a_frame_has_a_log_of_its_own(logged, dashboard):
     logged.jobs["j-2-frame2"] = job("j-2-frame2", sequence="j-2", frame=2)
     page = dashboard("#/jobs/j-2")
     page.click(".job-log summary")
+    page.wait("document.querySelector('.job-log pre')")  # which moves the link
     page.click(".job-log a")
     page.wait(AT_END)
     assert page.evaluate("location.hash") == "#/jobs/j-2-frame2/log"

@@ -50,7 +50,8 @@ def test_a_dropped_folder_is_walked_and_sent_with_what_its_scene_names(farm, das
     drop_from_the_desktop(page, tmp_path / "shot", "main h1")
 
     page.wait("location.hash === '#/submit' && document.querySelector('.bundle h2')?.innerText === 'scene.xml'")
-    assert "meshes/ball.obj" in page.text(".bundle") and "old119.obj" in page.evaluate("document.querySelector('.bundle').textContent")
+    page.wait("document.querySelector('.bundle').innerText.includes('meshes/ball.obj')")
+    assert "old119.obj" in page.evaluate("document.querySelector('.bundle').textContent")
     page.click("form.settings button.primary")
     page.wait("location.hash === '#/jobs/j-new'")
     (sent,) = farm.submitted
