@@ -165,7 +165,7 @@ void nvdb(std::string_view file, bool whole) {
   }
 }
 
-// What lightshaft-vdb may have replied: its head, without the padding, and the bricks.
+// Reads the data as a reply of lightshaft-vdb: the head without its padding, then the bricks.
 void vdb_reply(Bytes input) {
   std::vector<std::byte> reply(input.size() <= sizeof(render::VdbReply)
                                    ? input.size()

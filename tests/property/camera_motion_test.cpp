@@ -32,9 +32,6 @@ SceneBuilder room() {
 }
 
 TEST(CameraMotion, GivesTheMeanOfStills) {
-  constexpr int kSeeds = 24;
-  constexpr std::uint64_t kSpp = 64;
-  constexpr int kStills = 8;
   Tests tests("property/camera_motion");
   const auto lens = [](SceneBuilder& b) {
     b.scene.sensor.aperture_radius = .1;
@@ -82,11 +79,7 @@ TEST(CameraMotion, GivesTheMeanOfStills) {
          look_at({-1.2, .5, .6}, {.6, -.6, .2}, {.3, 1, 0})});
     shot.change(b);
     ASSERT_THAT(estimate(b, 2).variant, testing::HasSubstr(shot.variant)) << shot.name;
-    expect_same_quarters(
-        shot.name, level, quarters_of(b, kSpp, kSeeds, 100),
-        quarters_of(kSeeds,
-                    [&](int i) { return of_stills(b, kStills, kSpp, 900 + static_cast<std::uint64_t>(i)); }),
-        kSeeds);
+    expect_mean_of_stills(shot.name, level, b);
   }
   tests.close();
 }

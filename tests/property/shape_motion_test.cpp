@@ -39,9 +39,6 @@ void fill_with_fog(SceneBuilder& b) {
 }
 
 TEST(ShapeMotion, GivesTheMeanOfStills) {
-  constexpr int kSeeds = 24;
-  constexpr std::uint64_t kSpp = 64;
-  constexpr int kStills = 8;
   Tests tests("property/shape_motion");
   const auto ball = [](SceneBuilder& b) {
     move(b.scene, b.shape(SphereShape{}, {}, b.diffuse(.8)), {kBegin, kMiddle, kEnd});
@@ -121,11 +118,7 @@ TEST(ShapeMotion, GivesTheMeanOfStills) {
   for (const Change& shot : shots) {
     SceneBuilder b = room_without_fog();
     shot.change(b);
-    expect_same_quarters(
-        shot.name, level, quarters_of(b, kSpp, kSeeds, 100),
-        quarters_of(kSeeds,
-                    [&](int i) { return of_stills(b, kStills, kSpp, 900 + static_cast<std::uint64_t>(i)); }),
-        kSeeds);
+    expect_mean_of_stills(shot.name, level, b);
   }
   tests.close();
 }

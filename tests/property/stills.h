@@ -48,4 +48,15 @@ inline QuarterImage of_stills(const SceneBuilder& moving, int stills, std::uint6
   return mean;
 }
 
+// Expects the image of what moves to be the mean of stills. `level`: as in expect_same_quarters().
+inline void expect_mean_of_stills(const char* name, double level, const SceneBuilder& moving) {
+  constexpr int kSeeds = 24, kStills = 8;
+  constexpr std::uint64_t kSpp = 64;
+  const auto stills = [&](int i) {
+    return of_stills(moving, kStills, kSpp, 900 + static_cast<std::uint64_t>(i));
+  };
+  expect_same_quarters(name, level, quarters_of(moving, kSpp, kSeeds, 100), quarters_of(kSeeds, stills),
+                       kSeeds);
+}
+
 }  // namespace ls::test

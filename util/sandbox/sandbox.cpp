@@ -104,7 +104,7 @@ bool drop_capabilities() {
          });
 }
 
-// What all helpers have in common. `readable`, `program`: as in enter_sandbox().
+// Sets the restrictions that all helpers share. `readable` and `program` are as in enter_sandbox().
 void shut_in(std::uint64_t memory_bytes, const std::vector<std::filesystem::path>& readable,
              const std::filesystem::path& program) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);

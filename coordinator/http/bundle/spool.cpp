@@ -15,7 +15,7 @@ namespace ls::http {
 Error spool_error(std::string_view what, int code) {
   const bool full = code == ENOSPC || code == EDQUOT || code == EFBIG;
   return {full ? Errc::resource_exhausted : Errc::unavailable,
-          fmt::format("{} for the request's body: {}{}", what, std::strerror(code),
+          fmt::format("{} for the files of the request: {}{}", what, std::strerror(code),
                       full ? "; free some space on the coordinator's disk and send it again" : "")};
 }
 

@@ -219,7 +219,7 @@ void replace_all(const std::string& what, std::string_view by, std::string& text
     text.replace(at, what.size(), by);
 }
 
-// What the package says, with names of files as the user gave them, and without folders of this machine.
+// Returns the package's message with the user's names of files instead of paths on this machine.
 std::string shown_text(std::string text, const fs::path& folder, const Layout& layout) {
   replace_all(folder.string() + "/" + layout.own_folder, "", text);
   replace_all(folder.string() + "/", "", text);
@@ -371,7 +371,9 @@ Result<StageScene> StageReader::read(const Stage& stage, const std::string& call
   if (WIFSIGNALED(end->status)) {
     const int signal = WTERMSIG(end->status);
     if (signal == SIGALRM || signal == SIGKILL)
-      return bad_stage(fmt::format("{}: reading this stage took longer than {} s", name, options_.seconds));
+      return bad_stage(
+          fmt::format("{}: reading this stage took longer than {} s, or the machine ran out of memory", name,
+                      options_.seconds));
     return bad_stage(
         fmt::format("{}: USD crashed while it read this stage (signal {}), or this took more than {} MiB",
                     name, signal, options_.memory_bytes >> 20));

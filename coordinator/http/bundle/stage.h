@@ -33,7 +33,7 @@ bool is_stage(std::string_view file_name, std::span<const std::byte> begin);
 // True if the name ends as those of stages do.
 bool is_stage_name(std::string_view file_name);
 
-// What makes up a stage, and what is wanted of it.
+// The files of a stage, and the settings with which it is read.
 struct Stage {
   std::string name;  // of the stage's file
   Digest main;

@@ -61,7 +61,7 @@ void describe(V& v, T& k) {
   v.field({.name = "to_world", .doc = "", .derived = true}, k.to_world);
 }
 
-// Of everything that moves.
+// The field of objects that can move.
 inline constexpr Field kMotionField{
     .name = "motion", .doc = "keys of the animation", .derived = true, .elided = true};
 

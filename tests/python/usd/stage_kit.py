@@ -61,6 +61,24 @@ def mesh(stage, path, points, faces, **attributes):
     return made
 
 
+SQUARE = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]
+
+
+def square(stage, path="/world/m"):
+    """The square from -1 to 1 in the plane z = 0, with coordinates from 0 to 1."""
+    made = mesh(stage, path, SQUARE, [(0, 1, 2, 3)])
+    coordinates(made, [(0, 0), (1, 0), (1, 1), (0, 1)])
+    return made
+
+
+def stage_from_front(folder):
+    """A stage under a white sky, seen by a camera that looks along -z at the origin."""
+    made = new_stage(folder)
+    sky(made)
+    camera(made, (0, 0, 10), (0, 0, 0), 15.0)
+    return made
+
+
 def floor(stage, albedo=1.0, size=100.0, path="/floor"):
     """A diffuse square in the plane y = 0, seen from above."""
     half = size / 2

@@ -246,20 +246,20 @@ def test_points_move_by_their_velocities(stage):
 
 
 def test_a_jointed_mesh_and_points_that_change_are_told(stage):
-    root = UsdSkel.Root.Define(stage, "/root")
-    made = floor(stage, path="/root/cloth")
-    joints = UsdSkel.Skeleton.Define(stage, "/root/bones")
+    root = UsdSkel.Root.Define(stage, "/rig")
+    made = floor(stage, path="/rig/cloth")
+    joints = UsdSkel.Skeleton.Define(stage, "/rig/bones")
     joints.CreateJointsAttr(["a"])
     joints.CreateBindTransformsAttr([Gf.Matrix4d(1)])
     joints.CreateRestTransformsAttr([Gf.Matrix4d(1)])
-    animation = UsdSkel.Animation.Define(stage, "/root/pose")
+    animation = UsdSkel.Animation.Define(stage, "/rig/pose")
     animation.CreateJointsAttr(["a"])
     animation.CreateTranslationsAttr().Set([(0, 0, 0)], 0)
     animation.GetTranslationsAttr().Set([(0, 5, 0)], LONG)
     animation.CreateRotationsAttr([Gf.Quatf(1)])
     animation.CreateScalesAttr([Gf.Vec3h(1)])
-    UsdSkel.BindingAPI.Apply(root.GetPrim()).CreateSkeletonRel().SetTargets(["/root/bones"])
-    UsdSkel.BindingAPI.Apply(joints.GetPrim()).CreateAnimationSourceRel().SetTargets(["/root/pose"])
+    UsdSkel.BindingAPI.Apply(root.GetPrim()).CreateSkeletonRel().SetTargets(["/rig/bones"])
+    UsdSkel.BindingAPI.Apply(joints.GetPrim()).CreateAnimationSourceRel().SetTargets(["/rig/pose"])
     skin = UsdSkel.BindingAPI.Apply(made.GetPrim())
     skin.CreateJointIndicesPrimvar(False, 1).Set([0] * 4)
     skin.CreateJointWeightsPrimvar(False, 1).Set([1.0] * 4)
@@ -272,7 +272,7 @@ def test_a_jointed_mesh_and_points_that_change_are_told(stage):
     grows.Set(0.8, LONG)
     stage.GetPrimAtPath("/camera").GetAttribute("shutter:close").Set(0.5)
     told = read(stage).warnings
-    for name, changes in (("/flag", "points"), ("/root/pose", "translations"), ("/ball", "radius")):
+    for name, changes in (("/flag", "points"), ("/rig/pose", "translations"), ("/ball", "radius")):
         text = f"{name}: warning: {changes} changes while the shutter is open: its value at the frame is taken"
         assert text in told, told
 

@@ -16,34 +16,23 @@ from stage_kit import (
     bind,
     camera,
     colours,
-    coordinates,
-    mesh,
     new_stage,
     path_of,
     png,
     preview,
-    sky,
+    square,
+    stage_from_front,
     texture,
 )
 
 import lightshaft
 import lightshaft.usd
 
-SQUARE = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]
-
-
-def square(stage, path="/world/m"):
-    made = mesh(stage, path, SQUARE, [(0, 1, 2, 3)])
-    coordinates(made, [(0, 0), (1, 0), (1, 1), (0, 1)])
-    return made
 
 
 @pytest.fixture
 def stage(tmp_path):
-    made = new_stage(tmp_path)
-    sky(made)
-    camera(made, (0, 0, 10), (0, 0, 0), 15.0)
-    return made
+    return stage_from_front(tmp_path)
 
 
 def test_time_samples_are_frames(farm, stage):

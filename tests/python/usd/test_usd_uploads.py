@@ -10,9 +10,8 @@ import zipfile
 
 import pytest
 from local_farm import HttpError, LocalFarm, bin_dir
-from stage_kit import Gf, UsdGeom, UsdUtils, bind, camera, colours, coordinates, exr, mesh, new_stage, path_of, png, preview, sky, texture
+from stage_kit import Gf, UsdGeom, UsdUtils, bind, colours, exr, path_of, png, preview, square, stage_from_front, texture
 
-SQUARE = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]
 SPEC = {"spp": 4, "size": [24, 24]}
 
 
@@ -27,16 +26,7 @@ def local_farm(tmp_path_factory):
 
 @pytest.fixture
 def stage(tmp_path):
-    made = new_stage(tmp_path)
-    sky(made)
-    camera(made, (0, 0, 10), (0, 0, 0), 15.0)
-    return made
-
-
-def square(stage, path="/world/m"):
-    made = mesh(stage, path, SQUARE, [(0, 1, 2, 3)])
-    coordinates(made, [(0, 0), (1, 0), (1, 1), (0, 1)])
-    return made
+    return stage_from_front(tmp_path)
 
 
 def put(farm, content):

@@ -245,7 +245,7 @@ TEST_F(Vdb, HalfFloatsStayHalvesInMemory) {
   }
 }
 
-// What a leaf holds outside of the box of the active voxels and its layer is none of the grid's.
+// A leaf's values outside of the box of active voxels, enlarged by one layer, do not belong to the grid.
 TEST_F(Vdb, InactiveVoxelsCountWithinTheBoxOnly) {
   const auto grid = filled<openvdb::FloatGrid>([](int) { return 0.f; });
   grid->clear();

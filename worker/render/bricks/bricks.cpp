@@ -367,7 +367,7 @@ void Bricks::visit(const Position& a, const Position& b, const Visit& visit) con
     int first, last;
     std::uint64_t count() const { return static_cast<std::uint64_t>(last - first + 1); }
   };
-  // What is from a to b, along axis k, of part number i of `side` values
+  // Clips part number i, of `side` values along axis k, to the nodes from a to b
   const auto part = [&](std::size_t k, int i, int side) {
     return Range{std::max(a[k] + lead_[k] - i * side, 0), std::min(b[k] + lead_[k] - i * side, side - 1)};
   };

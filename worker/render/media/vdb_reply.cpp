@@ -18,7 +18,7 @@ bool sound(const VdbShape& shape) {
                      [](double v) { return std::isfinite(v); });
 }
 
-// What is left of a reply behind its head.
+// Reads the part of a reply that follows its head.
 class Rest {
  public:
   explicit Rest(std::span<const std::byte> bytes) : bytes_(bytes) {}

@@ -45,7 +45,7 @@ int read_vdb(const std::string& path, const std::string& grid_name, std::uint64_
 inline constexpr std::uint64_t kNoDataLimit = ~std::uint64_t{0};
 // Offset of the bricks in the reply's file, in bytes
 inline constexpr std::uint64_t kVdbBricksAt = 4096;
-// What padding may add to the bytes of the bricks
+// The most bytes that padding adds to those of the bricks
 inline constexpr std::uint64_t kVdbPadding = 16;
 inline constexpr std::uint64_t kVdbMagic = 0x3262'6476'736c;
 // The most voxels of a grid along an axis. Index coordinates are float32, which resolve a 1024th of a voxel

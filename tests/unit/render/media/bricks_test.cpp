@@ -187,7 +187,7 @@ TEST(Bricks, OfThreeGridsHaveTheMeansOfArrays) {
   EXPECT_FALSE(of[0].bricks.same_values(of[0].array));
 }
 
-// What a file says of a box of 4096^3 voxels of one value, between voxels without one.
+// Returns the tree of a file with a box of 4096^3 voxels of one value inside an empty border.
 VoxelTree large_tile() {
   VoxelTree tree;
   tree.size = {4098, 4098, 4098};

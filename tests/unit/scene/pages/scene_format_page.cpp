@@ -239,7 +239,7 @@ to the same bits, files named by SHA-256. Objects that nothing uses are left out
   three are read (of OpenVDB float, double, vec3s, vec3d; of NanoVDB, ABI 32: float, double, vec3f, vec3d, half, Fp4, Fp8, Fp16,
   FpN; plain, zlib or Blosc); level sets, staggered flows, points and whole numbers are refused.
 - A grid takes memory for what is in it: where it is empty or constant, next to none, and for values that are all exact as half
-  floats, as those of files of half floats are, two bytes each instead of four. Pixels don't depend on it. A grid may take 16 GiB
+  floats, as those of files of half floats are, two bytes each instead of four. Pixels don't depend on it, save for the noise of boxes of more than 4 million macro cells. A grid may take 16 GiB
   and, if it is of OpenVDB or NanoVDB, span 16384 voxels along each axis. `lightshaft inspect SCENE --json` tells the bytes.
 - Three numbers a voxel (of a `.vol`, too) are of red, green and blue: as a `sigma_t` each channel has a density of its own, as in
   Mitsuba's RGB modes. Where all three are the same everywhere the medium is grey, and renders as one of a single channel.
