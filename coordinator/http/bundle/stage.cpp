@@ -145,13 +145,25 @@ Result<void> write_blob(const BlobStore& blobs, const Digest& digest, const fs::
   return {};
 }
 
+// Returns the name for the stage's file in its folder: the user's, since other files may name it, unless USD
+// would take its ending for another format than that of its content, which begins with `begin`.
+std::string own_name(const std::string& given, std::string_view begin) {
+  const fs::path name = fs::path(given).filename();
+  const bool zip = begin.starts_with(kZip), crate = begin.starts_with(kUsdc);
+  const bool fits = is_stage_name(name.string()) && zip == ends_in(name.string(), ".usdz") &&
+                    !(crate ? ends_in(name.string(), ".usda") : ends_in(name.string(), ".usdc"));
+  return fits ? name.string() : name.stem().string() + (zip ? ".usdz" : ".usd");
+}
+
 // The files of a stage by their paths below one folder.
 struct Layout {
   std::map<std::string, Digest> files;
+  std::string above;             // the name of the folders above the stage's own, which no file has
   std::string own_folder, main;  // the stage's folder, "" or ending in "/", and the stage's file
 };
 
-Result<Layout> layout_of(const Stage& stage, std::string_view ending) {
+// `begin`: the first kStageMagic bytes of the stage's file.
+Result<Layout> layout_of(const Stage& stage, std::string_view begin) {
   std::vector<std::pair<Place, Digest>> files;
   std::size_t deepest = 0;
   for (const auto& [name, digest] : stage.files) {
@@ -160,15 +172,20 @@ Result<Layout> layout_of(const Stage& stage, std::string_view ending) {
     deepest = std::max(deepest, place->up);
     files.emplace_back(std::move(*place), digest);
   }
-  // Stands for the folders above the stage's own. No file has this name, as it has a control character.
+  Layout layout;
+  layout.above = "above_the_stage";
+  while (std::ranges::any_of(files, [&](const auto& file) {
+    return ("/" + file.first.rest + "/").find("/" + layout.above + "/") != std::string::npos;
+  }))
+    layout.above += '_';
   const auto above = [&](std::size_t up) {
     std::string path;
-    for (std::size_t i = up; i < deepest; ++i) path += "\x7f/";
+    for (std::size_t i = up; i < deepest; ++i) path += layout.above + "/";
     return path;
   };
-  Layout layout{{}, above(0), {}};
-  auto own = place_of(std::string(fs::path(stage.name).stem().string()).append(ending));
-  if (!own || own->up) own = Place{0, std::string("stage").append(ending)};
+  layout.own_folder = above(0);
+  auto own = place_of(own_name(stage.name, begin));
+  if (!own || own->up) own = Place{0, own_name("stage", begin)};
   layout.main = layout.own_folder + own->rest;
   files.emplace_back(*own, stage.main);
   for (const auto& [place, digest] : files)
@@ -224,7 +241,7 @@ std::string shown_text(std::string text, const fs::path& folder, const Layout& l
   replace_all(folder.string() + "/" + layout.own_folder, "", text);
   replace_all(folder.string() + "/", "", text);
   replace_all(folder.string(), "the folder of the stage's files", text);
-  replace_all("\x7f/", "", text);
+  replace_all(layout.above + "/", "", text);
   std::string out;
   for (const std::string& line : lines_of(text)) out += (out.empty() ? "" : "\n") + line;
   return out;
@@ -245,8 +262,6 @@ class Deadline {
   std::condition_variable_any ended_;
   std::jthread thread_;
 };
-
-std::string_view ending_of(std::string_view begin) { return begin.starts_with(kZip) ? ".usdz" : ".usd"; }
 
 }  // namespace
 
@@ -345,8 +360,7 @@ Result<StageScene> StageReader::read(const Stage& stage, const std::string& call
                 "a stage of this token, or two of others, are being read: try again in a minute");
   const auto begin = blobs.read(stage.main, 0, kStageMagic);
   if (!begin) return tl::unexpected(begin.error());
-  const auto layout =
-      layout_of(stage, ending_of({reinterpret_cast<const char*>(begin->data()), begin->size()}));
+  const auto layout = layout_of(stage, {reinterpret_cast<const char*>(begin->data()), begin->size()});
   if (!layout) return tl::unexpected(layout.error());
   const auto folder = ScratchFolder::make(options_.folder);
   if (!folder) return tl::unexpected(folder.error());

@@ -92,9 +92,10 @@ def test_images_that_are_computed_with_are_those_of_the_package(farm, local_farm
 def test_files_above_the_stage_and_layers_are_found(local_farm, stage, image, tmp_path):
     colours(square(stage), [(0.2, 0.4, 0.8)], "constant")
     part = path_of(stage).read_bytes()
-    shot = '#usda 1.0\n(\n    subLayers = [@../../parts/room.usda@]\n)\n'
+    shot = '#usda 1.0\n(\n    subLayers = [@./empty.usda@, @../../parts/room.usda@]\n)\n'
+    files = {"../../parts/room.usda": part, "empty.usda": b"#usda 1.0\n", "above_the_stage/notes.txt": b"nobody reads this"}
 
-    answer = upload(local_farm, "shot.usda", shot.encode(), {"../../parts/room.usda": part, "notes.txt": b"nobody reads this"})
+    answer = upload(local_farm, "shot.usda", shot.encode(), files)
 
     plain = upload(local_farm, "room.usda", part)
     assert pixels(local_farm, answer["id"]) == pixels(local_farm, plain["id"])
@@ -166,7 +167,7 @@ def test_a_stage_reads_no_file_that_was_not_sent(local_farm, stage, path):
 
 @pytest.mark.parametrize("name, words", [
     ("/etc/passwd", "has an absolute name"), ("a/../../" + "../" * 40 + "x", "is too many folders up"), ("a\\b.png", "backslash"), ("x/..", "is no name"),
-    ("shot.usd", "is there twice"), ("b" * 300 + ".png", "more than 200 bytes"), ("./wood.png", "is there twice"), ("wood.png/inner.png", "is a folder of another file, too")])
+    ("shot.usda", "is there twice"), ("b" * 300 + ".png", "more than 200 bytes"), ("./wood.png", "is there twice"), ("wood.png/inner.png", "is a folder of another file, too")])
 def test_names_of_files_lead_nowhere_else(local_farm, stage, image, name, words):
     square(stage)
 

@@ -71,6 +71,25 @@ TEST_F(Stages, AreLaidOutByTheNamesOfTheirFiles) {
   EXPECT_THAT(refused, Not(HasSubstr(folder.string())));
 }
 
+// Other files may name the stage's file, and USD tells formats by the endings of names.
+TEST_F(Stages, KeepTheirNamesUnlessTheseMislead) {
+  auto stages = reader("echo \"${5##*/}\" >&3; exit 2\n");
+  ASSERT_TRUE(stages) << stages.error().message;
+  const Digest text = add("#usda 1.0\n"), crate = add("PXR-USDC0"), zip = add("PK\x03\x04 and more");
+
+  for (const auto& [name, file, kept] : std::vector<std::tuple<std::string, Digest, std::string>>{
+           {"shot.usda", text, "shot.usda"},
+           {"a/shot.usd", text, "shot.usd"},
+           {"shot.usdc", text, "shot.usd"},
+           {"shot.usdc", crate, "shot.usdc"},
+           {"shot.usda", crate, "shot.usd"},
+           {"shot.usdz", zip, "shot.usdz"},
+           {"shot.usda", zip, "shot.usdz"},
+           {"shot.xml", text, "shot.usd"},
+           {std::string(300, 'b') + ".usda", text, "stage.usd"}})
+    EXPECT_EQ(refusal(**stages, {name, file, {}, {}, {}}), name + ": " + kept);
+}
+
 TEST_F(Stages, NamesThatCannotBeLaidOutAreRefused) {
   auto stages = reader("exit 2\n");
   ASSERT_TRUE(stages) << stages.error().message;
@@ -84,7 +103,7 @@ TEST_F(Stages, NamesThatCannotBeLaidOutAreRefused) {
                                                         {climbing + "f", "too many folders up"},
                                                         {std::string(201, 'b'), "more than 200 bytes"},
                                                         {"/etc/f", "absolute"},
-                                                        {"shot.usd", "twice"},
+                                                        {"shot.usda", "twice"},
                                                         {"\x7f/f", "control"}})
     EXPECT_THAT(refusal(**stages, {"shot.usda", main, {{name, file}}, {}, {}}), HasSubstr(why));
   EXPECT_THAT(refusal(**stages, {"shot.usda", main, {{"a", file}, {"a/b", file}}, {}, {}}),
