@@ -1,9 +1,18 @@
-"""Bakes procedural textures into images with Cycles, so that they can be exported."""
+"""Bakes procedural textures, volumes and worlds with Cycles, so that they can be exported."""
+
+import math
+import pathlib
+import tempfile
 
 import bpy
+import mathutils
+import numpy as np
 
+from . import voxels
 from .nodes import Place, constant, output_node
 from .textures import bake_key, exported_as_it_is
+from .volumes import VARYING
+from .world import BAKED, BAKED_SUN, is_readable
 
 INPUTS = {
     "Base Color", "Color", "Roughness", "Metallic", "Alpha", "Transmission Weight", "Emission Color", "Fac", "Factor",
@@ -25,12 +34,19 @@ def procedural_inputs(material):
 
 
 class LIGHTSHAFT_OT_bake(bpy.types.Operator):
-    """Bakes what feeds the shaders of all materials and is no image into images; press again after a change"""
+    """Bakes what feeds the shaders of all materials and the world, and is no image, into images; press again after a change"""
 
     bl_idname = "lightshaft.bake"
     bl_label = "Bake Procedural Textures"
 
     size: bpy.props.IntProperty(name="Size", default=1024, min=16, max=8192)
+    voxels: bpy.props.IntProperty(
+        name="Voxels",
+        description="Voxels across the longest side of a volume whose shader varies by nodes",
+        default=96,
+        min=2,
+        max=voxels.MOST_ACROSS,
+    )
 
     def execute(self, context):
         scene, baked = context.scene, 0
@@ -45,9 +61,12 @@ class LIGHTSHAFT_OT_bake(bpy.types.Operator):
         try:
             for item in [o for o in context.view_layer.objects if o.type == "MESH" and not o.hide_render]:
                 for material in dict.fromkeys(slot.material for slot in item.material_slots if slot.material):
-                    if material in done:
-                        continue
                     try:
+                        for node, socket in list(voxels.varying_inputs(material, VARYING)):
+                            voxels.bake(scene, item, material, node, socket, self.voxels)
+                            baked += 1
+                        if material in done:
+                            continue
                         for node, socket in list(procedural_inputs(material)):
                             self.bake(context, item, material, node, socket)
                             baked += 1
@@ -58,6 +77,11 @@ class LIGHTSHAFT_OT_bake(bpy.types.Operator):
         finally:
             scene.render.engine, scene.cycles.samples = engine, samples
             select(context, active, selected)
+        world = context.view_layer.world_override or scene.world
+        if world is not None and not is_readable(world):
+            for problem in bake_world(world, self.size):
+                self.report({"WARNING"}, f"world '{world.name}': {problem}")
+            baked += 1
         for material in [m for m in failed if m not in done]:
             self.report(
                 {"WARNING"},
@@ -101,6 +125,107 @@ class LIGHTSHAFT_OT_bake(bpy.types.Operator):
             tree.nodes.remove(glow)
         image.pack()
         material[bake_key(node, socket)] = image.name
+
+
+SUN_SIDE, SUN_SAMPLES = 64, 64  # of the picture of the sun alone, 1.5 times as wide as its disk
+
+
+def bake_world(world, size):
+    """Bakes the world's surface into an image of all directions, 2 * size x size pixels. The disk of a Sky Texture's sun is
+    too small for such an image: it becomes a lamp of the same direction, size and irradiance. Returns problems in words."""
+    problems = []
+    if any(node.type == "LIGHT_PATH" for node in all_nodes(world.node_tree)):
+        problems.append("it depends on Light Path; it is baked as the camera sees it")
+    world[BAKED_SUN] = None
+    del world[BAKED_SUN]
+    with tempfile.TemporaryDirectory() as folder, WorldPicture(world, pathlib.Path(folder) / "world.exr") as picture:
+        suns = [n for n in all_nodes(picture.world.node_tree) if n.type == "TEX_SKY" and n.sun_disc and "SCATTERING" in n.sky_type]
+        if len(suns) == 1 and not picture.shared_groups:
+            sun, disk = suns[0], suns[0].sun_size
+            towards = sun_direction(sun)
+            lit = picture.around(towards, 1.5 * disk)
+            sun.sun_disc = False
+            pixel = (1.5 * disk / SUN_SIDE) ** 2  # solid angle; a disk of a few degrees is flat
+            irradiance = np.maximum(lit - picture.around(towards, 1.5 * disk), 0).sum((0, 1)) * pixel
+            if irradiance.max() > 0:
+                world[BAKED_SUN] = [*towards, math.degrees(disk / 2), *map(float, irradiance)]
+            elif sun.sun_intensity > 0 and sun.sun_elevation > 0:
+                sun.sun_disc = True
+                problems.append("the sun of its Sky Texture is not where its nodes say; it is baked into the image and will be blurred")
+        elif suns:
+            problems.append("it has several suns, or one in a group; they are baked into the image and will be blurred")
+        image = picture.panorama(size)
+        image.name = f"{world.name} baked"
+        image.pack()
+    world[BAKED] = image.name
+    return problems
+
+
+def all_nodes(tree):
+    for node in tree.nodes:
+        yield node
+        if node.type == "GROUP" and node.node_tree:
+            yield from all_nodes(node.node_tree)
+
+
+def sun_direction(sky):
+    """Returns the direction of a Sky Texture's sun: its rotation is from +y towards +x."""
+    level = math.cos(sky.sun_elevation)
+    return level * math.sin(sky.sun_rotation), level * math.cos(sky.sun_rotation), math.sin(sky.sun_elevation)
+
+
+class WorldPicture:
+    """A scene of its own in which Cycles sees nothing but a copy of a world, without its Volume."""
+
+    def __init__(self, world, path):
+        self.path, self.world = path, world.copy()
+        self.shared_groups = any(n.type == "GROUP" for n in self.world.node_tree.nodes)
+        output = output_node(self.world.node_tree, "OUTPUT_WORLD")
+        for link in list(output.inputs["Volume"].links):
+            self.world.node_tree.links.remove(link)
+        self.world.cycles_visibility.camera = True
+        self.scene = bpy.data.scenes.new("Lightshaft world")
+        self.camera = bpy.data.objects.new("Lightshaft world", bpy.data.cameras.new("Lightshaft world"))
+        self.scene.collection.objects.link(self.camera)
+        self.scene.world, self.scene.camera = self.world, self.camera
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        data = self.camera.data
+        bpy.data.scenes.remove(self.scene)
+        bpy.data.objects.remove(self.camera)
+        bpy.data.cameras.remove(data)
+        bpy.data.worlds.remove(self.world)
+
+    def around(self, towards, angle):
+        """Returns the radiance of a square of this angle [rad], height x width x 3."""
+        data = self.camera.data
+        data.type, data.sensor_fit, data.angle = "PERSP", "HORIZONTAL", angle
+        self.camera.rotation_euler = mathutils.Vector(towards).to_track_quat("-Z", "Y").to_euler()
+        image = self.render(SUN_SIDE, SUN_SIDE, SUN_SAMPLES)
+        pixels = np.array(image.pixels[:]).reshape(SUN_SIDE, SUN_SIDE, -1)[..., :3]
+        bpy.data.images.remove(image)
+        return pixels
+
+    def panorama(self, size):
+        """Returns an image of all directions, whose middle is the direction +x."""
+        data = self.camera.data
+        data.type, data.panorama_type = "PANO", "EQUIRECTANGULAR"
+        self.camera.rotation_euler = (math.pi / 2, 0, -math.pi / 2)
+        return self.render(2 * size, size, 16)
+
+    def render(self, width, height, samples):
+        render, cycles = self.scene.render, self.scene.cycles
+        render.engine, render.resolution_x, render.resolution_y, render.resolution_percentage = "CYCLES", width, height, 100
+        cycles.samples, cycles.use_adaptive_sampling, cycles.use_denoising = samples, False, False
+        cycles.pixel_filter_type, cycles.sample_clamp_direct = "BOX", 0
+        settings = render.image_settings
+        settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGB", "32"
+        render.filepath = str(self.path)
+        bpy.ops.render.render(write_still=True, scene=self.scene.name)
+        return bpy.data.images.load(str(self.path), check_existing=False)
 
 
 def select(context, active, selected):

@@ -45,6 +45,12 @@ def parameter(name, value):
     return ElementTree.Element("rgb", name=name, value=numbers(rows))
 
 
+def vector(name, values, kind="vector"):
+    return ElementTree.Element(
+        kind, {"name": name, **{axis: repr(float(v)) for axis, v in zip("xyz", values)}}
+    )
+
+
 def transform(rows, **attributes):
     result = ElementTree.Element("transform", **attributes)
     result.append(ElementTree.Element("matrix", value=numbers(x for row in rows for x in row)))

@@ -15,7 +15,7 @@ from .motion import Exposure
 from .problems import Problems
 from .textures import Textures
 from .visibility import visibility_of
-from .volumes import Volumes
+from .volumes import Volumes, present
 from .world import add_world
 
 MESHES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
@@ -26,11 +26,25 @@ SHEET = 1e-5  # the back of a sheet that gives off light stands this share of it
 class Shape:
     """A part of a mesh that can be placed in the scene."""
 
-    def __init__(self, filenames, bsdf, emission, medium, flags, marks):
-        self.filenames, self.bsdf, self.emission, self.medium = filenames, bsdf, emission, medium
+    def __init__(self, filenames, bsdf, emission, fog, flags, marks):
+        self.filenames, self.bsdf, self.emission, self.fog = filenames, bsdf, emission, fog
         self.marks = marks  # light group and links of the emission
         self.flags = flags  # parameters about what rays meet the shape
         self.tree = None
+
+
+class Fog:
+    """What fills a mesh: one medium for all its places, or voxels, which are a medium of their own at each."""
+
+    def __init__(self, volumes, name, found, group, sets):
+        self.volumes, self.name, self.found, self.marks = volumes, name, found, (group, sets)
+        self.everywhere = None if found.voxels else volumes.homogeneous(name, found, *self.marks)
+
+    def at(self, placement, problems):
+        if self.everywhere is not None:
+            return self.everywhere
+        placement.stands(problems, "a volume of voxels")
+        return self.volumes.of_voxels(self.name, self.found, placement.still, *self.marks)
 
 
 def export(depsgraph, folder, size, exposure=None):
@@ -71,10 +85,15 @@ class Exporter:
             )
         self.place_meshes()
         world = self.layer.world_override or self.scene.world
-        add_world(self.document, self.problems, self.textures, world, self.groups)
+        fog = add_world(self.document, self.problems, self.textures, self.volumes, world, self.groups)
         camera = camera.evaluated_get(self.depsgraph)
         eye = camera.matrix_world.translation
         around = next((medium for medium, contains in self.bodies if contains(eye)), None)
+        if around is not None and fog is not None:
+            self.problems.error(
+                f"camera '{camera.name}': it stands in the volume of an object and in that of the world. Lightshaft's camera is in one: move it out of the object, or unlink the world's Volume"
+            )
+        around = around or fog
         add_camera(self.document, self.problems, camera, self.scene, self.size, around, Matrix, self.exposure)
         self.problems.raise_errors()
         drop_empty_sets(self.document.root)
@@ -126,7 +145,7 @@ class Exporter:
             if key not in self.known:
                 self.known[key] = self.shapes_of(item, visible, links, sets)
             self.places.setdefault(key, []).append((name, placement))
-            if any(shape.medium for shape in self.known[key]):
+            if any(shape.fog for shape in self.known[key]):
                 self.warn_of_shade(name, owner)
         else:
             self.problems.unsupported(
@@ -178,7 +197,7 @@ class Exporter:
         try:
             extent = max((v for corner in item.bound_box for v in (abs(c) for c in corner)), default=1) or 1
             shapes = [self.shape(item, visible, links, sets, part, extent) for part in meshes.parts(mesh)]
-            if any(shape.medium for shape in shapes):
+            if any(shape.fog for shape in shapes):
                 tree = BVHTree.FromPolygons(
                     [v.co for v in mesh.vertices], [p.vertices for p in mesh.polygons]
                 )
@@ -194,10 +213,10 @@ class Exporter:
         if material is None and len(slots):
             material = slots[min(part.slot, len(slots) - 1)].material
         bsdf, emission = self.materials.surface(item.name, material)
-        owner = Owner(item.name, material)
+        owner = Owner(item.name, material, item)
         found = self.volumes.coefficients(owner, of_grid=False) if material else None
-        medium, group = None, None
-        if emission is not None or (found is not None and any(found.emission)):
+        fog, group = None, None
+        if emission is not None or (found is not None and present(found.emission)):
             group = self.groups.of(item)
         if found is not None:
             if not part.closed:
@@ -208,7 +227,7 @@ class Exporter:
                 self.problems.unsupported(
                     f"{owner}: hidden from rays ({', '.join(visible.hidden())}) with a volume in it. Switch all on in Object properties > Visibility"
                 )
-            medium = self.volumes.homogeneous(f"{item.name}-{material.name}", found, group, sets)
+            fog = Fog(self.volumes, f"{item.name}-{material.name}", found, group, sets)
         sides = [part.front()]
         if emission is not None and not part.closed:  # Blender's sheets give off light on both sides
             sides.append(part.back(SHEET * extent))
@@ -217,12 +236,12 @@ class Exporter:
         if bsdf in self.materials.passing and emission is None:
             names = ("visible_camera", "holdout", "shadow_catcher")
             flags = {name: flags[name] for name in names}
-        return Shape(files, bsdf, emission, medium, flags, {"light_group": group, **links})
+        return Shape(files, bsdf, emission, fog, flags, {"light_group": group, **links})
 
     def place_meshes(self):
         for key, places in self.places.items():
             shapes = self.known[key]
-            plain = [shape for shape in shapes if shape.emission is None and shape.medium is None]
+            plain = [shape for shape in shapes if shape.emission is None and shape.fog is None]
             if len(places) > 1 and plain:
                 group = element(
                     "shape",
@@ -240,14 +259,15 @@ class Exporter:
             for shape in shapes:
                 for name, placement in places:
                     to_world = placement.to_world(self.problems, shape.emission is not None)
+                    medium = shape.fog.at(placement, self.problems) if shape.fog else None
                     for filename in shape.filenames:
-                        self.document.define(name, self.placed(shape, filename, to_world))
-                    if shape.medium:
+                        self.document.define(name, self.placed(shape, filename, to_world, medium))
+                    if medium:
                         to_local = placement.still.inverted_safe()
-                        self.bodies.append((shape.medium, inside_mesh(shape.tree, to_local)))
+                        self.bodies.append((medium, inside_mesh(shape.tree, to_local)))
 
-    def placed(self, shape, filename, to_world):
-        inside_medium = reference(shape.medium, "interior") if shape.medium else None
+    def placed(self, shape, filename, to_world, medium=None):
+        inside_medium = reference(medium, "interior") if medium else None
         emitter = None
         if shape.emission is not None:
             emitter = element("emitter", "area", None, radiance=shape.emission, **shape.marks)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from . import exr, meshes
-from .document import element
+from .document import element, vector
 from .motion import Placement
 
 FLIP = ((1, 0, 0, 0), (0, -1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1))  # Blender's lights look along -z
@@ -87,14 +87,6 @@ def light_colour(data):
     if data.use_temperature:
         colour = [c * t for c, t in zip(colour, data.temperature_color)]
     return colour
-
-
-def vector(name, values, kind="vector"):
-    import xml.etree.ElementTree as ElementTree
-
-    return ElementTree.Element(
-        kind, {"name": name, **{axis: repr(float(v)) for axis, v in zip("xyz", values)}}
-    )
 
 
 def lamp(shape, to_world, radiance, visible, may_see, marks, **values):

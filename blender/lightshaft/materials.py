@@ -7,10 +7,10 @@ from .nodes import Place, constant, output_node
 
 
 class Owner:
-    """The object and the material, for messages."""
+    """The object and the material, for messages. `item`: the object, if its volume may have been baked."""
 
-    def __init__(self, name, material):
-        self.name, self.material = name, material
+    def __init__(self, name, material, item=None):
+        self.name, self.material, self.item = name, material, item
 
     def __str__(self):
         return (

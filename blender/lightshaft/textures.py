@@ -1,5 +1,6 @@
 """Exports image textures, checkers and baked procedural textures."""
 
+import hashlib
 import pathlib
 
 import numpy as np
@@ -295,8 +296,11 @@ def absolute(image):
     return bpy.path.abspath(image.filepath, library=image.library)
 
 
-def bake_key(node, socket):
-    return f"lightshaft: {node.id_data.name} {node.name} {socket.identifier}"
+def bake_key(node, socket, *more):
+    """Returns the name of the property of a material that holds the name of the baked image. Names of properties are
+    short, and those of nodes and objects may be long."""
+    names = "\0".join([node.id_data.name, node.name, socket.identifier, *more])
+    return f"lightshaft {hashlib.sha256(names.encode()).hexdigest()[:40]}"
 
 
 def baked_image(material, node, socket):

@@ -3,8 +3,11 @@
 import math
 import xml.etree.ElementTree as ElementTree
 
+import numpy as np
+
 from .document import element
 from .nodes import Place, constant, output_node
+from .voxels import baked_values, vol
 
 
 ISOTROPIC = ("isotropic", {})
@@ -50,9 +53,11 @@ PHASES = {
 
 
 class Coefficients:
-    """Scattering, absorption (1/m) and emission (radiance/m) in three channels, and the phase function: the name
-    of its plugin and its parameters. `grid`: the name of the grid that multiplies scattering and absorption, or
-    None."""
+    """Scattering, absorption (1/m) and emission (radiance/m) in three channels, each a number or an array of voxels
+    (z x y x x), and the phase function: the name of its plugin and its parameters. `grid`: the name of the grid that
+    multiplies scattering and absorption, or None. `voxels`: the Grid of the arrays, or None."""
+
+    voxels = None
 
     def __init__(self, scattering=(0, 0, 0), absorption=(0, 0, 0), emission=(0, 0, 0), phase=ISOTROPIC, grid=None):
         self.scattering, self.absorption, self.emission, self.phase, self.grid = (
@@ -103,7 +108,7 @@ class Volumes:
                 return None
             more, phase_of = PHASES[place.node.phase]
             names = (*names, *more)
-        values = {}
+        values, voxels = {}, None
         for name in names:
             values[name] = constant(place, place.input(name))
             if (
@@ -112,6 +117,14 @@ class Volumes:
                 and self.is_grid(place, name, of_grid)
             ):
                 continue
+            if values[name] is None and name in VARYING.get(kind, ()) and owner.item is not None and not of_grid:
+                if (baked := baked_values(owner.item, owner.material, place, place.input(name))) is None:
+                    self.problems.error(
+                        f"{where}: {name} is procedural. Press Bake Procedural Textures in Render Properties > Lightshaft"
+                    )
+                    return None
+                values[name], voxels = channels_of(baked[0], place.input(name)), baked[1]
+                continue
             if values[name] is None:
                 self.problems.error(
                     f"{where}: {name} varies by nodes. Lightshaft supports numbers and grids of OpenVDB files: "
@@ -119,6 +132,7 @@ class Volumes:
                 )
                 return None
         found = BUILD[kind](values)
+        found.voxels = voxels
         if phase_of:
             found.phase = phase_of(values)
         if kind == "PRINCIPLED_VOLUME":
@@ -167,7 +181,10 @@ class Volumes:
         one, two = parts
         add = lambda a, b: tuple(x + y for x, y in zip(a, b))  # noqa: E731
         scattering = add(one.scattering, two.scattering)
-        phase = blended(one, two, scattering)
+        if one.voxels or two.voxels:
+            phase = one.phase if one.phase == two.phase else None
+        else:
+            phase = blended(one, two, scattering)
         if phase is None or one.grid != two.grid:
             self.problems.error(
                 f"{owner}, node '{place.title}': the sum of two volumes of different grids, or of different phase functions and colours. Give both the same, or put them into two objects"
@@ -179,13 +196,43 @@ class Volumes:
                 "Add them in pairs, or give some the same phase function"
             )
             return None
-        return Coefficients(
+        both = Coefficients(
             scattering,
             add(one.absorption, two.absorption),
             add(one.emission, two.emission),
             phase,
             one.grid,
         )
+        both.voxels = one.voxels or two.voxels
+        return both
+
+    def of_voxels(self, name, found, matrix, group, link_sets):
+        """Defines a medium of baked voxels in a mesh at this place. Returns its id."""
+        shape = tuple(int(n) for n in found.voxels.counts[::-1])
+        place = matrix @ type(matrix).Translation(found.voxels.low) @ type(matrix).Diagonal((*found.voxels.size, 1))
+
+        def grid(parameter, channels):
+            values = np.stack([np.broadcast_to(c, shape) for c in channels], axis=-1)
+            if np.ptp(values, axis=-1).max() == 0:
+                values = values[..., :1]
+            filename = self.document.write(vol(values), ".vol")
+            return element("volume", "gridvolume", parameter, filename=filename, to_world=place)
+
+        sigma_t = total(found)
+        albedo = [s / np.maximum(t, 1e-30) for s, t in zip(found.scattering, sigma_t)]
+        glows = present(found.emission)
+        fog = element(
+            "medium",
+            "heterogeneous",
+            None,
+            phase_element(found.phase),
+            grid("sigma_t", sigma_t),
+            grid("albedo", albedo),
+            grid("emission", found.emission) if glows else None,
+            light_group=group if glows else None,
+            link_sets=link_sets,
+        )
+        return self.document.define(name, fog)
 
     def homogeneous(self, name, found, group, link_sets):
         return self.document.define(
@@ -233,6 +280,23 @@ class Volumes:
         return identifier, place
 
 
+def channels_of(values, socket):
+    """Returns voxels (z x y x x x 3) as a number's array or those of three channels."""
+    return values[..., 0] if socket.type == "VALUE" else list(np.moveaxis(values, -1, 0))
+
+
+def present(channels):
+    return any(np.any(channel) for channel in channels)
+
+
+def not_negative(x):
+    return np.maximum(x, 0) if isinstance(x, np.ndarray) else max(x, 0)
+
+
+def root(x):
+    return np.sqrt(not_negative(x)) if isinstance(x, np.ndarray) else math.sqrt(max(x, 0))
+
+
 def total(found):
     return [s + a for s, a in zip(found.scattering, found.absorption)]
 
@@ -272,6 +336,14 @@ def medium(plugin, found, sigma_t, glows, group, link_sets):
     )
 
 
+# The inputs that may vary by nodes in meshes, by the type of the shader; Cycles evaluates them (voxels.py).
+VARYING = {
+    "PRINCIPLED_VOLUME": ("Color", "Density", "Absorption Color", "Emission Strength", "Emission Color"),
+    "VOLUME_SCATTER": ("Color", "Density"),
+    "VOLUME_ABSORPTION": ("Color", "Density"),
+    "VOLUME_COEFFICIENTS": ("Absorption Coefficients", "Scatter Coefficients", "Emission Coefficients"),
+    "EMISSION": ("Color", "Strength"),
+}
 INPUTS = {
     "PRINCIPLED_VOLUME": (
         "Color", "Density", "Anisotropy", "Absorption Color", "Emission Strength", "Emission Color", "Blackbody Intensity",
@@ -288,7 +360,7 @@ def principled(v):
     scattering = [density * c for c in v["Color"]]
     # Blender's rule: absorption = density * (1 - Color) * (1 - sqrt(Absorption Color)).
     absorption = [
-        density * max(1 - c, 0) * max(1 - math.sqrt(max(a, 0)), 0)
+        density * not_negative(1 - c) * not_negative(1 - root(a))
         for c, a in zip(v["Color"], v["Absorption Color"])
     ]
     emission = [v["Emission Strength"] * c for c in v["Emission Color"]]
@@ -296,14 +368,14 @@ def principled(v):
 
 
 def density_of(v):
-    return 1.0 if v["Density"] is None else max(v["Density"], 0)
+    return 1.0 if v["Density"] is None else not_negative(v["Density"])
 
 
 BUILD = {
     "PRINCIPLED_VOLUME": principled,
     "VOLUME_SCATTER": lambda v: Coefficients([density_of(v) * c for c in v["Color"]]),
     "VOLUME_ABSORPTION": lambda v: Coefficients(
-        absorption=[density_of(v) * max(1 - c, 0) for c in v["Color"]]
+        absorption=[density_of(v) * not_negative(1 - c) for c in v["Color"]]
     ),
     "VOLUME_COEFFICIENTS": lambda v: Coefficients(
         v["Scatter Coefficients"], v["Absorption Coefficients"], v["Emission Coefficients"]

@@ -1,8 +1,9 @@
-"""The world: one colour all around, or an image."""
+"""The world: one colour all around, an image, or what the operator Bake has made of its nodes."""
 
+import bpy
 import numpy as np
 
-from .document import element
+from .document import element, vector
 from .nodes import Place, constant, output_node
 from .textures import COLOR_SPACES, mapping_matrix
 from .visibility import visibility_of_world
@@ -12,94 +13,143 @@ from .visibility import visibility_of_world
 AXES = np.array([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]], float)
 
 
-def add_world(document, problems, textures, world, groups):
-    if world is None:
-        return
-    owner = WorldOwner(world)
-    node = output_node(world.node_tree, "OUTPUT_WORLD") if world.node_tree else None
-    if node is None:
-        return
+BAKED, BAKED_SUN = "lightshaft_baked", "lightshaft_baked_sun"  # properties of a world, which the operator Bake sets
+
+
+class Unreadable(Exception):
+    """The surface of a world is none that can be exported without baking. The message says why."""
+
+
+def add_world(document, problems, textures, volumes, world, groups):
+    """Adds the light of the world. Returns the id of the medium that is everywhere, or None."""
+    owner, output = WorldOwner(world), output_of(world)
+    if output is None:
+        return None
     group = groups.of(world)
     visible = visibility_of_world(problems, owner, world)
-    flags = {"visible_camera": visible.camera, **visible.receivers}
-    output = Place(node)
-    if output.source(output.input("Volume"))[0]:
-        problems.error(
-            f"{owner}: an infinite Volume. Put its shader into the material of a cube around the scene"
-        )
-    background, _ = output.source(output.input("Surface"))
-    if background is None:
-        return
-    if background.node.type != "BACKGROUND":
-        problems.error(
-            f"{owner}, node '{background.title}': the world needs a Background node. Link one to Surface"
-        )
-        return
-    strength = constant(background, background.input("Strength"))
-    if not isinstance(strength, float):
-        problems.error(f"{owner}, node '{background.title}': Strength varies by nodes. Set a number")
-        return
-    colour = constant(background, background.input("Color"))
-    if colour is not None:
-        radiance = [strength * c for c in colour]
-        if any(radiance):
+    around = add_fog(volumes, output, owner, group)
+    flags = {"visible_camera": visible.camera, **visible.receivers, "light_group": group}
+    try:
+        background = read(owner, output)
+    except Unreadable as why:
+        background = baked(world)
+        if background is None:
+            problems.error(f"{why}, or press Bake Procedural Textures in Render Properties > Lightshaft")
+            return around
+    if background.image is not None:
+        name, _ = textures.file(background.image, owner)
+        if name is not None:
             document.add(
                 element(
-                    "emitter", "constant", None, radiance=radiance, light_group=group, **flags
+                    "emitter",
+                    "envmap",
+                    None,
+                    filename=name,
+                    color_space=COLOR_SPACES.get(background.image.colorspace_settings.name),
+                    scale=background.strength,
+                    to_world=np.linalg.inv(background.turn) @ AXES,
+                    **flags,
                 )
             )
-        return
+    elif any(background.radiance):
+        document.add(element("emitter", "constant", None, radiance=background.radiance, **flags))
+    if background.sun is not None:
+        add_sun(document, background.sun, flags)
+    return around
+
+
+def add_fog(volumes, output, owner, group):
+    """Defines the world's Volume, which has no end, as a medium. Returns its id, or None."""
+    source, _ = output.source(output.input("Volume"))
+    found = volumes.shader(source, owner, of_grid=False) if source is not None else None
+    return None if found is None else volumes.homogeneous("world", found, group, None)
+
+
+def add_sun(document, sun, flags):
+    *towards, radius = sun[:4]
+    document.add(
+        element(
+            "emitter",
+            "directional",
+            None,
+            vector("direction", [-x for x in towards]),
+            irradiance=list(sun[4:]),
+            angular_radius=float(radius),
+            **flags,
+        )
+    )
+
+
+class Background:
+    """The light of a world: one radiance, or an image with its strength and the rotation of its directions, and a sun
+    (direction towards it, angular radius in degrees, irradiance) or None."""
+
+    def __init__(self, radiance=(0, 0, 0), image=None, strength=1.0, turn=None, sun=None):
+        self.radiance, self.image, self.strength, self.sun = radiance, image, strength, sun
+        self.turn = np.eye(4) if turn is None else turn
+
+
+def output_of(world):
+    node = output_node(world.node_tree, "OUTPUT_WORLD") if world is not None and world.node_tree else None
+    return None if node is None else Place(node)
+
+
+def read(owner, output):
+    """Returns the Background of a world that is one colour or one image. Raises Unreadable."""
+    background, _ = output.source(output.input("Surface"))
+    if background is None:
+        return Background()
+    where = f"{owner}, node '{background.title}'"
+    if background.node.type != "BACKGROUND":
+        raise Unreadable(f"{where}: link a Background node to Surface")
+    strength = constant(background, background.input("Strength"))
+    if not isinstance(strength, float):
+        raise Unreadable(f"{where}: Strength varies by nodes. Set a number")
+    colour = constant(background, background.input("Color"))
+    if colour is not None:
+        return Background([strength * c for c in colour])
     source, _ = background.source(background.input("Color"))
     where = f"{owner}, node '{source.title}'"
     if source.node.type != "TEX_ENVIRONMENT" or source.node.image is None:
-        problems.error(
-            f"{where}: the background needs an Environment Texture with an image. Bake the sky to an HDRI and open it there"
-        )
-        return
+        raise Unreadable(f"{where}: link an Environment Texture with an image to Color")
     if source.node.projection != "EQUIRECTANGULAR":
-        problems.error(f"{where}: projection {source.node.projection.title()}. Choose Equirectangular")
-        return
-    turn = direction_mapping(problems, source, where)
-    image = source.node.image
-    name, _ = textures.file(image, owner)
-    if turn is not None and name is not None:
-        document.add(
-            element(
-                "emitter",
-                "envmap",
-                None,
-                filename=name,
-                color_space=COLOR_SPACES.get(image.colorspace_settings.name),
-                scale=strength,
-                to_world=np.linalg.inv(turn) @ AXES,
-                light_group=group,
-                **flags,
-            )
-        )
+        raise Unreadable(f"{where}: projection {source.node.projection.title()}. Choose Equirectangular")
+    return Background(image=source.node.image, strength=strength, turn=direction_mapping(source, where))
 
 
-def direction_mapping(problems, place, where):
+def is_readable(world):
+    output = output_of(world)
+    try:
+        return output is None or read(WorldOwner(world), output) is not None
+    except Unreadable:
+        return False
+
+
+def baked(world):
+    image = bpy.data.images.get(world.get(BAKED, ""))
+    return None if image is None else Background(image=image, sun=world.get(BAKED_SUN))
+
+
+def direction_mapping(place, where):
     source, output = place.source(place.input("Vector"))
     if source is None or (source.node.type == "TEX_COORD" and output.name == "Generated"):
         return np.eye(4)
     if source.node.type == "MAPPING":
-        inner, own = direction_mapping(problems, source, where), mapping_matrix(source)
+        inner, own = direction_mapping(source, where), mapping_matrix(source)
         if own is not None:
             own[:3, 3] = 0
         if own is None or not np.allclose(own @ own.T, np.eye(4), atol=1e-5):
-            problems.error(
+            raise Unreadable(
                 f"{where}, node '{source.title}': Lightshaft can only rotate the world. Set Scale to 1, and type Point"
             )
-            return None
-        return None if inner is None else own @ inner
-    problems.error(
+        return own @ inner
+    raise Unreadable(
         f"{where}: coordinates from '{source.title}'. Take Texture Coordinate > Generated, or none"
     )
-    return None
 
 
 class WorldOwner:
-    material = None
+    material = item = None
 
     def __init__(self, world):
         self.world = world
