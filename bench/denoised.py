@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """How much error denoising leaves, and whether the figures that Lightshaft tells of it are right.
 
-usage: denoised.py SCENE.xml[@WxH]... [--seeds N] [--first SEED] [--spp N] [--reference-spp N] [--out PAGE.md]
+usage: denoised.py SCENE.xml[@WxH]... [--seeds N] [--first SEED] [--spp N] [--reference-spp N] [--out PAGE.md] [--sharing]
 Renders each scene with N seeds and --denoise. The true relMSE is (x - ref0)(x - ref1) / (ref^2 + 0.01) against two references with
 seeds of their own: free of the references' noise in the mean. `told` is the mean over seeds of the report's estimate, `covered` the
 share of the report's 95 % intervals that hold the true value; a true value that is not known to a quarter of the interval's half
-width, because of the references' noise, has no say, nor has a seed without an interval. Needs Open Image Denoise (deploy/install-denoiser.sh), numpy, and the OpenEXR
+width, because of the references' noise, has no say, nor has a seed without an interval.
+--sharing prints another table: the same with `path_reuse` and without, and what the denoised error is at equal time (error times
+core seconds, that without sharing over that with it; below 1 sharing loses). Needs Open Image Denoise (deploy/install-denoiser.sh), numpy, and the OpenEXR
 package of PyPI.
 """
 import argparse
@@ -75,6 +77,23 @@ def row(name, size, asked, folder):
             f"| {mean(true_rmse) ** .5:.3g} | {mean(told_rmse) ** .5:.3g} | {share(covered_rmse)} |")
 
 
+def sharing_row(name, size, asked, folder):
+    scene = pathlib.Path(name)
+    references = [render(scene, folder, size, asked.reference_spp, 10**6 + i)[0][0] for i in (0, 1)]
+    cells, costs = [], []
+    for techniques in ("+path_reuse", "-path_reuse"):
+        seconds, raw, true = [], [], []
+        for seed in range(asked.first, asked.first + asked.seeds):
+            (image, denoised), report = render(scene, folder, size, asked.spp, seed, "--denoise", f"--techniques={techniques}")
+            seconds.append(report["core_seconds"])
+            raw.append(against(image, *references)[0][0])
+            true.append(against(denoised, *references)[0][0])
+        error = statistics.stdev(true) / len(true) ** .5
+        cells.append(f"{statistics.mean(seconds):.2f} | {statistics.mean(raw):.3g} | {statistics.mean(true):.3g} +- {error:.1g}")
+        costs.append([statistics.mean(seconds) * x for x in (statistics.mean(raw), statistics.mean(true))])
+    return f"| {scene.stem} | {cells[0]} | {cells[1]} | {costs[1][0] / costs[0][0]:.2f} | {costs[1][1] / costs[0][1]:.2f} |"
+
+
 def publish(title, about, lines, out):
     """Writes the page with the table to the file `out`, or prints it. `{made}` in `about` is the command and its commit."""
     commit = subprocess.run(["git", "describe", "--always", "--dirty", "--abbrev=8"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
@@ -94,12 +113,16 @@ def main():
     parser.add_argument("--spp", type=int, default=32)
     parser.add_argument("--reference-spp", type=int, default=2048)
     parser.add_argument("--out", type=pathlib.Path)
+    parser.add_argument("--sharing", action="store_true")
     asked = parser.parse_args()
     lines = ["| scene | relMSE | denoised | ratio | told | covered | RMSE, denoised | told | covered |", "|---|---|---|---|---|---|---|---|---|"]
+    if asked.sharing:
+        lines = ["| scene | shared: core seconds | relMSE | denoised | alone: core seconds | relMSE | denoised | efficiency of sharing | denoised |",
+                 "|---|---|---|---|---|---|---|---|---|"]
     with tempfile.TemporaryDirectory() as folder:
         for named in asked.scenes:
             name, _, size = named.partition("@")
-            lines.append(row(name, size, asked, pathlib.Path(folder)))
+            lines.append((sharing_row if asked.sharing else row)(name, size, asked, pathlib.Path(folder)))
             print(lines[-1], flush=True)
     publish("The error of denoised images", "{made}. What the columns are: see the script, and "
             "[design/denoising.md](../design/denoising.md) for the estimate.", lines, asked.out)

@@ -71,7 +71,8 @@ void describe(V& v, T& i) {
       i.light_tree);
   technique("path_reuse", {-1, 64}, {"volpath", "path"},
             "how many pixels share what their paths find from the second scattering on, where media are "
-            "homogeneous; 0: 16 if that pays for the scene, else none; -1 or 1: none",
+            "homogeneous; 0: 16 if that pays for the scene and the image has no AOVs for a denoiser, else none; "
+            "-1 or 1: none",
             i.path_reuse);
   technique("shadow_roulette", {-1, 0}, {"volpath"},
             "whether shadow rays through grids that could bring little are traced at random; 0: where it is "

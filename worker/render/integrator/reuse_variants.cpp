@@ -158,7 +158,10 @@ void share_tails(const IntegratorSettings& settings, int threads, World& w) {
     // then hit several of them, but a tail keeps the light of only one.
     if ((s.transition && s.sheet) || ((s.null || s.null_transmission) && s.light != kNone)) return;
   const bool automatic = settings.path_reuse == 0;
-  if (automatic && !sharing_pays(w, *sharing, threads)) return;
+  // A denoiser takes means over neighbouring pixels itself, and takes noise that they share for detail of the
+  // picture. Its image is as good without sharing, in less time (docs/measurements/path-reuse.md).
+  w.reuse_left_to_denoiser = automatic && w.aovs.any_of(aovs_of(AovKind::guide));
+  if (w.reuse_left_to_denoiser || (automatic && !sharing_pays(w, *sharing, threads))) return;
   w.reuse = automatic ? kUsualPathReuse : settings.path_reuse;
   w.need.reuse = true;
 }

@@ -111,6 +111,8 @@ class World {
   // With Features::reuse: the number of pixels in a group, whose paths share their tails, that is, the parts
   // from the second vertex on (path_reuse.h)
   int reuse = 0;
+  // True if paths could be shared and the scene leaves the choice, but the AOVs have a denoiser's guides
+  bool reuse_left_to_denoiser = false;
   EmissiveGrids emissive;      // empty unless next-event estimation looks for emissive grids (emission_nee.h)
   bool hide_emitters = false;  // true if camera rays see no light that was not scattered
   bool transparent = false;    // true if camera rays see no environment (FilmSettings::transparent)

@@ -115,7 +115,9 @@ WorldReport describe(const World& w) {
   feature(w.lights.can_sample(), "next-event estimation");
   feature(w.lights.count() > 1, "choice among lights");
   feature(techniques.has(Technique::light_tree), "tree of lights");
-  feature(techniques.has(Technique::path_reuse), "paths that serve several pixels");
+  feature(techniques.has(Technique::path_reuse),
+          w.reuse_left_to_denoiser ? "paths that serve several pixels, since the image is made for a denoiser"
+                                   : "paths that serve several pixels");
   feature(techniques.has(Technique::sky_samples), "second directions that look for the sky");
   feature(techniques.has(Technique::shadow_roulette), "shadow rays at random where they could bring little");
   feature(techniques.has(Technique::sky_portals), "directions towards the sky through openings");

@@ -100,6 +100,22 @@ TEST(PathReuse, IsOnByDefaultWhereMultipleScatteringCausesTheNoise) {
   EXPECT_FALSE(shares(LampRoom{.fog = .5, .path_reuse = 0}.builder({15, 17}))) << "too few pixels";
 }
 
+// A denoiser takes means over the pixels that would share, so an image with its guides shares only if asked to.
+TEST(PathReuse, IsLeftOutByDefaultWhereTheImageIsMadeForADenoiser) {
+  const auto world = [](int path_reuse, std::vector<std::string> aov) {
+    const SceneBuilder b = LampRoom{.fog = .5, .path_reuse = path_reuse}.builder();
+    RenderSettings settings = test::settings_of(b.scene);
+    settings.aov = std::move(aov);
+    auto w = build_world(b.scene, settings, b.files, 1);
+    if (!w) throw std::runtime_error(w.error().message);
+    return *w;
+  };
+  EXPECT_GT(world(0, {"depth"})->reuse, 0);
+  EXPECT_EQ(world(0, {"denoising_albedo"})->reuse, 0);
+  EXPECT_EQ(world(0, {"depth", "denoising_albedo", "denoising_normal"})->reuse, 0);
+  EXPECT_EQ(world(8, {"denoising_albedo", "denoising_normal"})->reuse, 8);
+}
+
 std::vector<float> tile(const World& w, PixelRect rect, SampleRange samples) {
   return render_tile(w, rect, samples, nullptr, nullptr).sums;
 }
