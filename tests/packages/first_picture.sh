@@ -1,18 +1,19 @@
 #!/usr/bin/env bash
 # Measures, in fresh containers, the seconds from `pip install` to the first picture: of Lightshaft's wheel with `lightshaft up`,
-# and of Mitsuba 3 with the first lines of its manual (its Cornell box, 16 samples per pixel). Prints a line for each run, and what
-# numeric class the wheel's programs are of there and which pixels they render.
+# of the same with the extra `denoise`, and of Mitsuba 3 with the first lines of its manual (its Cornell box, 16 samples per pixel).
+# Prints a line for each run, and what numeric class the wheel's programs are of there and which pixels they render.
 #   tests/packages/first_picture.sh WHEEL RUNS IMAGE...
 # IMAGE is one of Docker that has Python 3.11 or later with venv, and nothing else. The containers use this machine's network.
+# WHAT="lightshaft denoise mitsuba" in the environment chooses what is measured.
 set -euo pipefail
 [ $# -ge 3 ] || { sed -n 's/^#   /usage: /p' "$0" >&2; exit 2; }
-wheel=$(realpath "$1") runs=$2
+wheel=$(realpath "$1") runs=$2 what=${WHAT:-lightshaft denoise mitsuba}
 shift 2
 
 begin='
 load=$(cut -d" " -f1 /proc/loadavg) begun=$(date +%s%N)'
 lightshaft='
-python3 -m venv /v && /v/bin/pip install -q --no-cache-dir /wheel/*.whl
+python3 -m venv /v && /v/bin/pip install -q --no-cache-dir "$(echo /wheel/*.whl)$EXTRA"
 installed=$(date +%s%N)
 touch /up.txt
 /v/bin/lightshaft up --no-browser --data /state >/up.txt 2>&1 & up=$!
@@ -36,13 +37,20 @@ report='
 s() { echo $(($1 / 1000000000)).$(($1 / 100000000 % 10)); }
 echo "installed after $(s $((installed - begun))) s, first picture after $(s $((ended - begun))) s; load $load; $facts"'
 
-run() {  # image, script
-  docker run --rm --network host -v "$wheel:/wheel/$(basename "$wheel"):ro" ${PIP_CERT:+-v "$PIP_CERT:/ca.pem:ro" -e PIP_CERT=/ca.pem} "$1" bash -e -c "$2"
+run() {  # image, script, extra of the wheel
+  docker run --rm --network host -e EXTRA="${3-}" -v "$wheel:/wheel/$(basename "$wheel"):ro" ${PIP_CERT:+-v "$PIP_CERT:/ca.pem:ro" -e PIP_CERT=/ca.pem} "$1" bash -e -c "$2"
 }
 
 for _ in $(seq "$runs"); do
   for image in "$@"; do
-    echo "lightshaft $image: $(run "$image" "$begin$lightshaft$report")"
-    echo "mitsuba $image: $(run "$image" "$libatomic$begin$mitsuba$report")"
+    for program in $what; do
+      case "$program" in
+        lightshaft) line=$(run "$image" "$begin$lightshaft$report") ;;
+        denoise) line=$(run "$image" "$begin$lightshaft$report" '[denoise]') ;;
+        mitsuba) line=$(run "$image" "$libatomic$begin$mitsuba$report") ;;
+        *) echo "error: WHAT names '$program', which is none of lightshaft, denoise, mitsuba" >&2; exit 2 ;;
+      esac
+      echo "$program $image: $line"
+    done
   done
 done
