@@ -12,6 +12,7 @@
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
+#include "core/assets/mesh.h"
 #include "core/scene/json/serialize.h"
 #include "formats/reader/xml_write.h"
 
@@ -88,6 +89,23 @@ void rename_those_outside(Scene& scene) {
   }
 }
 
+// Mitsuba smooths meshes whose files have no normals, where Nori and pbrt shade them flat
+// (MeshShape::flat_without_normals). With the files at hand this is said in Mitsuba's words, by `face_normals`;
+// the image is the same. A mesh whose file cannot be read stays as it is.
+void shade_as_mitsuba_says_it(const LocalScene& scene, Scene& written) {
+  for (std::size_t i = 0; i < written.shapes.size(); ++i) {
+    auto* mesh = std::get_if<MeshShape>(&written.shapes[i].geometry);
+    if (!mesh || !mesh->flat_without_normals) continue;
+    const std::string& name = scene.scene.assets[mesh->file.value].name;
+    const auto file = scene.files.find(name);
+    if (file == scene.files.end()) continue;
+    const auto loaded = load_mesh(file->second.path, name, mesh->shape_index);
+    if (!loaded) continue;
+    mesh->flat_without_normals = false;
+    mesh->face_normals = mesh->face_normals || loaded->normals.empty();
+  }
+}
+
 // Returns the files to copy into `folder` for `written`, the scene after its assets were renamed. A file that
 // already exists there with the same content is left out. If `all` is false, only temporary files are copied,
 // which were made from data in the scene's text when it was read. already_exists: `folder` has a different
@@ -131,6 +149,7 @@ Result<Converted> convert_scene(const LocalScene& scene, const fs::path& out) {
   const fs::path folder = folder_of(out);
   const bool other_folder = folder != folder_of(scene.name);
   if (other_folder) rename_those_outside(written);
+  shade_as_mitsuba_says_it(scene, written);
   auto copies = copies_for(scene, written, folder, other_folder);
   if (!copies) return tl::unexpected(copies.error());
   converted.copies = std::move(*copies);
@@ -194,7 +213,8 @@ void add_convert(CLI::App& app, Action& action) {
       app, action, "convert",
       "write a scene as canonical Mitsuba 3 XML. Its files are copied to OUT's folder under the names that "
       "the scene uses, unless they exist; files that would be outside of the folder get names inside. Prints "
-      "the digest of the scene, which OUT shares if no file was renamed",
+      "the digest of OUT, which is that of the scene unless a file was renamed or a mesh without normals, which "
+      "Nori and pbrt shade flat, had to be marked so",
       run);
   add_option(*convert, "in", flags->in, "IN", "the scene")->required();
   add_option(*convert, "out", flags->out, "OUT", "the XML file to write")->required();

@@ -103,12 +103,37 @@ def test_a_bad_scene_is_told_with_places_and_writes_nothing(tmp_path):
 
 
 def test_what_only_lightshaft_reads_is_named(tmp_path):
-    (tmp_path / "t.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    scene, out = tmp_path / "nori.xml", tmp_path / "out.xml"
-    scene.write_text('<scene><integrator type="path_mis"/><camera type="perspective"/>'
-                     '<mesh type="obj"><string name="filename" value="t.obj"/></mesh></scene>')
+    scene, out = tmp_path / "scene.xml", tmp_path / "out.xml"
+    scene.write_text('<scene version="3.0.0"><sensor type="perspective"/>'
+                     '<shape type="rectangle"><boolean name="holdout" value="true"/></shape></scene>')
 
     said = lightshaft("convert", scene, out).stderr
 
-    assert f"warning: only Lightshaft reads 'flat_without_normals' of shape \"obj\"; Mitsuba 3 refuses {out}" in said
+    assert f"warning: only Lightshaft reads 'holdout' of shape \"rectangle\"; Mitsuba 3 refuses {out}" in said
     assert "only Lightshaft reads" not in lightshaft("convert", write_fog(tmp_path), tmp_path / "fog2.xml").stderr
+
+
+NORI = """<scene><integrator type="path_mis"/>
+<camera type="perspective"><float name="fov" value="40"/><transform name="toWorld"><lookat origin="0,1,-4" target="0,0,0" up="0,1,0"/></transform>
+<integer name="width" value="16"/><integer name="height" value="12"/></camera><sampler type="independent"><integer name="sampleCount" value="4"/></sampler>
+<mesh type="obj"><string name="filename" value="flat.obj"/><bsdf type="diffuse"/></mesh>
+<mesh type="obj"><string name="filename" value="smooth.obj"/><bsdf type="diffuse"/><emitter type="area"><color name="radiance" value="1,2,3"/></emitter></mesh></scene>"""
+
+
+def test_nori_meshes_without_normals_are_flat_in_mitsubas_words(tmp_path):
+    corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 1\n"
+    (tmp_path / "flat.obj").write_text(corners + "f 1 2 3\nf 1 3 4\n")
+    (tmp_path / "smooth.obj").write_text("v -1.5 0 0\nv -0.5 0 0\nv -0.5 1 0\nvn 0 0 -1\nvn 0.6 0 -0.8\nf 1//1 3//1 2//2\n")
+    scene, out = tmp_path / "nori.xml", tmp_path / "there" / "scene.xml"
+    scene.write_text(NORI)
+    out.parent.mkdir()
+
+    done = lightshaft("convert", scene, out)
+
+    assert "only Lightshaft reads" not in done.stderr
+    text = out.read_text()
+    assert "flat_without_normals" not in text
+    assert [name in text for name in ("flat.obj", "smooth.obj")] == [True, True]
+    shading = [part.split("</shape>")[0] for part in text.split('<shape type="obj">')[1:]]
+    assert ['"face_normals" value="true"' in part for part in shading] == ["flat.obj" in part for part in shading]
+    assert digest(lightshaft("render", out, "-o", tmp_path / "a.exr")) == digest(lightshaft("render", scene, "-o", tmp_path / "b.exr"))
