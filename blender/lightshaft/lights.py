@@ -7,6 +7,7 @@ import numpy as np
 from . import exr, meshes
 from .document import element, vector
 from .motion import Placement
+from .nodes import Place, constant, output_node
 
 FLIP = ((1, 0, 0, 0), (0, -1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1))  # Blender's lights look along -z
 PROFILE = 512  # pixels of the image that a spot light throws
@@ -17,19 +18,7 @@ def add_light(document, problems, item, placement, matrix_class, may_see, marks,
     a radius, False if the camera does not see the ball. `marks`: the light group and the links of its emitter. `visible`:
     its Visibility."""
     data, name, matrix = item.data, item.name, placement.still
-    colour = light_colour(data)
-    if (
-        data.use_nodes
-        and data.node_tree
-        and any(
-            node.type not in ("EMISSION", "OUTPUT_LIGHT")
-            or any(socket.is_linked for socket in node.inputs if node.type == "EMISSION")
-            for node in data.node_tree.nodes
-        )
-    ):
-        problems.unsupported(
-            f"light '{name}': nodes. Set its Color and Power in Light properties, and switch Use Nodes off"
-        )
+    colour = [c * f for c, f in zip(light_colour(data), shader_factor(problems, data))]
     if not data.normalize:
         problems.unsupported(f"light '{name}': Normalize off. Switch it on in Light properties")
     if not any(colour) or data.cycles.is_portal:
@@ -80,6 +69,24 @@ def add_light(document, problems, item, placement, matrix_class, may_see, marks,
     else:
         placed = placement @ matrix_class(FLIP)
         add_area(document, problems, item, colour, placed, matrix_class, may_see, marks, visible)
+
+
+def shader_factor(problems, data):
+    """Returns by what the nodes of a light multiply its colour."""
+    output = output_node(data.node_tree, "OUTPUT_LIGHT") if data.use_nodes and data.node_tree else None
+    if output is None:
+        return (1, 1, 1)
+    source, _ = Place(output).source(output.inputs["Surface"])
+    if source is None:
+        return (0, 0, 0)
+    if source.node.type == "EMISSION":
+        strength, colour = (constant(source, source.input(name)) for name in ("Strength", "Color"))
+        if strength is not None and colour is not None:
+            return [strength * c for c in colour]
+    problems.unsupported(
+        f"light '{data.name}', node '{source.title}': a shader that varies. Set Color and Power in Light properties, and switch Use Nodes off"
+    )
+    return (1, 1, 1)
 
 
 def light_colour(data):

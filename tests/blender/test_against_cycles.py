@@ -601,3 +601,38 @@ def test_an_image_of_light_is_multiplied_by_its_strength(stage):
     made.node_tree.links.new(image.outputs["Color"], glow.inputs["Color"])
     stage.plane(made, 60)
     assert stage.render(samples=2)[:, :, :3].mean(axis=(0, 1)) == pytest.approx((0.5, 1, 1.5), rel=1e-3)
+
+
+def with_emission(stage):
+    light = stage.light("POINT", 100, (3, -2, 4), shadow_soft_size=0)
+    light.data.use_nodes = True
+    return light.data.node_tree, next(n for n in light.data.node_tree.nodes if n.type == "EMISSION")
+
+
+def test_the_emission_node_of_a_light_multiplies_its_power(stage):
+    from stage import material
+
+    tree, emission = with_emission(stage)
+    warm = tree.nodes.new("ShaderNodeBlackbody")
+    warm.inputs[0].default_value = 3000
+    tree.links.new(warm.outputs[0], emission.inputs["Color"])
+    emission.inputs["Strength"].default_value = 3
+    stage.plane(material("Floor", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5)))
+    differ(stage, EXACT, 16)
+
+
+def test_a_light_whose_shader_is_unlinked_is_dark(stage):
+    from stage import material
+
+    tree, emission = with_emission(stage)
+    tree.links.remove(emission.outputs[0].links[0])
+    stage.sky(0.1)
+    stage.plane(material("Floor", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5)))
+    differ(stage, EXACT, 16)
+
+
+def test_a_light_whose_shader_varies_is_refused(stage):
+    tree, emission = with_emission(stage)
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], emission.inputs["Strength"])
+    with pytest.raises(RuntimeError, match="light 'Point', node 'Emission': a shader that varies"):
+        stage.render(samples=1)

@@ -86,7 +86,7 @@ PAGE = """# Storms
 
 > Shown with fake workers (the real worker program, whose renderer makes pixels up) and one job at a time, except the storms "with real pixels". Workers that render, and many jobs open at once: [open-jobs.md](open-jobs.md).
 
-`/usr/bin/python3 tests/chaos/chaos.py --seed {seed} --repetitions {repetitions} --write docs/measurements/chaos.md` wrote this page, in {minutes:.0f} minutes on {cores} cores, with other work on the machine. Each storm has a farm of its own (coordinator and workers as processes, real sockets, disks and databases) and ends with the
+`/usr/bin/python3 tests/chaos/chaos.py --seed {seed} --repetitions {repetitions} --write docs/measurements/chaos.md` wrote this page, commit {commit}, in {minutes:.0f} minutes on {cores} cores, with other work on the machine. Each storm has a farm of its own (coordinator and workers as processes, real sockets, disks and databases) and ends with the
 same question: are the pixels those of one worker that nothing happened to? Workers are fake: their pixels are a pure function of the unit, so a unit that is lost, counted twice, swapped or folded out of order shows. In the storms "with real pixels" workers render fog, and the pixels must be those of `lightshaft render`. The job has {units} units of {delay} ms (1920 in the storm with audits of 1 %). What is random (who is killed, when, which bytes) follows from the seed.
 
 *Units again, at most*: units that workers had in hand when they were lost, too slow or failed, and second results of a unit; not all of the former had been begun; after a takeover also what the dead owner had done. *Seconds lost*: beyond the {calm:.1f} s that three workers take for the job when nothing happens; what the storm itself lasts (a cut of 2 to 6 s, a coordinator frozen for 3 s, one worker instead of three) is in it. Median, and the worst in brackets.
@@ -125,8 +125,9 @@ def main():
     print(f"{len(rows)} storms, {wrong} tries went wrong, {len(skipped)} storms left out, {time.monotonic() - began:.0f} s")
     if arguments.write and not arguments.only:
         left_out = "\nLeft out, because they could not be made on that machine:\n\n" + "\n".join(skipped) + "\n" if skipped else ""
+        commit = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], cwd=os.path.dirname(__file__), capture_output=True, text=True, check=True)
         with open(arguments.write, "w", encoding="utf-8") as out:
-            out.write(PAGE.format(seed=arguments.seed, repetitions=arguments.repetitions, cores=os.cpu_count(),
+            out.write(PAGE.format(commit=commit.stdout.strip(), seed=arguments.seed, repetitions=arguments.repetitions, cores=os.cpu_count(),
                                   minutes=(time.monotonic() - began) / 60, units=48 * 5, delay=DELAY, calm=calm_seconds(Asked()), table="\n".join(rows), skipped=left_out))
     return 1 if wrong else 0
 
