@@ -2,6 +2,8 @@
 """Every scene under a folder: does it load, and does it agree with the reference image that lies beside it?
 
 usage: agreement.py [--scenes DIR] [--only TEXT] [--spp N] [--seeds K] [--size WxH | --across N] [--seconds S] [--load-only] [--markdown] [--mitsuba N [--variant NAME]]
+       agreement.py --scenes DIR --page PAGE
+With --page the tables of docs/measurements/agreement.md are made: the rows of TABLES, of collections of scenes below DIR. About an hour of CPU time.
 Without DIR the bench scenes are made and compared with their references. References are found by name: refs/NAME.0.exr and
 NAME.1.exr (independent of each other, so that their noise counts in the standard errors), else refs/NAME_ref_rgb.exr for a scene
 NAME_INTEGRATOR.xml, else ref/NAME_*spp.exr, else a TungstenRender.exr in the scene's own folder. A scene without one is rendered all the same, and its picture must be finite.
@@ -23,6 +25,7 @@ import os
 import pathlib
 import re
 import subprocess
+import sys
 import tempfile
 
 import numpy as np
@@ -34,6 +37,17 @@ from verdicts import verdict
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 BIN = pathlib.Path(os.environ.get("LIGHTSHAFT_BIN", ROOT / "build" / "release" / "bin"))
 FLOOR = 3e-3
+# The rows of the page: the beginning of a scene's path below DIR, its size (None: the reference's), our samples per pixel and seed,
+# Mitsuba's (0: the reference beside the scene), and seeds.
+TABLES = {
+    "references": [
+        ("01-mitsuba-media/", None, 128, 0, 4), ("02-mitsuba-bsdf-lights/", None, 128, 0, 4),
+        ("04-cornell-box/", "256x256", 128, 0, 4), ("11-kombu-nori-agpl/pa3/veach_mi/veach_mis.xml", None, 32, 0, 4)],
+    "mitsuba": [
+        ("05-volumetric-caustic/scene_v3.xml", "64x36", 256, 512, 4), ("06-lajolla-volpath/scenes/volpath_test/vol", "64x64", 64, 256, 4),
+        ("10-mitsuba-tutorials/", "64x64", 64, 256, 4), ("11-kombu-nori-agpl/project/volumetric/cbox/cbox_inmedium.xml", "64x48", 64, 256, 4),
+        ("11-kombu-nori-agpl/project/volumetric/cbox/cbox_vol_path_mats.xml", "64x48", 64, 256, 4), ("03-living-room/", "160x90", 32, 128, 4),
+        ("chromatic_grids/", "64x48", 512, 512, 4)]}
 
 
 def load(path):
@@ -179,6 +193,28 @@ def row(scene, root, options, folder):
     return name, verdict(channels), f"{figures}; |z| > 4: {100 * outliers:.1f} %"
 
 
+def page(options):
+    """Makes the tables of the page, from the scenes below the folder and those of chromatic_grids.py, and writes them between its marks."""
+    commit = subprocess.run(["git", "-C", ROOT, "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        subprocess.run([sys.executable, ROOT / "bench" / "chromatic_grids.py", folder / "chromatic_grids"], check=True, stdout=subprocess.DEVNULL)
+        for table, rows in TABLES.items():
+            lines = ["| scene | size; samples per pixel and seed, ours / Mitsuba's | verdict | ratio of means - 1 (red, green, blue), standard error |", "|---|---|---|---|"]
+            for begin, options.size, options.spp, options.mitsuba, options.seeds in rows:
+                root = folder if begin.startswith("chromatic_grids") else options.scenes
+                for scene in scenes_below(root):
+                    if not str(scene.relative_to(root)).startswith(begin):
+                        continue
+                    name, said, figures = row(scene, root, options, folder)
+                    samples = f"{options.size or 'of the reference'}; {options.spp}" + (f" / {options.mitsuba}" if options.mitsuba else "")
+                    lines.append(f"| {name} | {samples} | {said} | {figures.replace('|z|', chr(92) + '|z' + chr(92) + '|')} |")
+                    print(lines[-1], flush=True)
+            text = options.page.read_text()
+            head, rest = text.split(f"<!-- {table} -->\n", 1)
+            options.page.write_text(f"{head}<!-- {table} -->\nCommit {commit}.\n\n" + "\n".join(lines) + f"\n<!-- end of {table} -->" + rest.split(f"<!-- end of {table} -->", 1)[1])
+
+
 def main():
     args = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     args.add_argument("--scenes", type=pathlib.Path)
@@ -192,7 +228,12 @@ def main():
     args.add_argument("--seconds", type=float, default=0)
     args.add_argument("--load-only", action="store_true")
     args.add_argument("--markdown", action="store_true")
+    args.add_argument("--page", type=pathlib.Path)
     options = args.parse_args()
+    if options.page:
+        if not options.scenes:
+            args.error("--page needs --scenes DIR")
+        return page(options)
     scenes = bench_scenes.scenes(options.scenes)
     if options.markdown:
         print("| scene | verdict | ratio of means - 1 (red, green, blue), standard error |\n|---|---|---|")
