@@ -38,15 +38,16 @@ std::string names_like(const fs::path& missing) {
 
 // The first bytes of a file, and its last one.
 struct FileEnds {
-  std::string head;
-  char last = 0;
+  std::string head, tail;
 };
 FileEnds ends_of(const fs::path& path, std::uintmax_t bytes) {
   FileEnds ends;
   ends.head.resize(std::min<std::uintmax_t>(bytes, kFormBytes));
   std::ifstream in(path, std::ios::binary);
   in.read(ends.head.data(), static_cast<std::streamsize>(ends.head.size()));
-  if (bytes > 0) in.seekg(-1, std::ios::end).get(ends.last);
+  ends.tail.resize(ends.head.size());
+  in.seekg(static_cast<std::streamoff>(bytes - ends.tail.size()));
+  in.read(ends.tail.data(), static_cast<std::streamsize>(ends.tail.size()));
   return ends;
 }
 
@@ -129,7 +130,7 @@ Result<Asset> FolderAssets::find(std::string_view name) {
   const FileEnds ends = ends_of(*path, bytes);
   if (const std::string why = why_placeholder(ends.head); !why.empty())
     return fail(Errc::invalid_argument, fmt::format("\"{}\" {}", name, why));
-  if (std::string why = why_perhaps_cut(name, ends.head, ends.last); !why.empty())
+  if (std::string why = why_perhaps_cut(name, ends.head, ends.tail); !why.empty())
     doubts_.emplace(name, std::move(why));
   const Asset asset{std::string(name), *digest, bytes};
   found_.emplace(asset.name, asset);

@@ -97,15 +97,42 @@ std::string why_placeholder(std::string_view head) {
   return "is a pointer of Git LFS, not the file itself: run `git lfs pull` in the repository it comes from";
 }
 
-std::string why_perhaps_cut(std::string_view name, std::string_view head, char last) {
-  if (head.empty() || is_gzip(head) || last == '\n' || last == '\r') return {};
+namespace {
+
+// True if the last statement of an OBJ file is a vertex, a normal or a texture coordinate.
+bool ends_in_vertex(std::string_view tail) {
+  while (!tail.empty()) {
+    const auto end = tail.find_last_not_of("\r\n");
+    if (end == tail.npos) return false;
+    const auto before = tail.find_last_of("\r\n", end);
+    if (before == tail.npos) return false;  // perhaps not the beginning of the line
+    std::string_view line = tail.substr(before + 1, end - before);
+    line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+    if (!line.empty() && line[0] != '#') {
+      const std::string_view key = line.substr(0, line.find_first_of(" \t"));
+      return key == "v" || key == "vn" || key == "vt";
+    }
+    tail = tail.substr(0, before);
+  }
+  return false;
+}
+
+}  // namespace
+
+std::string why_perhaps_cut(std::string_view name, std::string_view head, std::string_view tail) {
+  if (head.empty() || tail.empty() || is_gzip(head)) return {};
   const auto ends_in = [&](std::string_view end) {
     return name.size() >= end.size() &&
            ::strncasecmp(name.data() + name.size() - end.size(), end.data(), end.size()) == 0;
   };
   const bool is_ply = without_mark(head).starts_with("ply");
-  const bool is_text = is_ply ? head.find("format ascii") != head.npos : ends_in(".obj") || ends_in(".ies");
+  const bool is_obj = !is_ply && ends_in(".obj");
+  const bool is_text = is_ply ? head.find("format ascii") != head.npos : is_obj || ends_in(".ies");
   if (!is_text) return {};
+  if (tail.back() == '\n' || tail.back() == '\r')
+    return is_obj && ends_in_vertex(tail)
+               ? "ends in vertices, which no face after them uses: it may have been cut short"
+               : "";
   return "ends within a line: it may have been cut short; if it is whole, put a line end at its end";
 }
 

@@ -35,9 +35,10 @@ std::string why_no_utf8(std::string_view text);
 std::string_view without_mark(std::string_view text);
 
 // If the file may have been cut short, returns why, as the end of a sentence that begins with the file's
-// name; else "". Formats of text have no mark of their end: of an OBJ, IES or ASCII PLY file it can
-// only be told whether its last line has a line end. `head` is the file's beginning, `last` its last byte.
-std::string why_perhaps_cut(std::string_view name, std::string_view head, char last);
+// name; else "". Formats of text have no mark of their end: of an OBJ, IES or ASCII PLY file it can only be
+// told whether its last line has a line end, and of an OBJ whether faces follow its last vertices. `head` is
+// the file's beginning, `tail` its end, both of kFormBytes or the whole file.
+std::string why_perhaps_cut(std::string_view name, std::string_view head, std::string_view tail);
 
 // Returns the name without a last ".gz", in lower or upper case: "smoke.vdb" for "smoke.vdb.gz".
 std::string_view without_gz(std::string_view name);

@@ -176,6 +176,7 @@ class MaterialTranslator {
         return p_.refuse(names->at, fmt::format("no MakeNamedMaterial \"{}\" stands before this", name));
       m.transmits |= found->second.transmits;
       m.has_texture |= found->second.has_texture;
+      m.has_normal_map |= found->second.has_normal_map;
       refer(out, "", found->second.id, names->at);
     }
     return out;
@@ -308,6 +309,11 @@ class MaterialTranslator {
   Params& p_;
 };
 
+bool has_normal_map(const Element& e) {
+  if (e.tag == "bsdf" && e.get("type") == "normalmap") return true;
+  return std::any_of(e.children.begin(), e.children.end(), has_normal_map);
+}
+
 // True if the element, or an element below it, is a texture or a named reference to one.
 bool has_texture(const Element& e) {
   if (e.tag == "texture" || (e.tag == "ref" && e.find("name"))) return true;
@@ -322,6 +328,7 @@ std::optional<Material> add_material(Translation& t, const std::string& id, Para
   p.finish();
   if (!bsdf) return std::nullopt;
   m.has_texture |= has_texture(*bsdf);
+  m.has_normal_map |= has_normal_map(*bsdf);
   set(*bsdf, "id", id, p.at());
   add(t.scene, std::move(*bsdf));
   return m;

@@ -44,6 +44,7 @@ struct Material {
   bool transmits = false, null = false;
   // True if the material has an image or a pattern, which depends on the shape's uv.
   bool has_texture = false;
+  bool has_normal_map = false;
 };
 struct AreaLight {
   // The light's radiance, if `power` is nullopt. Otherwise the light's radiance is this colour times power /

@@ -301,6 +301,10 @@ class ShapeTranslator {
           p_.at(),
           "a mirrored sphere, disk or cylinder gives light here on the side from which pbrt shows it "
           "shining; when it samples lights, pbrt takes the other side");
+    if (a_.material.has_normal_map && is_mirrored())
+      t_.warn_once(p_.at(),
+                   "a normal map on a shape that its transform mirrors leans as in pbrt, which does not "
+                   "mirror it along: for the mirrored picture, mirror the mesh in its file instead");
     const bool by_corners = (type == "trianglemesh" || type == "bilinearmesh") && !has_normals_;
     const bool turned_here = determinant3(to_world_.to) < 0 && (type == "sphere" || by_corners);
     if (is_turned() != turned_here) add(out, "boolean", "flip_normals", "true", p_.at());

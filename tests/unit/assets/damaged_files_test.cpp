@@ -331,7 +331,7 @@ enum class Answer {
   refused,           // always refused
   refused_or_whole,  // refused, or read as the whole file is
   warned,            // as above, or a warning
-  told,              // as above, but a cut at a line's end can't be told
+  told,              // as above, but a cut between lines of faces can't be told
   pixels_checked,    // as refused_or_whole in the second half: the headers before it have no checksum
   unknown            // the format has no checksum: what was changed is read as it stands, if it can be
 };
@@ -344,7 +344,7 @@ std::string_view words(Answer a, bool cut) {
     case Answer::warned:
       return "refused, or a warning";
     case Answer::told:
-      return "refused, or a warning; within lines only: a cut at a line's end can't be known";
+      return "refused, or a warning; a cut at the end of a face's line can't be known";
     case Answer::pixels_checked:
       return "refused, or read as the whole file; its header alone has no checksum";
     case Answer::unknown:
@@ -419,7 +419,7 @@ TEST(DamagedFiles, TruncatedFileIsRefusedOrReportedOrComplete) {
       read_as_whole += got == whole;
       if (k.cut == Answer::told || k.cut == Answer::warned) {
         EXPECT_TRUE((k.cut == Answer::told && cut.ends_with('\n')) ||
-                    !why_perhaps_cut(k.file_name, cut, cut.back()).empty())
+                    !why_perhaps_cut(k.file_name, cut, cut).empty())
             << size;
       } else {
         EXPECT_TRUE(got == whole) << "read otherwise when cut to " << size << " of " << k.bytes.size();
@@ -428,8 +428,24 @@ TEST(DamagedFiles, TruncatedFileIsRefusedOrReportedOrComplete) {
     if (k.cut == Answer::refused_or_whole) {
       EXPECT_GT(read_as_whole, 0u) << "the table could say `refused`";
     }
-    EXPECT_EQ(why_perhaps_cut(k.file_name, k.bytes, k.bytes.back()), "");
+    EXPECT_EQ(why_perhaps_cut(k.file_name, k.bytes, k.bytes), "");
   }
+}
+
+// The vertices of a second object that was cut off before its first face are told; a file of which each
+// vertex is followed by faces is not.
+TEST(DamagedFiles, ObjThatEndsInVerticesMayBeCut) {
+  const std::string one = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  for (const std::string& end :
+       {std::string("v 5 5 5\n"), std::string("v 5 5 5\nvt 0 1\n"), std::string("v 5 5 5\nvn 0 0 1\r\n"),
+        std::string("v 5 5 5\n# ten of them\n\n")})
+    EXPECT_THAT(why_perhaps_cut("a.OBJ", one + end, one + end), testing::HasSubstr("ends in vertices"))
+        << end;
+  for (const std::string& end : {std::string(), std::string("v 5 5 5\nf 1 2 4\n"), std::string("# v 5 5 5\n"),
+                                 std::string("vp 1 1\n"), std::string("g v\n"), std::string("\n\n")})
+    EXPECT_EQ(why_perhaps_cut("a.obj", one + end, one + end), "") << end;
+  EXPECT_EQ(why_perhaps_cut("a.obj", "v 0 0 0\n", "v 0 0 0\n"), "") << "a file without faces is refused";
+  EXPECT_EQ(why_perhaps_cut("a.ies", one + "v 1 1 1\n", "v 1 1 1\n"), "");
 }
 
 TEST(DamagedFiles, ChangedByteIsRefusedOrHarmlessInFormatsWithAChecksum) {

@@ -100,7 +100,8 @@ TEST(PathReuse, IsOnByDefaultWhereMultipleScatteringCausesTheNoise) {
   EXPECT_FALSE(shares(LampRoom{.fog = .5, .path_reuse = 0}.builder({15, 17}))) << "too few pixels";
 }
 
-// A denoiser takes means over the pixels that would share, so an image with its guides shares only if asked to.
+// A denoiser takes means over the pixels that would share, so an image with its guides shares only if asked
+// to.
 TEST(PathReuse, IsLeftOutByDefaultWhereTheImageIsMadeForADenoiser) {
   const auto world = [](int path_reuse, std::vector<std::string> aov) {
     const SceneBuilder b = LampRoom{.fog = .5, .path_reuse = path_reuse}.builder();

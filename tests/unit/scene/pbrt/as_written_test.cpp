@@ -199,6 +199,19 @@ TEST(PbrtSides, MirroredLampIsAWarning) {
   EXPECT_THAT(messages(r), HasSubstr("when it samples lights, pbrt takes the other side"));
 }
 
+// pbrt keeps the tangent frame of a normal map as it is where a transform mirrors the shape.
+TEST(PbrtSides, NormalMapOfAMirroredShapeIsAWarning) {
+  const auto told = [](std::string_view transform) {
+    return messages(read_pbrt(pbrt_scene(fmt::format(
+        R"(MakeNamedMaterial "bumpy" "string type" "diffuse" "string normalmap" "normals.png"
+MakeNamedMaterial "mixed" "string type" "mix" "string materials" [ "bumpy" "bumpy" ]
+NamedMaterial "mixed" {} Shape "sphere")",
+        transform))));
+  };
+  EXPECT_THAT(told("Scale -1 1 1"), HasSubstr("does not mirror it along"));
+  EXPECT_THAT(told("Scale -1 -1 1"), Not(HasSubstr("mirror")));
+}
+
 TEST(PbrtSides, SidesOfAMirroredFileAreUnknown) {
   EXPECT_THAT(
       refusal(R"(Material "dielectric" Scale -1 1 1 Shape "plymesh" "string filename" "mesh.ply")"),
