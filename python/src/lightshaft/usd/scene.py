@@ -74,6 +74,11 @@ def read(
     problems = Problems()
     files = Files(place.parent if folder is None else folder, allow, problems)
     stage = _open(place)
+    if _ends_within_a_line(place):
+        problems.warn(
+            stage.GetPseudoRoot(),
+            f"{place.name} ends within a line: it may have been cut short; if it is whole, put a line end at its end",
+        )
     files.check_layers(stage)
     _check_composition(stage, problems)
     times = _times(stage, frames)
@@ -124,11 +129,27 @@ def _open(path: pathlib.Path) -> Usd.Stage:
             stage = Usd.Stage.Open(os.path.abspath(path), Usd.Stage.LoadAll)
             told.ClearWarnings()
     except Tf.ErrorException as error:
-        reasons = dict.fromkeys(" ".join(part.commentary.split()) for part in error.args)
+        reasons = dict.fromkeys(" ".join(_words_of(part).split()) for part in error.args)
         raise StageRejected(f"{path} is no stage: {'; '.join(reasons)}") from None
     if not stage:
         raise StageRejected(f"{path} is no stage")
     return stage
+
+
+def _ends_within_a_line(path: pathlib.Path) -> bool:
+    """Returns whether a stage in text has no line end at its end. The text has no other mark of its end."""
+    with path.open("rb") as file:
+        is_text = file.read(5) == b"#usda"
+        file.seek(-1, os.SEEK_END)
+        return is_text and file.read(1) not in b"\r\n"
+
+
+def _words_of(error: Tf.Error) -> str:
+    """Returns what USD says of an error. It quotes the file, whose bytes may be no text."""
+    try:
+        return str(error.commentary)
+    except UnicodeDecodeError as broken:
+        return bytes(broken.object).decode("utf-8", "replace")
 
 
 def _check_composition(stage: Usd.Stage, problems: Problems) -> None:
