@@ -151,7 +151,7 @@ def bake_world(world, size):
                 world[BAKED_SUN] = [*towards, math.degrees(disk / 2), *map(float, irradiance)]
             elif sun.sun_intensity > 0 and sun.sun_elevation > 0:
                 sun.sun_disc = True
-                problems.append("the sun of its Sky Texture is not where its nodes say; it is baked into the image and will be blurred")
+                problems.append("the sun of its Sky Texture was not found in the direction of its nodes; it is baked into the image and will be blurred")
         elif suns:
             problems.append("it has several suns, or one in a group; they are baked into the image and will be blurred")
         image = picture.panorama(size)

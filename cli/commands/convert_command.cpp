@@ -90,9 +90,9 @@ void rename_those_outside(Scene& scene) {
 }
 
 // Mitsuba smooths meshes whose files have no normals, where Nori and pbrt shade them flat
-// (MeshShape::flat_without_normals). With the files at hand this is said in Mitsuba's words, by `face_normals`;
-// the image is the same. A mesh whose file cannot be read stays as it is.
-void shade_as_mitsuba_says_it(const LocalScene& scene, Scene& written) {
+// (MeshShape::flat_without_normals). With the files at hand this is said in Mitsuba's words, by
+// `face_normals`; the image is the same. A mesh whose file cannot be read stays as it is.
+void mark_flat_meshes(const LocalScene& scene, Scene& written) {
   for (std::size_t i = 0; i < written.shapes.size(); ++i) {
     auto* mesh = std::get_if<MeshShape>(&written.shapes[i].geometry);
     if (!mesh || !mesh->flat_without_normals) continue;
@@ -149,7 +149,7 @@ Result<Converted> convert_scene(const LocalScene& scene, const fs::path& out) {
   const fs::path folder = folder_of(out);
   const bool other_folder = folder != folder_of(scene.name);
   if (other_folder) rename_those_outside(written);
-  shade_as_mitsuba_says_it(scene, written);
+  mark_flat_meshes(scene, written);
   auto copies = copies_for(scene, written, folder, other_folder);
   if (!copies) return tl::unexpected(copies.error());
   converted.copies = std::move(*copies);
@@ -213,7 +213,8 @@ void add_convert(CLI::App& app, Action& action) {
       app, action, "convert",
       "write a scene as canonical Mitsuba 3 XML. Its files are copied to OUT's folder under the names that "
       "the scene uses, unless they exist; files that would be outside of the folder get names inside. Prints "
-      "the digest of OUT, which is that of the scene unless a file was renamed or a mesh without normals, which "
+      "the digest of OUT, which is that of the scene unless a file was renamed or a mesh without normals, "
+      "which "
       "Nori and pbrt shade flat, had to be marked so",
       run);
   add_option(*convert, "in", flags->in, "IN", "the scene")->required();
