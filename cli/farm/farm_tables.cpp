@@ -108,7 +108,8 @@ void add_error_rows(std::vector<Row>& rows, const json& job) {
     add_reference_error("true RMSE", "rmse", "rmse_below_noise");
     add_known(rows, "FLIP", *reference, "flip");
   }
-  add_pixels(rows, "few hits", job, "few_hits", "too few for their error to be known");
+  add_pixels(rows, "too little light", job, "few_hits",
+             "too few samples found light for their error to be known");
   add_pixels(rows, "not reached yet", job, "pixels_without_samples", "the error is of the others");
   const Verdict verdict = verdict_of(job);
   if (!verdict.words.empty()) rows.push_back({"verdict", verdict.words});

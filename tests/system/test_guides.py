@@ -35,7 +35,10 @@ def test_the_blocks_run_as_they_stand(farm, tmp_path):
     assert "late" in run.stdout.splitlines()[-1]
 
 
-@pytest.mark.parametrize("page", PAGES)
+FOLLOWED = (*PAGES, "add-a-machine")  # by these tests; the commands of the last are run by test_up.py
+
+
+@pytest.mark.parametrize("page", FOLLOWED)
 def test_the_list_of_pages_has_it(page):
     assert f"(guide/{page}.md)" in (ROOT / "docs/README.md").read_text()
 
@@ -45,6 +48,21 @@ def test_every_command_that_a_page_names_is_there():
                            text=True, check=True).stdout
     commands = set(re.findall(r"^  ([a-z]+) ", known, re.MULTILINE))
 
-    named = {name for text in TEXT.values() for name in re.findall(r"lightshaft ([a-z]+)", text)}
+    texts = [(ROOT / f"docs/guide/{page}.md").read_text() for page in FOLLOWED]
+    named = {name for text in texts for name in re.findall(r"lightshaft ([a-z]+)", text)}
 
     assert len(named) > 10 and named <= commands, named - commands
+
+
+def test_the_options_of_the_farm_in_one_command_are_there():
+    program = os.environ.get("LIGHTSHAFT_CLI", ROOT / "build/release/bin/lightshaft")
+    known = set()
+    for command in ("up", "join", "doctor", "workers", "farm up", "worker", "submit"):
+        told = subprocess.run([program, *command.split(), "--help"], capture_output=True, text=True).stdout
+        known |= set(re.findall(r"--[a-z][a-z-]*", told))
+    told = subprocess.run([ROOT / "build/release/bin/lightshaft-coordinator", "--help"], capture_output=True, text=True).stdout
+    known |= set(re.findall(r"--[a-z][a-z-]*", told))
+
+    named = set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", (ROOT / "docs/guide/add-a-machine.md").read_text()))
+
+    assert len(named) > 6 and named <= known, named - known

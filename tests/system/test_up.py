@@ -597,3 +597,8 @@ def test_the_doctor_says_where_python_is_missing(tmp_path):
 
     refused = subprocess.run([bin_dir() / "lightshaft", "up"], env={**os.environ, "PATH": str(tmp_path)}, capture_output=True, text=True)
     assert refused.returncode == 1 and "Python 3.11" in refused.stderr
+
+
+def test_the_advice_names_the_denoiser_that_the_package_asks_for():
+    pinned = re.search(r'denoise = \["(pyoidn==[^"]+)"\]', (ROOT / "python/pyproject.toml").read_text())[1]
+    assert pinned in (ROOT / "python/src/lightshaft_command/first_picture.py").read_text()

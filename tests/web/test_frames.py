@@ -1,4 +1,5 @@
 """A sequence on the dashboard: its frames, the one that is shown, and what events say of them."""
+from local_farm import wait_until
 from stub_farm import job, png
 
 SEQUENCE = "j-5e9"
@@ -276,3 +277,32 @@ def test_the_files_of_all_frames_are_taken_along_and_the_range_is_sent(farm, das
     page.wait("location.hash === '#/jobs/j-new'")
     assert sorted(farm.submitted[0]["assets"]) == ["smoke/fog.0001.vdb", "smoke/fog.0002.vdb"]
     assert farm.submitted[0]["spec"] == {"frames": "1-2"}
+
+
+HEAVY = {"kind": "heavy_tail", "trusted": False, "advice": "render it with four times the samples."}
+
+
+def test_a_noisy_frame_says_what_to_do_and_goes_on_by_itself(farm, dashboard):
+    sequence(farm, {1: "done", 2: "done"}, 2)
+    farm.jobs[frame_id(1)] = frame_job(1, "done", spp=64, spp_asked=64, spp_done=64, verdict=HEAVY)
+    page = dashboard(f"#/jobs/{SEQUENCE}")
+    page.wait("document.querySelector('.frame[data-frame=\"1\"]')")
+    page.click('.frame[data-frame="1"]')
+    page.wait("document.querySelector('.frame-on')?.innerText.includes('Frame 1: Done')")
+    assert "Render it with four times the samples." in page.text(".frame-on .noisy")
+
+    page.click(".frame-on button")
+
+    wait_until(lambda: farm.changes, "the farm is asked")
+    assert farm.changes == [(frame_id(1), {"spp": 256})]
+
+
+def test_a_frame_offers_nothing_to_those_who_may_only_look(farm, dashboard):
+    farm.role = "read"
+    sequence(farm, {1: "done", 2: "done"}, 2)
+    farm.jobs[frame_id(1)] = frame_job(1, "done", spp=64, spp_asked=64, spp_done=64, verdict=HEAVY)
+    page = dashboard(f"#/jobs/{SEQUENCE}")
+    page.wait("document.querySelector('.frame[data-frame=\"1\"]')")
+    page.click('.frame[data-frame="1"]')
+    page.wait("document.querySelector('.frame-on')?.innerText.includes('Frame 1: Done')")
+    assert page.evaluate("document.querySelectorAll('.frame-on button').length") == 0

@@ -164,7 +164,8 @@ std::string health(const Json& report) {
         count(cut));
   if (const double few = number(report, "few_hits_pixels"); few > 0)
     items += fmt::format(
-        "<li>{} pixels got too few hits for their error to be known; the error map flags them.</li>\n",
+        "<li>In {} pixels too few samples found light for their error to be known; the error map flags "
+        "them.</li>\n",
         count(few));
   if (items.empty())
     return section(

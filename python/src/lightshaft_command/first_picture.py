@@ -16,7 +16,7 @@ from lightshaft_command.programs import BUNDLED, PACKAGE, find
 BUNDLED_SCENE = PACKAGE / "bath" / "bath.xml"  # in a wheel
 BATH = ["--spp", "16"]  # some 25 s of one core; with the denoiser it looks finished
 BATH_EXPOSURE = 0.8
-HOW_TO_DENOISE = f"{sys.executable} -m pip install pyoidn" if BUNDLED.exists() else "deploy/install-denoiser.sh"
+HOW_TO_DENOISE = f"{sys.executable} -m pip install pyoidn==2.5.1.0" if BUNDLED.exists() else "deploy/install-denoiser.sh"
 PATIENCE = 60.0  # seconds for one answer of the coordinator
 
 

@@ -71,7 +71,7 @@ TEST(ShownJob, ShowsAllErrorFigures) {
   for (const char* row :
        {"relMSE +0.00418 \\(0.0039 to 0.00448\\)", "RMSE +0.031 \\(0.0301 to 0.032\\)",
         "target relMSE +0.001", "true relMSE +0.00443", "true RMSE +0.0319", "FLIP +0.0271",
-        "verdict +converging as expected", "few hits +12 pixels", "slope +-0.98 \\(-1.06 to -0.9\\)",
+        "verdict +converging as expected", "too little light +12 pixels", "slope +-0.98 \\(-1.06 to -0.9\\)",
         "efficiency +0.322 ", "left +4:12 \\(3:06 to 5:30\\)", "not reached yet +4,096 pixels"})
     EXPECT_THAT(shown, ContainsRegex(row));
 }
@@ -93,7 +93,7 @@ TEST(ShownJob, LeavesOutUnknownFigures) {
   const std::string shown = job_text({{"id", "j-1"}, {"reference", nullptr}, {"few_hits", nullptr}});
 
   for (const char* row :
-       {"true", "FLIP", "verdict", "few hits", "slope", "efficiency", "not reached", "target"})
+       {"true", "FLIP", "verdict", "too little light", "slope", "efficiency", "not reached", "target"})
     EXPECT_THAT(shown, Not(HasSubstr(row)));
 }
 

@@ -147,7 +147,7 @@ TEST(JobPage, ShowsUntrustedEstimatesAndHealthProblems) {
   EXPECT_EQ(times(page, "few pixels carry the error"), 1u);
   expect(page, "3 samples were not a number; first at pixel 412,96, sample 1,100.");
   expect(page, "lightshaft render x.xml --pixel 412,96 --sample 1100");
-  expect(page, "12 pixels got too few hits");
+  expect(page, "In 12 pixels too few samples found light");
 }
 
 TEST(JobPage, UntrustedJobHasAdvice) {

@@ -24,7 +24,7 @@ export function goOn(state, job, actions, sentence) {
   return [
     h("div", { key: "go-on", class: "go-on" },
       h("p", { class: "sub" }, sentence),
-      job.state === "done" && !job.denoise && mayChange(state) ? h("button", { key: "denoise", type: "button", onclick: () => actions.openDenoise(job) }, "Denoise …") : null,
+      job.state === "done" && !job.denoise && !job.sequence && mayChange(state) ? h("button", { key: "denoise", type: "button", onclick: () => actions.openDenoise(job) }, "Denoise …") : null,
       next ? h("button", { key: "more", type: "button", class: noisy ? "primary" : "", disabled: state.ui.busy === job.id, onclick: () => actions.renderOn(job.id, next.changes) }, `Render on (${next.words})`) : null),
     job.state === "failed" || job.state === "cancelled" ? null : h("p", { key: "noisy", class: "noisy" }, noisy ? [h("b", { key: "what" }, kDoubts[job.verdict.kind] ?? kUnsure), ". ", h("span", { key: "advice" }, advice(job))] : null),
   ];

@@ -41,6 +41,7 @@ function shownJob(state, job, actions) {
   const started = job.state !== "failed" || job.units_done > 0; // of a job that failed at once there are no figures
   return [
     job.sequence && job.error ? h("div", { key: "frame-error" }, notice("bad", `Frame ${job.frame}`, failure(job))) : null,
+    job.sequence ? h("div", { key: "frame-on", class: "frame-on" }, goOn(state, job, actions, `Frame ${job.frame}: ${sentence(job)}`)) : null,
     h("div", { key: "columns", class: "columns" },
       h("div", { class: "picture" }, job.meters > 0 ? meterPanel(state, job) : imagePanel(state, job, actions), started ? errorPlot(job, state.open, actions, state.narrow) : null, downloadLinks(job, state), logOf(job, state.open, actions)),
       h("div", { class: "facts" }, started ? figures(job, job.denoised ?? state.open.report?.denoised) : null, started ? timeSplit(job) : null, jobFacts(state, job, actions), inFlight(state, job))),
