@@ -1,6 +1,6 @@
 """Pictures of every story at the width of a desk, a tablet and a phone, by day and by night: python3 tests/web/screenshots.py FOLDER [STORY...]
 
-With --docs instead of the folder: the six of docs/guide/dashboard.md, in docs/images.
+With --docs instead of the folder: those of docs/guide/dashboard.md, in docs/images.
 """
 import pathlib
 import sys
@@ -11,7 +11,7 @@ from stub_farm import StubFarm
 SIZES = {"desk": {"width": 1280, "height": 860}, "tablet": {"width": 768, "height": 1024}, "phone": {"width": 390, "height": 800, "phone": True}}
 SCHEMES = ("light", "dark")
 DOCS = pathlib.Path(__file__).resolve().parents[2] / "docs" / "images"
-PUBLISHED = [("job", "desk", "dark"), ("job", "phone", "light"), ("jobs", "desk", "light"), ("viewer", "tablet", "dark"), ("submit-ready", "tablet", "light"), ("workers", "desk", "dark")]
+PUBLISHED = [*(("job", size, scheme) for size in SIZES for scheme in SCHEMES), ("jobs", "desk", "light"), ("viewer", "tablet", "dark"), ("submit-ready", "tablet", "light"), ("workers", "desk", "dark")]
 QUALITY = 75  # of a JPEG
 
 

@@ -37,6 +37,14 @@ def test_axe_finds_nothing_in_a_story(open_page, farm, axe, view, scheme):
     assert violations(page, axe) == []
 
 
+@pytest.mark.parametrize("view", FACTS)
+def test_axe_finds_nothing_in_a_story_on_a_phone(open_page, farm, axe, view):
+    page = open_page(f"{farm.url}/demo.html?view={view}", width=375, height=800, phone=True)
+    page.wait("document.querySelector('#app *')")
+
+    assert violations(page, axe) == []
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("route, there", [("#/jobs", "[data-job]"), ("#/jobs/j-1", ".job-facts"), ("#/jobs/j-1/log", ".log-page pre"), ("#/view/j-1", "float-view"), ("#/workers", "[data-worker]"), ("#/submit", "#files")])
 def test_axe_finds_nothing_on_a_page_of_a_farm(farm, dashboard, axe, route, there, scheme):

@@ -91,7 +91,7 @@ function alerts(job) {
     job.few_hits > 0 ? h("p", { key: "few", class: "notice mild" }, `${plural(job.few_hits, "pixel")} ${job.few_hits === 1 ? "has" : "have"} too few samples that found light for the error to be known there: pink in the map of the error.`) : null,
     job.reference_same_seed === true ? h("p", { key: "seed", class: "notice mild" }, phrases.sameSeed) : null,
     complaints.length ? h("div", { key: "health" }, notice("warn", "The numbers of this image are not clean", h("ul", null, complaints.map(complaint)))) : null,
-    warnings.length ? h("div", { key: "warnings" }, h("details", { class: "notice mild" }, h("summary", null, warnings.length === 1 ? "1 warning about the scene" : `${warnings.length} warnings about the scene`), h("pre", null, warnings.join("\n")))) : null,
+    warnings.length ? h("div", { key: "warnings" }, h("details", { class: "notice mild" }, h("summary", null, warnings.length === 1 ? "1 warning about the scene" : `${warnings.length} warnings about the scene`), h("pre", { tabindex: 0 }, warnings.join("\n")))) : null,
   ];
 }
 
@@ -102,7 +102,7 @@ const complaint = ({ key, text, place, replay }) => h("li", { key },
 /** The cause, and below it where it happened. */
 function failure(job) {
   const { cause, where } = causeFirst(job);
-  return [h("pre", { key: "cause" }, cause), where ? h("p", { key: "where", class: "failure-where" }, where) : null];
+  return [h("pre", { key: "cause", tabindex: 0 }, cause), where ? h("p", { key: "where", class: "failure-where" }, where) : null];
 }
 
 /** What happened to the job, the latest last. While it is open it is fetched again when the job changes. */

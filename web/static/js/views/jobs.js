@@ -146,10 +146,10 @@ function firstSteps() {
   return h("section", { key: "empty", class: "empty" },
     h("h1", null, "Nothing is rendering yet"),
     h("p", null, "Drop a scene with its meshes and volumes anywhere on this page, choose it on ", h("a", { href: "#/submit" }, "New job"), ", or send it from a shell:"),
-    h("pre", null,
+    h("pre", { tabindex: 0 },
       `curl -H "Authorization: Bearer $(cat DATA/token)" \\\n     -H "Content-Type: application/xml" \\\n     --data-binary @scene.xml \\\n     "${origin}/api/v1/jobs?spp=64"`),
     h("p", null, "A scene that names other files goes up with them by"),
-    h("pre", null, `lightshaft submit scene.xml --to ${origin} --wait -o image.exr`),
+    h("pre", { tabindex: 0 }, `lightshaft submit scene.xml --to ${origin} --wait -o image.exr`),
     h("p", { class: "help" }, "It then appears here, and its image fills in tile by tile."),
     h("a", { class: "button primary", href: "#/submit" }, "New job"));
 }

@@ -57,7 +57,7 @@ export function diagnostics(list) {
     h("p", null,
       h("code", { class: "place" }, [d.file, d.line, d.column].filter((part) => part).join(":")), " ",
       h("b", null, d.severity === "warning" ? "warning" : "error"), " ", d.text),
-    d.source_line ? h("pre", null, `${d.source_line}\n`, h("span", { class: "caret" }, caretUnder(d))) : null)));
+    d.source_line ? h("pre", { tabindex: 0 }, `${d.source_line}\n`, h("span", { class: "caret" }, caretUnder(d))) : null)));
 }
 
 function caretUnder({ source_line, column, length }) {

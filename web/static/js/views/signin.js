@@ -14,5 +14,5 @@ export function signInView(state, actions) {
     state.ui.signInError ? h("p", { key: "error", class: "field-error", role: "alert" }, state.ui.signInError) : null,
     h("button", { type: "submit", class: "primary", disabled: state.ui.signingIn }, state.ui.signingIn ? "Signing in …" : "Sign in"),
     h("p", { id: "token-help", class: "help" }, "Whoever runs the farm gives you a token. The first one, an administrator’s, is in the file ", h("code", null, "token"), " in the coordinator’s data folder:"),
-    h("pre", null, "cat DATA/token"));
+    h("pre", { tabindex: 0 }, "cat DATA/token"));
 }

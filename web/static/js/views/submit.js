@@ -92,5 +92,5 @@ function reason({ files, plan, phase }, busy) {
 function refusal({ message, diagnostics: list }) {
   return h("section", { key: "refused", class: "notice bad", role: "alert" },
     h("h2", null, list.length ? "The scene was refused" : "This did not work"),
-    list.length ? diagnostics(list) : h("pre", null, message));
+    list.length ? diagnostics(list) : h("pre", { tabindex: 0 }, message));
 }

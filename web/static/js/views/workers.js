@@ -144,7 +144,7 @@ function howToJoin({ join }) {
   return [
     short,
     h("p", { key: "how" }, `${short ? "Without that line, start" : "Start"} one on ${isLoopback(addressOf(join).host) ? "the coordinator’s machine" : "any machine that reaches this coordinator"}. It renders on all its cores, and may come and go at any time:`),
-    h("pre", { key: "command" }, command),
+    h("pre", { key: "command", tabindex: 0 }, command),
     h("p", { key: "token", class: "help" },
       command.includes(kHost) ? [code(kHost), " is the name or address of the coordinator's machine. "] : null,
       "The file ", code("join-token"), " is a copy of ", h("code", { key: "file" }, join?.token_file ?? "join-token"), join?.token_file ? " of the coordinator's machine" : " in the coordinator's data folder",
