@@ -59,8 +59,8 @@ inline constexpr double kStandardErrors = 5;
 // That probability, for means whose standard errors have few degrees of freedom.
 inline constexpr double kSingleFigure = 5.73e-7;
 
-// The largest tolerance of a test that a technique keeps the expected image, as a part of the image: a bias of
-// twice this is found with a probability of nearly 1, and one of this in half of the cases. A test that is
+// The largest tolerance of a test that a technique keeps the expected image, as a part of the image: a bias
+// of twice this is found with a probability of nearly 1, and one of this in half of the cases. A test that is
 // noisier has no power and fails.
 inline constexpr double kBiasSeen = .005;
 

@@ -154,7 +154,8 @@ TEST(Techniques, SwitchingOneOffKeepsTheImage) {
     const test::Estimate plain = test::estimate(without), change = test::difference(with, without);
     for (std::size_t k = 0; k < 3; ++k) {
       EXPECT_GT(change.standard_error[k], 0) << name << " changes nothing";
-      const double room = cli::student_quantile(test::kSingleFigure, change.freedom[k]) * change.standard_error[k];
+      const double room =
+          cli::student_quantile(test::kSingleFigure, change.freedom[k]) * change.standard_error[k];
       EXPECT_LT(std::abs(change.mean[k]), room) << name << ", channel " << k << " of " << plain.mean[k];
       EXPECT_LT(room, test::kBiasSeen * plain.mean[k]) << name << ": the test has no power";
     }
