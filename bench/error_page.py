@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """The tables of docs/measurements/error.md: how often the stated intervals of the error hold.
 
-usage: error_page.py [--threads 2] [--share 1] [--only SCENE...] [--jobs] [--write PAGE.md]
-Prints the table of whole images of scene files, or writes it between the marks of the page; with --jobs also the tables of small jobs
-and of denominators (`error_coverage 100`, 25 minutes of CPU time). Renders are kept below build/error/kept and serve again, so that
-the table is made again in seconds when an estimator has changed, and in turns: empty that folder when the renderer or a scene has
-changed. --share 0.1 renders a tenth of the images, to try. All of it takes 40 minutes of CPU time. Needs python3-numpy, and the
-release build of `rendered_coverage` and `error_coverage`.
+usage: error_page.py [--threads 2] [--share 1] [--only SCENE...] [--targets] [--jobs] [--write PAGE.md]
+Prints the table of whole images of scene files, or writes it between the marks of the page; with --targets also that of jobs that stop
+at a target and of denoised layers (error_targets.py), with --jobs those of small jobs and of denominators (`error_coverage 100`, 25
+minutes of CPU time). Renders are kept below build/error and serve again, so that the tables are made again in seconds when an
+estimator has changed, and in turns: empty that folder when the renderer or a scene has changed. --share 0.1 renders a tenth of the
+images, to try. All of it takes an hour of CPU time. Needs python3-numpy, and the release build of `rendered_coverage`,
+`error_coverage` and `lightshaft`; --targets also Open Image Denoise (deploy/install-denoiser.sh) and the OpenEXR package of PyPI.
 """
 import argparse
 import pathlib
@@ -21,12 +22,12 @@ BIN = ROOT / "build" / "release" / "bin"
 WORK = ROOT / "build" / "error"
 # Scene, side of the images in pixels, samples, first seed, images, and with how many images each is paired.
 CELLS = [
-    ("shafts", 64, 64, 81001, 200, 8),
-    ("surface", 64, 64, 83001, 100, 8), ("surface", 256, 32, 84001, 16, 16),
-    ("spotfog", 64, 64, 85001, 60, 8),
-    ("fogbox", 64, 64, 86001, 40, 8), ("fogbox", 256, 16, 87001, 12, 12),
-    ("tint", 64, 64, 88001, 30, 16), ("cloud", 64, 16, 89001, 20, 16),
-    ("bath", 64, 64, 90001, 30, 16), ("sky_room", 64, 64, 91001, 60, 8), ("fire", 64, 64, 92001, 60, 8), ("lamps", 64, 64, 93001, 60, 8)]
+    ("shafts", 64, 64, 281001, 100, 8),
+    ("surface", 64, 64, 283001, 50, 16), ("surface", 256, 32, 284001, 8, 8),
+    ("spotfog", 64, 64, 285001, 60, 8),
+    ("fogbox", 64, 64, 286001, 30, 16), ("fogbox", 256, 16, 287001, 6, 6),
+    ("tint", 64, 64, 288001, 30, 16), ("cloud", 64, 16, 289001, 20, 16),
+    ("bath", 64, 64, 290001, 16, 16), ("sky_room", 64, 64, 291001, 60, 8), ("fire", 64, 64, 292001, 60, 8), ("lamps", 64, 64, 293001, 60, 8)]
 
 
 def marks(table):
@@ -77,10 +78,14 @@ def main():
     args.add_argument("--threads", type=int, default=2)
     args.add_argument("--share", type=float, default=1)
     args.add_argument("--only", nargs="*")
+    args.add_argument("--targets", action="store_true")
     args.add_argument("--jobs", action="store_true")
     args.add_argument("--write", type=pathlib.Path)
     options = args.parse_args()
     tables, right = {"images": images_table(options)}, True
+    if options.targets:
+        import error_targets  # only here, as it needs OpenEXR
+        tables["targets"] = error_targets.table(make_scenes(), WORK, options.only, options.share, options.threads)
     if options.jobs:
         tables["jobs"], tables["denominators"], right = jobs_tables(options)
     if options.write:

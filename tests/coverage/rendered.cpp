@@ -169,6 +169,10 @@ class RightAnswer {
                  of_j = i == j ? 0 : halves_[2 * j][n] + halves_[2 * j + 1][n];
     return (sum_[n] - of_i - of_j) / others(i, j);
   }
+  // The standard error of right().
+  double noise(std::size_t n, std::size_t i, std::size_t j) const {
+    return std::sqrt(variance_[n] / others(i, j));
+  }
   struct Errors {
     double mse = 0, relmse = 0;
   };
@@ -278,7 +282,9 @@ class Looks {
   }
 
   void look_at_areas(const AreaError& areas, const std::vector<double>& image, Look& look) const {
-    const double mean = areas.mean[1], half = areas.half_width[1];
+    // The distance of two noisy means has the variances of both: the interval is as much wider.
+    const double noise = green_.noise(0, look.first, look.second), mean = areas.mean[1],
+                 half = std::hypot(areas.half_width[1], kNormal95 * noise);
     look.mean = place(mean - half, green_.right(0, look.first, look.second), mean + half);
     if (areas.relmse_hi > 0)
       look.squares =
@@ -309,10 +315,11 @@ Ratio jackknifed(const std::vector<Look>& looks, int images, const Statistic& st
 
 Held held_of(const std::vector<Look>& looks, int images, Place Look::*interval) {
   Held out;
-  int above = 0;
+  int above = 0, all_held = 0;
   for (const Look& l : looks) {
     out.stated += l.*interval != Place::unstated;
     above += l.*interval == Place::above;
+    all_held += l.*interval == Place::held;
   }
   if (out.stated == 0) return out;
   out.above = static_cast<double>(above) / out.stated;
@@ -322,7 +329,8 @@ Held held_of(const std::vector<Look>& looks, int images, Place Look::*interval) 
       stated += l.*interval != Place::unstated;
       held += l.*interval == Place::held;
     }
-    return stated > 0 ? held / stated : 1;
+    // An image without which no pair states the interval says nothing of the share.
+    return stated > 0 ? held / stated : static_cast<double>(all_held) / out.stated;
   });
   out.share = share.value;
   out.sigma = share.sigma;

@@ -12,7 +12,8 @@
 // means over pairs).
 //
 // The right answer for a pair is the mean of all other images at their full number of samples; the noise of
-// that mean is known from the scatter of their halves, and its square is subtracted.
+// that mean is known from the scatter of their halves. Its square is subtracted from squared errors, and the
+// interval of the image's mean is wider by as much as this noise makes the distance of the two means.
 #pragma once
 
 #include <cstdint>

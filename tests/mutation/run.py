@@ -25,7 +25,7 @@ BIN = COPY / "build" / "release" / "bin"
 RESULTS = COPY / "results.json"
 
 GTEST = ("agent_test", "assemble_test", "bsdf_test", "cli_test", "domain_test", "http_api_test", "http_server_test",
-         "image_test", "leave_out_test", "render_test", "sampling_test", "service_test", "statistical_test", "store_test")
+         "image_test", "leave_out_test", "property_test", "render_test", "sampling_test", "service_test", "statistical_test", "store_test")
 
 
 def command_of(test):

@@ -4,19 +4,21 @@ A row: number, file, the place with the text that is replaced between « and »,
 the tests that should find it, in the order in which they are asked. Expressions are replaced by expressions of their type,
 statements (with their semicolon) by statements. The first 60 are five areas of twelve; they were chosen by reading the code
 alone, before the tests. From 101 on each drops or bends one term of the light: the quick table of `lightshaft validate` must
-turn red for it.
+turn red for it. From 201 on each bends one technique of core/job/techniques.h by a few per cent: the test that it keeps the
+expected image must see that.
 """
 import collections
 
 Mutant = collections.namedtuple("Mutant", "number file place new breaks tests")
 
 AREAS = {"render": range(1, 13), "fold": range(13, 25), "lease": range(25, 37), "audit": range(37, 49), "authorisation": range(49, 61),
-         "terms": range(101, 200)}
+         "terms": range(101, 200), "techniques": range(201, 300)}
 
 RENDER = ("validate:seed*", "validate:N37*", "validate:N05*", "validate:7.6c*", "render_test", "leave_out_test")
 FOLD = ("image_test:Film*:Merge*:Aovs*:Partial*:Sums*:FinalImage*", "assemble_test")
 DOMAIN = ("domain_test:-Month*:Scale*:RandomWalk*:AdaptiveStop*",)
 HTTP = ("http_api_test",)
+IMAGES = ("render_test:Techniques*:Splitting*:EmissiveGrids*:LocalLights*", "property_test:PathReuse.Keeps*:Connections.Transport*")
 TABLE = ("validate:seed*", "validate:N41*", "validate:N22*", "validate:7.6[abcg]*")
 
 ROWS = [
@@ -143,6 +145,31 @@ ROWS = [
     (116, "worker/render/integrator/path_tracer.h", "if (!may_go_on(depth_ + «1», passed_)) return {Collision::absorbed};\n  see_surface(hit.p);\n  ++depth_;", "2", "the last scattering on surfaces is left out", TABLE),
     (117, "worker/render/integrator/path_tracer.h", "if (s->transmitted) eta_scale_ *= «s->eta * s->eta»;", "1.f", "roulette forgets what refraction does to radiance; unbiased", TABLE),
     (118, "worker/render/integrator/mis.h", "heuristic == MisHeuristic::power ? «ratio * ratio» : ratio", "ratio", "the power heuristic has the exponent 1; unbiased", ("render_test",)),
+    # ---- techniques
+    (201, "worker/render/integrator/path_reuse.h", "if (lit > 0) light += s.lit * tail.light / «lit»;\n", "(1.05f * lit)",
+     "what next-event estimation finds at shared second vertices is 5 % too dark", IMAGES[1:]),
+    (202, "worker/render/integrator/vertex_nee.h", "(phase.value * weight / (light->pdf * «traced»)),", "1.f",
+     "faint shadow rays that survive roulette are not weighted up", IMAGES[:1]),
+    (203, "worker/render/integrator/medium_crossing.h", "refer_to_first_vertex();\n      «beta_ *= .5f;»", "beta_ *= .51f;",
+     "the two halves of a split path are more than the whole", IMAGES[:1]),
+    (204, "worker/render/integrator/surface_nee.h", "add(beta_ * s->weight * arriving * «.5f», world_", ".52f",
+     "second directions that look for the sky count 4 % too much", IMAGES[:1]),
+    (205, "worker/render/lights/portals.cpp", "return sum > 0 ? «sum / weight_in_front_of(p)» : 0;", "1.05f * sum / weight_in_front_of(p)",
+     "the stated density of portals is 5 % too high", IMAGES[:1]),
+    (206, "worker/render/lights/local_lights.cpp", "return {light, «probability_in_table(last, light)»};", "1.02f * probability_in_table(last, light)",
+     "the stated probability of a light chosen by place is 2 % too high", IMAGES[:1]),
+    (207, "worker/render/integrator/vertex_connection.h", "C3 added = beta_ * value * y.light * (weight * «choice.weight»);", "1.02f * choice.weight",
+     "light vertices are 2 % too bright", IMAGES[1:]),
+    (208, "worker/render/lights/light_tree.cpp", "return {nodes_[i].light, «words»};", "words + words / 100",
+     "the stated probability of a light of the tree is 1 % too high", IMAGES[:1]),
+    (209, "worker/render/integrator/emission_nee.h", "add_emission_at(*found, beta_ * f.f_cos * (1 / («found->pdf» + sampled)), ray,", "1.02f * found->pdf",
+     "light of grids found by next-event estimation is 2 % too dark", IMAGES[:1]),
+    (210, "worker/render/integrator/segment_nee.h", "path.add(path.beta_ * scattering * through * arriving * (phase.value * weight / (light->pdf * «own»)),", "1.02f * own",
+     "light at points on camera segments is 2 % too dark", IMAGES[:1]),
+    (211, "worker/render/integrator/vertex_nee.h", "(phase.value * weight / (light->pdf * «s.pdf»)),\n", "1.02f * s.pdf",
+     "light at points that are sampled equi-angularly is 2 % too dark", IMAGES[:1]),
+    (212, "worker/render/integrator/segment_nee.h", "const float by_depth = «e_depth * v.points»;", "1.05f * e_depth * v.points",
+     "the stated number of points by depth on segments is 5 % too high", IMAGES[:1]),
 ]
 
 MUTANTS = [Mutant(*row) for row in ROWS]

@@ -162,5 +162,16 @@ TEST(PathReuse, GivesTheSameImageAsPathsAlone) {
   tests.close();
 }
 
+TEST(PathReuse, KeepsTheExpectedImageToHalfAPercent) {
+  constexpr int kSeeds = 48;
+  Tests tests("property/path_reuse_mean");
+  const SceneBuilder on = LampRoom{.path_reuse = 8}.builder(), off = LampRoom{.path_reuse = -1}.builder();
+  const double tolerance =
+      expect_same_quarters("lamp room", tests.level(kQuarters), quarters_of(on, 64, kSeeds, 3000),
+                           quarters_of(off, 64, kSeeds, 4000), kSeeds);
+  EXPECT_LT(tolerance, kBiasSeen) << "the test has no power";
+  tests.close();
+}
+
 }  // namespace
 }  // namespace ls::test

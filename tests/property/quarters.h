@@ -56,18 +56,22 @@ inline Quarters quarters_of(const SceneBuilder& builder, std::uint64_t spp, int 
 }
 
 // Fails if the means of two ways to render the same image, each over `seeds` images, differ at this level.
-inline void expect_same_quarters(const char* name, double level, const Quarters& a, const Quarters& b,
-                                 int seeds) {
-  double least = 1;
+// Returns the largest tolerance of any mean, as a part of it.
+inline double expect_same_quarters(const char* name, double level, const Quarters& a, const Quarters& b,
+                                   int seeds) {
+  double least = 1, largest = 0;
   for (std::size_t q = 0; q < kQuarters; ++q) {
     const double error = std::sqrt(a.variance[q] + b.variance[q]);
     // Student's test with the freedom of one of the two alone: that of both together is larger
-    EXPECT_LT(std::abs(a.mean[q] - b.mean[q]), cli::student_quantile(level, seeds - 1) * error)
+    const double tolerance = cli::student_quantile(level, seeds - 1) * error;
+    EXPECT_LT(std::abs(a.mean[q] - b.mean[q]), tolerance)
         << name << ", quarter and channel " << q << ": " << a.mean[q] << " and " << b.mean[q];
     least = std::min(least, error / b.mean[q]);
+    largest = std::max(largest, tolerance / b.mean[q]);
   }
   std::printf("%s: +- %.2g %%\n", name, 100 * least);
   EXPECT_LT(least, .015) << name << ": the test has no power";
+  return largest;
 }
 
 }  // namespace ls::test

@@ -48,8 +48,15 @@ inline std::shared_ptr<const render::World> world_of(const SceneBuilder& builder
   return *w;
 }
 
-inline Estimate estimate(const SceneBuilder& builder, std::uint64_t spp, std::uint64_t seed = 0,
-                         int threads = 2) {
+// Both halves of an image: for each half the means of the planes R, G, B, pixel by pixel.
+struct HalfImages {
+  std::array<std::array<std::vector<double>, 3>, 2> mean;
+  Health health;
+  std::string variant;
+};
+
+inline HalfImages half_images(const SceneBuilder& builder, std::uint64_t spp, std::uint64_t seed = 0,
+                              int threads = 2) {
   const auto world = world_of(builder, seed, threads);
   const FrameSize size = builder.scene.film.image_size();
   const int rows = render::tile_alignment(*world);
@@ -66,28 +73,50 @@ inline Estimate estimate(const SceneBuilder& builder, std::uint64_t spp, std::ui
     std::vector<std::jthread> pool;
     for (int i = 0; i < threads; ++i) pool.emplace_back(work);
   }
+  HalfImages out;
+  out.variant = render::describe(*world).variant;
+  for (const auto& r : results) {
+    const std::size_t count = r.sums.size() / 6;
+    for (std::size_t i = 0; i < r.sums.size(); ++i)
+      out.mean[i / count / 3][i / count % 3].push_back(double{r.sums[i]} * 2 / static_cast<double>(spp));
+    out.health.merge(r.health);
+  }
+  return out;
+}
+
+inline Estimate estimate(const HalfImages& image) {
   Estimate e;
-  e.variant = render::describe(*world).variant;
-  const double per_half = static_cast<double>(spp) / 2,
-               pixels = static_cast<double>(size.width) * size.height;
+  e.variant = image.variant;
+  e.health = image.health;
   for (std::size_t c = 0; c < 3; ++c) {
+    const auto &as = image.mean[0][c], &bs = image.mean[1][c];
+    const auto pixels = static_cast<double>(as.size());
     double sum = 0, square = 0, fourth = 0;
-    for (const auto& r : results) {
-      const std::size_t count = r.sums.size() / 6;
-      for (std::size_t i = 0; i < count; ++i) {
-        const double a = r.sums[c * count + i] / per_half, b = r.sums[(3 + c) * count + i] / per_half;
-        const double v = (a - b) * (a - b) / 4;
-        sum += (a + b) / 2;
-        square += v;
-        fourth += v * v;
-      }
+    for (std::size_t i = 0; i < as.size(); ++i) {
+      const double v = (as[i] - bs[i]) * (as[i] - bs[i]) / 4;
+      sum += (as[i] + bs[i]) / 2;
+      square += v;
+      fourth += v * v;
     }
     e.mean[c] = sum / pixels;
     e.standard_error[c] = std::sqrt(square) / pixels;
     e.freedom[c] = fourth > 0 ? 3 * square * square / fourth : pixels;
   }
-  for (const auto& r : results) e.health.merge(r.health);
   return e;
+}
+
+inline Estimate estimate(const SceneBuilder& builder, std::uint64_t spp, std::uint64_t seed = 0,
+                         int threads = 2) {
+  return estimate(half_images(builder, spp, seed, threads));
+}
+
+// The difference of two images of the same scene by other means, a - b. What both sample alike cancels in it
+// and in its standard error.
+inline Estimate difference(HalfImages a, const HalfImages& b) {
+  for (std::size_t half = 0; half < 2; ++half)
+    for (std::size_t c = 0; c < 3; ++c)
+      for (std::size_t i = 0; i < b.mean[half][c].size(); ++i) a.mean[half][c][i] -= b.mean[half][c][i];
+  return estimate(a);
 }
 
 }  // namespace ls::test

@@ -56,6 +56,13 @@ static_assert(sum_of_rates() <= kSuiteFalsePositives * (1 + 1e-12));
 // A single mean deviates by this many of its standard errors by chance once in 1.7 million times. These tests
 // are not counted: 300 of them would use up 1.7e-4.
 inline constexpr double kStandardErrors = 5;
+// That probability, for means whose standard errors have few degrees of freedom.
+inline constexpr double kSingleFigure = 5.73e-7;
+
+// The largest tolerance of a test that a technique keeps the expected image, as a part of the image: a bias
+// of twice this is found with a probability of nearly 1, and one of this in half of the cases. A test that is
+// noisier has no power and fails.
+inline constexpr double kBiasSeen = .005;
 
 struct Share {
   Family family;
@@ -86,6 +93,7 @@ inline constexpr std::array kShares = {Share{Family::chi_square, "bsdf/sampling"
                                        Share{Family::scenes, "property/connections", 27},
                                        Share{Family::scenes, "property/lit_disk", 1},
                                        Share{Family::scenes, "property/path_reuse", 228},
+                                       Share{Family::scenes, "property/path_reuse_mean", 12},
                                        Share{Family::scenes, "property/sky_portals", 13 * 12},
                                        Share{Family::scenes, "property/local_lights", 13 * 12},
                                        Share{Family::scenes, "property/emissive_grids", 12 * 12},

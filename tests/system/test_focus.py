@@ -32,6 +32,31 @@ def test_the_pixels_are_the_same_with_and_without_it(farm):
     assert farm.pixels(job) == farm.pixels(plain)
 
 
+def stated_error(farm, job):
+    """What the report says of the error at the end and at each checkpoint, without what tells of time."""
+    report = farm.report(job)
+    end = {key: report[key] for key in ("spp", "rmse", "rmse_ci95", "relmse", "relmse_ci95", "relmse_16", "relmse_16_ci95", "mean", "mean_ci95",
+                                        "trusted", "few_hits_pixels")}
+    return end, [{key: value for key, value in point.items() if "seconds" not in key} for point in report["convergence"]]
+
+
+def test_the_error_estimate_is_the_same_with_it_and_in_jobs_that_were_extended(farm):
+    farm.add_workers(2, fake=False)
+    plain, first, after_16, after_24 = (farm.submit(SCENE, spp=spp, size="64x64", seed=7) for spp in (64, 64, 16, 24))
+    change(farm, first, focus=[0, 0, 20, 20])
+    for job in (after_16, after_24):
+        farm.wait_for_job(job)
+        change(farm, job, spp=64)
+    for job in (plain, first, after_16, after_24):
+        farm.wait_for_job(job)
+    end, checkpoints = stated_error(farm, plain)
+    assert end["relmse_ci95"] and len(checkpoints) == 6
+    assert stated_error(farm, first) == (end, checkpoints)
+    assert stated_error(farm, after_16) == (end, checkpoints)
+    # Its checkpoint of 32 samples is that of the 24 with which it had ended
+    assert stated_error(farm, after_24)[0] == end
+
+
 def test_its_tiles_get_the_first_samples_and_it_outlives_a_restart(farm):
     job = submit(farm)
     change(farm, job, focus=[100, 100, 101, 101])
