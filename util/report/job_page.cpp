@@ -88,8 +88,9 @@ std::string pictures(const JobPage& page, const Json& report) {
   const bool flagged = number(report, "few_hits_pixels") > 0;
   const std::string maps =
       map(page.error_map, "error",
-          flagged ? "of each pixel: its relative standard error; magenta: too few samples found light to know it"
-                  : "of each pixel: its relative standard error",
+          flagged
+              ? "of each pixel: its relative standard error; magenta: too few samples found light to know it"
+              : "of each pixel: its relative standard error",
           legend(given(100 * kMapLeastError) + " %", given(100 * kMapMostError) + " % or more")) +
       map(page.samples_map, "samples", "of each pixel",
           legend(count(kMapLeastSamples), count(kMapMostSamples) + " or more"));

@@ -69,11 +69,12 @@ void describe(V& v, T& i) {
       "light_tree", {-1, 0}, {},
       "how one of 32 lights and more is chosen; 0: by distance, direction and power; -1: by power alone",
       i.light_tree);
-  technique("path_reuse", {-1, 64}, {"volpath", "path"},
-            "how many pixels share what their paths find from the second scattering on, where media are "
-            "homogeneous; 0: 16 if that pays for the scene and the image has no AOVs for a denoiser, else none; "
-            "-1 or 1: none",
-            i.path_reuse);
+  technique(
+      "path_reuse", {-1, 64}, {"volpath", "path"},
+      "how many pixels share what their paths find from the second scattering on, where media are "
+      "homogeneous; 0: 16 if that pays for the scene and the image has no AOVs for a denoiser, else none; "
+      "-1 or 1: none",
+      i.path_reuse);
   technique("shadow_roulette", {-1, 0}, {"volpath"},
             "whether shadow rays through grids that could bring little are traced at random; 0: where it is "
             "possible; -1: never",
