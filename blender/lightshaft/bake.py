@@ -63,7 +63,7 @@ class LIGHTSHAFT_OT_bake(bpy.types.Operator):
                 for material in dict.fromkeys(slot.material for slot in item.material_slots if slot.material):
                     try:
                         for node, socket in list(voxels.varying_inputs(material, VARYING)):
-                            voxels.bake(scene, item, material, node, socket, self.voxels)
+                            voxels.bake(context, item, material, node, socket, self.voxels)
                             baked += 1
                         if material in done:
                             continue
@@ -136,8 +136,8 @@ def bake_world(world, size):
     problems = []
     if any(node.type == "LIGHT_PATH" for node in all_nodes(world.node_tree)):
         problems.append("it depends on Light Path; it is baked as the camera sees it")
-    world[BAKED_SUN] = None
-    del world[BAKED_SUN]
+    if BAKED_SUN in world:
+        del world[BAKED_SUN]
     with tempfile.TemporaryDirectory() as folder, WorldPicture(world, pathlib.Path(folder) / "world.exr") as picture:
         suns = [n for n in all_nodes(picture.world.node_tree) if n.type == "TEX_SKY" and n.sun_disc and "SCATTERING" in n.sky_type]
         if len(suns) == 1 and not picture.shared_groups:

@@ -16,6 +16,7 @@ from .problems import Problems
 from .textures import Textures
 from .visibility import visibility_of
 from .volumes import Volumes, present
+from .voxels import is_baked
 from .world import add_world
 
 MESHES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
@@ -141,6 +142,7 @@ class Exporter:
                 item.lightgroup,
                 sets := self.links.sets_of(owner),
                 tuple(links.values()),
+                item.name_full if is_baked(item) else None,
             )
             if key not in self.known:
                 self.known[key] = self.shapes_of(item, visible, links, sets)

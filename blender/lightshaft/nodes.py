@@ -71,3 +71,12 @@ def constant(place, socket):
     else:
         value = computed(source.node, output, lambda name: constant(source, source.input(name)))
     return as_type(value, getattr(socket, "type", None), getattr(output, "type", None))
+
+
+def is_animated(tree):
+    """Returns whether values of a node tree change over time, so that what was baked is that of one frame."""
+    data = tree.animation_data
+    return data is not None and (data.action is not None or len(data.drivers) > 0)
+
+
+BAKED_ONCE = "is animated; all frames have what was baked at one"

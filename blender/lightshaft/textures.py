@@ -7,7 +7,7 @@ import numpy as np
 
 from . import exr
 from .document import element
-from .nodes import constant
+from .nodes import BAKED_ONCE, constant, is_animated
 
 # Blender's colour spaces, and `color_space` of the textures that have them. Files with these are read as they are.
 COLOR_SPACES = {
@@ -51,6 +51,8 @@ class Textures:
         node = source.node if source else None
         baked = baked_image(owner.material, place.node, socket)
         if baked is not None and not exported_as_it_is(source, output):
+            if is_animated(owner.material.node_tree):
+                self.problems.warning(f"{owner}, node '{place.title}': {name} {BAKED_ONCE}")
             return self.bitmap(baked, owner)
         if node and node.type == "TEX_IMAGE":
             return self.image_node(source, output, owner)

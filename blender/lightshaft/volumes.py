@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 
 from .document import element
-from .nodes import Place, constant, output_node
+from .nodes import BAKED_ONCE, Place, constant, is_animated, output_node
 from .voxels import baked_values, vol
 
 
@@ -124,6 +124,8 @@ class Volumes:
                     )
                     return None
                 values[name], voxels = channels_of(baked[0], place.input(name)), baked[1]
+                if is_animated(owner.material.node_tree):
+                    self.problems.warning(f"{where}: {name} {BAKED_ONCE}")
                 continue
             if values[name] is None:
                 self.problems.error(

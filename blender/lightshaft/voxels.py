@@ -17,6 +17,7 @@ class Grid:
     """The voxels of an object's box (in its own space), of equal width, along x, y and z."""
 
     def __init__(self, item, across):
+        """item: an evaluated object."""
         corners = np.array([tuple(corner) for corner in item.bound_box])
         self.low, self.size = corners.min(0), np.maximum(np.ptp(corners, axis=0), 1e-6)
         self.counts = np.clip(np.ceil(across * self.size / self.size.max()).astype(int), 1, MOST_ACROSS)
@@ -70,15 +71,15 @@ def varying_inputs(material, names_of):
                 yield node, socket
 
 
-def bake(scene, item, material, node, socket, across):
+def bake(context, item, material, node, socket, across):
     """Bakes one input of the material's volume for this object, with this many voxels across the longest side."""
-    grid, own = Grid(item, across), material.copy()
+    grid, own = Grid(item.evaluated_get(context.evaluated_depsgraph_get()), across), material.copy()
     mesh = grid.layers()
     if item.type == "MESH":  # for Generated coordinates
         mesh.use_auto_texspace = False
         mesh.texspace_location, mesh.texspace_size = item.data.texspace_location, item.data.texspace_size
     layers = bpy.data.objects.new("Lightshaft layers", mesh)
-    scene.collection.objects.link(layers)
+    context.scene.collection.objects.link(layers)
     try:
         layers.matrix_world = item.matrix_world
         layers.color, layers.pass_index = item.color, item.pass_index
@@ -95,16 +96,20 @@ def bake(scene, item, material, node, socket, across):
         tree.links.new(glow.outputs[0], output.inputs["Surface"])
         for link in list(output.inputs["Volume"].links):
             tree.links.remove(link)
-        for other in bpy.context.view_layer.objects:
+        for other in context.view_layer.objects:
             other.select_set(other == layers)
-        bpy.context.view_layer.objects.active = layers
+        context.view_layer.objects.active = layers
         bpy.ops.object.bake(type="EMIT", margin=0)
         image.pack()
     finally:
         bpy.data.objects.remove(layers)
         bpy.data.meshes.remove(mesh)
         bpy.data.materials.remove(own)
-    material[bake_key(node, socket, item.name_full)] = {"image": image.name, "across": across}
+    material[bake_key(node, socket, item.name_full)] = {
+        "image": image.name,
+        "across": across,
+        "box": [*grid.low, *grid.size],
+    }
 
 
 def baked_values(item, material, place, socket):
@@ -114,7 +119,14 @@ def baked_values(item, material, place, socket):
     if image is None:
         return None
     grid = Grid(item, made["across"])
-    return (grid.values(image), grid) if tuple(image.size) == grid.image_size else None
+    same = np.allclose([*grid.low, *grid.size], list(made["box"]), rtol=0, atol=1e-4 * grid.size.max())
+    return (grid.values(image), grid) if same and tuple(image.size) == grid.image_size else None
+
+
+def is_baked(item):
+    """Returns whether a material of the object has voxels that were baked for it alone."""
+    made = (one for slot in item.material_slots if slot.material for one in slot.material.items())
+    return any(name.startswith("lightshaft ") and not isinstance(value, str) for name, value in made)
 
 
 def vol(values):

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 
 from .document import element, vector
-from .nodes import Place, constant, output_node
+from .nodes import BAKED_ONCE, Place, constant, is_animated, output_node
 from .textures import COLOR_SPACES, mapping_matrix
 from .visibility import visibility_of_world
 
@@ -36,6 +36,8 @@ def add_world(document, problems, textures, volumes, world, groups):
         if background is None:
             problems.error(f"{why}, or press Bake Procedural Textures in Render Properties > Lightshaft")
             return around
+        if is_animated(world.node_tree):
+            problems.warning(f"{owner}: its node tree {BAKED_ONCE}")
     if background.image is not None:
         name, _ = textures.file(background.image, owner)
         if name is not None:

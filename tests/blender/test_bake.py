@@ -197,16 +197,51 @@ def test_each_object_bakes_the_volume_of_its_own_box(stage):
     differ(stage, 2 * EXACT, 64)
 
 
-def test_a_volume_whose_voxels_were_baked_in_another_box_is_refused(stage):
+@pytest.mark.parametrize("factors", [(3, 1, 1), (2, 2, 2)])
+def test_a_volume_whose_voxels_were_baked_in_another_box_is_refused(stage, factors):
     stage.sky(0.3)
     _, cube = clouded(stage)
     bake(voxels=8)
 
     for vertex in cube.data.vertices:
-        vertex.co.x *= 3
+        vertex.co = [x * factor for x, factor in zip(vertex.co, factors)]
 
     with pytest.raises(RuntimeError, match="is procedural.*Bake Procedural Textures"):
         stage.render(samples=1)
+
+
+def test_objects_of_one_mesh_have_voxels_of_their_own(stage):
+    import bpy
+    from stage import material
+
+    made = material("Fog", "ShaderNodeVolumeScatter", output="Volume")
+    tree = made.node_tree
+    place, parts = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("NewGeometry", "SeparateXYZ"))
+    shader = next(node for node in tree.nodes if node.type == "VOLUME_SCATTER")
+    tree.links.new(place.outputs["Position"], parts.inputs[0])
+    tree.links.new(parts.outputs["X"], shader.inputs["Density"])  # so it is 0 in the left half of the world
+    stage.sky(0.5)
+    left = stage.cube(made, 1.5, (-1.5, 0, 0.5))
+    right = bpy.data.objects.new("Right", left.data)
+    stage.put(right, (1.5, 0, 0.5))
+
+    bake(voxels=24)
+
+    differ(stage, 2 * EXACT, 32)
+
+
+def test_baked_volumes_that_are_animated_are_a_warning(stage, capfd):
+    stage.sky(0.3)
+    made, _ = clouded(stage)
+    noise = next(node for node in made.node_tree.nodes if node.type == "TEX_NOISE")
+    for frame, scale in ((1, 2), (10, 4)):
+        noise.inputs["Scale"].default_value = scale
+        noise.inputs["Scale"].keyframe_insert("default_value", frame=frame)
+    bake(voxels=8)
+
+    stage.render(samples=1)
+
+    assert "Density is animated; all frames have what was baked at one" in "".join(capfd.readouterr())
 
 
 def test_voxels_are_found_in_their_layers():
