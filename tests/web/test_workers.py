@@ -46,6 +46,26 @@ def test_workers_are_searched_by_all_words(some, dashboard):
     page.wait("document.querySelector('main').innerText.includes('No worker matches.')")
 
 
+def test_the_list_of_workers_stands_in_the_address(some, dashboard):
+    page = dashboard("#/workers?search=lab-1&sort=-Threads")
+    shows(page, [f"lab-{n}" for n in (11, 10, 1, 12)])
+    page.click("#worker-search")
+    page.type("2")
+    shows(page, ["lab-12"])
+    head(page, "Done")
+    page.wait("location.hash === '#/workers?search=lab-12&sort=-Done'")
+    page.evaluate("history.back()")
+    page.wait("location.hash === '#/workers?search=lab-12&sort=-Threads'")
+    page.evaluate("history.back()")
+    shows(page, [f"lab-{n}" for n in (11, 10, 1, 12)])
+    assert page.evaluate("document.getElementById('worker-search').value") == "lab-1"
+
+
+def test_a_wrong_order_in_the_address_of_workers_is_that_by_name(some, dashboard):
+    page = dashboard("#/workers?sort=-nonsense&tag=gpu")
+    shows(page, [f"lab-{n}" for n in (12, 9, 6, 3)])
+
+
 def test_the_search_has_a_line_for_itself_on_a_phone(some, dashboard):
     page = dashboard("#/workers", width=375, height=800, phone=True)
     page.wait("document.getElementById('worker-search')")

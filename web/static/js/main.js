@@ -12,6 +12,7 @@ import { listOf } from "./job_list.js";
 import { makeListActions } from "./list_actions.js";
 import { makeSubmitActions } from "./submit_actions.js";
 import { makeWorkerActions } from "./worker_actions.js";
+import { workersOf } from "./worker_list.js";
 import { makeViewerActions } from "./viewer_actions.js";
 import { jobName } from "./format.js";
 import { askFirst, opened, tryLink } from "./session.js";
@@ -63,7 +64,8 @@ function refusedIn(session) {
 
 async function start() {
   const { token, link, first } = opened;
-  set({ ...state, route: routeOf(window.location.hash) });
+  const route = routeOf(window.location.hash);
+  set({ ...state, route, workerList: workersOf(route.view === "workers" ? route.query : "") });
   if (token) await followLink(token, link, first);
   else await enter(first);
 }
@@ -263,6 +265,7 @@ function showRoute() {
   set(withUi({ ...state, route, open }, moved ? { confirming: null, notice: null, again: null, renaming: null } : {}));
   if (moved) window.scrollTo(0, 0);
   if (route.view === "jobs" && state.session === "in") actions.openList(route.query);
+  if (route.view === "workers") actions.openWorkers(route.query);
   if (route.view !== "view") actions.closeViewer();
   else if (state.session === "in") actions.openViewer(route);
   if (fresh && state.session === "in") refreshOpen().then(() => (route.view === "job" && state.jobs?.get(route.id)?.frames ? actions.openVideo(route.id) : null));

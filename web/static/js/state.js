@@ -2,6 +2,7 @@
 
 import { kOnlyPlain } from "./api.js";
 import { kWholeList } from "./job_list.js";
+import { kAllWorkers } from "./worker_list.js";
 
 const kFlashes = 48; // most recently folded tiles that are highlighted
 export const kPalette = 10; // number of worker colours in css/tokens.css
@@ -20,7 +21,7 @@ export function initialState() {
     workers: null, // Map id -> worker JSON
     join: null, // how further workers join: {address, tls, token_file}
     workerLog: null, // of the worker whose log is open: {id, text}; text is null until it is there
-    workerList: { search: "", tag: "", sort: "Worker", descending: false },
+    workerList: kAllWorkers,
     colours: new Map(), // worker name -> index into the palette, in order of appearance
     open: null, // the state of the job that is open, see openJob()
     viewer: null, // the state of the viewer, see viewer_actions.js

@@ -1,10 +1,24 @@
 // What the user can do with workers and their list.
 import { withUi } from "./state.js";
+import { queryOfWorkers, workersOf } from "./worker_list.js";
 
 export function makeWorkerActions({ get, set, attempt, api }) {
-  const list = (more) => set({ ...get(), workerList: { ...get().workerList, ...more } });
+  let typing = false; // the latest step of the history is a search that is being typed
+
+  /** Each change is a step of the browser's history, so that Back undoes it; a word that is typed is one step. */
+  function list(more, typed = false) {
+    const workerList = { ...get().workerList, ...more };
+    set({ ...get(), workerList });
+    const query = queryOfWorkers(workerList);
+    window.history[typed && typing ? "replaceState" : "pushState"](null, "", `#/workers${query ? `?${query}` : ""}`);
+    typing = typed;
+  }
   return {
-    searchWorkers: (search) => list({ search }),
+    openWorkers: (query) => {
+      typing = false;
+      set({ ...get(), workerList: workersOf(query) });
+    },
+    searchWorkers: (search) => list({ search }, true),
     chooseTag: (tag) => list({ tag }),
     /** largest: the first press puts the largest first; each further one turns the order round. */
     sortWorkers: (name, largest) => {
