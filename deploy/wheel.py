@@ -86,11 +86,22 @@ def add_programs(folder, programs, packages):
     return travels
 
 
+# What libstdc++ and libgcc have at least where glibc is 2.36: those of GCC 12.
+MOST = {"GLIBCXX": (3, 4, 30), "CXXABI": (1, 3, 13), "GCC": (12, 0, 0)}
+
+
+def newest(needed, prefix):
+    """The highest version of symbols that begin so, of a listing by readelf; () if there is none."""
+    return max((tuple(map(int, version.split("."))) for version in re.findall(rf"\b{prefix}_(\d+(?:\.\d+)+)\b", needed)), default=())
+
+
 def glibc_of(folder):
     """The version of glibc that these files need, such as "2_36"."""
-    files = [file for file in folder.rglob("*") if file.is_file()]
-    versions = re.findall(r"\bGLIBC_(\d+)\.(\d+)", run("readelf", "-V", "-W", *files))
-    return "{}_{}".format(*max((int(major), int(minor)) for major, minor in versions))
+    needed = run("readelf", "-V", "-W", *[file for file in folder.rglob("*") if file.is_file()])
+    for prefix, most in MOST.items():
+        if newest(needed, prefix) > most:
+            sys.exit(f"error: symbols of {prefix}_{'.'.join(map(str, newest(needed, prefix)))} are needed, which systems of the wheel's tag lack: build it on Debian 12")
+    return "{}_{}".format(*newest(needed, "GLIBC")[:2])
 
 
 def add_bath(folder):
@@ -152,4 +163,5 @@ def main():
     print(f"{wheel}: {wheel.stat().st_size / 1e6:.1f} MB, {installed / 1e6:.1f} MB when installed")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -5,6 +5,7 @@ import json
 import os
 import re
 import subprocess
+import sys
 import zipfile
 
 import pytest
@@ -47,6 +48,20 @@ def pixels(program, scene, folder):
 def test_it_says_what_it_runs_on(wheel):
     assert re.fullmatch(r"lightshaft-[\d.]+-py3-none-manylinux_2_36_x86_64\.whl", wheel.name)
     assert wheel.stat().st_size < 100e6, "the Python Package Index takes no larger one"
+
+
+def test_it_needs_no_newer_symbols_than_the_systems_of_its_name_have(installed):
+    sys.path.insert(0, str(ROOT / "deploy"))
+    import wheel as maker
+
+    files = [file for file in programs(installed).rglob("*") if file.is_file()]
+    needed = subprocess.run(["readelf", "-V", "-W", *files], check=True, capture_output=True, text=True).stdout
+    # glibc 2.36 and GCC 12, as Debian 12 has them
+    assert (2, 36) >= maker.newest(needed, "GLIBC") > (2, 17)
+    assert (3, 4, 30) >= maker.newest(needed, "GLIBCXX") > (3, 4)
+    assert (1, 3, 13) >= maker.newest(needed, "CXXABI") > (1, 3)
+    assert maker.newest("Name: GLIBCXX_3.4.9  Name: GLIBCXX_3.4.32 Name: CXXABI_FLOAT128", "GLIBCXX") == (3, 4, 32)
+    assert maker.newest("none", "GLIBCXX") == ()
 
 
 def test_programs_find_all_libraries_in_the_wheel(installed):
