@@ -46,7 +46,8 @@ def rendered(scene, out, *more):
 def test_a_scene_of_pbrt_and_its_translation_render_the_same_pixels(room, tmp_path):
     out = tmp_path / "there" / "room.xml"
     out.parent.mkdir()
-    assert convert(room, out) == identity(room) == convert(room, tmp_path / "beside.xml")
+    # Its meshes have no normals, so the translation has `face_normals`, which gives it a digest of its own.
+    assert convert(room, out) == identity(out) == convert(room, tmp_path / "beside.xml") != identity(room)
     assert sorted(p.suffix for p in out.parent.iterdir()) == [".ply", ".ply", ".vol", ".xml"]
 
     of_pbrt = rendered(room, tmp_path / "a.exr")
