@@ -29,6 +29,17 @@ def test_the_log_opens_as_a_page_and_back_leads_to_the_job(logged, dashboard):
     page.wait(AT_END)
 
 
+def test_a_log_that_comes_before_its_page_is_drawn_opens_at_its_end(logged, dashboard):
+    page = dashboard("#/jobs/j-1")
+    page.click(".job-log summary")
+    page.wait("document.querySelector('.job-log pre')")
+    # A page that draws so late has its answer first.
+    page.evaluate("(draw => { window.requestAnimationFrame = (f) => setTimeout(() => draw(f), 500); })(window.requestAnimationFrame)")
+    page.evaluate("document.querySelector('.job-log pre').scrollTop = 40")
+    page.click(".job-log a")
+    page.wait(AT_END)
+
+
 @pytest.mark.parametrize("width, height", [(1280, 900), (375, 700), (900, 400)])
 def test_the_lines_fill_the_window(logged, dashboard, width, height):
     page = dashboard("#/jobs/j-1/log", width=width, height=height, phone=width < 500)

@@ -44,7 +44,8 @@ export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) 
 
   /** Who looks at the end of the log goes on to see its end. */
   async function readLog(id) {
-    const lines = () => document.querySelector(".job-log pre");
+    // Those of another page, which this one has not replaced yet, do not count.
+    const lines = () => document.querySelector(get().route.view === "log" ? ".log-page pre" : ".job-log:not(.log-page) pre");
     let before = null; // where the reader is, if that is the end
     await snapshot(`log ${id}`, () => attempt(() => api.log(id).catch(unlessGone)), (now, text) => {
       if (now.open?.shown !== id || now.open.log === null) return now;
