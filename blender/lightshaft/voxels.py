@@ -4,7 +4,6 @@ values travel with the object until they are exported as grids."""
 import math
 import struct
 
-import bpy
 import numpy as np
 
 from .nodes import Place, constant, output_node
@@ -31,6 +30,8 @@ class Grid:
     def layers(self):
         """Returns a mesh of a rectangle through the middles of each layer of voxels, which lies in the image beside the
         others."""
+        import bpy
+
         nx, ny, nz = (int(n) for n in self.counts)
         width, height = self.image_size
         corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)
@@ -73,6 +74,8 @@ def varying_inputs(material, names_of):
 
 def bake(context, item, material, node, socket, across):
     """Bakes one input of the material's volume for this object, with this many voxels across the longest side."""
+    import bpy
+
     grid, own = Grid(item.evaluated_get(context.evaluated_depsgraph_get()), across), material.copy()
     mesh = grid.layers()
     if item.type == "MESH":  # for Generated coordinates
@@ -114,6 +117,8 @@ def bake(context, item, material, node, socket, across):
 
 def baked_values(item, material, place, socket):
     """Returns (values z x y x x x 3, Grid) of an input that was baked for this object, or None."""
+    import bpy
+
     made = material.get(bake_key(place.node, socket, item.name_full))
     image = bpy.data.images.get(made["image"]) if made else None
     if image is None:

@@ -1,6 +1,5 @@
 """The world: one colour all around, an image, or what the operator Bake has made of its nodes."""
 
-import bpy
 import numpy as np
 
 from .document import element, vector
@@ -128,6 +127,9 @@ def is_readable(world):
 
 
 def baked(world):
+    """Returns the Background that the operator Bake has made of the world, or None."""
+    import bpy
+
     image = bpy.data.images.get(world.get(BAKED, ""))
     return None if image is None else Background(image=image, sun=world.get(BAKED_SUN))
 

@@ -1,9 +1,7 @@
 """Worlds and volumes that vary by nodes: Cycles bakes them, and Lightshaft's image is that of Cycles."""
 
 import math
-import types
 
-import numpy as np
 import pytest
 from test_against_cycles import EXACT, differ
 
@@ -242,26 +240,3 @@ def test_baked_volumes_that_are_animated_are_a_warning(stage, capfd):
     stage.render(samples=1)
 
     assert "Density is animated; all frames have what was baked at one" in "".join(capfd.readouterr())
-
-
-def test_voxels_are_found_in_their_layers():
-    pytest.importorskip("bpy")
-    from lightshaft.voxels import Grid
-
-    item = types.SimpleNamespace(bound_box=[(x, y, z) for x in (0, 2) for y in (0, 1) for z in (0, 3)])
-    grid = Grid(item, 6)
-    assert list(grid.counts) == [4, 2, 6]
-    width, height = grid.image_size
-    assert (width, height) == (3 * 4, 2 * 2)
-    # Each pixel holds its own voxel, as the layers lie in the image: three in a row.
-    pixels = np.zeros((height, width, 4), np.float32)
-    for z in range(6):
-        for y in range(2):
-            for x in range(4):
-                pixels[z // 3 * 2 + y, z % 3 * 4 + x, :3] = (x, y, z)
-    image = types.SimpleNamespace(
-        pixels=types.SimpleNamespace(foreach_get=lambda out: out.__setitem__(slice(None), pixels.ravel()))
-    )
-    values = grid.values(image)
-    z, y, x = np.mgrid[0:6, 0:2, 0:4]
-    assert np.array_equal(values, np.stack([x, y, z], axis=-1))

@@ -2,11 +2,12 @@
 
 import io
 import struct
+import types
 import zlib
 
 import numpy as np
 import pytest
-from lightshaft import document, exr, lights, meshes, textures, volumes, world
+from lightshaft import document, exr, lights, meshes, textures, volumes, voxels, world
 
 
 def test_an_image_is_read_as_it_was_written():
@@ -104,3 +105,23 @@ def test_the_nesting_of_blends_is_counted():
     for depth in range(1, 10):
         assert volumes.nesting(phase) == depth
         phase = ("blendphase", {"weight": 0.5, "parts": (phase, volumes.ISOTROPIC)})
+
+
+def test_voxels_are_found_in_their_layers():
+    item = types.SimpleNamespace(bound_box=[(x, y, z) for x in (0, 2) for y in (0, 1) for z in (0, 3)])
+    grid = voxels.Grid(item, 6)
+    assert list(grid.counts) == [4, 2, 6]
+    width, height = grid.image_size
+    assert (width, height) == (3 * 4, 2 * 2)
+    # Each pixel holds its own voxel, as the layers lie in the image: three in a row.
+    pixels = np.zeros((height, width, 4), np.float32)
+    for z in range(6):
+        for y in range(2):
+            for x in range(4):
+                pixels[z // 3 * 2 + y, z % 3 * 4 + x, :3] = (x, y, z)
+    image = types.SimpleNamespace(
+        pixels=types.SimpleNamespace(foreach_get=lambda out: out.__setitem__(slice(None), pixels.ravel()))
+    )
+    values = grid.values(image)
+    z, y, x = np.mgrid[0:6, 0:2, 0:4]
+    assert np.array_equal(values, np.stack([x, y, z], axis=-1))
