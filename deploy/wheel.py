@@ -86,7 +86,7 @@ def add_programs(folder, programs, packages):
     return travels
 
 
-# What libstdc++ and libgcc have at least where glibc is 2.36: those of GCC 12.
+# The newest symbols that a system with glibc 2.36 is sure to have: its libstdc++ and libgcc are of GCC 12 or later.
 MOST = {"GLIBCXX": (3, 4, 30), "CXXABI": (1, 3, 13), "GCC": (12, 0, 0)}
 
 

@@ -128,6 +128,7 @@ class LIGHTSHAFT_OT_bake(bpy.types.Operator):
 
 
 SUN_SIDE, SUN_SAMPLES = 64, 64  # of the picture of the sun alone, 1.5 times as wide as its disk
+WIDEST = 2.6  # angle of that picture [rad]
 
 
 def bake_world(world, size):
@@ -139,14 +140,13 @@ def bake_world(world, size):
     if BAKED_SUN in world:
         del world[BAKED_SUN]
     with tempfile.TemporaryDirectory() as folder, WorldPicture(world, pathlib.Path(folder) / "world.exr") as picture:
-        suns = [n for n in all_nodes(picture.world.node_tree) if n.type == "TEX_SKY" and n.sun_disc and "SCATTERING" in n.sky_type]
+        suns = [n for n in all_nodes(picture.world.node_tree) if n.type == "TEX_SKY" and n.sun_disc and "SCATTERING" in n.sky_type and n.sun_size > 0]
         if len(suns) == 1 and not picture.shared_groups:
             sun, disk = suns[0], suns[0].sun_size
             towards = sun_direction(sun)
-            lit = picture.around(towards, 1.5 * disk)
+            with_disk = picture.irradiance(towards, 1.5 * disk)
             sun.sun_disc = False
-            pixel = (1.5 * disk / SUN_SIDE) ** 2  # solid angle; a disk of a few degrees is flat
-            irradiance = np.maximum(lit - picture.around(towards, 1.5 * disk), 0).sum((0, 1)) * pixel
+            irradiance = np.maximum(with_disk - picture.irradiance(towards, 1.5 * disk), 0)
             if irradiance.max() > 0:
                 world[BAKED_SUN] = [*towards, math.degrees(disk / 2), *map(float, irradiance)]
             elif sun.sun_intensity > 0 and sun.sun_elevation > 0:
@@ -199,15 +199,20 @@ class WorldPicture:
         bpy.data.cameras.remove(data)
         bpy.data.worlds.remove(self.world)
 
-    def around(self, towards, angle):
-        """Returns the radiance of a square of this angle [rad], height x width x 3."""
+    def irradiance(self, towards, angle):
+        """Returns what a plane that faces this direction receives from a square of about this angle [rad], in three
+        channels."""
         data = self.camera.data
-        data.type, data.sensor_fit, data.angle = "PERSP", "HORIZONTAL", angle
+        data.type, data.sensor_fit, data.angle = "PERSP", "HORIZONTAL", min(angle, WIDEST)
         self.camera.rotation_euler = mathutils.Vector(towards).to_track_quat("-Z", "Y").to_euler()
         image = self.render(SUN_SIDE, SUN_SIDE, SUN_SAMPLES)
         pixels = np.array(image.pixels[:]).reshape(SUN_SIDE, SUN_SIDE, -1)[..., :3]
         bpy.data.images.remove(image)
-        return pixels
+        # A pixel's solid angle is its area in the plane at distance 1, times cos^3; Blender limits narrow angles.
+        half = math.tan(data.angle / 2)
+        across = ((np.arange(SUN_SIDE) + 0.5) / SUN_SIDE * 2 - 1) * half
+        cosine = 1 / np.sqrt(1 + across[:, None] ** 2 + across[None, :] ** 2)
+        return (pixels * cosine[..., None] ** 4).sum((0, 1)) * (2 * half / SUN_SIDE) ** 2
 
     def panorama(self, size):
         """Returns an image of all directions, whose middle is the direction +x."""

@@ -119,9 +119,12 @@ class Volumes:
                 continue
             if values[name] is None and name in VARYING.get(kind, ()) and owner.item is not None and not of_grid:
                 if (baked := baked_values(owner.item, owner.material, place, place.input(name))) is None:
-                    self.problems.error(
-                        f"{where}: {name} is procedural. Press Bake Procedural Textures in Render Properties > Lightshaft"
+                    way = (
+                        "Ungroup the node, since what is in a group cannot be baked"
+                        if place.groups
+                        else "Press Bake Procedural Textures in Render Properties > Lightshaft"
                     )
+                    self.problems.error(f"{where}: {name} is procedural. {way}")
                     return None
                 values[name], voxels = channels_of(baked[0], place.input(name)), baked[1]
                 if is_animated(owner.material.node_tree):
@@ -215,6 +218,7 @@ class Volumes:
 
         def grid(parameter, channels):
             values = np.stack([np.broadcast_to(c, shape) for c in channels], axis=-1)
+            values = np.maximum(np.nan_to_num(values, nan=0, posinf=0, neginf=0), 0)  # as Cycles takes them
             if np.ptp(values, axis=-1).max() == 0:
                 values = values[..., :1]
             filename = self.document.write(vol(values), ".vol")

@@ -63,6 +63,34 @@ def test_sky_textures_are_baked_with_a_sun_of_their_own(stage, kind):
     assert sun[3] == pytest.approx(math.degrees(0.01), rel=1e-5)
 
 
+# Narrower than Blender's cameras see, and so wide that it is not flat
+@pytest.mark.parametrize("size", [0.002, 0.6])
+def test_suns_of_all_sizes_have_their_power(stage, size):
+    sky(stage, "SINGLE_SCATTERING", sun_elevation=0.9, sun_rotation=1, sun_size=size)
+    shaded(stage)
+    bake()
+    differ(stage, 2 * EXACT, 64)
+
+
+def test_a_volume_in_a_group_is_refused_with_a_way_out(stage):
+    from stage import bpy, material
+
+    made = material("Fog", "ShaderNodeVolumeScatter", output="Volume")
+    tree = made.node_tree
+    group = bpy.data.node_groups.new("Cloud", "ShaderNodeTree")
+    group.interface.new_socket("Volume", in_out="OUTPUT", socket_type="NodeSocketShader")
+    fog, noise, end = (group.nodes.new(kind) for kind in ("ShaderNodeVolumeScatter", "ShaderNodeTexNoise", "NodeGroupOutput"))
+    group.links.new(noise.outputs[0], fog.inputs["Density"])
+    group.links.new(fog.outputs[0], end.inputs[0])
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
+    tree.links.new(node.outputs[0], output.inputs["Volume"])
+    stage.cube(made)
+    with pytest.raises(RuntimeError, match="Density is procedural. Ungroup the node"):
+        stage.render(samples=1)
+
+
 def test_a_sky_that_is_baked_again_without_its_sun_has_none(stage):
     made = sky(stage, "SINGLE_SCATTERING", sun_elevation=0.6)
     shaded(stage)

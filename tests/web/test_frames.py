@@ -282,13 +282,19 @@ def test_the_files_of_all_frames_are_taken_along_and_the_range_is_sent(farm, das
 HEAVY = {"kind": "heavy_tail", "trusted": False, "advice": "render it with four times the samples."}
 
 
-def test_a_noisy_frame_says_what_to_do_and_goes_on_by_itself(farm, dashboard):
+def noisy_frame(farm, dashboard):
+    """The page of a sequence, whose first frame is chosen and noisy."""
     sequence(farm, {1: "done", 2: "done"}, 2)
     farm.jobs[frame_id(1)] = frame_job(1, "done", spp=64, spp_asked=64, spp_done=64, verdict=HEAVY)
     page = dashboard(f"#/jobs/{SEQUENCE}")
     page.wait("document.querySelector('.frame[data-frame=\"1\"]')")
     page.click('.frame[data-frame="1"]')
     page.wait("document.querySelector('.frame-on')?.innerText.includes('Frame 1: Done')")
+    return page
+
+
+def test_a_noisy_frame_says_what_to_do_and_goes_on_by_itself(farm, dashboard):
+    page = noisy_frame(farm, dashboard)
     assert "Render it with four times the samples." in page.text(".frame-on .noisy")
 
     page.click(".frame-on button")
@@ -299,10 +305,5 @@ def test_a_noisy_frame_says_what_to_do_and_goes_on_by_itself(farm, dashboard):
 
 def test_a_frame_offers_nothing_to_those_who_may_only_look(farm, dashboard):
     farm.role = "read"
-    sequence(farm, {1: "done", 2: "done"}, 2)
-    farm.jobs[frame_id(1)] = frame_job(1, "done", spp=64, spp_asked=64, spp_done=64, verdict=HEAVY)
-    page = dashboard(f"#/jobs/{SEQUENCE}")
-    page.wait("document.querySelector('.frame[data-frame=\"1\"]')")
-    page.click('.frame[data-frame="1"]')
-    page.wait("document.querySelector('.frame-on')?.innerText.includes('Frame 1: Done')")
+    page = noisy_frame(farm, dashboard)
     assert page.evaluate("document.querySelectorAll('.frame-on button').length") == 0
